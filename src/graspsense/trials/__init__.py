@@ -1,0 +1,1 @@
+"""Grasps that were made elsewhere or earlier: recordings and what replays them."""

@@ -1,0 +1,201 @@
+"""Reader of the iCub Grasp Dataset, and its mapping onto two fingers.
+
+Source: Harold Soh, Yanyu Su and Yiannis Demiris, "Online Spatio-Temporal Gaussian Process Experts with
+Application to Tactile Classification", IEEE/RSJ IROS 2012; https://github.com/clear-nus/icub_grasp_dataset,
+copyright 2012 Harold Soh. One file is one grasp: a first line `-10000`, then seven lines a frame: nine
+encoder values of the hand (degrees), five maxima of `255 - reading`, and the twelve taxels of thumb, index,
+middle, ring and little fingertip (8 bits, lower is more pressure). There are no time stamps.
+
+The encoders are joints 7 to 15 of an iCub arm: 7 spreads the fingers, 8 opposes the thumb, 9 and 10 are the
+thumb's proximal and distal flexion, 11 and 12 the index finger's, 13 and 14 the middle finger's, 15 closes
+ring and little finger together (https://icub-tech-iit.github.io/documentation, page "iCub Joints").
+
+`relative_readings` maps them onto a gripper with two fingers; `docs/icub.md` gives reasons for its numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.core.errors import ConfigError, DataDamaged, suggestion
+from graspsense.core.roles import Reading
+from graspsense.core.signals import NO_PADS, Frame
+from graspsense.trials.recording import Recording
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+FIRST_LINE: Final = "-10000"
+DATA_FOLDER: Final = "iCubGraspDataset"
+FIRST_JOINT: Final = 7
+FINGERS: Final = ("thumb", "index", "middle", "ring", "little")
+_LINES: Final = (("encoder", 9), ("maximum", 5), *((f"{finger} taxel", 12) for finger in FINGERS))
+_FULL_TURN_DEG: Final = 360.0
+_FULL_SCALE: Final = 255.0
+
+THUMB_FLEXION: Final = (9, 10)
+FINGER_FLEXION: Final = (11, 12, 13, 14)
+START_GAP_M: Final = 0.08
+"""Nominal gap in the first frame: it only keeps the gap positive, since no frame tells the true one."""
+GAP_M_PER_DEG: Final = 1e-3
+"""Nominal: by this much the gap falls when thumb and fingers flex by one degree in the mean."""
+FORCE_N_PER_COUNT: Final = 0.1
+"""Nominal: force on a fingertip for one count of pressure, summed over its twelve taxels."""
+
+
+@frozen(kw_only=True, eq=False)
+class IcubGrasp:
+    """One grasp as the file has it, over `n` frames.
+
+    `encoders_deg` has shape (n, 9), joints 7 to 15. `maxima` has shape (n, 5) and `taxels` (n, 5, 12), in
+    counts, thumb first. The maxima differ by up to 6 counts from those of the taxels in the same frame: they
+    were read at another moment.
+    """
+
+    encoders_deg: NDArray[np.float64]
+    maxima: NDArray[np.float64]
+    taxels: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.encoders_deg)
+
+
+def read_recording(name: str) -> Recording:
+    """Return the grasp in this file as a recording, mapped by `relative_readings`.
+
+    `name` is a file in the data set's folder, or in the one that contains `iCubGraspDataset`.
+
+    Raises ConfigError where no such file can be read, DataDamaged where it is not what it claims to be.
+    """
+    path = _locate(name)
+    grasp = read_grasp(path)
+    return Recording(
+        name=f"iCub hand, {path.name}",
+        readings=relative_readings(grasp),
+        rate_hz=1.0,
+        units={"t": "frame", "velocity": "m/frame"},
+        notes=(
+            f"{len(grasp)} frames of an iCub hand without time stamps: times are frame numbers, not seconds",
+            "metres and newtons are nominal: gap from the encoders, forces from the taxels, "
+            "all relative to the first frame (docs/icub.md)",
+            "the recording goes its own way: what the controller commands has no effect on it",
+        ),
+    )
+
+
+def read_grasp(path: Path) -> IcubGrasp:
+    """Return the frames of one file as they stand there.
+
+    Raises ConfigError where the file cannot be read, DataDamaged where its content is not a whole grasp.
+    """
+    try:
+        text = path.read_bytes().decode("ascii")
+    except UnicodeDecodeError:
+        raise _damaged(path, 1, "it is not plain text") from None
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be read: {error.strerror}") from error
+    lines = text.splitlines()
+    if not lines:
+        raise DataDamaged(f"{path} is empty: a grasp of the iCub data set starts with the line {FIRST_LINE}")
+    if lines[0].strip() != FIRST_LINE:
+        raise _damaged(
+            path, 1, f"it starts with {lines[0][:40]!r}, a grasp starts with the line {FIRST_LINE}"
+        )
+    if not text.endswith("\n"):
+        raise _damaged(path, len(lines), "the file ends within this line: fetch it again")
+    frames, rest = divmod(len(lines) - 1, len(_LINES))
+    if rest:
+        raise _damaged(
+            path,
+            len(lines),
+            f"the file ends after {rest} of the {len(_LINES)} lines of frame {frames + 1}: fetch it again",
+        )
+    if not frames:
+        raise _damaged(path, 1, "there is no frame after the first line")
+    rows = [_numbers(path, 2 + i, line, *_LINES[i % len(_LINES)]) for i, line in enumerate(lines[1:])]
+    return IcubGrasp(
+        encoders_deg=np.array(rows[0 :: len(_LINES)]),
+        maxima=np.array(rows[1 :: len(_LINES)]),
+        taxels=np.stack([np.array(rows[k :: len(_LINES)]) for k in range(2, len(_LINES))], axis=1),
+    )
+
+
+def relative_readings(grasp: IcubGrasp) -> tuple[Reading, ...]:
+    """Return one reading a frame, thumb against fingers, all relative to the first frame.
+
+    Left force is the thumb, right force the finger with the most pressure in that frame: `FORCE_N_PER_COUNT`
+    times the pressure above the first frame, summed over the taxels with its sign, so that noise adds no
+    force of its own. The gap falls from `START_GAP_M` by `GAP_M_PER_DEG` times the mean of two flexions, the
+    thumb's and that of index and middle finger. Time is the number of the frame. Nothing is taken from a
+    later frame.
+    """
+    pressure = FORCE_N_PER_COUNT * (grasp.taxels[0] - grasp.taxels).sum(axis=2)
+    thumb_deg = grasp.encoders_deg[:, [joint - FIRST_JOINT for joint in THUMB_FLEXION]].mean(axis=1)
+    finger_deg = grasp.encoders_deg[:, [joint - FIRST_JOINT for joint in FINGER_FLEXION]].mean(axis=1)
+    flexion_deg = (thumb_deg + finger_deg) / 2.0
+    gap_m = START_GAP_M - GAP_M_PER_DEG * (flexion_deg - flexion_deg[0])
+    velocity = np.diff(gap_m, prepend=gap_m[0])
+    return tuple(
+        Reading(
+            Frame(
+                t_s=float(k),
+                dt_s=1.0,
+                gap_m=float(gap_m[k]),
+                velocity_m_s=float(velocity[k]),
+                effort_n=math.nan,
+                force_left_n=float(pressure[k, 0]),
+                force_right_n=float(pressure[k, 1:].max()),
+                edge_left_n=math.nan,
+                edge_right_n=math.nan,
+                status=0,
+            ),
+            NO_PADS,
+        )
+        for k in range(len(grasp))
+    )
+
+
+def _locate(name: str) -> Path:
+    given = Path(name).expanduser()
+    path = next((p for p in (given, given.parent / DATA_FOLDER / given.name) if p.is_file()), None)
+    if path is not None:
+        return path
+    if given.is_dir():
+        raise ConfigError(
+            f"{given} is a folder: name one grasp in it, such as {given}/full_vitamin_water_1.txt"
+        )
+    folder = next((f for f in (given.parent / DATA_FOLDER, given.parent) if f.is_dir()), None)
+    if folder is None:
+        raise ConfigError(f"no file {given}: there is no folder {given.parent}")
+    grasps = [p.name for p in folder.glob("*.txt")]
+    near = suggestion(given.name, grasps)
+    raise ConfigError(
+        f"no file {given}: {folder} holds {len(grasps)} files *.txt, but none of this name.{near}"
+    )
+
+
+def _numbers(path: Path, number: int, line: str, what: str, count: int) -> list[float]:
+    words = line.split()
+    if len(words) != count:
+        raise _damaged(path, number, f"{len(words)} {what} values where {count} are expected")
+    lowest, highest = (-_FULL_TURN_DEG, _FULL_TURN_DEG) if what == "encoder" else (0.0, _FULL_SCALE)
+    values = []
+    for word in words:
+        try:
+            value = float(word)
+        except ValueError:
+            raise _damaged(path, number, f"{what} value {word[:40]!r} is not a number") from None
+        if not lowest <= value <= highest:
+            raise _damaged(path, number, f"{what} value {word[:40]} lies outside {lowest:g} to {highest:g}")
+        values.append(value)
+    return values
+
+
+def _damaged(path: Path, number: int, what: str) -> DataDamaged:
+    return DataDamaged(f"{path}, line {number}: {what}")

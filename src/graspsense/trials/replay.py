@@ -1,0 +1,96 @@
+"""The gripper that is a recording: frame after frame as somebody recorded them, whatever is commanded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from math import inf
+from typing import Final, final
+
+from attrs import Attribute, field, frozen
+from attrs.validators import instance_of
+
+from graspsense.core.errors import DeviceLost, RecordingEnded, suggestion
+from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
+from graspsense.core.signals import EFFORT, Command, Pads
+from graspsense.trials.icub import read_recording
+from graspsense.trials.recording import Recording
+
+KINDS: Final[Mapping[str, Callable[[str], Recording]]] = {"icub": read_recording}
+"""What can stand before the colon of a recording's name, and the reader of that kind."""
+
+
+def _known_kind(_config: object, _attribute: Attribute[str], value: str) -> None:
+    kind, colon, name = value.partition(":")
+    known = ", ".join(f"{k}:" for k in KINDS)
+    if not colon:
+        raise ValueError(
+            f"{value!r} does not say what kind of recording it is: write {known} before the file"
+        )
+    if kind not in KINDS:
+        raise ValueError(f"unknown kind of recording {kind!r}. Known: {known}.{suggestion(kind, KINDS)}")
+    if not name:
+        raise ValueError(f"{value!r} names no file: write it after the colon")
+
+
+@frozen
+class ReplayConfig:
+    """Which recording: `KIND:FILE` with a kind of `KINDS`, as in `icub:FOLDER/full_vitamin_water_1.txt`."""
+
+    recording: str = field(validator=[instance_of(str), _known_kind])
+
+
+@final
+class ReplayBackend(SensorBackend[ReplayConfig]):
+    """Gives the frames of a recording, one a read; commands have no effect on what has happened."""
+
+    _recording: Recording | None = None
+    _next = 0
+
+    def open(self, seed: int) -> DeviceInfo:
+        """Read the recording and describe it; the seed has no effect.
+
+        Raises ConfigError where there is no such file, DataDamaged where it is not what it claims to be.
+        """
+        kind, _, name = self.config.recording.partition(":")
+        recording = KINDS[kind](name)
+        self._recording, self._next = recording, 0
+        return DeviceInfo(
+            name=recording.name,
+            clock="virtual",
+            rate_hz=recording.rate_hz,
+            effort_limit_n=inf,
+            speed_limit_m_s=inf,
+            opening=None,
+            relaxed=Command(EFFORT, 0.0, inf, inf),
+            units=recording.units,
+            notes=recording.notes,
+        )
+
+    def read(self, timeout_s: float) -> Reading:
+        """Return the next frame at once. Raises RecordingEnded after the last, DeviceLost when not open."""
+        readings = self._opened().readings
+        if self._next == len(readings):
+            raise RecordingEnded
+        self._next += 1
+        return readings[self._next - 1]
+
+    def apply(self, command: Command) -> None:
+        """Do nothing: a recording cannot be commanded. Raises DeviceLost when not open."""
+        self._opened()
+
+    def tare(self, images: Sequence[Pads]) -> None:
+        """Do nothing: the reader of the recording has set its zero. Raises DeviceLost when not open."""
+        self._opened()
+
+    def close(self) -> None:
+        """Let go of the recording."""
+        self._recording = None
+
+    def report(self) -> Mapping[str, float | int | str | bool]:
+        """Return which recording this is and how many of its frames were read."""
+        return {"recording": self.config.recording, "frames_read": self._next}
+
+    def _opened(self) -> Recording:
+        if self._recording is None:
+            raise DeviceLost("the recording is not open")
+        return self._recording

@@ -1,0 +1,286 @@
+"""Recordings: the iCub reader, its mapping onto two fingers, and the replay backend."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.core.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
+from graspsense.core.roles import DeviceInfo
+from graspsense.core.signals import EFFORT, NO_PADS, VELOCITY, Command, Frame
+from graspsense.trials.icub import IcubGrasp, read_grasp, read_recording, relative_readings
+from graspsense.trials.replay import ReplayBackend, ReplayConfig
+
+REST_DEG = (20.0, 80.0, 10.0, 40.0, 30.0, 50.0, 32.0, 45.0, 5.0)
+"""Joints 7 to 15."""
+THUMB, INDEX, MIDDLE, RING, LITTLE = range(5)
+
+real_data = pytest.mark.skipif(
+    "GRASPSENSE_ICUB" not in os.environ,
+    reason="needs the iCub Grasp Dataset: name its folder in GRASPSENSE_ICUB",
+)
+
+
+def frame_lines(encoders: Sequence[float] = REST_DEG, pressed: dict[int, int] | None = None) -> list[str]:
+    """Seven lines: `pressed` takes that many counts off one taxel of a fingertip that rests at 240."""
+    taxels = np.full((5, 12), 240)
+    for finger, counts in (pressed or {}).items():
+        taxels[finger, 3] -= counts
+    return [
+        " ".join(f"{value}" for value in encoders) + " ",
+        " ".join(f"{255 - row.min():.1f}" for row in taxels),
+        *(" ".join(f"{value:.1f}" for value in row) for row in taxels),
+    ]
+
+
+def write(path: Path, *frames: list[str]) -> Path:
+    path.write_bytes("".join(f"{line}\r\n" for line in ["-10000", *chain(*frames)]).encode())
+    return path
+
+
+def moved(**joints_deg: float) -> tuple[float, ...]:
+    """The resting hand with some joints turned by these degrees: `moved(j12=8.0)`."""
+    encoders = list(REST_DEG)
+    for joint, by in joints_deg.items():
+        encoders[int(joint[1:]) - 7] += by
+    return tuple(encoders)
+
+
+def frames_of(path: Path) -> list[Frame]:
+    return [reading.frame for reading in relative_readings(read_grasp(path))]
+
+
+def test_reader_keeps_what_the_file_says(tmp_path: Path) -> None:
+    grasp = read_grasp(write(tmp_path / "g.txt", frame_lines(), frame_lines(moved(j12=8.0), {LITTLE: 7})))
+    assert len(grasp) == 2
+    assert grasp.encoders_deg[1].tolist() == [20.0, 80.0, 10.0, 40.0, 30.0, 58.0, 32.0, 45.0, 5.0]
+    assert grasp.maxima[1].tolist() == [15, 15, 15, 15, 22]
+    assert grasp.taxels.shape == (2, 5, 12)
+    assert grasp.taxels[1, LITTLE, 3] == 233
+    assert grasp.taxels.sum() == 2 * 60 * 240 - 7
+
+
+def test_times_are_frame_numbers(tmp_path: Path) -> None:
+    frames = frames_of(write(tmp_path / "g.txt", *[frame_lines()] * 3))
+    assert [frame.t_s for frame in frames] == [0.0, 1.0, 2.0]
+    assert {frame.dt_s for frame in frames} == {1.0}
+
+
+def test_thumb_is_left_and_the_strongest_finger_is_right(tmp_path: Path) -> None:
+    path = write(
+        tmp_path / "g.txt",
+        frame_lines(pressed={THUMB: 5, MIDDLE: 30}),  # the first frame is the zero
+        frame_lines(pressed={THUMB: 25, MIDDLE: 30, INDEX: 9}),
+        frame_lines(pressed={THUMB: 25, MIDDLE: 70, RING: 12}),
+    )
+    frames = frames_of(path)
+    assert [frame.force_left_n for frame in frames] == pytest.approx([0.0, 2.0, 2.0])
+    assert [frame.force_right_n for frame in frames] == pytest.approx([0.0, 0.9, 4.0])
+
+
+@pytest.mark.parametrize(
+    ("joints", "closed_mm"),
+    [
+        ({"j9": 8.0}, 2.0),  # half the mean of two joints of the thumb
+        ({"j10": 8.0}, 2.0),
+        ({"j11": 8.0}, 1.0),  # half the mean of four joints of index and middle finger
+        ({"j12": 8.0}, 1.0),
+        ({"j13": 8.0}, 1.0),
+        ({"j14": 8.0}, 1.0),
+        ({"j9": 1.0, "j10": 1.0, "j11": 1.0, "j12": 1.0, "j13": 1.0, "j14": 1.0}, 1.0),
+        ({"j7": 8.0, "j8": 8.0, "j15": 8.0}, 0.0),
+        ({"j10": -4.0}, -1.0),
+    ],
+)
+def test_gap_falls_as_thumb_and_fingers_flex(
+    tmp_path: Path, joints: dict[str, float], closed_mm: float
+) -> None:
+    first, last = frames_of(write(tmp_path / "g.txt", frame_lines(), frame_lines(moved(**joints))))
+    assert first.gap_m == 0.08
+    assert (first.gap_m - last.gap_m) * 1e3 == pytest.approx(closed_mm)
+    assert last.velocity_m_s == pytest.approx(last.gap_m - first.gap_m)
+    assert first.velocity_m_s == 0.0
+
+
+def test_what_was_not_recorded_is_missing(tmp_path: Path) -> None:
+    (reading,) = relative_readings(read_grasp(write(tmp_path / "g.txt", frame_lines())))
+    frame = reading.frame
+    assert all(math.isnan(v) for v in (frame.effort_n, frame.edge_left_n, frame.edge_right_n))
+    assert reading.pads == NO_PADS
+
+
+@given(data=st.data())
+def test_mapping_depends_on_no_later_frame_and_on_no_offset(data: st.DataObject) -> None:
+    n = data.draw(st.integers(2, 6))
+    rng = np.random.default_rng(data.draw(st.integers(0, 1000)))
+    encoders, taxels = rng.uniform(10, 60, (n, 9)), rng.integers(100, 200, (n, 5, 12)).astype(float)
+
+    def frames(up_to: int, angle: float, counts: float) -> list[Frame]:
+        grasp = IcubGrasp(
+            encoders_deg=encoders[:up_to] + angle, maxima=np.zeros((up_to, 5)), taxels=taxels[:up_to] + counts
+        )
+        return [reading.frame for reading in relative_readings(grasp)]
+
+    whole, cut = frames(n, 0.0, 0.0), frames(n - 1, 0.0, 0.0)
+    # A list of frames with NaN in it equals another only by its repr.
+    assert repr(whole[:-1]) == repr(cut)
+    shifted = frames(n, 7.5, -31.0)
+    for a, b in zip(whole, shifted, strict=True):
+        assert a.gap_m == pytest.approx(b.gap_m, abs=1e-12)
+        assert a.force_left_n == pytest.approx(b.force_left_n, abs=1e-9)
+        assert a.force_right_n == pytest.approx(b.force_right_n, abs=1e-9)
+
+
+def damaged_files() -> list[tuple[str, bytes, str]]:
+    good = "".join(f"{line}\r\n" for line in ["-10000", *frame_lines(), *frame_lines()]).encode()
+    lines = good.split(b"\r\n")
+    short = b"\r\n".join([*lines[:4], b" ".join(lines[4].split()[:11]), *lines[5:]])
+    return [
+        ("empty", b"", "is empty"),
+        ("other", b"t,gap\n0,1\n", "line 1: it starts with 't,gap'"),
+        ("binary", bytes(range(256)), "line 1: it is not plain text"),
+        ("first_line_only", b"-10000\r\n", "line 1: there is no frame"),
+        (
+            "mid_frame",
+            b"\r\n".join(lines[:11]) + b"\r\n",
+            "line 11: the file ends after 3 of the 7 lines of frame 2",
+        ),
+        ("mid_line", good[:-4], "line 15: the file ends within this line"),
+        ("taxel_lost", short, "line 5: 11 index taxel values where 12 are expected"),
+        ("word", good.replace(b"45.0", b"fast", 1), "line 2: encoder value 'fast' is not a number"),
+        ("nan", good.replace(b"45.0", b"nan", 1), "line 2: encoder value nan lies outside -360 to 360"),
+        (
+            "nine_bits",
+            good.replace(b"240.0", b"256.0", 1),
+            "line 4: thumb taxel value 256.0 lies outside 0 to 255",
+        ),
+    ]
+
+
+@pytest.mark.parametrize(("name", "content", "says"), damaged_files(), ids=lambda value: str(value)[:20])
+def test_damaged_file_is_told_with_its_line(tmp_path: Path, name: str, content: bytes, says: str) -> None:
+    path = tmp_path / f"{name}.txt"
+    path.write_bytes(content)
+    with pytest.raises(DataDamaged) as caught:
+        read_grasp(path)
+    assert says in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert caught.value.exit_code == 5
+
+
+def test_a_file_cut_anywhere_is_damaged_or_ends_between_two_frames(tmp_path: Path) -> None:
+    frames = [frame_lines(), frame_lines(pressed={THUMB: 9})]
+    path = write(tmp_path / "g.txt", *frames)
+    whole = path.read_bytes()
+    read = {}
+    for cut in range(len(whole)):
+        path.write_bytes(whole[:cut])
+        with suppress(DataDamaged):
+            read[cut] = read_grasp(path)
+    first_frame_alone = len(write(path, frames[0]).read_bytes())
+    assert list(read) == [first_frame_alone]
+    assert len(read[first_frame_alone]) == 1
+
+
+def test_folder_may_be_the_one_that_contains_the_data_set(tmp_path: Path) -> None:
+    inside = tmp_path / "iCubGraspDataset"
+    inside.mkdir()
+    write(inside / "full_bottle_1.txt", frame_lines())
+    assert read_recording(f"{inside}/full_bottle_1.txt").name == "iCub hand, full_bottle_1.txt"
+    assert read_recording(f"{tmp_path}/full_bottle_1.txt").name == "iCub hand, full_bottle_1.txt"
+    with pytest.raises(ConfigError, match=r"holds 1 files.*Did you mean 'full_bottle_1.txt'\?"):
+        read_recording(f"{tmp_path}/ful_bottle_1.txt")
+
+
+def test_folder_in_place_of_a_file(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="is a folder: name one grasp in it"):
+        read_recording(str(tmp_path))
+
+
+def test_missing_folder(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"there is no folder .*nowhere"):
+        read_recording(f"{tmp_path}/nowhere/full_bottle_1.txt")
+
+
+@pytest.mark.parametrize(
+    ("recording", "says"),
+    [
+        ("full_bottle_1.txt", "does not say what kind of recording it is: write icub: before"),
+        ("icb:full_bottle_1.txt", "unknown kind of recording 'icb'. Known: icub:. Did you mean 'icub'?"),
+        ("icub:", "names no file"),
+    ],
+)
+def test_recording_must_name_kind_and_file(recording: str, says: str) -> None:
+    with pytest.raises(ValueError) as caught:
+        ReplayConfig(recording)
+    assert says in str(caught.value)
+
+
+def opened(path: Path) -> tuple[ReplayBackend, DeviceInfo]:
+    backend = ReplayBackend(ReplayConfig(f"icub:{path}"))
+    return backend, backend.open(seed=0)
+
+
+def test_backend_gives_each_frame_once_and_then_ends(tmp_path: Path) -> None:
+    path = write(tmp_path / "g.txt", frame_lines(), frame_lines(moved(j9=4.0)), frame_lines())
+    backend, info = opened(path)
+    assert info.opening is None
+    assert info.clock == "virtual"
+    assert info.tare_images == 0
+    readings = []
+    for command in (Command(VELOCITY, -0.01, 20.0, 0.1), Command(EFFORT, 99.0, 99.0, 0.1), info.relaxed):
+        readings.append(backend.read(timeout_s=0.0))
+        backend.apply(command)
+    assert repr(readings) == repr(list(relative_readings(read_grasp(path))))
+    for _ in range(2):
+        with pytest.raises(RecordingEnded):
+            backend.read(timeout_s=0.0)
+    assert backend.report()["frames_read"] == 3
+
+
+def test_backend_says_that_times_are_frames_and_units_nominal(tmp_path: Path) -> None:
+    _, info = opened(write(tmp_path / "g.txt", frame_lines(), frame_lines()))
+    assert info.units["t"] == "frame"
+    said = " ".join(info.notes)
+    assert "times are frame numbers, not seconds" in said
+    assert "nominal" in said
+
+
+def test_backend_closes_twice_and_plays_again(tmp_path: Path) -> None:
+    backend, _ = opened(write(tmp_path / "g.txt", frame_lines()))
+    first = backend.read(timeout_s=0.0)
+    backend.close()
+    backend.close()
+    with pytest.raises(DeviceLost, match="not open"):
+        backend.read(timeout_s=0.0)
+    backend.open(seed=1)
+    assert repr(backend.read(timeout_s=0.0)) == repr(first)
+
+
+@real_data
+def test_every_file_of_the_data_set_reads() -> None:
+    folder = Path(os.environ["GRASPSENSE_ICUB"])
+    files = sorted(folder.glob("**/*_*.txt"))
+    assert len(files) == 230
+    lengths = [len(read_grasp(path)) for path in files]
+    assert (min(lengths), max(lengths)) == (4, 24)
+
+
+@real_data
+def test_nothing_in_the_hand_is_no_contact_and_a_full_bottle_is() -> None:
+    def touched(name: str) -> bool:
+        path = f"{os.environ['GRASPSENSE_ICUB']}/{name}"
+        frames = [reading.frame for reading in read_recording(path).readings]
+        return any(min(frame.force_left_n, frame.force_right_n) >= 0.625 for frame in frames)
+
+    assert [touched(f"none_{k}.txt") for k in range(1, 23)] == [False] * 22
+    assert [touched(f"full_vitamin_water_{k}.txt") for k in range(1, 21)] == [True] * 20
