@@ -1,0 +1,43 @@
+"""What this distribution brings to graspsense; imports no driver."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from graspsense.plugin_api import Channel, FoundDevice, SensorBackendEntry, hookimpl
+
+GRASPSENSE_API = (1, 0)
+
+_RATE_HZ = 1000.0
+_PADS_RATE_HZ = 24.39
+
+
+@hookimpl
+def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
+    """Return the PR2 gripper."""
+    yield SensorBackendEntry(
+        name="pr2",
+        target="graspsense_pr2_gripper.backend:Pr2Backend",
+        config="graspsense_pr2_gripper.config:Pr2Config",
+        summary="PR2 gripper with fingertip pressure arrays, over USB HID",
+        channels=(
+            Channel("gap", "m", _RATE_HZ),
+            Channel("velocity", "m/s", _RATE_HZ),
+            Channel("effort", "N", _RATE_HZ),
+            Channel("force_left", "N", _PADS_RATE_HZ),
+            Channel("force_right", "N", _PADS_RATE_HZ),
+            Channel("edge_left", "N", _PADS_RATE_HZ),
+            Channel("edge_right", "N", _PADS_RATE_HZ),
+            Channel("pads", "counts", _PADS_RATE_HZ),
+        ),
+        accepts=("effort",),
+        needs='pip install "graspsense[pr2]"; on Linux also a udev rule (README of graspsense-pr2-gripper)',
+    )
+
+
+@hookimpl
+def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:
+    """Look for the gripper under its default numbers; a listing of HID devices needs no time limit."""
+    from graspsense_pr2_gripper.discovery import found_devices
+
+    return found_devices()

@@ -1,0 +1,83 @@
+"""Looking for the gripper: what is said when it is not there, and which devices count as it."""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType
+from typing import Any
+
+import pytest
+from graspsense.plugin_api import DeviceLost, NoDevice, PluginUnavailable
+from graspsense_pr2_gripper.backend import Pr2Backend
+from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.discovery import LIBRARY, found_devices, search
+
+# No machine that runs these tests has a device of this number: pid.codes gives it to nobody.
+NOBODYS = Pr2Config(vendor_id=0x1209, product_id=0xFFFF)
+
+
+def listing(*devices: dict[str, Any]) -> ModuleType:
+    """The library at its outermost edge: a listing in the form that hidapi 0.15 gives."""
+    module = ModuleType(LIBRARY)
+    module.enumerate = lambda: list(devices)  # type: ignore[attr-defined]
+    return module
+
+
+def device(vendor_id: int, product_id: int, serial: str, path: str) -> dict[str, Any]:
+    return {"vendor_id": vendor_id, "product_id": product_id, "serial_number": serial, "path": path.encode()}
+
+
+@pytest.fixture
+def two_grippers_and_a_mouse(monkeypatch: pytest.MonkeyPatch) -> None:
+    listed = listing(
+        device(0x1209, 0x0001, "L7", "/dev/hidraw0"),
+        device(0x046D, 0xC077, "", "/dev/hidraw1"),
+        device(0x1209, 0x0001, "R2", "/dev/hidraw2"),
+    )
+    monkeypatch.setitem(sys.modules, LIBRARY, listed)
+
+
+def test_absent_device_says_what_was_looked_for_and_what_to_try() -> None:
+    with pytest.raises(NoDevice) as caught:
+        Pr2Backend(NOBODYS).open(seed=0)
+    said = str(caught.value)
+    assert caught.value.exit_code == 3
+    assert "USB HID device 1209:ffff" in said
+    assert f"module {LIBRARY}" in said
+    assert "graspsense devices" in said
+    assert "--gripper sim" in said
+
+
+@pytest.mark.usefixtures("two_grippers_and_a_mouse")
+def test_device_is_known_by_its_numbers_and_serial() -> None:
+    assert [one.path for one in search(Pr2Config()).matching] == ["/dev/hidraw0", "/dev/hidraw2"]
+    assert [one.path for one in search(Pr2Config(serial="R2")).matching] == ["/dev/hidraw2"]
+    assert search(Pr2Config(serial="X")).matching == ()
+    assert search(Pr2Config()).total == 3
+
+
+@pytest.mark.usefixtures("two_grippers_and_a_mouse")
+def test_found_device_is_not_passed_off_as_usable() -> None:
+    with pytest.raises(NoDevice, match=r"was found .*/dev/hidraw0.* cannot drive it yet"):
+        Pr2Backend(Pr2Config()).open(seed=0)
+    assert [(one.serial, one.ready) for one in found_devices()] == [("L7", False), ("R2", False)]
+
+
+def test_missing_library_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, LIBRARY, None)
+    with pytest.raises(PluginUnavailable, match="pip install hidapi"):
+        search(Pr2Config())
+
+
+def test_nothing_moves_before_it_is_open() -> None:
+    backend = Pr2Backend(NOBODYS)
+    backend.close()
+    backend.close()
+    with pytest.raises(DeviceLost, match="not open"):
+        backend.read(timeout_s=0.1)
+
+
+@pytest.mark.parametrize("number", [-1, 0x10000])
+def test_ids_are_sixteen_bits(number: int) -> None:
+    with pytest.raises(ValueError):
+        Pr2Config(vendor_id=number)

@@ -1,0 +1,116 @@
+"""What an installation rests on: every part is installed, every version is pinned, our own versions agree."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from importlib.metadata import PackageNotFoundError, requires
+from pathlib import Path
+from typing import Any
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = sorted(path.parent for path in (ROOT / "plugins").glob("*/pyproject.toml"))
+
+
+def toml(path: Path) -> dict[str, Any]:
+    return tomllib.loads(path.read_text())
+
+
+PROJECT = toml(ROOT / "pyproject.toml")
+PLUGINS = {toml(folder / "pyproject.toml")["project"]["name"]: folder.name for folder in FOLDERS}
+
+
+def requirement_lines() -> list[str]:
+    lines = (ROOT / "requirements-dev.txt").read_text().splitlines()
+    return [line for line in lines if line and not line.startswith("#")]
+
+
+def pinned() -> dict[str, str]:
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    return dict(line.split("==") for line in lines if not line.startswith("#"))
+
+
+def test_every_folder_under_plugins_is_a_distribution() -> None:
+    assert sorted(path.name for path in (ROOT / "plugins").iterdir() if (path / "src").is_dir()) == [
+        folder.name for folder in FOLDERS
+    ]
+    assert set(PLUGINS.values()) >= {"c45", "pr2_gripper", "sim_gripper"}
+
+
+def test_requirements_install_every_distribution_in_editable_form() -> None:
+    editable = [line.removeprefix("-e ") for line in requirement_lines() if line.startswith("-e ")]
+    assert editable == [".", *(f"./plugins/{folder.name}" for folder in FOLDERS)]
+
+
+def test_uv_knows_every_plugin() -> None:
+    names = sorted(PLUGINS)
+    assert sorted(PROJECT["dependency-groups"]["plugins"]) == names
+    assert sorted(PROJECT["tool"]["uv"]["sources"]) == ["graspsense", *names]
+
+
+def test_pip_and_uv_install_the_same_tools() -> None:
+    tools = [line for line in requirement_lines() if not line.startswith("-")]
+    assert tools == PROJECT["dependency-groups"]["dev"]
+
+
+def test_requirements_apply_the_constraints() -> None:
+    assert "-c constraints.txt" in requirement_lines()
+
+
+def test_extra_of_each_plugin_and_of_all() -> None:
+    extras = PROJECT["project"]["optional-dependencies"]
+    of_plugins = {name: extra for extra, (name, *_) in extras.items() if name in PLUGINS}
+    assert set(of_plugins) == set(PLUGINS)
+    assert extras["all"] == [f"graspsense[{','.join(sorted(of_plugins.values()))}]"]
+
+
+def test_constraints_are_plain_versions() -> None:
+    for line in (ROOT / "constraints.txt").read_text().splitlines():
+        assert re.fullmatch(r"#.*|[a-z0-9-]+==[0-9][0-9a-z.]*", line), line
+
+
+def test_constraints_pin_everything_that_is_installed_with_us() -> None:
+    """From our own requirements on, through the metadata of what is installed, whatever applies here."""
+    todo = [Requirement(line) for line in requirement_lines() if not line.startswith("-")]
+    for folder in [ROOT, *FOLDERS]:
+        project = toml(folder / "pyproject.toml")["project"]
+        extras = project.get("optional-dependencies", {}).values()
+        todo += map(Requirement, [*project["dependencies"], *(line for extra in extras for line in extra)])
+    ours, versions, seen = {"graspsense", *PLUGINS}, pinned(), set()
+    while todo:
+        one = todo.pop()
+        name = canonicalize_name(one.name)
+        if (name, *sorted(one.extras)) in seen or name in ours:
+            continue
+        seen.add((name, *sorted(one.extras)))
+        assert name in versions, f"{one} is not pinned in constraints.txt"
+        assert versions[name] in one.specifier, (
+            f"constraints.txt has {name}=={versions[name]}, asked is {one}"
+        )
+        try:
+            further = map(Requirement, requires(name) or [])
+        except PackageNotFoundError:
+            continue  # an extra that is not installed here
+        contexts = [{"extra": extra} for extra in one.extras or {""}]
+        todo += [r for r in further if r.marker is None or any(map(r.marker.evaluate, contexts))]
+    assert {name for name, *_ in seen} == set(versions), "constraints.txt pins what nothing asks for"
+
+
+def test_versions_of_the_project_agree() -> None:
+    version = PROJECT["project"]["version"]
+    for folder in FOLDERS:
+        project = toml(folder / "pyproject.toml")["project"]
+        assert project["version"] == version
+        for line in project["dependencies"]:
+            if (ours := Requirement(line)).name == "graspsense":
+                assert version in ours.specifier
+
+
+def test_every_distribution_carries_licence_and_type_marker() -> None:
+    licence = (ROOT / "LICENSE").read_text()
+    for folder in [ROOT, *FOLDERS]:
+        assert (folder / "LICENSE").read_text() == licence
+        assert len(list((folder / "src").glob("*/py.typed"))) == 1
