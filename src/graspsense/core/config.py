@@ -1,0 +1,317 @@
+"""Settings: which components make up a pipeline, and the value and the origin of every one of their keys.
+
+Layers, each over the one before: defaults of the config classes, the pipeline file with what it extends, an
+experiment, options (`-o a.b=VALUE`), named flags. First each table's `type` is settled, then only the chosen
+component's config class is imported and the rest of the table made into it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from textwrap import indent
+from typing import TYPE_CHECKING, Any, Final, cast
+
+from attrs import frozen
+
+from graspsense import __version__
+from graspsense.core.entries import TABLE_OF_ROLE, Role
+from graspsense.core.errors import ConfigError, PluginUnavailable, UnknownName, suggestion
+from graspsense.core.layers import (
+    Flag,
+    Layer,
+    Merged,
+    dotted,
+    option_layers,
+    pipeline_layers,
+    read_layer,
+)
+from graspsense.core.plugins import Component, Plugins, installed
+from graspsense.core.strict import Misfit, Problem, plain, shown, structured
+from graspsense.core.toml_lines import KeyPath
+
+if TYPE_CHECKING:
+    from graspsense.core.runner import RunConfig
+
+__all__ = [
+    "Chosen",
+    "Flag",
+    "Layer",
+    "Settings",
+    "build",
+    "create",
+    "read_layer",
+    "resolve",
+    "to_toml",
+]
+
+NONE: Final = "none"
+"""The `type` of a classifier table that asks for no classifier."""
+
+_ROLE_OF_TABLE: Final[dict[str, Role]] = {table: role for role, table in TABLE_OF_ROLE.items()}
+_TABLES: Final = (*_ROLE_OF_TABLE, "run")
+
+
+@frozen(eq=False)
+class Chosen:
+    """A component that was chosen, with its config."""
+
+    component: Component
+    config: Any
+
+    def create(self) -> Any:
+        """Return the component built from its config. Raises PluginUnavailable."""
+        return self.component.create(self.config)
+
+
+@frozen(eq=False, kw_only=True)
+class Settings:
+    """A resolved pipeline.
+
+    `values` holds every key of every table as plain values, defaults included, `type` with its qualified
+    name; None stands for a key that is not set. `origins` says for each key where its value comes from:
+    `default`, `lab.toml:7`, `-o` or a flag's name. `pipeline` is the pipeline as it was asked for.
+    """
+
+    pipeline: str
+    gripper: Chosen
+    controller: Chosen
+    features: Chosen
+    classifier: Chosen | None
+    run: RunConfig
+    values: dict[str, dict[str, Any]]
+    origins: dict[str, str]
+
+    @property
+    def chosen(self) -> tuple[Chosen, ...]:
+        """Gripper, controller, features, and the classifier where there is one."""
+        return tuple(
+            one for one in (self.gripper, self.controller, self.features, self.classifier) if one is not None
+        )
+
+    @property
+    def components(self) -> dict[str, str]:
+        """Table to `distribution/name version` of each component."""
+        return {
+            one.component.table: f"{one.component.qualified} {one.component.version}" for one in self.chosen
+        }
+
+
+def resolve(
+    pipeline: str = "default",
+    *,
+    plugins: Plugins | None = None,
+    experiment: Layer | None = None,
+    options: Sequence[str] = (),
+    flags: Sequence[Flag] = (),
+) -> Settings:
+    """Return the settings that these layers give.
+
+    `pipeline` is the name of a pipeline or the path of a `.toml` file; `options` are as typed after `-o`;
+    `plugins` are the process's own where none are given. Raises ConfigError with every error at once, each
+    with its file and line.
+    """
+    plugins = installed() if plugins is None else plugins
+    layers = pipeline_layers(pipeline, plugins)
+    if experiment is not None:
+        layers.append(experiment)
+    typed, complaints = option_layers(options)
+    layers += typed
+    layers += [flag.layer() for flag in flags]
+    layers = [_tables_only(layer, complaints) for layer in layers]
+
+    from graspsense.core.runner import RunConfig
+
+    chosen: dict[str, Chosen] = {}
+    values: dict[str, dict[str, Any]] = {}
+    origins: dict[str, str] = {}
+    run: RunConfig | None = None
+    for table in _TABLES:
+        cls: type
+        if table == "run":
+            component, cls, called = None, RunConfig, "[run]"
+            merged = _merged(layers, table, None)
+        else:
+            found = _component(layers, table, plugins, complaints)
+            if found is None:
+                continue
+            component, cls = found
+            called = component.qualified
+            merged = _merged(layers, table, component)
+        config: Any
+        try:
+            config = structured({k: v for k, v in merged.values.items() if k != "type"}, cls, called)
+        except Misfit as misfit:
+            for problem in misfit.under(table):
+                owner = merged.owner_of(problem.path)
+                complaints.append(
+                    owner.complain(problem) if owner else f"{dotted(problem.path)}: {problem.text}"
+                )
+            continue
+        if component is None:
+            run = config
+            values[table] = plain(config)
+        else:
+            chosen[table] = Chosen(component, config)
+            values[table] = {"type": component.qualified, **plain(config)}
+        for path in _leaves(values[table], (table,)):
+            owner = merged.owner.get(path)
+            origins[dotted(path)] = owner.where(path) if owner else "default"
+    if complaints:
+        raise ConfigError(_listed(complaints))
+    return Settings(
+        pipeline=pipeline,
+        gripper=chosen["gripper"],
+        controller=chosen["controller"],
+        features=chosen["features"],
+        classifier=chosen.get("classifier"),
+        run=cast("RunConfig", run),
+        values=values,
+        origins=origins,
+    )
+
+
+def build(component: Component, values: Mapping[str, Any]) -> Any:
+    """Return the config instance of a component from plain values.
+
+    Raises ConfigError with every error at once, PluginUnavailable.
+    """
+    try:
+        return structured(values, component.config_class(), component.qualified)
+    except Misfit as misfit:
+        lines = [f"{dotted((component.table, *one.path))}: {one.text}" for one in misfit.problems]
+        raise ConfigError(_listed(lines)) from None
+
+
+def create(role: Role, name: str, /, **config: Any) -> Any:
+    """Return a component by role and name, its config made from these values as strictly as from a file.
+
+    Raises UnknownName, PluginUnavailable, ConfigError.
+    """
+    component = installed().find(role, name)
+    return component.create(build(component, config))
+
+
+def to_toml(settings: Settings) -> str:
+    """Return a complete pipeline file: it extends nothing, and resolves to the same values by itself."""
+    lines = [f"# Resolved by graspsense {__version__} from the pipeline {json.dumps(settings.pipeline)}."]
+    versions = {one.component.table: one.component.version for one in settings.chosen}
+    for table, values in settings.values.items():
+        lines += ["", f"[{table}]"]
+        for key, value in values.items():
+            if value is None:
+                lines.append(f"# {toml_key(key)} is not set")
+            else:
+                note = f"  # version {versions[table]}" if key == "type" else ""
+                lines.append(f"{toml_key(key)} = {toml_value(value)}{note}")
+    return "\n".join(lines) + "\n"
+
+
+def toml_key(key: str) -> str:
+    """Return a key as TOML writes it."""
+    bare = key.isascii() and key.replace("-", "_").replace("_", "a").isalnum()
+    return key if bare else _toml_text(key)
+
+
+def toml_value(value: Any) -> str:
+    """Return a plain value as TOML writes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return _toml_text(value)
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, Mapping):
+        inner = (f"{toml_key(key)} = {toml_value(one)}" for key, one in value.items() if one is not None)
+        return "{ " + ", ".join(inner) + " }" if value else "{}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(toml_value(one) for one in value) + "]"
+    raise TypeError(f"{value!r} is no TOML value")
+
+
+def _toml_text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _tables_only(layer: Layer, complaints: list[str]) -> Layer:
+    """Return the layer without what is no table of a pipeline, having complained of that."""
+    values = {}
+    for key, value in layer.values.items():
+        if key not in _TABLES:
+            text = f"there is no table {key!r}.{suggestion(key, _TABLES)} There are: {', '.join(_TABLES)}"
+            complaints.append(layer.complain(Problem((key,), text)))
+        elif not isinstance(value, Mapping):
+            advice = (
+                f": write {key}.type = {toml_value(value)}" if isinstance(value, str) and key != "run" else ""
+            )
+            complaints.append(
+                layer.complain(Problem((key,), f"expected a table, found {shown(value)}{advice}"))
+            )
+        else:
+            values[key] = value
+    return Layer(label=layer.label, values=values, lines=layer.lines, typed=layer.typed, final=layer.final)
+
+
+def _component(
+    layers: Sequence[Layer], table: str, plugins: Plugins, complaints: list[str]
+) -> tuple[Component, type] | None:
+    """Return the component that a table asks for and its config class; None, with any complaint, for none."""
+    role = _ROLE_OF_TABLE[table]
+    path = (table, "type")
+    setter = next((layer for layer in reversed(layers) if "type" in layer.values.get(table, {})), None)
+    users = [layer for layer in layers if table in layer.values]
+    if setter is None:
+        if users or table != "classifier":
+            names = ", ".join(one.name for one in plugins.components(role)) or "none"
+            where = f"{users[-1].where((table,))}: " if users else ""
+            kind = role.replace("-", " ")
+            complaints.append(f"{where}{table}.type is not given: name a {kind}. Known: {names}")
+        return None
+    name = setter.values[table]["type"]
+    if not isinstance(name, str):
+        complaints.append(setter.complain(Problem(path, f"expected text, found {shown(name)}")))
+        return None
+    if table == "classifier" and name == NONE:
+        for layer in users:
+            for key in layer.values[table]:
+                if key != "type" and (layer.final or layer is setter):
+                    text = f'classifier.type is "{NONE}", so nothing takes this key'
+                    complaints.append(layer.complain(Problem((table, key), text)))
+        return None
+    try:
+        component = plugins.find(role, name)
+        return component, component.config_class()
+    except (UnknownName, PluginUnavailable) as error:
+        complaints.append(setter.complain(Problem(path, str(error))))
+        return None
+
+
+def _merged(layers: Sequence[Layer], table: str, component: Component | None) -> Merged:
+    """Lay the layers of one table over each other, without the file keys meant for another component."""
+    merged = Merged()
+    named: str | None = None
+    for layer in layers:
+        values = layer.values.get(table)
+        if values is None:
+            continue
+        named = values.get("type", named)
+        other = component is not None and named not in (None, component.name, component.qualified)
+        if layer.final or not other:
+            merged.add((table,), values, layer)
+    return merged
+
+
+def _leaves(values: Mapping[str, Any], path: KeyPath) -> Iterator[KeyPath]:
+    for key, value in values.items():
+        if isinstance(value, Mapping) and value:
+            yield from _leaves(value, (*path, key))
+        else:
+            yield (*path, key)
+
+
+def _listed(complaints: Sequence[str]) -> str:
+    if len(complaints) == 1:
+        return complaints[0]
+    return "\n".join(
+        [f"{len(complaints)} errors in the settings:", *(indent(one, "  ") for one in complaints)]
+    )

@@ -1,0 +1,201 @@
+"""What a plugin declares about its components: light values and import strings, no driver imported.
+
+An entry is what the hooks return. The names of classes are import strings (`"package.module:Class"`),
+resolved at first use, so that listing plugins imports nothing beyond the modules that hold the entries.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from attrs import field, frozen
+from attrs.validators import deep_iterable, ge, instance_of, matches_re
+
+from graspsense.core.errors import suggestion
+from graspsense.core.signals import CHANNELS, CommandKind
+
+if TYPE_CHECKING:
+    from attrs import Attribute
+
+Role = Literal["sensor-backend", "controller", "feature-set", "classifier"]
+
+TABLE_OF_ROLE: Final[dict[Role, str]] = {
+    "sensor-backend": "gripper",
+    "controller": "controller",
+    "feature-set": "features",
+    "classifier": "classifier",
+}
+"""The table of a pipeline file in which a component of each role is chosen."""
+
+KINDS: Final = tuple(kind.name.lower() for kind in CommandKind)
+"""Command kinds as entries name them: effort, velocity, position, force."""
+
+
+def _known_kinds(entry: object, attribute: Attribute[Any], kinds: tuple[str, ...]) -> None:
+    for kind in kinds:
+        if kind not in KINDS:
+            raise ValueError(
+                f"'{attribute.name}' has the unknown command kind {kind!r}; there are {', '.join(KINDS)}."
+                f"{suggestion(str(kind), KINDS)}"
+            )
+
+
+def _distinct_channels(entry: object, attribute: Attribute[Any], channels: tuple[Channel, ...]) -> None:
+    names = [channel.name for channel in channels]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"'{attribute.name}' names channel {name!r} twice")
+
+
+def _named_features(entry: object, attribute: Attribute[Any], features: tuple[tuple[str, str], ...]) -> None:
+    for feature in features:
+        if not (
+            isinstance(feature, tuple) and len(feature) == 2 and all(isinstance(x, str) for x in feature)
+        ):
+            raise ValueError(f"'features' holds {feature!r}: give (name, unit)")
+    names = [name for name, _ in features]
+    if len(set(names)) < len(names):
+        raise ValueError(f"'features' names one feature twice: {', '.join(names)}")
+
+
+_IS_NAME: Final = [instance_of(str), matches_re(r"[a-z][a-z0-9_-]*")]
+_IS_TARGET: Final = [instance_of(str), matches_re(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")]
+_IS_RESOURCE: Final = [instance_of(str), matches_re(r"[A-Za-z_][\w.]*:[^/:][^:]*")]
+_ARE_KINDS: Final = [instance_of(tuple), _known_kinds]
+
+
+@frozen
+class Channel:
+    """A signal that a backend gives or a component needs.
+
+    `rate_hz` is what a backend gives, or the least that a component needs (0: any rate will do). A name of
+    `signals.CHANNELS` has the unit given there; any other name is a channel of the plugin's own, in a unit of
+    its own. Raises ValueError for a wrong or missing unit.
+    """
+
+    name: str = field(validator=_IS_NAME)
+    unit: str = field(validator=instance_of(str))
+    rate_hz: float = field(default=0.0, converter=float, validator=ge(0.0))
+
+    def __attrs_post_init__(self) -> None:
+        unit = CHANNELS.get(self.name)
+        if unit is not None and self.unit != unit:
+            raise ValueError(f"channel {self.name!r} is in {unit}, not in {self.unit!r}")
+        if not self.unit:
+            raise ValueError(f"channel {self.name!r} is none of {', '.join(CHANNELS)}: give it a unit")
+
+
+_ARE_CHANNELS: Final = [deep_iterable(instance_of(Channel), instance_of(tuple)), _distinct_channels]
+
+
+@frozen
+class SensorBackendEntry:
+    """A gripper with its sensors: what it gives, what it can be told, where its class lies."""
+
+    name: str = field(validator=_IS_NAME)
+    target: str = field(validator=_IS_TARGET)
+    config: str = field(validator=_IS_TARGET)
+    summary: str = field(validator=instance_of(str))
+    channels: tuple[Channel, ...] = field(validator=_ARE_CHANNELS)
+    accepts: tuple[str, ...] = field(validator=_ARE_KINDS)
+    """Command kinds it takes: any of effort, velocity, position, force."""
+    needs: str = ""
+    """What to install or do where the target cannot be imported."""
+
+
+@frozen
+class ControllerEntry:
+    """A control law: what it must see and what it will command."""
+
+    name: str = field(validator=_IS_NAME)
+    target: str = field(validator=_IS_TARGET)
+    config: str = field(validator=_IS_TARGET)
+    summary: str = field(validator=instance_of(str))
+    requires: tuple[Channel, ...] = field(validator=_ARE_CHANNELS)
+    commands: tuple[str, ...] = field(validator=_ARE_KINDS)
+    """Command kinds it may send."""
+    needs: str = ""
+
+
+@frozen
+class FeatureSetEntry:
+    """A set of features: the channels it reads, the names and units of what it returns."""
+
+    name: str = field(validator=_IS_NAME)
+    target: str = field(validator=_IS_TARGET)
+    config: str = field(validator=_IS_TARGET)
+    summary: str = field(validator=instance_of(str))
+    requires: tuple[Channel, ...] = field(validator=_ARE_CHANNELS)
+    features: tuple[tuple[str, str], ...] = field(validator=[instance_of(tuple), _named_features])
+    """`(name, unit)` in the order in which they are returned."""
+    needs: str = ""
+
+
+@frozen
+class ClassifierEntry:
+    """A classifier: learns from a table of features, names the object and its state."""
+
+    name: str = field(validator=_IS_NAME)
+    target: str = field(validator=_IS_TARGET)
+    config: str = field(validator=_IS_TARGET)
+    summary: str = field(validator=instance_of(str))
+    needs: str = ""
+
+
+@frozen
+class PipelineEntry:
+    """A pipeline file shipped inside a package: `resource` is `"package:path/inside/it.toml"`."""
+
+    name: str = field(validator=_IS_NAME)
+    resource: str = field(validator=_IS_RESOURCE)
+    summary: str = field(validator=instance_of(str))
+
+
+@frozen
+class ModelEntry:
+    """A trained model shipped inside a package: `resource` is `"package:path/inside/it.json"`."""
+
+    name: str = field(validator=_IS_NAME)
+    resource: str = field(validator=_IS_RESOURCE)
+    summary: str = field(validator=instance_of(str))
+
+
+@frozen
+class DatasetEntry:
+    """A reader of somebody's recordings, called as `name:FOLDER`; `target` is what reads them."""
+
+    name: str = field(validator=_IS_NAME)
+    target: str = field(validator=_IS_TARGET)
+    summary: str = field(validator=instance_of(str))
+    needs: str = ""
+
+
+@frozen
+class CommandEntry:
+    """A further subcommand of `graspsense`: `target` is a click command."""
+
+    name: str = field(validator=_IS_NAME)
+    target: str = field(validator=_IS_TARGET)
+    summary: str = field(validator=instance_of(str))
+    needs: str = ""
+
+
+@frozen
+class FoundDevice:
+    """A device that a probe found: which backend drives it, how to name it, and whether it can be opened."""
+
+    backend: str
+    serial: str
+    where: str
+    ready: bool
+    advice: str = ""
+
+
+ComponentEntry = SensorBackendEntry | ControllerEntry | FeatureSetEntry | ClassifierEntry
+
+ENTRY_OF_ROLE: dict[Role, type] = {
+    "sensor-backend": SensorBackendEntry,
+    "controller": ControllerEntry,
+    "feature-set": FeatureSetEntry,
+    "classifier": ClassifierEntry,
+}

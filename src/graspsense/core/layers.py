@@ -1,0 +1,236 @@
+"""The layers that settings are made of: files that extend one another, options and flags."""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any
+
+from attrs import define, field, frozen
+
+from graspsense.core.errors import ConfigError, UnknownName
+from graspsense.core.plugins import Plugins
+from graspsense.core.strict import Problem, shown
+from graspsense.core.toml_lines import KeyPath, key_lines
+
+
+@frozen(eq=False, kw_only=True)
+class Layer:
+    """Values from one place.
+
+    `label` names the place, `typed` is what a user typed for it where it is no file. A layer that is `final`
+    holds for whichever component is chosen at last; of another, the keys of a table are dropped where a later
+    layer changes that table's `type`.
+    """
+
+    label: str
+    values: Mapping[str, Any]
+    lines: Mapping[KeyPath, int] = field(factory=dict)
+    typed: str = ""
+    final: bool = False
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], label: str) -> Layer:
+        """Return a layer of values that stand in no file."""
+        return cls(label=label, values=values)
+
+    def where(self, path: KeyPath) -> str:
+        """Return the place of a key, with its line where there is one."""
+        for end in range(len(path), 0, -1):
+            if path[:end] in self.lines:
+                return f"{self.label}:{self.lines[path[:end]]}"
+        return self.label
+
+    def complain(self, problem: Problem) -> str:
+        """Return a problem in one line: where, which key, what."""
+        if self.typed:
+            return f"{self.typed}: {problem.text}"
+        return f"{self.where(problem.path)}: {dotted(problem.path)}: {problem.text}"
+
+
+@frozen
+class Flag:
+    """A command-line flag that sets one key: `Flag("--gripper", "gripper.type", "pr2")`."""
+
+    name: str
+    key: str
+    value: Any
+
+    def layer(self) -> Layer:
+        """Return it as a layer."""
+        values = _nested(self.key.split("."), self.value)
+        return Layer(label=self.name, values=values, typed=f"{self.name} {self.value}", final=True)
+
+
+@define
+class Merged:
+    """One table's values, and the layer that set each key last."""
+
+    values: dict[str, Any] = field(factory=dict)
+    owner: dict[KeyPath, Layer] = field(factory=dict)
+
+    def add(self, path: KeyPath, values: Mapping[str, Any], layer: Layer) -> None:
+        """Lay these values over the others; `path` is where the table stands. Lists replace, tables merge."""
+        self._add(self.values, path, values, layer)
+
+    def _add(self, into: dict[str, Any], path: KeyPath, values: Mapping[str, Any], layer: Layer) -> None:
+        self.owner[path] = layer
+        for key, value in values.items():
+            here = (*path, key)
+            if isinstance(value, Mapping):
+                inner = into.get(key)
+                if not isinstance(inner, dict):
+                    inner = into[key] = {}
+                self._add(inner, here, value, layer)
+            else:
+                into[key] = value
+                self.owner[here] = layer
+                for below in [one for one in self.owner if one[: len(here)] == here and one != here]:
+                    del self.owner[below]
+
+    def owner_of(self, path: KeyPath) -> Layer | None:
+        """Return the layer that set this key, or the table that holds it; None for a default."""
+        for end in range(len(path), 0, -1):
+            if path[:end] in self.owner:
+                return self.owner[path[:end]]
+        return None
+
+
+def read_layer(path: str | os.PathLike[str]) -> Layer:
+    """Read a TOML file. Raises ConfigError where there is none, or where it is no readable TOML."""
+    return _read(Path(path), os.fspath(path), "configuration file")
+
+
+def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
+    """Return the layers of a pipeline, the one that extends nothing first.
+
+    `pipeline` is a path that ends in `.toml`, or a name that a plugin provides. Raises ConfigError.
+    """
+    layers: list[Layer] = []
+    seen: list[tuple[object, str]] = []
+    asked, base, asker = pipeline, Path(), ""
+    while True:
+        source, label, base = _located(asked, base, asker, plugins)
+        identity = source.resolve() if isinstance(source, Path) else str(source)
+        if identity in (one for one, _ in seen):
+            names = " -> ".join([*(name for _, name in seen), label])
+            raise ConfigError(f"{asker}extends goes round in a circle: {names}")
+        seen.append((identity, label))
+        layer = _read(source, label, "pipeline file")
+        values = dict(layer.values)
+        extends = values.pop("extends", None)
+        layers.insert(0, Layer(label=label, values=values, lines=layer.lines))
+        if extends is None:
+            return layers
+        asker = f"{layer.where(('extends',))}: "
+        if not isinstance(extends, str):
+            raise ConfigError(
+                f"{asker}extends: expected the name of a pipeline or the path of a .toml file, "
+                f"found {shown(extends)}"
+            )
+        asked = extends
+
+
+def _located(asked: str, base: Path, asker: str, plugins: Plugins) -> tuple[Traversable, str, Path]:
+    """Return the file of a pipeline, how to call it, and the folder from which its own `extends` counts."""
+    if asked.endswith(".toml"):
+        path = base / asked
+        return path, str(path), path.parent
+    try:
+        offer = plugins.pipeline(asked)
+    except UnknownName as error:
+        hint = "\n  A file is given with its ending .toml"
+        if (base / asked).is_file():
+            hint += f"; there is a file {str(base / asked)!r} without it: rename it"
+        elif (base / f"{asked}.toml").is_file():
+            hint += f": {base / asked}.toml"
+        raise UnknownName(f"{asker}{error}{hint}") from None
+    resource = offer.resource()
+    return resource, f"pipeline {offer.qualified}", resource.parent if isinstance(resource, Path) else Path()
+
+
+def _read(source: Traversable, label: str, what: str) -> Layer:
+    try:
+        data = source.read_bytes()
+    except FileNotFoundError:
+        raise ConfigError(f"no {what} {label!r} in {Path.cwd()}") from None
+    except OSError as error:
+        raise ConfigError(f"cannot read the {what} {label!r}: {error.strerror or error}") from None
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ConfigError(
+            f"{label}:{line}: not UTF-8 text (byte 0x{data[error.start]:02x}): "
+            "TOML files are UTF-8; is this the right file?"
+        ) from None
+    try:
+        values = tomllib.loads(text)
+    except RecursionError:
+        raise ConfigError(f"{label}: lists or tables nested too deep") from None
+    except ValueError as error:
+        place = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", str(error))
+        said = str(error)[: place.start()] if place else str(error)
+        line = int(place[1]) if place and place[1] else text.count("\n") + 1
+        column = f", column {place[2]}" if place and place[2] else ""
+        raise ConfigError(f"{label}:{line}{column}: not TOML: {said}") from None
+    return Layer(label=label, values=values, lines=key_lines(text))
+
+
+def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:
+    """Return a layer for each `a.b=VALUE`, and what is wrong with those that are none.
+
+    VALUE is a TOML value; anything that is none is a string.
+    """
+    layers, complaints = [], []
+    for option in options:
+        key, equals, value = option.partition("=")
+        parts = _key_parts(key)
+        if not equals or not parts:
+            complaints.append(f"-o {option}: expected TABLE.KEY=VALUE, as in -o run.seed=3")
+            continue
+        values = _nested(parts, _toml_value(value))
+        layers.append(Layer(label="-o", values=values, typed=f"-o {option}", final=True))
+    return layers, complaints
+
+
+def _key_parts(key: str) -> list[str]:
+    try:
+        table: Any = tomllib.loads(f"{key}=0")
+    except ValueError:
+        return []
+    parts = []
+    while isinstance(table, dict):
+        if len(table) != 1:
+            return []
+        part, table = next(iter(table.items()))
+        parts.append(part)
+    return parts
+
+
+def _toml_value(text: str) -> Any:
+    """Return the TOML value that this text is, or the text itself where it is none or more than one."""
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+        # Within brackets a comment swallows the end and a second key is no TOML.
+        return value if len(tomllib.loads(f"value = [{text}]")["value"]) == 1 else text
+    except (ValueError, RecursionError):
+        return text
+
+
+def _nested(parts: Sequence[str], value: Any) -> dict[str, Any]:
+    for part in reversed(parts):
+        value = {part: value}
+    return dict(value)
+
+
+def dotted(path: Iterable[str | int]) -> str:
+    """Return a key as it is written: `gripper.terms[2].stiffness`."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text

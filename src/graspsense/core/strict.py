@@ -1,0 +1,297 @@
+"""Plain values, as TOML gives them, into attrs classes and back: nothing is coerced, every error is kept.
+
+cattrs picks the rule for each type; the rules here replace its own, which turn `"false"` into True, 2.9 into
+2 and 3 into "3".
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import types
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from enum import Enum
+from pathlib import Path
+from typing import Any, Final, Literal, TypeVar, Union, cast, get_args, get_origin
+
+import attrs
+import cattrs
+from attrs import frozen
+
+from graspsense.core.errors import suggestion
+from graspsense.core.toml_lines import KeyPath
+
+ConfigT = TypeVar("ConfigT")
+
+_NUMBER_WITH_UNIT: Final = re.compile(r"\s*([-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*[^\d\s]\S*\s*")
+
+
+@frozen
+class Problem:
+    """What is wrong with the value at `path`."""
+
+    path: KeyPath
+    text: str
+
+
+class Misfit(Exception):
+    """Values that do not make an instance; `problems` holds everything that is wrong with them."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        super().__init__()
+        self.problems = tuple(problems)
+
+    def under(self, key: str | int) -> list[Problem]:
+        """Return the problems as seen from one level further out."""
+        return [Problem((key, *one.path), one.text) for one in self.problems]
+
+
+def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> ConfigT:
+    """Return the instance of the attrs class `cls` that these values describe.
+
+    Numbers, text and booleans must be what the class declares (a whole number is taken for a number), keys
+    must be known, and validators keep their own words. `called` is how to name the table in errors. Raises
+    Misfit with every problem at once.
+    """
+    attrs.resolve_types(cls)  # type: ignore[type-var]
+    fields = {one.alias: one for one in attrs.fields(cls) if one.init}  # type: ignore[arg-type]
+    problems = [Problem((key,), _unknown(key, fields, called)) for key in values if key not in fields]
+    given: dict[str, Any] = {}
+    for name, field in fields.items():
+        if name not in values:
+            if field.default is attrs.NOTHING:
+                problems.append(Problem((), f"{called} needs the key {name!r}, which is not given"))
+            continue
+        try:
+            given[name] = (
+                values[name] if field.type is None else _CONVERTER.structure(values[name], field.type)
+            )
+        except Misfit as misfit:
+            problems += misfit.under(name)
+        except cattrs.errors.StructureHandlerNotFoundError:
+            problems.append(Problem((name,), f"its type {field.type} cannot be written in TOML"))
+    if not problems:
+        try:
+            return cls(**given)
+        except Exception as error:
+            raise Misfit(_complaints(cls, fields, given) or [Problem((), _words(error))]) from error
+    raise Misfit([*problems, *_complaints(cls, fields, given)])
+
+
+def plain(config: object) -> dict[str, Any]:
+    """Return the values of an attrs instance as TOML has them, and None where a key is not set."""
+    return {
+        field.alias: _plain(getattr(config, field.name))
+        for field in attrs.fields(type(config))  # type: ignore[arg-type]
+        if field.init
+    }
+
+
+def _plain(value: Any) -> Any:
+    if attrs.has(type(value)):
+        return plain(value)
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, Enum):
+        return _plain(value.value)
+    return str(value) if isinstance(value, Path) else value
+
+
+def _complaints(
+    cls: type, fields: Mapping[str, attrs.Attribute[Any]], given: Mapping[str, Any]
+) -> list[Problem]:
+    """Return what the validators of the given fields say, each on its own.
+
+    attrs stops at the first validator that objects, so the instance is made without them. Where a value that
+    is needed is missing or of the wrong type there is no instance to ask, and nothing is returned.
+    """
+    try:
+        with attrs.validators.disabled():
+            instance = cls(**given)
+    except Exception:
+        return []
+    problems = []
+    for name in given:
+        field = fields[name]
+        if field.validator is not None:
+            try:
+                field.validator(instance, field, getattr(instance, field.name))
+            except Exception as error:
+                problems.append(Problem((name,), _words(error)))
+    return problems
+
+
+def _words(error: Exception) -> str:
+    """Return the text of an error; some of attrs' own carry the attribute and its value behind the text."""
+    return (
+        error.args[0] if error.args and isinstance(error.args[0], str) else f"{type(error).__name__}: {error}"
+    )
+
+
+def _unknown(key: str, known: Iterable[str], called: str) -> str:
+    names = sorted(known)
+    return f"{called} has no key {key!r}.{suggestion(key, names)} It has: {', '.join(names) or 'none'}"
+
+
+def shown(value: object) -> str:
+    """Return a value with its kind, for an error."""
+    if isinstance(value, bool):
+        return f"{str(value).lower()} (a boolean)"
+    if isinstance(value, str):
+        return f"{value!r} (text)"
+    if isinstance(value, int):
+        return f"{value} (a whole number)"
+    if isinstance(value, float):
+        return f"{value} (a number)"
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list | tuple):
+        return "a list"
+    return "nothing" if value is None else f"{value} (a {type(value).__name__})"
+
+
+def _expected(what: str, value: object, advice: str = "") -> Misfit:
+    return Misfit([Problem((), f"expected {what}, found {shown(value)}{advice}")])
+
+
+def _bool(value: object, _: object) -> bool:
+    if not isinstance(value, bool):
+        raise _expected("true or false", value)
+    return value
+
+
+def _int(value: object, _: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise _expected("a whole number", value)
+    return value
+
+
+def _float(value: object, _: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        unit = _NUMBER_WITH_UNIT.fullmatch(value) if isinstance(value, str) else None
+        advice = ": give the number alone, in the unit that the key ends with, or SI" if unit else ""
+        raise _expected("a number", value, advice)
+    if math.isnan(value):
+        raise _expected("a number", value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise _expected("a number below 1.8e308", value) from None
+
+
+def _str(value: object, _: object) -> str:
+    if not isinstance(value, str):
+        simple = isinstance(value, bool | int | float)
+        raise _expected("text", value, ": put it in quotes, with -o as 'KEY=\"...\"'" if simple else "")
+    return value
+
+
+def _path(value: object, _: object) -> Path:
+    return Path(_str(value, str))
+
+
+def _none(value: object, _: object) -> None:
+    if value is not None:
+        raise _expected("nothing", value)
+
+
+def _choice(value: object, cls: Any) -> Any:
+    allowed = [one.value for one in cls] if _is_enum(cls) else list(get_args(cls))
+    for one in allowed:
+        if type(one) is type(value) and one == value:
+            return cls(value) if _is_enum(cls) else one
+    near = (
+        suggestion(value, (one for one in allowed if isinstance(one, str))) if isinstance(value, str) else ""
+    )
+    raise _expected(f"one of {', '.join(map(repr, allowed))}", value, near and "." + near)
+
+
+def _union(value: object, cls: Any) -> Any:
+    members = get_args(cls)
+    exact = [one for one in members if type(value) is one]
+    misfits = []
+    for member in [*exact, *members]:
+        try:
+            return _CONVERTER.structure(value, member)
+        except Misfit as misfit:
+            misfits.append((member, misfit))
+    wanted = [misfit for member, misfit in misfits if member is not type(None)]
+    if len(wanted) == 1:
+        raise wanted[0]
+    names = [getattr(one, "__name__", str(one)) for one in members if one is not type(None)]
+    raise _expected(f"one of the kinds {', '.join(names)}", value)
+
+
+def _sequence(value: object, cls: Any) -> Any:
+    if not isinstance(value, list | tuple):
+        raise _expected("a list", value)
+    kind = get_origin(cls) or cls
+    members: Sequence[Any] = get_args(cls)
+    if kind is tuple and members and members[-1] is not Ellipsis:
+        if len(value) != len(members):
+            raise Misfit([Problem((), f"expected a list of {len(members)}, found {len(value)} in it")])
+    else:
+        members = [members[0] if members else Any] * len(value)
+    problems: list[Problem] = []
+    items = []
+    for index, (one, member) in enumerate(zip(value, members, strict=True)):
+        try:
+            items.append(_CONVERTER.structure(one, member))
+        except Misfit as misfit:
+            problems += misfit.under(index)
+    if problems:
+        raise Misfit(problems)
+    return items if kind is list else tuple(items)
+
+
+def _mapping(value: object, cls: Any) -> Any:
+    if not isinstance(value, Mapping):
+        raise _expected("a table", value)
+    member = get_args(cls)[1] if get_args(cls) else Any
+    problems: list[Problem] = []
+    items = {}
+    for key, one in value.items():
+        try:
+            items[key] = _CONVERTER.structure(one, member)
+        except Misfit as misfit:
+            problems += misfit.under(key)
+    if problems:
+        raise Misfit(problems)
+    return items
+
+
+def _table(value: object, cls: Any) -> Any:
+    if not isinstance(value, Mapping):
+        raise _expected("a table", value)
+    return structured(value, get_origin(cls) or cls, "this table")
+
+
+def _is_enum(cls: Any) -> bool:
+    return isinstance(cls, type) and issubclass(cls, Enum)
+
+
+def _has_origin(*origins: Any) -> Callable[[Any], bool]:
+    return lambda cls: get_origin(cls) in origins or cls in origins
+
+
+def _is(kind: Any) -> Callable[[Any], bool]:
+    return lambda cls: cls is kind
+
+
+_CONVERTER: Final = cattrs.Converter()
+for _predicate, _rule in (
+    (_is(bool), _bool),
+    (_is(int), _int),
+    (_is(float), _float),
+    (_is(str), _str),
+    (_is(Path), _path),
+    (_is(type(None)), _none),
+    (lambda cls: cast(Any, get_origin(cls)) is Literal or _is_enum(cls), _choice),
+    (_has_origin(Union, types.UnionType), _union),
+    (_has_origin(list, tuple, Sequence), _sequence),
+    (_has_origin(dict, Mapping), _mapping),
+    (attrs.has, _table),
+):
+    _CONVERTER.register_structure_hook_func(_predicate, _rule)

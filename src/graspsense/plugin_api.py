@@ -1,0 +1,233 @@
+"""The door for plugin authors: everything a component is made of, and `create` for making another one.
+
+Names are imported when they are first used, so that a plugin's entry module, which is all that listing
+plugins imports, pulls in neither numpy nor a driver.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from graspsense.core.binding import bind as bind
+    from graspsense.core.calibration import EDGE_COUNTS_PER_N as EDGE_COUNTS_PER_N
+    from graspsense.core.calibration import PAD_COUNTS_PER_N as PAD_COUNTS_PER_N
+    from graspsense.core.calibration import edge_force as edge_force
+    from graspsense.core.calibration import pad_force as pad_force
+    from graspsense.core.calibration import tare as tare
+    from graspsense.core.calibration import zero_of as zero_of
+    from graspsense.core.config import create as create
+    from graspsense.core.contact import CONTACT_FORCE_N as CONTACT_FORCE_N
+    from graspsense.core.contact import REST_SPEED_M_S as REST_SPEED_M_S
+    from graspsense.core.contact import REST_WINDOW_S as REST_WINDOW_S
+    from graspsense.core.contact import Stillness as Stillness
+    from graspsense.core.contact import at_rest as at_rest
+    from graspsense.core.contact import both_touch as both_touch
+    from graspsense.core.contact import watch as watch
+    from graspsense.core.entries import Channel as Channel
+    from graspsense.core.entries import ClassifierEntry as ClassifierEntry
+    from graspsense.core.entries import CommandEntry as CommandEntry
+    from graspsense.core.entries import ControllerEntry as ControllerEntry
+    from graspsense.core.entries import DatasetEntry as DatasetEntry
+    from graspsense.core.entries import FeatureSetEntry as FeatureSetEntry
+    from graspsense.core.entries import FoundDevice as FoundDevice
+    from graspsense.core.entries import ModelEntry as ModelEntry
+    from graspsense.core.entries import PipelineEntry as PipelineEntry
+    from graspsense.core.entries import SensorBackendEntry as SensorBackendEntry
+    from graspsense.core.errors import ConfigError as ConfigError
+    from graspsense.core.errors import DataDamaged as DataDamaged
+    from graspsense.core.errors import DeviceLost as DeviceLost
+    from graspsense.core.errors import GraspsenseError as GraspsenseError
+    from graspsense.core.errors import NoDevice as NoDevice
+    from graspsense.core.errors import PluginUnavailable as PluginUnavailable
+    from graspsense.core.errors import RecordingEnded as RecordingEnded
+    from graspsense.core.errors import TareRefused as TareRefused
+    from graspsense.core.errors import UnknownName as UnknownName
+    from graspsense.core.errors import suggestion as suggestion
+    from graspsense.core.features import UNKNOWN as UNKNOWN
+    from graspsense.core.features import Features as Features
+    from graspsense.core.features import FeatureTable as FeatureTable
+    from graspsense.core.features import Prediction as Prediction
+    from graspsense.core.features import missing as missing
+    from graspsense.core.features import table_of as table_of
+    from graspsense.core.guard import GuardParams as GuardParams
+    from graspsense.core.guard import GuardState as GuardState
+    from graspsense.core.hookspecs import hookimpl as hookimpl
+    from graspsense.core.plugins import collect as collect
+    from graspsense.core.roles import BatchBackend as BatchBackend
+    from graspsense.core.roles import Classifier as Classifier
+    from graspsense.core.roles import Controller as Controller
+    from graspsense.core.roles import ControllerState as ControllerState
+    from graspsense.core.roles import DeviceInfo as DeviceInfo
+    from graspsense.core.roles import FeatureSet as FeatureSet
+    from graspsense.core.roles import Reading as Reading
+    from graspsense.core.roles import SensorBackend as SensorBackend
+    from graspsense.core.roles import StepLaw as StepLaw
+    from graspsense.core.runner import RunConfig as RunConfig
+    from graspsense.core.runner import tick_params as tick_params
+    from graspsense.core.signals import APPROACH as APPROACH
+    from graspsense.core.signals import CELLS as CELLS
+    from graspsense.core.signals import CHANNELS as CHANNELS
+    from graspsense.core.signals import CRUSHED as CRUSHED
+    from graspsense.core.signals import EFFORT as EFFORT
+    from graspsense.core.signals import FIRST_PAD_CELL as FIRST_PAD_CELL
+    from graspsense.core.signals import FORCE as FORCE
+    from graspsense.core.signals import HOLD as HOLD
+    from graspsense.core.signals import NEVER_STEADY as NEVER_STEADY
+    from graspsense.core.signals import NO_PADS as NO_PADS
+    from graspsense.core.signals import NOTHING_THERE as NOTHING_THERE
+    from graspsense.core.signals import ONE_FINGER as ONE_FINGER
+    from graspsense.core.signals import POSITION as POSITION
+    from graspsense.core.signals import RUNNING as RUNNING
+    from graspsense.core.signals import SIDE_IMPACT as SIDE_IMPACT
+    from graspsense.core.signals import SLIPPED as SLIPPED
+    from graspsense.core.signals import SQUEEZE as SQUEEZE
+    from graspsense.core.signals import STEADY as STEADY
+    from graspsense.core.signals import TOO_WIDE as TOO_WIDE
+    from graspsense.core.signals import VELOCITY as VELOCITY
+    from graspsense.core.signals import Command as Command
+    from graspsense.core.signals import CommandKind as CommandKind
+    from graspsense.core.signals import Frame as Frame
+    from graspsense.core.signals import Outcome as Outcome
+    from graspsense.core.signals import Pads as Pads
+    from graspsense.core.signals import Phase as Phase
+    from graspsense.core.tick import OPENING as OPENING
+    from graspsense.core.tick import RELEASE as RELEASE
+    from graspsense.core.tick import TARING as TARING
+    from graspsense.core.tick import Schedule as Schedule
+    from graspsense.core.tick import TickParams as TickParams
+    from graspsense.core.tick import TickState as TickState
+    from graspsense.core.tick import first_state as first_state
+    from graspsense.core.tick import tick as tick
+    from graspsense.core.trace import Trace as Trace
+    from graspsense.core.trace import TraceRecorder as TraceRecorder
+    from graspsense.core.trace import trace_of as trace_of
+    from graspsense.core.transmission import PR2_ENCODER_TICKS as PR2_ENCODER_TICKS
+    from graspsense.core.transmission import PR2_LINKAGES as PR2_LINKAGES
+    from graspsense.core.transmission import ScrewLinkage as ScrewLinkage
+    from graspsense.core.transmission import gap_and_rate as gap_and_rate
+    from graspsense.core.transmission import revolutions_at as revolutions_at
+    from graspsense.core.transmission import screw_linkage as screw_linkage
+    from graspsense.core.trial import GraspEvent as GraspEvent
+    from graspsense.core.trial import RunInfo as RunInfo
+    from graspsense.core.trial import Trial as Trial
+
+_HOME_OF: Final = {
+    "bind": "binding",
+    "EDGE_COUNTS_PER_N": "calibration",
+    "PAD_COUNTS_PER_N": "calibration",
+    "edge_force": "calibration",
+    "pad_force": "calibration",
+    "tare": "calibration",
+    "zero_of": "calibration",
+    "create": "config",
+    "CONTACT_FORCE_N": "contact",
+    "REST_SPEED_M_S": "contact",
+    "REST_WINDOW_S": "contact",
+    "Stillness": "contact",
+    "at_rest": "contact",
+    "both_touch": "contact",
+    "watch": "contact",
+    "Channel": "entries",
+    "ClassifierEntry": "entries",
+    "CommandEntry": "entries",
+    "ControllerEntry": "entries",
+    "DatasetEntry": "entries",
+    "FeatureSetEntry": "entries",
+    "FoundDevice": "entries",
+    "ModelEntry": "entries",
+    "PipelineEntry": "entries",
+    "SensorBackendEntry": "entries",
+    "ConfigError": "errors",
+    "DataDamaged": "errors",
+    "DeviceLost": "errors",
+    "GraspsenseError": "errors",
+    "NoDevice": "errors",
+    "PluginUnavailable": "errors",
+    "RecordingEnded": "errors",
+    "TareRefused": "errors",
+    "UnknownName": "errors",
+    "suggestion": "errors",
+    "UNKNOWN": "features",
+    "Features": "features",
+    "FeatureTable": "features",
+    "Prediction": "features",
+    "missing": "features",
+    "table_of": "features",
+    "GuardParams": "guard",
+    "GuardState": "guard",
+    "hookimpl": "hookspecs",
+    "collect": "plugins",
+    "BatchBackend": "roles",
+    "Classifier": "roles",
+    "Controller": "roles",
+    "ControllerState": "roles",
+    "DeviceInfo": "roles",
+    "FeatureSet": "roles",
+    "Reading": "roles",
+    "SensorBackend": "roles",
+    "StepLaw": "roles",
+    "RunConfig": "runner",
+    "tick_params": "runner",
+    "APPROACH": "signals",
+    "CELLS": "signals",
+    "CHANNELS": "signals",
+    "CRUSHED": "signals",
+    "EFFORT": "signals",
+    "FIRST_PAD_CELL": "signals",
+    "FORCE": "signals",
+    "HOLD": "signals",
+    "NEVER_STEADY": "signals",
+    "NOTHING_THERE": "signals",
+    "NO_PADS": "signals",
+    "ONE_FINGER": "signals",
+    "POSITION": "signals",
+    "RUNNING": "signals",
+    "SIDE_IMPACT": "signals",
+    "SLIPPED": "signals",
+    "SQUEEZE": "signals",
+    "STEADY": "signals",
+    "TOO_WIDE": "signals",
+    "VELOCITY": "signals",
+    "Command": "signals",
+    "CommandKind": "signals",
+    "Frame": "signals",
+    "Outcome": "signals",
+    "Pads": "signals",
+    "Phase": "signals",
+    "OPENING": "tick",
+    "RELEASE": "tick",
+    "TARING": "tick",
+    "Schedule": "tick",
+    "TickParams": "tick",
+    "TickState": "tick",
+    "first_state": "tick",
+    "tick": "tick",
+    "Trace": "trace",
+    "TraceRecorder": "trace",
+    "trace_of": "trace",
+    "PR2_ENCODER_TICKS": "transmission",
+    "PR2_LINKAGES": "transmission",
+    "ScrewLinkage": "transmission",
+    "gap_and_rate": "transmission",
+    "revolutions_at": "transmission",
+    "screw_linkage": "transmission",
+    "GraspEvent": "trial",
+    "RunInfo": "trial",
+    "Trial": "trial",
+}
+
+__all__ = sorted(_HOME_OF)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = getattr(import_module(f"graspsense.core.{_HOME_OF[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return __all__

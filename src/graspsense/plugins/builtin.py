@@ -1,0 +1,81 @@
+"""The parts that come with graspsense itself, registered through the same hooks as anybody's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from graspsense.plugin_api import (
+    CHANNELS,
+    Channel,
+    ControllerEntry,
+    FeatureSetEntry,
+    PipelineEntry,
+    SensorBackendEntry,
+    hookimpl,
+)
+
+GRASPSENSE_API = (1, 0)
+
+_PAD_FORCES: Final = (Channel("force_left", "N"), Channel("force_right", "N"))
+
+
+@hookimpl
+def graspsense_controllers() -> Iterable[ControllerEntry]:
+    """Return the paper's controller and the two that it is made of."""
+    for name, summary in (
+        ("velocity", "PI control of the gap's rate, whatever is in the way"),
+        ("force", "constant effort, or closed loop on the pad force, from the start"),
+        ("hybrid", "velocity control until both pads touch, then force control"),
+    ):
+        yield ControllerEntry(
+            name=name,
+            target=f"graspsense.plugins.controllers.{name}:{name.capitalize()}Controller",
+            config=f"graspsense.plugins.controllers.{name}:{name.capitalize()}Config",
+            summary=summary,
+            requires=(Channel("gap", "m"), Channel("velocity", "m/s"), *_PAD_FORCES),
+            commands=("effort",),
+        )
+
+
+@hookimpl
+def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
+    """Return the six features of the paper's Table I."""
+    yield FeatureSetEntry(
+        name="chitta",
+        target="graspsense.plugins.features.chitta:ChittaFeatures",
+        config="graspsense.plugins.features.chitta:ChittaConfig",
+        summary="the six features of Table I (Chitta, Piccoli, Sturm 2010)",
+        requires=(Channel("gap", "m"), *_PAD_FORCES),
+        features=(
+            ("p_first", "m"),
+            ("p_steady", "m"),
+            ("f_steady", "N"),
+            ("delta_t", "s"),
+            ("dp_dt", "m/s"),
+            ("df_dt", "N/s"),
+        ),
+    )
+
+
+@hookimpl
+def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
+    """Return the gripper that is a recording."""
+    yield SensorBackendEntry(
+        name="replay",
+        target="graspsense.trials.replay:ReplayBackend",
+        config="graspsense.trials.replay:ReplayConfig",
+        summary="a recording instead of a gripper; a channel it lacks is NaN",
+        channels=tuple(Channel(name, unit) for name, unit in CHANNELS.items()),
+        accepts=("effort", "velocity", "position", "force"),
+    )
+
+
+@hookimpl
+def graspsense_pipelines() -> Iterable[PipelineEntry]:
+    """Return the pipeline that runs where none is named."""
+    yield PipelineEntry(
+        name="default",
+        resource="graspsense:plugins/pipelines/default.toml",
+        summary="simulated gripper, hybrid control, the six features of Table I",
+    )
