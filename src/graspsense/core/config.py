@@ -192,19 +192,33 @@ def create(role: Role, name: str, /, **config: Any) -> Any:
     return component.create(build(component, config))
 
 
-def to_toml(settings: Settings) -> str:
-    """Return a complete pipeline file: it extends nothing, and resolves to the same values by itself."""
+def to_toml(settings: Settings, origins: bool = False) -> str:
+    """Return a complete pipeline file: it extends nothing, and resolves to the same values by itself.
+
+    With `origins` a comment behind each key says where its value comes from.
+    """
     lines = [f"# Resolved by graspsense {__version__} from the pipeline {json.dumps(settings.pipeline)}."]
     versions = {one.component.table: one.component.version for one in settings.chosen}
     for table, values in settings.values.items():
         lines += ["", f"[{table}]"]
         for key, value in values.items():
-            if value is None:
-                lines.append(f"# {toml_key(key)} is not set")
-            else:
-                note = f"  # version {versions[table]}" if key == "type" else ""
-                lines.append(f"{toml_key(key)} = {toml_value(value)}{note}")
+            line = (
+                f"{toml_key(key)} = {toml_value(value)}"
+                if value is not None
+                else f"# {toml_key(key)} is not set"
+            )
+            notes = [f"version {versions[table]}"] if key == "type" else []
+            if origins:
+                inside = {
+                    path: one for path, one in settings.origins.items() if _within(path, f"{table}.{key}")
+                }
+                notes += list(dict.fromkeys(inside.values()))
+            lines.append(f"{line:<40}  # {', '.join(notes)}" if notes else line)
     return "\n".join(lines) + "\n"
+
+
+def _within(path: str, key: str) -> bool:
+    return path == key or path.startswith(f"{key}.")
 
 
 def toml_key(key: str) -> str:

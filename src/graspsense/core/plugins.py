@@ -325,6 +325,10 @@ class Plugins:
         """Return the subcommand of this short or qualified name. Raises UnknownName."""
         return self._only("command", self.commands(), name)
 
+    def absences(self) -> str:
+        """Return lines on the plugins that are here but take no part, for whoever misses a name."""
+        return "".join(_absence(status) for status in self._statuses)
+
     def probe_devices(self, timeout_s: float) -> tuple[Probe, ...]:
         """Let every plugin look for its devices for at most `timeout_s` each; a failure is its own."""
         probes = []
@@ -527,7 +531,7 @@ class Plugins:
         names = sorted({one.qualified if wanted else one.name for one in known})
         raise UnknownName(
             f"no {kind} named {name!r}. Known: {', '.join(names) or 'none'}.{suggestion(name, names)}"
-            + "".join(_absence(status) for status in self._statuses)
+            + self.absences()
         )
 
 

@@ -87,6 +87,29 @@ def plain(config: object) -> dict[str, Any]:
     }
 
 
+def keys_of(cls: type) -> dict[str, dict[str, Any]]:
+    """Return for each key of a config class its `type` in words, whether it is `required`, its `default`."""
+    attrs.resolve_types(cls)
+    keys: dict[str, dict[str, Any]] = {}
+    for field in attrs.fields(cls):
+        if field.init:
+            default = field.default
+            if isinstance(default, attrs.Factory):  # type: ignore[arg-type]
+                default = None if default.takes_self else default.factory()
+            keys[field.alias] = {
+                "type": _kind_words(field.type),
+                "required": field.default is attrs.NOTHING,
+                "default": None if default is attrs.NOTHING else _plain(default),
+            }
+    return keys
+
+
+def _kind_words(kind: Any) -> str:
+    if cast(Any, get_origin(kind)) is Literal:
+        return " | ".join(repr(one) for one in get_args(kind))
+    return kind.__name__ if isinstance(kind, type) and not get_args(kind) else str(kind)
+
+
 def _plain(value: Any) -> Any:
     if attrs.has(type(value)):
         return plain(value)

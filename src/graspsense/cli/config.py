@@ -1,0 +1,66 @@
+"""`graspsense config`: the settings of a pipeline, where each comes from, whether its parts fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from graspsense.cli.options import pipeline_options, settings_of
+from graspsense.cli.output import echo_json
+
+if TYPE_CHECKING:
+    from graspsense.core.config import Settings
+
+
+@click.group()
+def config() -> None:
+    """Show or check the settings of a pipeline."""
+
+
+@config.command()
+@click.argument("name", metavar="[PIPELINE]", required=False)
+@pipeline_options
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+def show(name: str | None, as_json: bool, **asked: Any) -> None:
+    """Print every setting with its origin: a default, a line of a file, -o, or a flag.
+
+    What is printed is a complete pipeline file.
+    """
+    settings = _settings(name, asked)
+    if as_json:
+        echo_json(
+            {
+                "pipeline": settings.pipeline,
+                "components": settings.components,
+                "values": settings.values,
+                "origins": settings.origins,
+            }
+        )
+        return
+    from graspsense.core.config import to_toml
+
+    click.echo(to_toml(settings, origins=True), nl=False)
+
+
+@config.command()
+@click.argument("name", metavar="[PIPELINE]", required=False)
+@pipeline_options
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+def validate(name: str | None, as_json: bool, **asked: Any) -> None:
+    """Check that the settings are valid and that the components fit together; nothing is opened."""
+    from graspsense.core.wiring import check
+
+    settings = _settings(name, asked)
+    check(settings)
+    if as_json:
+        echo_json({"valid": True, "pipeline": settings.pipeline, "components": settings.components})
+    else:
+        click.echo(f"{settings.pipeline} is valid: {', '.join(settings.components.values())}")
+
+
+def _settings(name: str | None, asked: Mapping[str, Any]) -> Settings:
+    if name is not None and asked["pipeline"] is not None:
+        raise click.UsageError(f"the pipeline is given twice: {name} and --pipeline {asked['pipeline']}")
+    return settings_of(**{**asked, "pipeline": name if name is not None else asked["pipeline"]})

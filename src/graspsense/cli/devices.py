@@ -1,0 +1,42 @@
+"""`graspsense devices`: what is plugged in."""
+
+from __future__ import annotations
+
+import attrs
+import click
+
+from graspsense.cli.output import echo_json, echo_table, talk
+
+
+@click.command()
+@click.option(
+    "--timeout",
+    "timeout_s",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=2.0,
+    show_default=True,
+    help="How long each plugin may look, in seconds.",
+)
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+def devices(timeout_s: float, as_json: bool) -> None:
+    """Look for grippers that are plugged in."""
+    from graspsense.core.plugins import installed
+
+    probes = installed().probe_devices(timeout_s)
+    found = [(probe.distribution, device) for probe in probes for device in probe.found]
+    failed = {probe.distribution: probe.error for probe in probes if probe.error}
+    for distribution, error in failed.items():
+        talk(f"{distribution} could not look for its devices: {error}")
+    if as_json:
+        listed = [{**attrs.asdict(device), "distribution": distribution} for distribution, device in found]
+        echo_json({"devices": listed, "looked": [probe.distribution for probe in probes], "failed": failed})
+    elif found:
+        rows = [
+            (one.backend, one.serial or "-", one.where, "ready" if one.ready else "not ready", one.advice)
+            for _, one in found
+        ]
+        echo_table(("GRIPPER", "SERIAL", "WHERE", "STATE", "ADVICE"), rows)
+    elif probes:
+        talk(f"no device found by {', '.join(probe.distribution for probe in probes)}")
+    else:
+        talk("no installed plugin looks for devices (graspsense plugins list)")

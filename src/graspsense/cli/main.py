@@ -1,0 +1,162 @@
+"""The command `graspsense`: its subcommands from a table, and what becomes of an error.
+
+The table holds names and import strings only, so that `--help` imports no plugin, no numpy and no command.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any, Final, NoReturn
+
+import click
+
+from graspsense import __version__
+from graspsense.core.errors import GraspsenseError, PluginUnavailable, UnknownName, suggestion
+
+PROGRAM: Final = "graspsense"
+COMPLETION_VARIABLE: Final = "_GRASPSENSE_COMPLETE"
+TRACEBACK_VARIABLE: Final = "GRASPSENSE_TRACEBACK"
+
+COMMANDS: Final[dict[str, tuple[str, str]]] = {
+    "run": ("graspsense.cli.run:run", "Grasp once, live in the terminal."),
+    "config": ("graspsense.cli.config:config", "Show or check the settings of a pipeline."),
+    "plugins": ("graspsense.cli.plugins:plugins", "Show what is installed and whether it works."),
+    "devices": ("graspsense.cli.devices:devices", "Look for grippers that are plugged in."),
+    "completion": ("graspsense.cli.completion:completion", "Print the completion script for a shell."),
+}
+"""Name to import string and summary of each command of our own."""
+
+EXIT_USAGE: Final = 2
+EXIT_BUG: Final = 70
+EXIT_INTERRUPTED: Final = 130
+EXIT_BROKEN_PIPE: Final = 141
+
+
+class Commands(click.Group):
+    """Our own commands from the table, anybody else's from their plugins when one is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of our own commands."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return a command. Raises UnknownName, PluginUnavailable."""
+        if cmd_name in COMMANDS:
+            module, _, name = COMMANDS[cmd_name][0].partition(":")
+            command: click.Command = getattr(import_module(module), name)
+            return command
+        return None if ctx.resilient_parsing or cmd_name.startswith("-") else _plugin_command(cmd_name)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands for the help, from the table."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[Any]:
+        """Return the commands that begin so, without importing them."""
+        from click.shell_completion import CompletionItem
+
+        commands = [
+            CompletionItem(name, help=summary)
+            for name, (_, summary) in COMMANDS.items()
+            if name.startswith(incomplete)
+        ]
+        return [*commands, *click.Command.shell_complete(self, ctx, incomplete)]
+
+
+def _plugin_command(name: str) -> click.Command:
+    from graspsense.core.plugins import installed
+
+    plugins = installed()
+    offers = plugins.commands()
+    if all(name not in (offer.name, offer.qualified) for offer in offers):
+        known = [*COMMANDS, *(offer.name for offer in offers)]
+        raise UnknownName(
+            f"no command named {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}"
+            + plugins.absences()
+        )
+    offer = plugins.command(name)
+    command = offer.load()
+    if not isinstance(command, click.Command):
+        raise PluginUnavailable(
+            f"command {name!r} of {offer.distribution} {offer.version} cannot be used here: "
+            f"{offer.entry.target} is no click command"
+        )
+    return command
+
+
+@click.group(
+    cls=Commands,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Plugins may add commands: see `graspsense plugins list`.",
+)
+@click.version_option(__version__, prog_name=PROGRAM)
+@click.pass_context
+def cli(ctx: click.Context) -> None:
+    """Feel what a thing is, whether it is open and whether it is full, while a gripper closes on it."""
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run the command line and exit with its code; no argument means the process's own."""
+    sys.exit(_exit_code(list(sys.argv[1:] if arguments is None else arguments)))
+
+
+def _exit_code(arguments: list[str]) -> int:
+    instruction = os.environ.get(COMPLETION_VARIABLE)
+    if instruction:
+        from click.shell_completion import shell_complete
+
+        return shell_complete(cli, {}, PROGRAM, COMPLETION_VARIABLE, instruction)
+    try:
+        with cli.make_context(PROGRAM, arguments) as ctx:
+            if os.environ.get("NO_COLOR"):
+                ctx.color = False
+            cli.invoke(ctx)
+        sys.stdout.flush()
+        return 0
+    except click.exceptions.Exit as ended:
+        return ended.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read us has gone; the interpreter's last flush must not complain of it either.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_BROKEN_PIPE
+    except Exception as error:
+        return _report(error, as_json="--json" in arguments)
+
+
+def _report(error: Exception, as_json: bool) -> int:
+    """Tell of an error, on stderr and with --json on stdout too, and return the exit code."""
+    if isinstance(error, GraspsenseError):
+        message, code = str(error), error.exit_code
+    elif isinstance(error, click.ClickException):
+        message, code = error.format_message(), EXIT_USAGE
+        if isinstance(error, click.UsageError) and error.ctx is not None:
+            message += f"\n  {error.ctx.command_path} --help shows what there is"
+    elif isinstance(error, OSError):
+        place = f": {error.filename}" if error.filename else ""
+        message, code = f"{error.strerror or error}{place}", EXIT_USAGE
+    else:
+        message, code = f"{type(error).__name__}: {error}", EXIT_BUG
+    talk = message
+    if code == EXIT_BUG:
+        talk = f"internal error: {message}\n  This is a bug, ours or a plugin's."
+        if os.environ.get(TRACEBACK_VARIABLE) != "1":
+            talk += f" Run it again with {TRACEBACK_VARIABLE}=1 to see where it happened."
+    if os.environ.get(TRACEBACK_VARIABLE) == "1":
+        talk = "".join(traceback.format_exception(error)) + talk
+    click.echo(f"{PROGRAM}: {talk}" if not talk.startswith("Traceback") else talk, err=True)
+    if as_json:
+        from graspsense.cli.output import echo_json
+
+        echo_json({"error": {"kind": type(error).__name__, "message": message, "exit_code": code}})
+    return code

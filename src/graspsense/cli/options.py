@@ -1,0 +1,67 @@
+"""The options by which every command that needs a pipeline is told which one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from graspsense.core.config import Settings
+
+CommandT = TypeVar("CommandT", bound=Callable[..., Any])
+
+DEFAULT_PIPELINE: Final = "default"
+
+_OPTIONS: Final = (
+    click.option(
+        "--pipeline",
+        metavar="NAME|FILE",
+        help=f"A pipeline by name, or a .toml file.  [default: {DEFAULT_PIPELINE}]",
+    ),
+    click.option("--gripper", metavar="NAME", help="Another gripper: sim, pr2, replay, ... (gripper.type)"),
+    click.option(
+        "--object",
+        "object_name",
+        metavar="NAME:STATE",
+        help="What a simulated gripper finds, as in odwalla:full_open. (gripper.object)",
+    ),
+    click.option(
+        "-o",
+        "options",
+        metavar="TABLE.KEY=VALUE",
+        multiple=True,
+        help="Any other key, as in -o controller.probing_force_n=17. May be given again.",
+    ),
+    click.option("--seed", type=int, help="What everything drawn at random follows from. (run.seed)"),
+)
+
+
+def pipeline_options(command: CommandT) -> CommandT:
+    """Add --pipeline, --gripper, --object, -o and --seed; their values are what `settings_of` takes."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def settings_of(
+    pipeline: str | None,
+    gripper: str | None,
+    object_name: str | None,
+    options: Sequence[str],
+    seed: int | None,
+) -> Settings:
+    """Return the settings that these options ask for. Raises ConfigError with every error at once."""
+    from graspsense.core.config import Flag, resolve
+
+    flags = (
+        Flag("--gripper", "gripper.type", gripper),
+        Flag("--object", "gripper.object", object_name),
+        Flag("--seed", "run.seed", seed),
+    )
+    return resolve(
+        pipeline if pipeline is not None else DEFAULT_PIPELINE,
+        options=options,
+        flags=[flag for flag in flags if flag.value is not None],
+    )
