@@ -1,0 +1,1 @@
+"""A simulated gripper for graspsense. Importing this imports nothing else."""

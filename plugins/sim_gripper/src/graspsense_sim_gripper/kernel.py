@@ -1,0 +1,261 @@
+"""Composing a scene's step, and compiling the whole loop where many grasps are wanted.
+
+`sum_of` folds a scene's terms in pairs; `world_of` binds them into the plant. Everything runs as it is in the
+interpreter. `compiled` compiles a bound function with all it reaches. This is the only module that imports numba,
+and only when a loop is compiled.
+
+numba keeps compiled code on disk under a function's file, name and argument types. Two compositions of the same
+functions share all three, so each gets a fingerprint of its code, constants and parts in its name: without it a
+composition loaded from disk can silently run another's code, and an edited helper is not noticed.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import sys
+import types
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from graspsense.plugin_api import TARING, Pads, bind, tick
+from graspsense_sim_gripper import plant
+from graspsense_sim_gripper.plant import PlantParams, PlantState
+from graspsense_sim_gripper.sensing import SensorParams, SensorState, felt_again, sense
+from graspsense_sim_gripper.terms import Law
+
+
+def _nothing(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
+    return 0.0, ()
+
+
+first: Any = _nothing
+rest: Any = _nothing
+
+
+def _pair(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
+    force, state = first(params[0], states[0], d0, d1, h)
+    others, left = rest(params[1:], states[1:], d0, d1, h)
+    return force + others, (state, *left)
+
+
+def sum_of(laws: Sequence[Law]) -> Law:
+    """Return one term that is the sum of these: parameters and states become tuples in the same order."""
+    total: Any = _nothing
+    for law in reversed(laws):
+        total = bind(_pair, first=law, rest=total)
+    return total  # type: ignore[no-any-return]
+
+
+def plant_of(laws: Sequence[Law]) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
+    """Return `move` for an object that is the sum of these terms."""
+    squeeze = bind(plant.squeeze, advance=sum_of(laws))
+    piece = bind(plant._piece, squeeze=squeeze, _felt=bind(plant._felt, squeeze=squeeze))
+    return bind(plant.move, _piece=piece)
+
+
+move: Any = _nothing
+control: Any = _nothing
+
+
+def grasp(
+    plant_params: PlantParams,
+    sensor_params: SensorParams,
+    dt: float,
+    tick_params: Any,
+    body: PlantState,
+    sensor: SensorState,
+    state: Any,
+    left_zero: Any,
+    right_zero: Any,
+    noise: Any,
+    images: Any,
+    image_times: Any,
+    columns: Any,
+) -> tuple[int, PlantState, SensorState, Any]:
+    """Run one whole grasp; return how many ticks were recorded, and the plant, the sensor, the state at the end.
+
+    The runner's loop on arrays: `left_zero` and `right_zero` (22,) hold the zero before the tare and become the
+    tare; `images` (k, 2, 22), NaN at first, and `image_times` (k,) are filled; `columns` (n, 11) gets a row a
+    tick from the approach on: the frame without its `dt_s`, then phase and command. It ends where they are full.
+    """
+    effort = 0.0
+    ticks = 0
+    recorded = 0
+    untared = 0
+    phase = -1
+    while recorded < len(columns) and sensor.images < len(images):
+        frame, sensor = sense(
+            sensor_params, sensor, body, ticks * dt, dt, effort, left_zero, right_zero, noise, images
+        )
+        count = sensor.images
+        if count > 0:
+            image_times[count - 1] = sensor.image_t_s
+        pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
+        command, state = control(tick_params, state, frame, pads)
+        if state.phase != phase:
+            if phase == TARING and count > untared:
+                _tare(images, untared, count, left_zero, right_zero)
+                sensor = felt_again(sensor, images, left_zero, right_zero)
+            phase = state.phase
+            untared = count
+        effort = command.value
+        if phase > TARING:
+            row = columns[recorded]
+            row[0] = frame.t_s
+            row[1] = frame.gap_m
+            row[2] = frame.velocity_m_s
+            row[3] = frame.effort_n
+            row[4] = frame.force_left_n
+            row[5] = frame.force_right_n
+            row[6] = frame.edge_left_n
+            row[7] = frame.edge_right_n
+            row[8] = frame.status
+            row[9] = phase
+            row[10] = effort
+            recorded += 1
+        if state.done == 1 or state.guard.stopped == 1:
+            break
+        body = move(plant_params, body, effort, dt)
+        ticks += 1
+    return recorded, body, sensor, state
+
+
+def _tare(images: Any, begin: int, end: int, left_zero: Any, right_zero: Any) -> None:
+    """Make the mean of images `begin` to `end` the zero, summed in the order in which they came."""
+    for i in range(len(left_zero)):
+        left = images[begin][0][i]
+        right = images[begin][1][i]
+        for k in range(begin + 1, end):
+            left += images[k][0][i]
+            right += images[k][1][i]
+        left_zero[i] = left / (end - begin)
+        right_zero[i] = right / (end - begin)
+
+
+def grasp_of(laws: Sequence[Law], step: Callable[..., Any]) -> Callable[..., Any]:
+    """Return `grasp` for an object of these terms under this control law, in plain Python."""
+    return bind(grasp, move=plant_of(laws), control=bind(tick, step=step))
+
+
+# ------------------------------------------------------------------------------------------------- compiling
+
+
+class NotCompilable(Exception):
+    """A function outside the subset that can be compiled; the text names it and the reason."""
+
+
+def compiled(function: Callable[..., Any], memo: dict[str, Any]) -> Callable[..., Any]:
+    """Return `function` compiled with all it reaches; `memo` keeps what this process has compiled.
+
+    Raises NotCompilable for closures and recursion, and where numba cannot be imported.
+    """
+    try:
+        import numba
+    except ImportError as error:
+        raise NotCompilable('numba is not installed: pip install "graspsense-sim-gripper[fast]"') from error
+    _use_cache_folder()
+    return _compiled(function, memo, numba, outermost=True, above=())
+
+
+def _compiled(
+    function: Callable[..., Any],
+    memo: dict[str, Any],
+    numba: types.ModuleType,
+    outermost: bool,
+    above: tuple[int, ...],
+) -> Callable[..., Any]:
+    plain = _plain(function)
+    if id(plain) in above:
+        raise NotCompilable(f"{plain.__module__}.{plain.__qualname__} calls itself, which cannot be compiled")
+    mark = fingerprint(plain)
+    key = f"{mark}{'!' if outermost else ''}"
+    if key not in memo:
+        parts = {
+            name: _compiled(value, memo, numba, outermost=False, above=(*above, id(plain)))
+            for name, value in _reached(plain)
+            if isinstance(_unwrapped(value), types.FunctionType)
+        }
+        copy = bind(plain, **parts)
+        copy.__qualname__ = f"{plain.__qualname__}_{mark}"
+        # Only the outermost is kept on disk: the rest is inside it.
+        memo[key] = numba.njit(copy, nogil=True, cache=outermost)
+    return memo[key]  # type: ignore[no-any-return]
+
+
+def fingerprint(function: Callable[..., Any]) -> str:
+    """Return a mark that differs where the code, a constant or a part of this function differs, however deep."""
+    digest = hashlib.sha256()
+    for item in _described(_plain(function), ()):
+        digest.update(item.encode())
+        digest.update(b"\0")
+    return digest.hexdigest()[:16]
+
+
+def _described(function: types.FunctionType, above: tuple[int, ...]) -> Iterator[str]:
+    if id(function) in above:
+        raise NotCompilable(f"{function.__module__}.{function.__qualname__} calls itself")
+    if function.__closure__:
+        raise NotCompilable(
+            f"{function.__module__}.{function.__qualname__} is a closure over "
+            f"{', '.join(function.__code__.co_freevars)}: pass those as parameters"
+        )
+    code = function.__code__
+    # The interpreter's version and the place of the source: both decide what numba finds on disk.
+    yield f"{sys.version_info[:2]} {function.__module__} {code.co_name} {code.co_varnames} {code.co_names}"
+    yield code.co_code.hex()
+    yield repr([c for c in code.co_consts if not isinstance(c, types.CodeType)])
+    yield repr(function.__defaults__)
+    for nested in _codes(code)[1:]:
+        yield nested.co_code.hex()
+        yield repr([c for c in nested.co_consts if not isinstance(c, types.CodeType)])
+    for name, value in _reached(function):
+        value = _unwrapped(value)
+        yield name
+        if isinstance(value, types.FunctionType):
+            yield from _described(value, (*above, id(function)))
+        elif isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields"):
+            yield f"{value.__module__} {value.__qualname__} {value._fields} {value._field_defaults}"
+        elif isinstance(value, int | float | str | bool | tuple):
+            yield repr(value)
+        else:
+            yield getattr(value, "__qualname__", getattr(value, "__name__", type(value).__qualname__))
+
+
+def _reached(function: types.FunctionType) -> list[tuple[str, Any]]:
+    names: dict[str, None] = {}
+    for code in _codes(function.__code__):
+        names.update(dict.fromkeys(code.co_names))
+    return [(n, function.__globals__[n]) for n in sorted(names) if n in function.__globals__]
+
+
+def _codes(code: types.CodeType) -> list[types.CodeType]:
+    found = [code]
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            found.extend(_codes(constant))
+    return found
+
+
+def _unwrapped(value: Any) -> Any:
+    """Return the plain function of one that is already compiled by numba, anything else as it is."""
+    return getattr(value, "py_func", value)
+
+
+def _plain(function: Callable[..., Any]) -> types.FunctionType:
+    plain = _unwrapped(function)
+    if not isinstance(plain, types.FunctionType):
+        raise NotCompilable(f"{function!r} is no plain function")
+    return plain
+
+
+@functools.cache
+def _use_cache_folder() -> None:
+    """Keep compiled code in a folder of the user's: an installed package may not be writable."""
+    import numba
+
+    if "NUMBA_CACHE_DIR" not in os.environ:
+        base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+        numba.config.CACHE_DIR = str(Path(base) / "graspsense" / "compiled")

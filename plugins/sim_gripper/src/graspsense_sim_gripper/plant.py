@@ -1,0 +1,256 @@
+"""The gripper and what it squeezes: one degree of freedom, the motor angle, with a true stuck state.
+
+The balance on the gap p is that of a geared pair of fingers,
+
+    m(p) p'' + 1/2 m'(p) p'^2 = -F + (N_l + N_r)/2 - friction - b p',
+
+with m(p) = (2 pi / (dp/dMR))^2 J, the rotor's inertia J seen through the transmission. It is integrated in the
+motor angle, where the inertia is constant and the m' term is none; 73 to 123 kg on the gap of a PR2, beside which
+the fingers' own 0.2 kg vanish. Friction is Coulomb, Stribeck and a part that grows with the load on the screw;
+below breakaway nothing moves at all. A step is a kick, a drift and a kick (second order); contact, stop and
+reversal are located inside it.
+
+The object is free on a table, its mass negligible beside m: a finger that touches first pushes it, with the
+table's friction on that pad, until both touch.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+from graspsense.plugin_api import ScrewLinkage, gap_and_rate
+
+EVENTS_A_STEP: Final = 16
+"""A step is cut at most this often; the rest is then taken whole."""
+SEARCH: Final = 40
+"""Most steps of the search for the object's share of the compression."""
+FORCE_ROUNDING_N: Final = 1e-9
+FORCE_ROUNDING: Final = 1e-9
+"""The search ends where the force balances to this, absolute and relative."""
+
+
+class Drive(NamedTuple):
+    """The gripper: linkage, rotor, friction, ends of travel."""
+
+    link: ScrewLinkage
+    inertia: float
+    """(2 pi)^2 times the rotor's inertia, kg m2: force on the gap times its rate, over this, is rev/s2."""
+    coulomb_n: float
+    breakaway_n: float
+    stribeck_m_s: float
+    load_share: float
+    """Friction added per newton of mean pad force."""
+    damping_n_s_m: float
+    closed_rev: float
+    open_rev: float
+
+
+class Thing(NamedTuple):
+    """What stands between the fingers. `terms` are the parameters of its terms, in order."""
+
+    width_m: float
+    table_n: float
+    """Friction of the table that the finger touching first has to overcome."""
+    skins_n_m: float
+    """Stiffness of the two fingertip covers in series; `inf`: rigid covers."""
+    terms: Any
+
+
+class PlantParams(NamedTuple):
+    """The drive, the object, and in how many steps a tick is taken while they are near each other."""
+
+    drive: Drive
+    thing: Thing
+    substeps: int
+
+
+class Squeezed(NamedTuple):
+    """The object's compression, the force that goes with it, its last slope, and its terms' states."""
+
+    compression_m: float
+    force_n: float
+    slope_n_m: float
+    states: Any
+
+
+class PlantState(NamedTuple):
+    """Motor angle and speed (revolutions), the gap with its rate, forces on the pads, the object's state."""
+
+    revolutions: float
+    speed_rev_s: float
+    gap_m: float
+    rate_m_rev: float
+    left_n: float
+    right_n: float
+    offset_m: float
+    """Where the object stands off the gripper's centre line; positive is nearer the right finger."""
+    touched: int
+    squeezed: Squeezed
+    peak_n: float
+
+
+def _unbound(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
+    raise TypeError("the plant has no terms: bind(squeeze, advance=sum_of(terms))")
+
+
+advance: Callable[[Any, Any, float, float, float], tuple[float, Any]] = _unbound
+
+
+def squeeze(thing: Thing, now: Squeezed, closure_m: float, h: float) -> Squeezed:
+    """Return the object after the fingers have come to `closure_m` (its width less the gap) within `h`.
+
+    The covers' compression and the object's add up to the closure and carry one force; a secant search finds
+    the object's share. Where that force would pull, the object springs back by itself, free of force.
+    """
+    d0, force0, slope, states0 = now
+    skins = thing.skins_n_m
+    terms = thing.terms
+    if skins == math.inf:
+        force, states = advance(terms, states0, d0, closure_m, h)
+        if force >= 0.0:
+            return Squeezed(closure_m, force, slope, states)
+        skins = 0.0
+    while True:
+        slope = max(slope, 1.0)
+        d1 = d0 + (skins * (closure_m - d0) - force0) / (skins + slope)
+        force, states = advance(terms, states0, d0, d1, h)
+        residual = force - skins * (closure_m - d1)
+        for _ in range(SEARCH):
+            if abs(residual) <= FORCE_ROUNDING_N + FORCE_ROUNDING * abs(force):
+                break
+            d2 = d1 - residual / (skins + slope)
+            if d2 == d1:
+                break
+            force2, states = advance(terms, states0, d0, d2, h)
+            # Over less than this the difference of two forces is mostly rounding.
+            if abs(d2 - d1) > 1e-13:
+                slope = max((force2 - force) / (d2 - d1), 1.0)
+            d1, force = d2, force2
+            residual = force - skins * (closure_m - d1)
+        if skins == 0.0:
+            return Squeezed(d1, 0.0, slope, states)
+        if force >= 0.0:
+            return Squeezed(d1, force, slope, states)
+        skins = 0.0
+
+
+def friction(drive: Drive, velocity_m_s: float, load_n: float) -> float:
+    """Return the sliding friction (N, positive) at this speed of the gap and this mean pad force."""
+    x = velocity_m_s / drive.stribeck_m_s
+    force = drive.coulomb_n + drive.load_share * load_n
+    if -6.0 < x < 6.0:
+        force += (drive.breakaway_n - drive.coulomb_n) * math.exp(-x * x)
+    return force
+
+
+def move(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
+    """Return the plant after `dt` under a constant effort (N, positive squeezes)."""
+    drive, thing, steps = params
+    if steps > 1 and state.gap_m - thing.width_m - 2.0 * abs(state.offset_m) > dt:
+        # Further off than a metre a second would take it.
+        steps = 1
+    h = dt / steps
+    for _ in range(steps):
+        left = h
+        for event in range(EVENTS_A_STEP):
+            state, used = _piece(drive, thing, state, effort_n, left, event == EVENTS_A_STEP - 1)
+            left -= used
+            if left <= 1e-12 * h:
+                break
+    return state
+
+
+def _piece(
+    drive: Drive, thing: Thing, state: PlantState, effort_n: float, h: float, whole: bool
+) -> tuple[PlantState, float]:
+    """Return the plant after one piece of motion without an event inside, and how long it took."""
+    revolutions, speed, gap, rate, left, right, offset, touched, squeezed, peak = state
+    load = 0.5 * (left + right)
+    net = load - effort_n
+    gain = rate / drive.inertia
+
+    if speed == 0.0:
+        resisting = drive.breakaway_n + drive.load_share * load
+        if (
+            abs(net) <= resisting
+            or (net > 0.0 and revolutions >= drive.open_rev)
+            or (net < 0.0 and revolutions <= drive.closed_rev)
+        ):
+            if touched == 0:
+                return state, h
+            squeezed = squeeze(thing, squeezed, thing.width_m - gap, h)
+            force = squeezed.force_n
+            # A pad that alone holds the object against the table goes on doing so.
+            left, right = max(force, min(left, thing.table_n)), max(force, min(right, thing.table_n))
+            peak = max(peak, force)
+            return PlantState(revolutions, 0.0, gap, rate, left, right, offset, touched, squeezed, peak), h
+        direction = 1.0 if net > 0.0 else -1.0
+    else:
+        direction = 1.0 if speed > 0.0 else -1.0
+        resisting = friction(drive, speed * rate, load)
+    kick = gain * (net - direction * resisting - drive.damping_n_s_m * speed * rate)
+
+    used = h
+    stops = speed != 0.0 and (speed + kick * h) * direction <= 0.0 and not whole
+    if stops:
+        used = min(-speed / kick, h)
+    revolutions1 = revolutions + used * (speed + 0.5 * kick * used)
+    gap1, rate1 = gap_and_rate(drive.link, revolutions1)
+
+    # The gap at which a finger touches, or once one does, the second.
+    reach = thing.width_m + 2.0 * abs(offset)
+    touching = reach if gap > reach else thing.width_m
+    if gap > touching > gap1 and not whole:
+        used = used * (gap - touching) / (gap - gap1)
+        stops = False
+        revolutions1 = revolutions + used * (speed + 0.5 * kick * used)
+        gap1, rate1 = gap_and_rate(drive.link, revolutions1)
+        gap1 = min(gap1, touching)
+
+    if touched == 1 or gap1 <= reach:
+        left, right, offset, squeezed = _felt(thing, state, gap1, used)
+        touched = 1
+        peak = max(peak, squeezed.force_n)
+        load = 0.5 * (left + right)
+
+    if stops:
+        speed1 = 0.0
+    else:
+        guess = speed + kick * used
+        resisting = friction(drive, guess * rate1, load)
+        kick1 = (
+            rate1
+            / drive.inertia
+            * (load - effort_n - direction * resisting - drive.damping_n_s_m * guess * rate1)
+        )
+        speed1 = speed + 0.5 * used * (kick + kick1)
+        if speed1 * direction < 0.0:
+            speed1 = 0.0
+    if revolutions1 >= drive.open_rev and speed1 > 0.0:
+        revolutions1, speed1 = drive.open_rev, 0.0
+        gap1, rate1 = gap_and_rate(drive.link, revolutions1)
+    elif revolutions1 <= drive.closed_rev and speed1 < 0.0:
+        revolutions1, speed1 = drive.closed_rev, 0.0
+        gap1, rate1 = gap_and_rate(drive.link, revolutions1)
+    return PlantState(revolutions1, speed1, gap1, rate1, left, right, offset, touched, squeezed, peak), used
+
+
+def _felt(thing: Thing, state: PlantState, gap_m: float, h: float) -> tuple[float, float, float, Squeezed]:
+    """Return the forces on the pads at this gap, reached in `h`, where the object then stands, and its state."""
+    closure = thing.width_m - gap_m
+    offset, squeezed = state.offset_m, state.squeezed
+    left = right = 0.0
+    if -closure <= 2.0 * abs(offset):
+        pushed = 0.5 * max(-closure, 0.0)
+        if pushed < abs(offset):
+            right = thing.table_n if offset > 0.0 else 0.0
+            left = thing.table_n - right
+        elif closure > 0.0:
+            left, right = min(state.left_n, thing.table_n), min(state.right_n, thing.table_n)
+        offset = pushed if offset >= 0.0 else -pushed
+    if closure > 0.0 or squeezed.compression_m != 0.0:
+        squeezed = squeeze(thing, squeezed, closure, h)
+    force = squeezed.force_n
+    return max(force, left), max(force, right), offset, squeezed

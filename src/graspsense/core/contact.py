@@ -1,0 +1,50 @@
+"""The two instants a grasp turns on: first contact of both fingers, and coming to rest.
+
+Chitta, Piccoli and Sturm (ICRA 2010), equations 1 and 2, as they must be read: contact is the first time at
+which *both* pads are at or above tau_1 (the text; the printed formula has the inequality reversed), and rest is
+a speed that *stays* below tau_2 (the printed formula takes a single sample, which noise would end).
+Controllers and features share these, so that they never disagree on when a thing was touched or at rest.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+CONTACT_FORCE_N: Final = 0.625
+"""tau_1 on each pad: 1000 counts over the tared zero at 1600 counts/N, as in the authors' code."""
+REST_SPEED_M_S: Final = 1e-4
+"""tau_2: 0.1 mm/s, as in the authors' code."""
+REST_WINDOW_S: Final = 0.05
+"""How long the speed must stay below tau_2: one encoder tick in 1 ms alone is 0.33 mm/s on the PR2."""
+
+
+class Stillness(NamedTuple):
+    """Since when, and where, the gap has stood still."""
+
+    since_t_s: float
+    gap_m: float
+
+
+def both_touch(force_left_n: float, force_right_n: float, contact_force_n: float) -> bool:
+    """Return whether both pads are at or above the contact force (equation 1). NaN never touches."""
+    return force_left_n >= contact_force_n and force_right_n >= contact_force_n
+
+
+def watch(
+    still: Stillness, t_s: float, gap_m: float, rest_speed_m_s: float, rest_window_s: float
+) -> Stillness:
+    """Return the stillness after one more sample: unchanged, or begun anew where the gap has moved on.
+
+    The gap may stray from where the stillness began by the rest speed times the window; on a clock slower than
+    the window, by the rest speed times the time elapsed. A gap that is NaN is never still.
+    """
+    allowed_m = rest_speed_m_s * max(rest_window_s, t_s - still.since_t_s)
+    if abs(gap_m - still.gap_m) <= allowed_m:
+        return still
+    return Stillness(t_s, gap_m)
+
+
+def at_rest(still: Stillness, t_s: float, rest_window_s: float) -> bool:
+    """Return whether the stillness has lasted the window (equation 2); rest then began at `still.since_t_s`."""
+    # Half a nanosecond of grace: sums of ticks of 1 ms fall short of 50 ms by rounding.
+    return t_s - still.since_t_s >= rest_window_s - 5e-10

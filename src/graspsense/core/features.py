@@ -1,0 +1,102 @@
+"""Features, tables of them, and predictions: what passes between a feature set and a classifier."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from attrs import field, frozen
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@frozen(kw_only=True)
+class Features:
+    """Named numbers drawn from one trace.
+
+    A feature that is not defined on this trace is NaN, and `reasons` says why. NaN means *missing*.
+    """
+
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    units: tuple[str, ...]
+    reasons: Mapping[str, str] = field(factory=dict)
+
+    def __attrs_post_init__(self) -> None:
+        if not len(self.names) == len(self.values) == len(self.units):
+            raise ValueError(
+                f"{len(self.names)} names, {len(self.values)} values and {len(self.units)} units: "
+                "give one of each a feature"
+            )
+        for name, value in zip(self.names, self.values, strict=True):
+            if math.isinf(value):
+                raise ValueError(
+                    f"feature {name!r} is {value}: give NaN with a reason where it is not defined"
+                )
+            if math.isnan(value) and not self.reasons.get(name):
+                raise ValueError(f"feature {name!r} is NaN without a reason: add one to `reasons`")
+
+    def __getitem__(self, name: str) -> float:
+        """Return the value of one feature; KeyError names the known ones."""
+        try:
+            return self.values[self.names.index(name)]
+        except ValueError:
+            raise KeyError(f"no feature {name!r}; there are {', '.join(self.names)}") from None
+
+    def as_dict(self) -> dict[str, float | None]:
+        """Return name to value, with None for a missing one (JSON has no NaN)."""
+        return {n: None if math.isnan(v) else v for n, v in zip(self.names, self.values, strict=True)}
+
+
+@frozen(kw_only=True, eq=False)
+class FeatureTable:
+    """Features of many trials: `values` has shape (trials, features), NaN is missing."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        """Return the number of trials."""
+        return len(self.values)
+
+
+def table_of(rows: Sequence[Features]) -> FeatureTable:
+    """Return the table of these features, which must agree in names and units. ValueError if they do not."""
+    import numpy as np
+
+    if not rows:
+        raise ValueError("a table needs at least one trial")
+    first = rows[0]
+    for row in rows:
+        if row.names != first.names or row.units != first.units:
+            raise ValueError(
+                f"trials disagree: {row.names} in {row.units} beside {first.names} in {first.units}"
+            )
+    values = np.array([row.values for row in rows], dtype=np.float64)
+    return FeatureTable(names=first.names, units=first.units, values=values)
+
+
+@frozen(kw_only=True)
+class Prediction:
+    """What a classifier says of one trial.
+
+    `label` is a class, or `unknown` where the trial lies far outside the training data. `probabilities` sum to 1.
+    `because` is the reason in words and units, one step an item.
+    """
+
+    label: str
+    probabilities: Mapping[str, float]
+    because: tuple[str, ...] = field(converter=tuple)
+    warnings: tuple[str, ...] = field(default=(), converter=tuple)
+
+
+UNKNOWN = "unknown"
+
+
+def missing(names: Iterable[str], reason: str) -> dict[str, str]:
+    """Return one reason for each of these features."""
+    return dict.fromkeys(names, reason)

@@ -1,0 +1,77 @@
+"""The guard between a controller and a gripper: limits, and a stop where a command is no number.
+
+It clamps to the gripper's limits of effort and speed and to the command's own, turns NaN into a stop, keeps the
+first closing of a real gripper slow and weak until a contact has once been seen, and counts each time it acted.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from graspsense.core.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame
+
+
+class GuardParams(NamedTuple):
+    """Limits in N and m/s; `first_*` hold until a pad has once felt `contact_force_n` (`inf`: no such limit)."""
+
+    effort_limit_n: float
+    speed_limit_m_s: float
+    first_effort_n: float
+    first_speed_m_s: float
+    contact_force_n: float
+
+
+class GuardState(NamedTuple):
+    """Whether a contact was ever felt, on how many ticks the guard acted, and whether it stopped the grasp."""
+
+    contact_seen: int
+    acted: int
+    stopped: int
+
+
+def guard(
+    params: GuardParams, state: GuardState, frame: Frame, command: Command
+) -> tuple[Command, GuardState]:
+    """Return the command as the gripper may have it, and the guard's state.
+
+    An effort in the direction in which the gap already moves at the speed limit becomes 0: friction brakes.
+    """
+    kind, value, effort_limit, speed_limit = command
+    contact_seen, acted, stopped = state
+    # A limit that is NaN fails this comparison, is kept, and stops the grasp below.
+    if params.effort_limit_n < effort_limit:
+        effort_limit = params.effort_limit_n
+    if params.speed_limit_m_s < speed_limit:
+        speed_limit = params.speed_limit_m_s
+    if contact_seen == 0:
+        if frame.force_left_n >= params.contact_force_n or frame.force_right_n >= params.contact_force_n:
+            contact_seen = 1
+        else:
+            if params.first_effort_n < effort_limit:
+                effort_limit = params.first_effort_n
+            if params.first_speed_m_s < speed_limit:
+                speed_limit = params.first_speed_m_s
+    if stopped == 1 or value != value or not (effort_limit >= 0.0 and speed_limit >= 0.0):
+        halt = Command(EFFORT, 0.0, params.effort_limit_n, params.speed_limit_m_s)
+        return halt, GuardState(contact_seen, acted + 1, 1)
+
+    asked = value
+    if kind == EFFORT:
+        if value > effort_limit:
+            value = effort_limit
+        elif value < -effort_limit:
+            value = -effort_limit
+        velocity = frame.velocity_m_s
+        if (value > 0.0 and -velocity > speed_limit) or (value < 0.0 and velocity > speed_limit):
+            value = 0.0
+    elif kind == VELOCITY:
+        value = min(max(value, -speed_limit), speed_limit)
+    elif kind == FORCE:
+        value = min(max(value, 0.0), effort_limit)
+    elif kind == POSITION:
+        value = max(value, 0.0)
+    if value != asked:
+        acted += 1
+    if contact_seen != state.contact_seen or acted != state.acted:
+        state = GuardState(contact_seen, acted, 0)
+    return Command(kind, value, effort_limit, speed_limit), state

@@ -1,0 +1,96 @@
+"""The hooks a plugin can implement. Component hooks return entries; observer hooks return nothing.
+
+A plugin implements any of these as module functions marked with `graspsense.plugin_api.hookimpl`, in the module
+that its entry point in the group `graspsense.plugins` names. No hook depends on the order of plugins, and none
+may change a run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import pluggy
+
+from graspsense.core.entries import (
+    ClassifierEntry,
+    CommandEntry,
+    ControllerEntry,
+    DatasetEntry,
+    FeatureSetEntry,
+    FoundDevice,
+    ModelEntry,
+    PipelineEntry,
+    SensorBackendEntry,
+)
+
+if TYPE_CHECKING:
+    from graspsense.core.trial import GraspEvent, RunInfo, Trial
+
+PROJECT = "graspsense"
+ENTRY_POINT_GROUP = "graspsense.plugins"
+API = (1, 0)
+"""Version of these hooks. A plugin's `GRASPSENSE_API` must have the same major and no larger minor number."""
+
+hookspec = pluggy.HookspecMarker(PROJECT)
+hookimpl = pluggy.HookimplMarker(PROJECT)
+
+
+@hookspec
+def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:  # type: ignore[empty-body]
+    """Return the grippers this plugin brings."""
+
+
+@hookspec
+def graspsense_controllers() -> Iterable[ControllerEntry]:  # type: ignore[empty-body]
+    """Return the control laws this plugin brings."""
+
+
+@hookspec
+def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:  # type: ignore[empty-body]
+    """Return the feature sets this plugin brings."""
+
+
+@hookspec
+def graspsense_classifiers() -> Iterable[ClassifierEntry]:  # type: ignore[empty-body]
+    """Return the classifiers this plugin brings."""
+
+
+@hookspec
+def graspsense_pipelines() -> Iterable[PipelineEntry]:  # type: ignore[empty-body]
+    """Return the pipeline files this plugin ships."""
+
+
+@hookspec
+def graspsense_models() -> Iterable[ModelEntry]:  # type: ignore[empty-body]
+    """Return the trained models this plugin ships."""
+
+
+@hookspec
+def graspsense_datasets() -> Iterable[DatasetEntry]:  # type: ignore[empty-body]
+    """Return the readers of recorded data this plugin brings."""
+
+
+@hookspec
+def graspsense_commands() -> Iterable[CommandEntry]:  # type: ignore[empty-body]
+    """Return further subcommands of `graspsense`."""
+
+
+@hookspec
+def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:  # type: ignore[empty-body]
+    """Look for devices for at most `timeout_s` seconds. May import drivers: only `graspsense devices` calls it."""
+
+
+@hookspec
+def graspsense_run_starting(run: RunInfo) -> None:
+    """Observe that a grasp is about to start."""
+
+
+@hookspec
+def graspsense_grasp_event(run: RunInfo, event: GraspEvent) -> None:
+    """Observe a change of phase, or that the guard acted."""
+
+
+@hookspec
+def graspsense_run_finished(run: RunInfo, trial: Trial) -> None:
+    """Observe the finished trial, whatever its outcome."""

@@ -1,0 +1,190 @@
+"""The four roles a component can play. Each is abstract; an implementation is final.
+
+A component is built from its config (an attrs class) and does nothing until it is used: no file, no device, no
+prompt in a constructor.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, Protocol, TypeVar
+
+from attrs import field, frozen
+
+from graspsense.core.signals import Command, Frame, Pads
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from graspsense.core.features import Features, FeatureTable, Prediction
+    from graspsense.core.trace import Trace
+
+ConfigT = TypeVar("ConfigT")
+
+
+class Reading(NamedTuple):
+    """What one read of a gripper gives: the frame of this tick and the last cell image."""
+
+    frame: Frame
+    pads: Pads
+
+
+@frozen(kw_only=True)
+class DeviceInfo:
+    """A gripper as it was opened.
+
+    On a `virtual` clock, apply-then-read advances one tick and nothing waits; on a `device` clock a read waits
+    for the next frame. `opening` is the command that opens the fingers and `relaxed` the one that lets go; a
+    recording has no opening (None). `tare_images` is how many unloaded cell images the tare needs (0: none).
+    `units` names units that are not SI, as of a recording: `{"t": "frame"}`. `frames_due` is the number of
+    frames a recording holds, None where there is no end to them.
+    """
+
+    name: str
+    serial: str = ""
+    firmware: str = ""
+    clock: Literal["virtual", "device"]
+    rate_hz: float = field(converter=float)
+    effort_limit_n: float = field(converter=float)
+    speed_limit_m_s: float = field(converter=float)
+    opening: Command | None
+    relaxed: Command
+    tare_images: int = 0
+    units: Mapping[str, str] = field(factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+class SensorBackend(ABC, Generic[ConfigT]):
+    """A gripper with its sensors, real, simulated, emulated or recorded.
+
+    The order of calls is open, then read and apply in turn, then close. Config is kept as `self.config`.
+    """
+
+    def __init__(self, config: ConfigT) -> None:
+        self.config = config
+
+    @abstractmethod
+    def open(self, seed: int) -> DeviceInfo:
+        """Open the gripper and describe it; bounded in time, asks nothing.
+
+        `seed` decides whatever the backend draws at random; a real gripper ignores it.
+
+        Raises NoDevice where the gripper is not there, saying what was looked for and what to try.
+        """
+
+    @abstractmethod
+    def read(self, timeout_s: float) -> Reading | None:
+        """Return the next frame with the last cell image, or None where none came within `timeout_s`.
+
+        Raises DeviceLost where the gripper stopped answering, RecordingEnded after the last recorded frame.
+        """
+
+    @abstractmethod
+    def apply(self, command: Command) -> None:
+        """Ask the gripper for this until the next command. Raises DeviceLost."""
+
+    @abstractmethod
+    def tare(self, images: Sequence[Pads]) -> None:
+        """Set the zero of the pads from these cell images, taken with nothing touching. Raises TareRefused."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Leave the gripper safe and let go of it. Bounded in time, can be called twice and in any state."""
+
+    def report(self) -> Mapping[str, float | int | str | bool]:
+        """Return what the backend counted, or knows beyond its frames (a simulator knows the true force)."""
+        return {}
+
+
+class BatchBackend(SensorBackend[ConfigT]):
+    """A backend that can do many grasps at once."""
+
+    @abstractmethod
+    def run_many(
+        self, controller: Controller[Any], scenes: Sequence[str], seeds: Sequence[int]
+    ) -> Sequence[Trace]:
+        """Grasp each scene with its seed under this controller and return the traces, in that order.
+
+        The same seed gives the same trace as `read` and `apply` under the runner, to rounding.
+        """
+
+
+class ControllerState(Protocol):
+    """What every controller state carries besides its own numbers."""
+
+    @property
+    def phase(self) -> int:
+        """`APPROACH`, `SQUEEZE` or `HOLD`."""
+
+    @property
+    def outcome(self) -> int:
+        """`RUNNING` until the law has ended the grasp, then an `Outcome` number."""
+
+
+StepLaw = Callable[[Any, Any, Frame, Pads], tuple[Command, Any]]
+
+
+class Controller(ABC, Generic[ConfigT]):
+    """A control law: a pure step over named tuples of numbers.
+
+    `step` is a class attribute: a plain function `step(params, state, frame, pads) -> (command, state)` without
+    clock, input, output or objects, in the subset of Python that a just-in-time compiler takes, so that the one
+    law drives a gripper, runs in a debugger and is compiled together with a simulated plant.
+    """
+
+    step: ClassVar[StepLaw]
+
+    def __init__(self, config: ConfigT) -> None:
+        self.config = config
+
+    @abstractmethod
+    def params(self) -> Any:
+        """Return the law's numbers as a named tuple of floats and integers."""
+
+    @abstractmethod
+    def init(self) -> ControllerState:
+        """Return the state before the first tick."""
+
+
+class FeatureSet(ABC, Generic[ConfigT]):
+    """Draws features from a trace."""
+
+    def __init__(self, config: ConfigT) -> None:
+        self.config = config
+
+    @abstractmethod
+    def extract(self, trace: Trace) -> Features:
+        """Return the features of this trace, defined or NaN with a reason for every trace there can be."""
+
+
+class Classifier(ABC, Generic[ConfigT]):
+    """Learns labels from a table of features, and predicts with reasons."""
+
+    def __init__(self, config: ConfigT) -> None:
+        self.config = config
+
+    @abstractmethod
+    def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
+        """Learn from these trials. The same table, labels and seed give the same model."""
+
+    @abstractmethod
+    def classes(self) -> tuple[str, ...]:
+        """Return the labels it can give, in the order of the columns of `probabilities`."""
+
+    @abstractmethod
+    def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
+        """Return shape (trials, classes); each row sums to 1."""
+
+    @abstractmethod
+    def explain(self, features: Features) -> Prediction:
+        """Return the prediction for one trial with its reason in words and units."""
+
+    @abstractmethod
+    def to_json(self) -> dict[str, Any]:
+        """Return the fitted model as values that JSON holds exactly."""
+
+    @abstractmethod
+    def from_json(self, model: Mapping[str, Any]) -> None:
+        """Become the model that `to_json` gave. Raises DataDamaged; runs nothing that the model names."""

@@ -1,0 +1,284 @@
+"""The runner owns time: it opens the gripper, drives one grasp tick by tick, and leaves the gripper safe.
+
+Open the fingers, tare, close under the controller, hold, open again; each tick it reads, steps, guards, applies
+and hands the tick to the sinks. On every way out (done, error, Ctrl-C, lost device) the fingers are told to open,
+then to relax, and the gripper is closed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Protocol
+
+from attrs import field, frozen
+from attrs.validators import ge, gt, instance_of
+
+from graspsense.core.binding import bind
+from graspsense.core.contact import CONTACT_FORCE_N, Stillness, at_rest, watch
+from graspsense.core.errors import DeviceLost, RecordingEnded, TareRefused
+from graspsense.core.guard import GuardParams, GuardState, guard
+from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
+from graspsense.core.signals import APPROACH, RUNNING, SQUEEZE, Command, Frame, Outcome, Pads, Phase
+from graspsense.core.tick import (
+    OPEN_SPEED_M_S,
+    OPEN_WINDOW_S,
+    TARING,
+    Schedule,
+    TickParams,
+    TickState,
+    first_state,
+    tick,
+)
+from graspsense.core.trace import SI_UNITS, Trace, TraceRecorder
+from graspsense.core.trial import GraspEvent
+
+
+@frozen(kw_only=True)
+class RunConfig:
+    """The `[run]` table: what holds for a grasp whatever the components are."""
+
+    seed: int = field(default=0, validator=[instance_of(int), ge(0)])
+    """Decides everything drawn at random."""
+    hold_s: float = field(default=0.25, validator=ge(0.0))
+    """How long a steady grasp is held before the fingers open."""
+    opening_timeout_s: float = field(default=5.0, validator=gt(0.0))
+    """Opening, taring and releasing each take at most this long."""
+    frame_timeout_s: float = field(default=0.1, validator=gt(0.0))
+    """No frame for this long on a device clock: the device is lost."""
+    late_periods: float = field(default=5.0, validator=gt(0.0))
+    """A frame older than this many periods counts as late."""
+    first_effort_n: float = field(default=12.0, validator=gt(0.0))
+    """Most effort on a real gripper until a contact has once been seen; above its breakaway, below a squeeze."""
+    first_speed_m_s: float = field(default=0.015, validator=gt(0.0))
+    """Most speed on a real gripper until a contact has once been seen."""
+
+
+class Sink(Protocol):
+    """Something that is handed every tick: a terminal, a recorder. It must not block."""
+
+    def take(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
+        """Take one tick."""
+
+
+@frozen(kw_only=True, eq=False)
+class Grasp:
+    """What the runner brings back: the trace and how it ended."""
+
+    trace: Trace
+    outcome: Outcome
+    reason: str
+    device: DeviceInfo
+    report: Mapping[str, Any]
+    counts: Mapping[str, int]
+    events: tuple[GraspEvent, ...]
+    seconds_simulated: float | None
+    seconds_wall: float
+
+
+def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -> TickParams:
+    """Return the numbers of one grasp of this gripper under this controller."""
+    real = info.clock == "device"
+    infinite = float("inf")
+    return TickParams(
+        schedule=Schedule(
+            opens=1 if info.opening is not None else 0,
+            opening=info.opening if info.opening is not None else info.relaxed,
+            relaxed=info.relaxed,
+            tare_images=info.tare_images,
+            hold_s=run.hold_s,
+            opening_timeout_s=run.opening_timeout_s,
+        ),
+        guard=GuardParams(
+            effort_limit_n=info.effort_limit_n,
+            speed_limit_m_s=info.speed_limit_m_s,
+            first_effort_n=run.first_effort_n if real else infinite,
+            first_speed_m_s=run.first_speed_m_s if real else infinite,
+            contact_force_n=CONTACT_FORCE_N,
+        ),
+        law=controller.params(),
+    )
+
+
+def run_grasp(
+    backend: SensorBackend[Any],
+    controller: Controller[Any],
+    run: RunConfig,
+    *,
+    sinks: Iterable[Sink] = (),
+    on_event: Callable[[GraspEvent], None] | None = None,
+) -> Grasp:
+    """Drive one grasp and return it, whatever its outcome.
+
+    Raises NoDevice where the gripper cannot be opened. All that goes wrong later is an outcome.
+    """
+    began = time.perf_counter()
+    try:
+        info = backend.open(run.seed)
+        grasp = _Grasp(backend, controller, run, info, tuple(sinks), on_event)
+        outcome, reason = grasp.drive()
+    finally:
+        backend.close()
+    frames = grasp.recorder.frames
+    return Grasp(
+        trace=grasp.recorder.trace(),
+        outcome=outcome,
+        reason=reason,
+        device=info,
+        report=dict(backend.report()),
+        counts={"ticks": len(frames), "late": grasp.late, "guarded": grasp.state.guard.acted},
+        events=tuple(grasp.events),
+        seconds_simulated=grasp.seconds() if info.clock == "virtual" else None,
+        seconds_wall=time.perf_counter() - began,
+    )
+
+
+class _Grasp:
+    """One grasp under way: what the loop below and the ways out of it share."""
+
+    def __init__(
+        self,
+        backend: SensorBackend[Any],
+        controller: Controller[Any],
+        run: RunConfig,
+        info: DeviceInfo,
+        sinks: tuple[Sink, ...],
+        on_event: Callable[[GraspEvent], None] | None,
+    ) -> None:
+        self.backend, self.run, self.info, self.sinks, self.on_event = backend, run, info, sinks, on_event
+        self.step = type(controller).step
+        self.params = tick_params(info, controller, run)
+        self.state: TickState = first_state(controller.init())
+        self.recorder = TraceRecorder({**SI_UNITS, **info.units})
+        self.events: list[GraspEvent] = []
+        self.late = 0
+        self.first_t_s: float | None = None
+        self.last: Frame | None = None
+
+    def drive(self) -> tuple[Outcome, str]:
+        """Run the loop to its end and return how it ended; the gripper has then been told to let go."""
+        lost = False
+        try:
+            self._loop()
+            ending: tuple[Outcome, str] | None = None
+        except DeviceLost as error:
+            lost = True
+            ending = Outcome.DEVICE_LOST, str(error)
+        except RecordingEnded:
+            ending = self._recording_ended()
+        except TareRefused as error:
+            ending = Outcome.ABORTED, str(error)
+        except KeyboardInterrupt:
+            ending = Outcome.ABORTED, "interrupted"
+        except Exception as error:
+            # A controller or sink of anybody's may fail; the gripper must be let go and the trace kept.
+            ending = Outcome.ABORTED, f"{type(error).__name__}: {error}"
+        finally:
+            if not lost and not self.state.done:
+                self._let_go()
+        if ending is None:
+            ending = self._ended_by_itself()
+        if self.state.law.outcome != RUNNING and ending[0] in (Outcome.DEVICE_LOST, Outcome.ABORTED):
+            ending = (
+                ending[0],
+                f"{ending[1]} (after the grasp had ended: {Outcome(self.state.law.outcome).words})",
+            )
+        return ending
+
+    def seconds(self) -> float:
+        """Return the seconds of the gripper's own clock from the first frame to the last."""
+        return 0.0 if self.last is None or self.first_t_s is None else self.last.t_s - self.first_t_s
+
+    def _loop(self) -> None:
+        read, apply, sinks, run = self.backend.read, self.backend.apply, self.sinks, self.run
+        advance = bind(tick, step=self.step)
+        params, record = self.params, self.recorder.add
+        on_device_clock = self.info.clock == "device"
+        late_s = run.late_periods / self.info.rate_hz if on_device_clock else float("inf")
+        state, phase, watcher = self.state, self.state.phase, self.state.guard
+        images: list[Pads] = []
+        newest = 0
+        while True:
+            reading = read(run.frame_timeout_s)
+            if reading is None:
+                raise DeviceLost(
+                    f"no frame from {self.info.name} for {run.frame_timeout_s * 1e3:.0f} ms: check its cable and "
+                    "power, then `graspsense devices`"
+                )
+            frame, pads = reading
+            if frame.dt_s > late_s:
+                self.late += 1
+            self.last = frame
+            if self.first_t_s is None:
+                self.first_t_s = frame.t_s
+            command, state = advance(params, state, frame, pads)
+            self.state = state
+            if phase == TARING and pads.counter > newest:
+                newest = pads.counter
+                images.append(pads)
+            if state.phase != phase:
+                if phase == TARING:
+                    self.backend.tare(images)
+                phase, newest = state.phase, pads.counter
+                self._event(frame.t_s, Phase(phase), Phase(phase).name.lower())
+            if state.guard is not watcher:
+                self._guard_event(frame, watcher, state.guard)
+                watcher = state.guard
+            apply(command)
+            if phase >= APPROACH:
+                record(frame, pads, phase, command)
+                for sink in sinks:
+                    sink.take(frame, pads, phase, command)
+            if state.done or watcher.stopped:
+                return
+
+    def _guard_event(self, frame: Frame, before: GuardState, now: GuardState) -> None:
+        if now.stopped and not before.stopped:
+            self._event(frame.t_s, Phase(self.state.phase), "guard: the controller commanded no number")
+        elif now.acted and not before.acted:
+            self._event(frame.t_s, Phase(self.state.phase), "guard: a command was limited")
+
+    def _event(self, t_s: float, phase: Phase, what: str) -> None:
+        event = GraspEvent(t_s, phase, what)
+        self.events.append(event)
+        if self.on_event is not None:
+            self.on_event(event)
+
+    def _let_go(self) -> None:
+        """Open the fingers for as long as that takes, then relax. Nothing that fails here may stop the rest."""
+        info, run = self.info, self.run
+        try:
+            if info.opening is not None and self.state.phase >= APPROACH and self.last is not None:
+                still, began_s = Stillness(self.last.t_s, self.last.gap_m), self.last.t_s
+                give_up = time.perf_counter() + run.opening_timeout_s
+                fresh = GuardState(1, 0, 0)
+                while time.perf_counter() < give_up:
+                    command, fresh = guard(self.params.guard, fresh, self.last, info.opening)
+                    self.backend.apply(command)
+                    reading = self.backend.read(run.frame_timeout_s)
+                    if reading is None:
+                        break
+                    self.last = frame = reading.frame
+                    still = watch(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
+                    if at_rest(still, frame.t_s, OPEN_WINDOW_S) or (
+                        frame.t_s - began_s > run.opening_timeout_s
+                    ):
+                        break
+        except (KeyboardInterrupt, Exception):
+            pass
+        try:
+            self.backend.apply(info.relaxed)
+        except (KeyboardInterrupt, Exception):
+            pass
+
+    def _recording_ended(self) -> tuple[Outcome, str]:
+        if self.state.law.outcome != RUNNING:
+            return self._ended_by_itself()
+        if self.state.law.phase == SQUEEZE:
+            return Outcome.NEVER_STEADY, "the recording ended before the fingers came to rest"
+        return Outcome.NOTHING_THERE, "the recording ended before both pads were in contact"
+
+    def _ended_by_itself(self) -> tuple[Outcome, str]:
+        if self.state.guard.stopped:
+            return Outcome.ABORTED, "the controller commanded no number (NaN), so the guard stopped the grasp"
+        return Outcome(self.state.law.outcome), ""

@@ -1,0 +1,112 @@
+"""One tick of a grasp as one pure function: open, tare, the controller's step, hold, release, and the guard.
+
+The runner calls it in the interpreter; a simulator that does many grasps at once binds the same function, with
+the same controller, into its compiled loop. `bind(tick, step=controller.step)` makes it whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from graspsense.core.contact import Stillness, at_rest, watch
+from graspsense.core.guard import GuardParams, GuardState, guard
+from graspsense.core.signals import RUNNING, STEADY, Command, Frame, Pads, Phase
+
+OPENING = int(Phase.OPENING)
+TARING = int(Phase.TARING)
+APPROACH = int(Phase.APPROACH)
+RELEASE = int(Phase.RELEASE)
+
+OPEN_SPEED_M_S = 1e-3
+OPEN_WINDOW_S = 0.1
+"""Opened or released is: slower than 1 mm/s over 0.1 s (the authors' stopped threshold and least time)."""
+
+
+class Schedule(NamedTuple):
+    """What frames a grasp: how to open and let go, how many images to tare with, how long to hold.
+
+    `opens` is 0 where there is nothing to open (a recording): then there is no opening, taring or release.
+    """
+
+    opens: int
+    opening: Command
+    relaxed: Command
+    tare_images: int
+    hold_s: float
+    opening_timeout_s: float
+
+
+class TickParams(NamedTuple):
+    """The numbers of one grasp: the schedule's, the guard's, and the controller's own (`law`)."""
+
+    schedule: Schedule
+    guard: GuardParams
+    law: Any
+
+
+class TickState(NamedTuple):
+    """Where the grasp stands. `done` is 1 after the release."""
+
+    phase: int
+    since_t_s: float
+    still: Stillness
+    first_image: int
+    law: Any
+    guard: GuardState
+    done: int
+
+
+def first_state(law: Any) -> TickState:
+    """Return the state before the first tick, given the controller's."""
+    return TickState(-1, 0.0, Stillness(0.0, 0.0), 0, law, GuardState(0, 0, 0), 0)
+
+
+def _unbound(params: Any, state: Any, frame: Frame, pads: Pads) -> tuple[Command, Any]:
+    raise TypeError("tick has no controller: bind(tick, step=controller.step)")
+
+
+step: Callable[[Any, Any, Frame, Pads], tuple[Command, Any]] = _unbound
+
+
+def tick(params: TickParams, state: TickState, frame: Frame, pads: Pads) -> tuple[Command, TickState]:
+    """Return the command for this tick and the next state."""
+    schedule = params.schedule
+    phase, since, still, first_image = state.phase, state.since_t_s, state.still, state.first_image
+    law, done = state.law, state.done
+
+    if phase == -1:
+        since, still = frame.t_s, Stillness(frame.t_s, frame.gap_m)
+        phase = OPENING if schedule.opens == 1 else APPROACH
+    elif phase == OPENING or phase == RELEASE:
+        still = watch(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
+        elapsed = frame.t_s - since
+        if at_rest(still, frame.t_s, OPEN_WINDOW_S) or elapsed >= schedule.opening_timeout_s:
+            if phase == RELEASE:
+                done = 1
+            else:
+                phase, since, first_image = TARING, frame.t_s, pads.counter
+    elif phase == TARING and (
+        pads.counter >= first_image + schedule.tare_images or frame.t_s - since >= schedule.opening_timeout_s
+    ):
+        # The zero holds from the next frame on, so this tick still commands what the taring did.
+        return schedule.relaxed, TickState(APPROACH, frame.t_s, still, 0, law, state.guard, done)
+
+    if phase == OPENING or phase == RELEASE:
+        command = schedule.opening
+    elif phase == TARING:
+        command = schedule.relaxed
+    else:
+        command, law = step(params.law, law, frame, pads)
+        if law.outcome == RUNNING:
+            phase, since = law.phase, frame.t_s
+        else:
+            phase = law.phase
+            if law.outcome != STEADY or frame.t_s - since >= schedule.hold_s:
+                still = Stillness(frame.t_s, frame.gap_m)
+                if schedule.opens == 1:
+                    phase, since = RELEASE, frame.t_s
+                else:
+                    done = 1
+    command, watcher = guard(params.guard, state.guard, frame, command)
+    return command, TickState(phase, since, still, first_image, law, watcher, done)

@@ -1,0 +1,56 @@
+"""What a grasp leaves behind: the trial, with everything that made it, and the events on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from attrs import field, frozen
+
+from graspsense.core.signals import Outcome, Phase
+
+if TYPE_CHECKING:
+    from graspsense.core.features import Features, Prediction
+    from graspsense.core.trace import Trace
+
+
+@frozen(kw_only=True)
+class RunInfo:
+    """What is about to run: qualified names and versions of the components, the resolved settings, the seed."""
+
+    components: Mapping[str, str]
+    settings: Mapping[str, Any]
+    seed: int
+    labels: Mapping[str, str] = field(factory=dict)
+
+
+@frozen
+class GraspEvent:
+    """Something that happened once: at `t_s`, in `phase`, in a sentence."""
+
+    t_s: float
+    phase: Phase
+    what: str
+
+
+@frozen(kw_only=True, eq=False)
+class Trial:
+    """One grasp: trace, features, prediction, labels, and every setting, version and seed that made it.
+
+    `reason` says why where the outcome alone does not. `device` describes the gripper as it was opened;
+    `report` is what the gripper counted or, being simulated, knows to be true. `counts` are the runner's own:
+    ticks, late frames, how often the guard acted.
+    """
+
+    run: RunInfo
+    trace: Trace
+    outcome: Outcome
+    reason: str
+    features: Features
+    prediction: Prediction | None
+    device: Mapping[str, Any]
+    report: Mapping[str, Any]
+    counts: Mapping[str, int]
+    events: tuple[GraspEvent, ...]
+    seconds_simulated: float | None
+    seconds_wall: float

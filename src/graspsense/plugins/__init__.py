@@ -1,0 +1,1 @@
+"""The default parts, registered through the same hooks as anybody's."""

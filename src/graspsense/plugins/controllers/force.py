@@ -1,0 +1,109 @@
+"""Force control: a constant effort as in the authors' code, or a closed loop on the force of the pads.
+
+Driven from an open gripper it arrives at full speed: the impact of Fig. 5.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Literal, NamedTuple
+
+from attrs import field, frozen
+from attrs.validators import ge, gt, in_
+
+from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, Pads
+from graspsense.plugins.controllers.supervision import (
+    Progress,
+    Supervision,
+    SupervisionConfig,
+    not_begun,
+    supervise,
+    supervision,
+)
+
+
+@frozen(kw_only=True, slots=False)
+class ForceLoopConfig:
+    """What the squeeze is to reach, and how."""
+
+    probing_force_n: float = field(default=20.0, validator=gt(0.0))
+    """The effort of the squeeze; with `loop = "closed"`, the force on each pad."""
+    loop: Literal["open", "closed"] = field(default="open", validator=in_(("open", "closed")))
+    """`open`: a constant effort, as in the authors' code. `closed`: an integral loop on the pads' mean force."""
+    force_gain_1_s: float = field(default=4.0, validator=ge(0.0))
+    """Closed loop only: effort per second per newton of error; slow beside a cell image every 41 ms."""
+    effort_limit_n: float = field(default=100.0, validator=gt(0.0))
+    """Closed loop only: the effort stays within 0 and this."""
+
+
+@frozen(kw_only=True, slots=False)
+class ForceConfig(SupervisionConfig, ForceLoopConfig):
+    """Settings of the force controller."""
+
+
+class ForceLoop(NamedTuple):
+    """The numbers of `ForceLoopConfig`; `closed` is 0 or 1."""
+
+    probing_force_n: float
+    closed: int
+    force_gain_1_s: float
+    effort_limit_n: float
+
+
+def force_loop(config: ForceLoopConfig) -> ForceLoop:
+    """Return the numbers of this config."""
+    return ForceLoop(
+        probing_force_n=float(config.probing_force_n),
+        closed=1 if config.loop == "closed" else 0,
+        force_gain_1_s=float(config.force_gain_1_s),
+        effort_limit_n=float(config.effort_limit_n),
+    )
+
+
+def squeezing_effort(loop: ForceLoop, effort_n: float, frame: Frame) -> float:
+    """Return the effort (N) of this tick, given that of the tick before."""
+    if loop.closed == 0:
+        return loop.probing_force_n
+    error = loop.probing_force_n - 0.5 * (frame.force_left_n + frame.force_right_n)
+    effort_n += loop.force_gain_1_s * error * frame.dt_s
+    return min(max(effort_n, 0.0), loop.effort_limit_n)
+
+
+class ForceParams(NamedTuple):
+    """Numbers of the law."""
+
+    loop: ForceLoop
+    supervision: Supervision
+
+
+class ForceState(NamedTuple):
+    """State of the law."""
+
+    phase: int
+    outcome: int
+    progress: Progress
+    effort_n: float
+
+
+def step(params: ForceParams, state: ForceState, frame: Frame, pads: Pads) -> tuple[Command, ForceState]:
+    """Close with the probing effort; from contact on, closed loop if so set."""
+    progress = supervise(params.supervision, state.progress, frame)
+    effort = params.loop.probing_force_n
+    if progress.phase != APPROACH:
+        effort = squeezing_effort(params.loop, state.effort_n, frame)
+    return Command(EFFORT, effort, inf, inf), ForceState(progress.phase, progress.outcome, progress, effort)
+
+
+class ForceController(Controller[ForceConfig]):
+    """Closes with a set effort, or squeezes to a set force."""
+
+    step = staticmethod(step)
+
+    def params(self) -> ForceParams:
+        """Return the law's numbers."""
+        return ForceParams(loop=force_loop(self.config), supervision=supervision(self.config, 0.0))
+
+    def init(self) -> ForceState:
+        """Return the state before the first tick."""
+        progress = not_begun()
+        return ForceState(progress.phase, progress.outcome, progress, float(self.config.probing_force_n))

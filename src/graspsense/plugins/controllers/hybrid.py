@@ -1,0 +1,103 @@
+"""Hybrid velocity-force control: close gently until both fingers touch, then squeeze (equation 15).
+
+Velocity control until *both* pads are tau_1 over their tared zero, then force control. The authors' code
+switches hard to a constant effort, which is the default; a ramp is an option.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple
+
+from attrs import field, frozen
+from attrs.validators import ge
+
+from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, Pads
+from graspsense.plugins.controllers.force import ForceLoop, ForceLoopConfig, force_loop, squeezing_effort
+from graspsense.plugins.controllers.supervision import (
+    Progress,
+    Supervision,
+    SupervisionConfig,
+    not_begun,
+    supervise,
+    supervision,
+)
+from graspsense.plugins.controllers.velocity import (
+    VelocityLoop,
+    VelocityLoopConfig,
+    closing_effort,
+    velocity_loop,
+)
+
+
+@frozen(kw_only=True, slots=False)
+class HybridConfig(SupervisionConfig, ForceLoopConfig, VelocityLoopConfig):
+    """Settings of the hybrid controller."""
+
+    ramp_s: float = field(default=0.0, validator=ge(0.0))
+    """Time over which the effort goes from the velocity loop's last to the force law's (0: a hard switch)."""
+
+
+class HybridParams(NamedTuple):
+    """Numbers of the law."""
+
+    velocity: VelocityLoop
+    force: ForceLoop
+    supervision: Supervision
+    ramp_s: float
+
+
+class HybridState(NamedTuple):
+    """State of the law. `approach_effort_n` is the velocity loop's last effort, from which a ramp starts."""
+
+    phase: int
+    outcome: int
+    progress: Progress
+    integral_n: float
+    force_effort_n: float
+    approach_effort_n: float
+
+
+def step(params: HybridParams, state: HybridState, frame: Frame, pads: Pads) -> tuple[Command, HybridState]:
+    """Velocity until both pads touch, then force."""
+    progress = supervise(params.supervision, state.progress, frame)
+    integral, force_effort, approach_effort = state.integral_n, state.force_effort_n, state.approach_effort_n
+    if progress.phase == APPROACH:
+        effort, integral = closing_effort(params.velocity, integral, frame)
+        approach_effort = effort
+    else:
+        force_effort = squeezing_effort(params.force, force_effort, frame)
+        effort = force_effort
+        elapsed = frame.t_s - progress.contact_t_s
+        if elapsed < params.ramp_s:
+            effort = approach_effort + (effort - approach_effort) * (elapsed / params.ramp_s)
+    return Command(EFFORT, effort, inf, inf), HybridState(
+        progress.phase, progress.outcome, progress, integral, force_effort, approach_effort
+    )
+
+
+class HybridController(Controller[HybridConfig]):
+    """The paper's controller, and the default."""
+
+    step = staticmethod(step)
+
+    def params(self) -> HybridParams:
+        """Return the law's numbers."""
+        return HybridParams(
+            velocity=velocity_loop(self.config),
+            force=force_loop(self.config),
+            supervision=supervision(self.config, self.config.closing_speed_m_s),
+            ramp_s=float(self.config.ramp_s),
+        )
+
+    def init(self) -> HybridState:
+        """Return the state before the first tick."""
+        progress = not_begun()
+        return HybridState(
+            progress.phase,
+            progress.outcome,
+            progress,
+            float(self.config.preload_n),
+            float(self.config.probing_force_n),
+            0.0,
+        )

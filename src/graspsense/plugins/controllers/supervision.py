@@ -1,0 +1,195 @@
+"""When a closing gripper has touched, come to rest, or gone wrong: shared by the control laws.
+
+The states and time-outs are those of the paper's own controller (personalrobots-pkg, September 2009,
+`experimental_controllers/src/pr2_gripper_controller.cpp`): 10 s to make contact, 3 s to come to rest, and the
+result codes of `GraspClosedLoop.srv`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from attrs import field, frozen
+from attrs.validators import ge, gt
+
+from graspsense.plugin_api import (
+    APPROACH,
+    CONTACT_FORCE_N,
+    CRUSHED,
+    HOLD,
+    NEVER_STEADY,
+    NOTHING_THERE,
+    ONE_FINGER,
+    REST_SPEED_M_S,
+    REST_WINDOW_S,
+    RUNNING,
+    SIDE_IMPACT,
+    SLIPPED,
+    SQUEEZE,
+    STEADY,
+    TOO_WIDE,
+    Frame,
+    Stillness,
+    at_rest,
+    both_touch,
+    watch,
+)
+
+
+@frozen(kw_only=True, slots=False)
+class SupervisionConfig:
+    """Thresholds and time-outs that every control law of this package has."""
+
+    contact_force_n: float = field(default=CONTACT_FORCE_N, validator=gt(0.0))
+    """Contact is this much on both pads, over their tared zero."""
+    rest_speed_m_s: float = field(default=REST_SPEED_M_S, validator=gt(0.0))
+    """At rest is slower than this throughout the window."""
+    rest_window_s: float = field(default=REST_WINDOW_S, validator=gt(0.0))
+    edge_force_n: float = field(default=0.25, validator=gt(0.0))
+    """More than this on one edge cell while closing is a side impact (100 counts of the softest cell)."""
+    move_timeout_s: float = field(default=10.0, validator=gt(0.0))
+    """Longest approach; longer by itself where the closing speed needs it."""
+    steady_timeout_s: float = field(default=3.0, validator=gt(0.0))
+    """Longest squeeze before the grasp counts as never steady."""
+    closed_gap_m: float = field(default=0.003, validator=ge(0.0))
+    """Fingers closed to this gap: nothing is there, or after contact nothing is left."""
+    too_wide_m: float = field(default=0.001, validator=ge(0.0))
+    """Contact within this much of closing: the thing is wider than the opening."""
+    crush_share: float = field(default=0.2, validator=gt(0.0))
+    """The force falling below this share of its peak while the gap falls by `crush_travel_m`: crushed."""
+    crush_travel_m: float = field(default=0.002, validator=gt(0.0))
+    slip_time_s: float = field(default=0.2, validator=gt(0.0))
+    """Both pads below half the contact force for this long, closed further than at the peak: slipped out.
+
+    A finger that bounces off a rigid thing loses contact too, but opens.
+    """
+
+
+class Supervision(NamedTuple):
+    """The numbers of `SupervisionConfig`, and the slowest speed that the time-out must allow for."""
+
+    contact_force_n: float
+    rest_speed_m_s: float
+    rest_window_s: float
+    edge_force_n: float
+    move_timeout_s: float
+    steady_timeout_s: float
+    closed_gap_m: float
+    too_wide_m: float
+    crush_share: float
+    crush_travel_m: float
+    slip_time_s: float
+    slowest_m_s: float
+
+
+class Progress(NamedTuple):
+    """How far the grasp has come. The start is unknown until the first tick (`begun` 0)."""
+
+    phase: int
+    outcome: int
+    begun: int
+    start_t_s: float
+    start_gap_m: float
+    contact_t_s: float
+    still: Stillness
+    peak_force_n: float
+    peak_gap_m: float
+    held_t_s: float
+    """When a pad was last felt after contact."""
+
+
+def supervision(config: SupervisionConfig, slowest_m_s: float) -> Supervision:
+    """Return the numbers of this config; `slowest_m_s` stretches the move time-out (0: it does not)."""
+    return Supervision(
+        contact_force_n=float(config.contact_force_n),
+        rest_speed_m_s=float(config.rest_speed_m_s),
+        rest_window_s=float(config.rest_window_s),
+        edge_force_n=float(config.edge_force_n),
+        move_timeout_s=float(config.move_timeout_s),
+        steady_timeout_s=float(config.steady_timeout_s),
+        closed_gap_m=float(config.closed_gap_m),
+        too_wide_m=float(config.too_wide_m),
+        crush_share=float(config.crush_share),
+        crush_travel_m=float(config.crush_travel_m),
+        slip_time_s=float(config.slip_time_s),
+        slowest_m_s=float(slowest_m_s),
+    )
+
+
+def not_begun() -> Progress:
+    """Return the progress before the first tick."""
+    return Progress(APPROACH, RUNNING, 0, 0.0, 0.0, 0.0, Stillness(0.0, 0.0), 0.0, 0.0, 0.0)
+
+
+def supervise(params: Supervision, now: Progress, frame: Frame) -> Progress:
+    """Return the progress after this frame; the same object where nothing has changed."""
+    if now.outcome != RUNNING:
+        return now
+    t, gap = frame.t_s, frame.gap_m
+    if now.phase == APPROACH:
+        return _approaching(params, now, frame, t, gap)
+    return _squeezing(params, now, frame, t, gap)
+
+
+def _approaching(params: Supervision, now: Progress, frame: Frame, t: float, gap: float) -> Progress:
+    start_t, start_gap = now.start_t_s, now.start_gap_m
+    if now.begun == 0:
+        start_t, start_gap = t, gap
+    left, right = frame.force_left_n, frame.force_right_n
+    outcome = RUNNING
+    if frame.edge_left_n > params.edge_force_n or frame.edge_right_n > params.edge_force_n:
+        outcome = SIDE_IMPACT
+    elif both_touch(left, right, params.contact_force_n):
+        if start_gap - gap < params.too_wide_m and now.begun == 1:
+            outcome = TOO_WIDE
+        else:
+            still = Stillness(t, gap)
+            return Progress(SQUEEZE, RUNNING, 1, start_t, start_gap, t, still, 0.5 * (left + right), gap, t)
+    elif gap <= params.closed_gap_m:
+        outcome = NOTHING_THERE
+    else:
+        limit = params.move_timeout_s
+        if params.slowest_m_s > 0.0:
+            limit = max(limit, 1.5 * start_gap / params.slowest_m_s)
+        if t - start_t > limit:
+            one = left >= params.contact_force_n or right >= params.contact_force_n
+            outcome = ONE_FINGER if one else NOTHING_THERE
+    if outcome == RUNNING and now.begun == 1:
+        return now
+    return Progress(APPROACH, outcome, 1, start_t, start_gap, 0.0, Stillness(t, gap), 0.0, gap, t)
+
+
+def _squeezing(params: Supervision, now: Progress, frame: Frame, t: float, gap: float) -> Progress:
+    left, right = frame.force_left_n, frame.force_right_n
+    force = 0.5 * (left + right)
+    still = watch(now.still, t, gap, params.rest_speed_m_s, params.rest_window_s)
+    peak_force, peak_gap, held_t = now.peak_force_n, now.peak_gap_m, now.held_t_s
+    if force > peak_force:
+        peak_force, peak_gap = force, gap
+    half = 0.5 * params.contact_force_n
+    if left >= half or right >= half:
+        held_t = t
+
+    phase, outcome = SQUEEZE, RUNNING
+    if force < params.crush_share * peak_force and gap < peak_gap - params.crush_travel_m:
+        outcome = CRUSHED
+    elif gap <= params.closed_gap_m:
+        outcome = CRUSHED
+    elif t - held_t > params.slip_time_s and gap < peak_gap:
+        outcome = SLIPPED
+    elif at_rest(still, t, params.rest_window_s):
+        phase, outcome = HOLD, STEADY
+    elif t - now.contact_t_s > params.steady_timeout_s:
+        outcome = NEVER_STEADY
+    return Progress(
+        phase,
+        outcome,
+        1,
+        now.start_t_s,
+        now.start_gap_m,
+        now.contact_t_s,
+        still,
+        peak_force,
+        peak_gap,
+        held_t,
+    )

@@ -1,0 +1,117 @@
+"""Velocity control: a PI loop on the rate of the gap, with the authors' gains.
+
+On its own it keeps its speed after contact by raising its effort, and crushes what it holds (section III.B of
+the paper); the hybrid controller uses it only until both fingers touch.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import NamedTuple
+
+from attrs import field, frozen
+from attrs.validators import ge, gt
+
+from graspsense.plugin_api import EFFORT, Command, Controller, Frame, Pads
+from graspsense.plugins.controllers.supervision import (
+    Progress,
+    Supervision,
+    SupervisionConfig,
+    not_begun,
+    supervise,
+    supervision,
+)
+
+
+@frozen(kw_only=True, slots=False)
+class VelocityLoopConfig:
+    """The loop's gains: those of the authors' code, 15000 and 25 with the integral held within 100 N."""
+
+    closing_speed_m_s: float = field(default=0.010, validator=gt(0.0))
+    """Rate at which the gap is to close."""
+    velocity_gain_n_s_m: float = field(default=15000.0, validator=ge(0.0))
+    """Effort per error of speed, N s/m."""
+    integral_gain_n_m: float = field(default=25.0, validator=ge(0.0))
+    """Effort per error of gap, N/m."""
+    integral_limit_n: float = field(default=100.0, validator=ge(0.0))
+    preload_n: float = field(default=7.0, validator=ge(0.0))
+    """Where the integral starts: the gripper's Coulomb friction (7 N is fed forward in pr2_gripper_sensor)."""
+
+
+@frozen(kw_only=True, slots=False)
+class VelocityConfig(SupervisionConfig, VelocityLoopConfig):
+    """Settings of the velocity controller."""
+
+
+class VelocityLoop(NamedTuple):
+    """The numbers of `VelocityLoopConfig`."""
+
+    closing_speed_m_s: float
+    velocity_gain_n_s_m: float
+    integral_gain_n_m: float
+    integral_limit_n: float
+    preload_n: float
+
+
+def velocity_loop(config: VelocityLoopConfig) -> VelocityLoop:
+    """Return the numbers of this config."""
+    return VelocityLoop(
+        closing_speed_m_s=float(config.closing_speed_m_s),
+        velocity_gain_n_s_m=float(config.velocity_gain_n_s_m),
+        integral_gain_n_m=float(config.integral_gain_n_m),
+        integral_limit_n=float(config.integral_limit_n),
+        preload_n=float(config.preload_n),
+    )
+
+
+def closing_effort(loop: VelocityLoop, integral_n: float, frame: Frame) -> tuple[float, float]:
+    """Return the effort (N) that keeps the closing speed, and the integral (N) after this tick."""
+    error = loop.closing_speed_m_s + frame.velocity_m_s
+    integral_n += loop.integral_gain_n_m * error * frame.dt_s
+    integral_n = min(max(integral_n, -loop.integral_limit_n), loop.integral_limit_n)
+    return loop.velocity_gain_n_s_m * error + integral_n, integral_n
+
+
+class VelocityParams(NamedTuple):
+    """Numbers of the law."""
+
+    loop: VelocityLoop
+    supervision: Supervision
+
+
+class VelocityState(NamedTuple):
+    """State of the law."""
+
+    phase: int
+    outcome: int
+    progress: Progress
+    integral_n: float
+
+
+def step(
+    params: VelocityParams, state: VelocityState, frame: Frame, pads: Pads
+) -> tuple[Command, VelocityState]:
+    """Close at the set speed, whatever resists."""
+    progress = supervise(params.supervision, state.progress, frame)
+    effort, integral = closing_effort(params.loop, state.integral_n, frame)
+    return Command(EFFORT, effort, inf, inf), VelocityState(
+        progress.phase, progress.outcome, progress, integral
+    )
+
+
+class VelocityController(Controller[VelocityConfig]):
+    """Closes at a set speed."""
+
+    step = staticmethod(step)
+
+    def params(self) -> VelocityParams:
+        """Return the law's numbers."""
+        return VelocityParams(
+            loop=velocity_loop(self.config),
+            supervision=supervision(self.config, self.config.closing_speed_m_s),
+        )
+
+    def init(self) -> VelocityState:
+        """Return the state before the first tick."""
+        progress = not_begun()
+        return VelocityState(progress.phase, progress.outcome, progress, float(self.config.preload_n))

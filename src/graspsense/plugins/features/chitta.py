@@ -1,0 +1,148 @@
+"""The six features of Table I (Chitta, Piccoli and Sturm, ICRA 2010), with the paper's errata applied.
+
+| feature | meaning | unit |
+|---|---|---|
+| p_first | gap at first contact of both fingers (equation 1) | m |
+| p_steady | gap when the fingers have come to rest (equation 2) | m |
+| f_steady | fingertip force when the fingers have come to rest | N |
+| delta_t | time from first contact to rest | s |
+| dp_dt | (p_steady - p_first) / delta_t | m/s |
+| df_dt | (f_steady - f_first) / delta_t | N/s |
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, Literal
+
+from attrs import field, frozen
+from attrs.validators import gt, in_
+
+from graspsense.plugin_api import (
+    APPROACH,
+    CONTACT_FORCE_N,
+    HOLD,
+    REST_SPEED_M_S,
+    REST_WINDOW_S,
+    Features,
+    FeatureSet,
+    Stillness,
+    at_rest,
+    missing,
+    watch,
+)
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from graspsense.plugin_api import Trace
+
+NAMES: Final = ("p_first", "p_steady", "f_steady", "delta_t", "dp_dt", "df_dt")
+AT_REST: Final = NAMES[1:]
+RATES: Final = NAMES[4:]
+
+
+@frozen(kw_only=True)
+class ChittaConfig:
+    """Which force, and when contact and rest are."""
+
+    force: Literal["mean", "left", "right", "min", "sum"] = field(
+        default="mean", validator=in_(("mean", "left", "right", "min", "sum"))
+    )
+    """f of the two pad forces: their mean, one of them, the smaller, or their sum."""
+    contact_force_n: float = field(default=CONTACT_FORCE_N, validator=gt(0.0))
+    """tau_1, on each pad."""
+    rest_speed_m_s: float = field(default=REST_SPEED_M_S, validator=gt(0.0))
+    """tau_2, throughout the window."""
+    rest_window_s: float = field(default=REST_WINDOW_S, validator=gt(0.0))
+
+
+class ChittaFeatures(FeatureSet[ChittaConfig]):
+    """Draws the six features of Table I."""
+
+    def extract(self, trace: Trace) -> Features:
+        """Return the six features.
+
+        Before contact all are missing; between contact and rest all but p_first are; where rest begins in the
+        very sample of the contact the two rates are missing, as they would divide by zero. The force is the
+        pads' at the end of the window that shows the rest: at its beginning the last cell image may still be
+        one from before.
+        """
+        units = self._units(trace)
+        first = self._first(trace)
+        if first is None:
+            reasons = missing(NAMES, self._why_no_contact(trace))
+            return Features(names=NAMES, values=(math.nan,) * 6, units=units, reasons=reasons)
+        p_first = float(trace.gap_m[first])
+        rest = self._rest(trace, first)
+        if rest is None:
+            felt = float(trace.t_s[-1] - trace.t_s[first])
+            why = f"not at rest within the {felt:.3g} {trace.units['t']} after contact"
+            values = (p_first, *(math.nan,) * 5)
+            return Features(names=NAMES, values=values, units=units, reasons=missing(AT_REST, why))
+
+        steady, shown = rest
+        p_steady = float(trace.gap_m[steady])
+        force = self._force(trace)
+        f_first, f_steady = float(force[first]), float(force[shown])
+        delta_t = float(trace.t_s[steady] - trace.t_s[first])
+        if delta_t > 0.0:
+            rates = ((p_steady - p_first) / delta_t, (f_steady - f_first) / delta_t)
+            return Features(names=NAMES, values=(p_first, p_steady, f_steady, delta_t, *rates), units=units)
+        return Features(
+            names=NAMES,
+            values=(p_first, p_steady, f_steady, delta_t, math.nan, math.nan),
+            units=units,
+            reasons=missing(RATES, "delta_t is zero: at rest from the first contact on, so there is no rate"),
+        )
+
+    def _units(self, trace: Trace) -> tuple[str, ...]:
+        t, gap, force = trace.units["t"], trace.units["gap"], trace.units["force_left"]
+        return (gap, gap, force, t, f"{gap}/{t}", f"{force}/{t}")
+
+    def _force(self, trace: Trace) -> NDArray[np.float64]:
+        import numpy as np
+
+        left, right = trace.force_left_n, trace.force_right_n
+        choice = self.config.force
+        if choice == "left":
+            return left
+        if choice == "right":
+            return right
+        if choice == "min":
+            return np.minimum(left, right)
+        return (left + right) * (0.5 if choice == "mean" else 1.0)
+
+    def _first(self, trace: Trace) -> int | None:
+        tau_1 = self.config.contact_force_n
+        touch = (trace.force_left_n >= tau_1) & (trace.force_right_n >= tau_1)
+        touch &= (trace.phase >= APPROACH) & (trace.phase <= HOLD)
+        return int(touch.argmax()) if touch.any() else None
+
+    def _rest(self, trace: Trace, first: int) -> tuple[int, int] | None:
+        """Return the tick at which rest begins and the one at which its window is full, or None."""
+        config = self.config
+        times, gaps = trace.t_s[first:].tolist(), trace.gap_m[first:].tolist()
+        phases = trace.phase[first:].tolist()
+        still, since = Stillness(times[0], gaps[0]), 0
+        for i, (t, gap, phase) in enumerate(zip(times, gaps, phases, strict=True)):
+            if phase > HOLD:
+                return None
+            now = watch(still, t, gap, config.rest_speed_m_s, config.rest_window_s)
+            if now is not still:
+                still, since = now, i
+            if at_rest(still, t, config.rest_window_s):
+                return first + since, first + i
+        return None
+
+    def _why_no_contact(self, trace: Trace) -> str:
+        if len(trace) == 0:
+            return "the trace is empty"
+        tau_1 = self.config.contact_force_n
+        left, right = bool((trace.force_left_n >= tau_1).any()), bool((trace.force_right_n >= tau_1).any())
+        if left and right:
+            return f"the pads never felt {tau_1:g} N at the same time"
+        if left or right:
+            return f"only the {'left' if left else 'right'} pad felt {tau_1:g} N"
+        return f"no pad felt {tau_1:g} N"
