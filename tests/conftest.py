@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+from attrs import field, frozen
+
+from graspsense.core.plugins import Plugins
+
+
+@frozen
+class Site:
+    """A folder of installed distributions, made of real metadata and real modules."""
+
+    folder: Path
+    patch: pytest.MonkeyPatch
+    modules: list[str] = field(factory=list)
+
+    def install(
+        self, distribution: str, plugin: str, version: str = "0.2", entry: str = "main", **modules: str
+    ) -> None:
+        """Install a distribution whose entry point names a module with the source `plugin`."""
+        name = distribution.replace("-", "_")
+        self.write(**{f"{name}_plugin": plugin}, **modules)
+        self.metadata(distribution, version, f"[graspsense.plugins]\n{entry} = {name}_plugin\n")
+
+    def metadata(self, distribution: str, version: str, entry_points: str) -> None:
+        info = self.folder / f"{distribution.replace('-', '_')}-{version}.dist-info"
+        info.mkdir(parents=True)
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {distribution}\nVersion: {version}\n")
+        (info / "entry_points.txt").write_text(entry_points)
+
+    def write(self, **modules: str) -> None:
+        for name, source in modules.items():
+            (self.folder / f"{name}.py").write_text(dedent(source))
+            self.modules.append(name)
+
+    def discover(self, **environ: str) -> Plugins:
+        """Discover plugins in this folder alone, whatever else is installed where the tests run."""
+        with pytest.MonkeyPatch.context() as patch:
+            for name in ("GRASPSENSE_PLUGINS", "GRASPSENSE_DISABLED_PLUGINS", "GRASPSENSE_STRICT_PLUGINS"):
+                patch.delenv(name, raising=False)
+            for name, value in environ.items():
+                patch.setenv(name, value)
+            patch.setattr(sys, "path", [one for one in sys.path if "site-packages" not in one])
+            return Plugins.discover()
+
+
+@pytest.fixture
+def site(tmp_path, monkeypatch):
+    folder = tmp_path / "installed"
+    folder.mkdir()
+    monkeypatch.syspath_prepend(folder)
+    site = Site(folder, monkeypatch)
+    yield site
+    for name in site.modules:
+        sys.modules.pop(name, None)

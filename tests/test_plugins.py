@@ -1,0 +1,426 @@
+"""The loader, on distributions with real metadata and real modules."""
+
+from __future__ import annotations
+
+import sys
+import types
+
+import pytest
+
+from graspsense.core.errors import PluginUnavailable, UnknownName
+from graspsense.core.plugins import IsolatedPlugins, canonical, installed
+from graspsense.core.roles import SensorBackend
+
+HEAD = """
+    from graspsense.plugin_api import Channel, ControllerEntry, PipelineEntry, SensorBackendEntry, hookimpl
+    GRASPSENSE_API = (1, 0)
+"""
+
+BROKEN = HEAD + "    import no_such_driver"
+
+
+def backend(name: str, module: str = "somewhere", needs: str = "") -> str:
+    return (
+        HEAD
+        + f"""
+    @hookimpl
+    def graspsense_sensor_backends():
+        yield SensorBackendEntry(
+            name="{name}", target="{module}:Backend", config="{module}:Config", summary="a gripper",
+            channels=(Channel("gap", "m", 100.0),), accepts=("effort",), needs={needs!r},
+        )
+    """
+    )
+
+
+def reason_of(plugins, distribution):
+    return next(one.reason for one in plugins.statuses if one.distribution == distribution)
+
+
+def states(plugins):
+    return {one.distribution: one.state for one in plugins.statuses}
+
+
+def test_an_installed_plugin_is_found_and_its_driver_left_alone_until_used(site):
+    driver = """
+        from attrs import frozen
+        from graspsense.plugin_api import SensorBackend
+        @frozen
+        class Config:
+            port: str = "usb"
+        class Backend(SensorBackend):
+            def open(self, seed): ...
+            def read(self, timeout_s): ...
+            def apply(self, command): ...
+            def tare(self, images): ...
+            def close(self): ...
+        """
+    site.install("lab-hand", backend("hand", "lab_hand_driver"), version="1.4", lab_hand_driver=driver)
+
+    plugins = site.discover()
+    component = plugins.find("sensor-backend", "hand")
+
+    assert (component.qualified, component.version, component.table) == ("lab-hand/hand", "1.4", "gripper")
+    assert plugins.find("sensor-backend", "lab-hand/hand") is component
+    assert plugins.find("sensor-backend", "Lab_Hand/hand") is component
+    assert "lab_hand_driver" not in sys.modules
+    made = component.create(component.config_class()(port="serial"))
+    assert isinstance(made, SensorBackend)
+    assert made.config.port == "serial"
+
+
+def test_built_in_parts_need_no_metadata(site):
+    plugins = site.discover()
+
+    assert [one.qualified for one in plugins.components("controller")] == [
+        "graspsense/force",
+        "graspsense/hybrid",
+        "graspsense/velocity",
+    ]
+    assert plugins.find("feature-set", "chitta").entry.features == (
+        ("p_first", "m"),
+        ("p_steady", "m"),
+        ("f_steady", "N"),
+        ("delta_t", "s"),
+        ("dp_dt", "m/s"),
+        ("df_dt", "N/s"),
+    )
+
+
+@pytest.mark.parametrize(
+    ("role", "name"),
+    [
+        ("controller", "velocity"),
+        ("controller", "force"),
+        ("controller", "hybrid"),
+        ("feature-set", "chitta"),
+        ("sensor-backend", "replay"),
+    ],
+)
+def test_what_the_built_in_entries_point_at_is_there(role, name):
+    component = IsolatedPlugins().find(role, name)
+    component.component_class()
+    component.config_class()
+
+
+def test_a_broken_plugin_is_listed_with_its_reason_and_the_others_work(site):
+    site.install("graspsense-hid", BROKEN)
+    site.install("lab-hand", backend("hand"))
+
+    plugins = site.discover()
+
+    assert states(plugins) == {"graspsense": "loaded", "graspsense-hid": "broken", "lab-hand": "loaded"}
+    assert reason_of(plugins, "graspsense-hid") == "ModuleNotFoundError: No module named 'no_such_driver'"
+    assert plugins.find("sensor-backend", "hand").distribution == "lab-hand"
+    traceback = next(one.traceback for one in plugins.statuses if one.distribution == "graspsense-hid")
+    assert "import no_such_driver" in traceback
+
+
+def test_text_for_an_unknown_name(site):
+    site.install("lab-pr2", backend("pr2"))
+    site.install("graspsense-hid", BROKEN)
+
+    with pytest.raises(UnknownName) as caught:
+        site.discover().find("sensor-backend", "pr3")
+
+    assert str(caught.value) == (
+        "no sensor backend named 'pr3'. Known: pr2, replay. Did you mean 'pr2'?\n"
+        "  graspsense-hid 0.2 is installed but failed to load: "
+        "ModuleNotFoundError: No module named 'no_such_driver'\n"
+        "  (graspsense plugins show graspsense-hid)"
+    )
+
+
+@pytest.mark.parametrize("name", ["pr2", "graspsense-pr2-gripper/pr2"])
+def test_text_for_a_part_of_ours_that_is_not_installed(site, name):
+    with pytest.raises(UnknownName) as caught:
+        site.discover().find("sensor-backend", name)
+
+    assert str(caught.value) == (
+        f"no sensor backend named '{name}'. It is provided by graspsense-pr2-gripper:\n"
+        "  in a clone: pip install -e . -e ./plugins/pr2_gripper"
+        '     published: pip install "graspsense[pr2]"'
+    )
+
+
+def test_a_part_of_ours_that_is_installed_and_broken_is_not_to_be_installed_again(site):
+    site.install("graspsense-pr2-gripper", BROKEN)
+
+    with pytest.raises(UnknownName) as caught:
+        site.discover().find("sensor-backend", "pr2")
+
+    assert "pip install" not in str(caught.value)
+    assert "graspsense-pr2-gripper 0.2 is installed but failed to load" in str(caught.value)
+
+
+def test_text_for_a_name_that_two_distributions_provide(site):
+    site.install("graspsense-pr2-gripper", backend("pr2"))
+    site.install("lab-pr2", backend("pr2"))
+    plugins = site.discover()
+
+    with pytest.raises(UnknownName) as caught:
+        plugins.find("sensor-backend", "pr2")
+
+    assert str(caught.value) == (
+        "sensor backend 'pr2' is provided by graspsense-pr2-gripper and lab-pr2; "
+        'write gripper.type = "graspsense-pr2-gripper/pr2"'
+    )
+    assert plugins.find("sensor-backend", "lab-pr2/pr2").distribution == "lab-pr2"
+    assert (
+        plugins.find("sensor-backend", "graspsense-pr2-gripper/pr2").distribution == "graspsense-pr2-gripper"
+    )
+
+
+def test_one_entry_point_name_in_two_distributions_drops_neither(site):
+    site.install("lab-a", backend("a"), entry="gripper")
+    site.install("lab-b", backend("b"), entry="gripper")
+
+    names = [one.name for one in site.discover().components("sensor-backend")]
+
+    assert names == ["a", "b", "replay"]
+
+
+def test_a_distribution_found_twice_on_the_path_is_loaded_once(site, tmp_path, monkeypatch):
+    site.install("lab-a", backend("a"))
+    link = tmp_path / "lib64"
+    link.symlink_to(site.folder)
+    monkeypatch.syspath_prepend(link)
+
+    assert [one.distribution for one in site.discover().statuses] == ["graspsense", "lab-a"]
+
+
+@pytest.mark.parametrize(
+    ("environ", "loaded", "reason"),
+    [
+        ({"GRASPSENSE_PLUGINS": ""}, [], "not in GRASPSENSE_PLUGINS"),
+        ({"GRASPSENSE_PLUGINS": "Lab_B, lab-x"}, ["lab-b"], "not in GRASPSENSE_PLUGINS"),
+        ({"GRASPSENSE_DISABLED_PLUGINS": "lab.a"}, ["lab-b"], "in GRASPSENSE_DISABLED_PLUGINS"),
+    ],
+)
+def test_a_disabled_plugin_is_not_even_imported(site, environ, loaded, reason):
+    site.install("lab-a", backend("a"))
+    site.install("lab-b", backend("b"))
+
+    plugins = site.discover(**environ)
+
+    assert [one.distribution for one in plugins.components("sensor-backend")] == [*loaded, "graspsense"]
+    assert states(plugins)["lab-a"] == "disabled"
+    assert reason_of(plugins, "lab-a") == reason
+    assert "lab_a_plugin" not in sys.modules
+    with pytest.raises(UnknownName, match=f"lab-a 0.2 is installed but disabled: {reason}"):
+        plugins.find("sensor-backend", "a")
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("", "lab_a_plugin has no GRASPSENSE_API: add GRASPSENSE_API = (1, 0)"),
+        ("GRASPSENSE_API = 1", "GRASPSENSE_API is 1: it must be two integers, as (1, 0)"),
+        (
+            "GRASPSENSE_API = (1, 1)",
+            "it is written for plugin API 1.1, graspsense 0.1.0 has 1.0: upgrade graspsense",
+        ),
+        (
+            "GRASPSENSE_API = (2, 0)",
+            "it is written for plugin API 2.0, graspsense 0.1.0 has 1.0: upgrade graspsense",
+        ),
+        (
+            "GRASPSENSE_API = (0, 9)",
+            "it is written for plugin API 0.9, graspsense 0.1.0 has 1.0: upgrade lab-a",
+        ),
+    ],
+)
+def test_a_plugin_for_another_api_is_refused_before_its_hooks_are_looked_at(site, line, reason):
+    site.install("lab-a", line)
+
+    assert reason_of(site.discover(), "lab-a") == reason
+
+
+@pytest.mark.parametrize(
+    ("body", "reason"),
+    [
+        (
+            "@hookimpl\n    def graspsense_controlers(): return []",
+            "it implements graspsense_controlers, which is no hook of graspsense 0.1.0. "
+            "Did you mean 'graspsense_controllers'?",
+        ),
+        (
+            "def graspsense_controllers(): return []",
+            "graspsense_controllers is not marked with @hookimpl, so it would never be called",
+        ),
+        (
+            "@hookimpl(wrapper=True)\n    def graspsense_controllers(): return (yield)",
+            "graspsense_controllers is a wrapper: no hook may change what another plugin returns",
+        ),
+        (
+            "@hookimpl\n    def graspsense_controllers(): pass",
+            "graspsense_controllers returned None: return the entries, or yield them",
+        ),
+        (
+            "@hookimpl\n    def graspsense_controllers(): return 'hybrid'",
+            "graspsense_controllers returned 'hybrid': return a list of ControllerEntry, or yield them",
+        ),
+        (
+            "@hookimpl\n    def graspsense_controllers(): yield 3",
+            "graspsense_controllers gave 3: it takes ControllerEntry only",
+        ),
+        (
+            "@hookimpl\n    def graspsense_controllers(): raise OSError('no such file')",
+            "OSError: no such file",
+        ),
+        ("Channel('gap', 'mm')", "ValueError: channel 'gap' is in m, not in 'mm'"),
+        (
+            "Channel('temperature', '')",
+            "ValueError: channel 'temperature' is none of gap, velocity, effort, force_left, force_right, "
+            "edge_left, edge_right, pads: give it a unit",
+        ),
+        ("raise SystemExit(3)", "SystemExit: 3"),
+    ],
+)
+def test_a_plugin_that_breaks_the_rules_is_broken_and_says_which(site, body, reason):
+    site.install("lab-a", HEAD + f"    {body}")
+
+    plugins = site.discover()
+
+    assert reason_of(plugins, "lab-a") == reason
+    assert plugins.find("controller", "hybrid")
+
+
+@pytest.mark.parametrize(
+    ("field", "reason"),
+    [
+        (
+            'accepts=("torque",)',
+            "'accepts' has the unknown command kind 'torque'; there are effort, velocity, ",
+        ),
+        ('channels=(Channel("gap", "m"), Channel("gap", "m"))', "'channels' names channel 'gap' twice"),
+        ('name="Two Words"', "'name' must match regex"),
+        ('target="module.Class"', "'target' must match regex"),
+    ],
+)
+def test_a_wrong_entry_breaks_its_plugin_alone(site, field, reason):
+    site.install(
+        "lab-a",
+        HEAD
+        + f"""
+    @hookimpl
+    def graspsense_sensor_backends():
+        given = dict(name="a", target="m:B", config="m:C", summary="", channels=(), accepts=())
+        yield SensorBackendEntry(**given | dict({field}))
+    """,
+    )
+
+    assert reason in reason_of(site.discover(), "lab-a")
+
+
+def test_one_distribution_cannot_declare_one_name_twice(site):
+    site.install("lab-a", backend("a").replace("yield", "for _ in range(2): yield"))
+
+    assert reason_of(site.discover(), "lab-a") == "lab-a declares sensor backend 'a' twice"
+
+
+def test_metadata_that_cannot_be_read_is_a_broken_plugin(site):
+    site.metadata("lab-a", "0.1", "[graspsense.plugins]\nthis is no entry point\n")
+    site.install("lab-b", backend("b"))
+
+    assert states(site.discover()) == {"graspsense": "loaded", "lab-a": "broken", "lab-b": "loaded"}
+
+
+def test_what_a_plugin_prints_when_imported_does_not_reach_stdout(site, capsys):
+    site.install("lab-a", HEAD + "    print('hello from the lab')")
+
+    site.discover()
+
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "hello from the lab" in err
+
+
+def test_strict_raises_the_plugins_own_error(site):
+    site.install("lab-a", BROKEN)
+
+    with pytest.raises(ModuleNotFoundError) as caught:
+        site.discover(GRASPSENSE_STRICT_PLUGINS="1")
+    assert caught.value.__notes__ == ["while loading main of lab-a 0.2"]
+
+
+def test_calls_of_hooks_are_traced_on_demand(site, capsys):
+    site.install("lab-a", backend("a"))
+
+    site.discover(GRASPSENSE_TRACE_PLUGINS="1")
+
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "hook graspsense_sensor_backends() of lab-a:main returned in " in err
+
+
+@pytest.mark.parametrize(
+    ("driver", "why"),
+    [
+        (None, "ModuleNotFoundError: No module named 'lab_driver'"),
+        ("import no_such_library", "ModuleNotFoundError: No module named 'no_such_library'"),
+        ("1 +", "SyntaxError: invalid syntax (lab_driver.py, line 1)"),
+        ("", "AttributeError: module 'lab_driver' has no attribute 'Backend'"),
+        ("class Backend: pass", "lab_driver:Backend is no subclass of SensorBackend"),
+        (
+            "from graspsense.plugin_api import SensorBackend\nclass Backend(SensorBackend):\n"
+            "    def open(self, seed): ...\n    def read(self, timeout_s): ...\n    def close(self): ...",
+            "lab_driver:Backend does not implement apply, tare",
+        ),
+    ],
+)
+def test_text_for_a_component_whose_code_cannot_be_used(site, driver, why):
+    site.install("lab-a", backend("a", "lab_driver", needs="pip install lab-driver"))
+    if driver is not None:
+        site.write(lab_driver=driver)
+
+    with pytest.raises(PluginUnavailable) as caught:
+        site.discover().find("sensor-backend", "a").component_class()
+
+    assert str(caught.value) == (
+        f"sensor backend 'a' of lab-a 0.2 cannot be used here: {why}\n  needs: pip install lab-driver"
+    )
+
+
+def test_a_config_must_be_an_attrs_class(site):
+    site.install("lab-a", backend("a", "lab_driver"), lab_driver="class Config: pass")
+
+    with pytest.raises(PluginUnavailable, match="lab_driver:Config is no attrs class"):
+        site.discover().find("sensor-backend", "a").config_class()
+
+
+def test_a_pipeline_file_left_out_of_the_wheel_is_named(site):
+    site.install(
+        "lab-a",
+        HEAD
+        + """
+    @hookimpl
+    def graspsense_pipelines():
+        return [PipelineEntry(name="mine", resource="graspsense:no/such.toml", summary="")]
+    """,
+    )
+
+    with pytest.raises(
+        PluginUnavailable, match=r"there is no file 'no/such\.toml' in the package 'graspsense'"
+    ):
+        site.discover().pipeline("mine").resource()
+
+
+def test_isolated_plugins_do_not_discover(site):
+    site.install("lab-a", backend("a"))
+
+    with IsolatedPlugins() as plugins:
+        assert installed() is plugins
+        assert {one.distribution for one in plugins.statuses} == {"graspsense"}
+    assert installed() is not plugins
+
+
+def test_isolated_plugins_raise_what_a_plugin_raises():
+    module = types.ModuleType("mine")
+
+    with pytest.raises(Exception, match="mine has no GRASPSENSE_API"):
+        IsolatedPlugins(module)
+
+
+def test_names_are_canonical_as_packaging_has_it():
+    assert canonical("Lab_Hand..Driver") == "lab-hand-driver"
