@@ -1,0 +1,183 @@
+"""ARFF files in: Weka's text format for tables.
+
+Source: Weka manual, chapter "ARFF" (attribute declarations, sparse rows, instance weights, quoting).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from graspsense_c45.schema import Attribute, Schema
+from graspsense_c45.table import MISSING_CLASS, Table, make_table
+
+_TOKEN = re.compile(r"""\s*(?:'((?:[^'\\]|\\.)*)'|"((?:[^"\\]|\\.)*)"|([^\s,{}'"%][^\s,{}]*))""")
+_ESCAPE = re.compile(r"\\(.)")
+_ESCAPED = {"n": "\n", "t": "\t", "r": "\r"}
+_NUMERIC = ("numeric", "real", "integer")
+_MISSING = "?"
+
+
+class ArffError(ValueError):
+    """An ARFF file that cannot be read; the message names file, line, what was found and what is allowed."""
+
+
+def read_arff(path: str | Path, class_attribute: str | None = None) -> Table:
+    """The table in an ARFF file; the class is a nominal attribute, the last one unless named.
+
+    Numeric and nominal attributes, dense and sparse rows, instance weights and missing values (``?``) are read.
+    Raises ArffError: anything else, each with its line.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ArffError(f"{path}: not UTF-8 text (byte {error.start}); save the file as UTF-8") from None
+    return parse_arff(text, class_attribute, str(path))
+
+
+def parse_arff(text: str, class_attribute: str | None = None, source: str = "<text>") -> Table:
+    """The table in a text; see ``read_arff``."""
+    reader = _Reader(source)
+    for number, line in enumerate(text.splitlines(), start=1):
+        reader.take(number, line)
+    return reader.table(class_attribute)
+
+
+class _Reader:
+    def __init__(self, source: str) -> None:
+        self._source, self._line = source, 0
+        self._attributes: list[Attribute] = []
+        self._codes: list[dict[str, int]] = []
+        self._rows: list[list[float]] = []
+        self._weights: list[float] = []
+        self._in_data = False
+
+    def take(self, number: int, line: str) -> None:
+        self._line = number
+        line = line.strip()
+        if not line or line.startswith("%"):
+            return
+        if self._in_data:
+            self._row(line)
+            return
+        keyword, _, rest = line.partition(" ") if " " in line else line.partition("\t")
+        if keyword.lower() == "@attribute":
+            self._attribute(rest)
+        elif keyword.lower() == "@data":
+            self._in_data = True
+            if not self._attributes:
+                raise self._error("@data without any @attribute before it; declare the columns first")
+        elif keyword.lower() != "@relation":
+            raise self._error(f"found {keyword!r}; allowed here: @relation, @attribute, @data, % comments")
+
+    def table(self, class_attribute: str | None) -> Table:
+        if not self._in_data:
+            raise ArffError(f"{self._source}: no @data line; is this an ARFF file?")
+        if not self._rows:
+            raise ArffError(f"{self._source}: no rows after @data; there is nothing to learn")
+        names = [attribute.name for attribute in self._attributes]
+        if class_attribute is not None and class_attribute not in names:
+            raise ArffError(f"{self._source}: no attribute {class_attribute!r}; there are {', '.join(names)}")
+        at = len(names) - 1 if class_attribute is None else names.index(class_attribute)
+        classes = self._attributes[at].values
+        if classes is None:
+            raise ArffError(f"{self._source}: the class {names[at]!r} is numeric; name a nominal attribute as the class")
+        values = np.array(self._rows)
+        labels = np.where(np.isnan(values[:, at]), MISSING_CLASS, values[:, at]).astype(np.int64)
+        schema = Schema(tuple(a for i, a in enumerate(self._attributes) if i != at), classes)
+        try:
+            return make_table(schema, np.delete(values, at, axis=1), labels, np.array(self._weights))
+        except ValueError as error:
+            raise ArffError(f"{self._source}: {error}") from None
+
+    def _attribute(self, rest: str) -> None:
+        match = _TOKEN.match(rest)
+        if match is None:
+            raise self._error("@attribute without a name; write @attribute NAME numeric or @attribute NAME {a, b}")
+        name, kind = _text(match), rest[match.end() :].strip()
+        if kind.startswith("{"):
+            if not kind.endswith("}"):
+                raise self._error(f"the values of {name!r} do not end with }}")
+            values = tuple(self._tokens(kind[1:-1]))
+            if len(set(values)) != len(values) or not values:
+                raise self._error(f"the values of {name!r} are {values}; there must be some, each once")
+            self._attributes.append(Attribute(name, values=values))
+            self._codes.append({value: code for code, value in enumerate(values)})
+        elif kind.lower() in _NUMERIC:
+            self._attributes.append(Attribute(name))
+            self._codes.append({})
+        else:
+            raise self._error(f"attribute {name!r} is {kind!r}; allowed: {', '.join(_NUMERIC)}, or {{value, value}}")
+
+    def _row(self, line: str) -> None:
+        weight = 1.0
+        if line.startswith("{"):
+            end = line.find("}")
+            cells, rest = self._sparse(line[1:end] if end > 0 else line[1:]), line[end + 1 :] if end > 0 else ""
+        else:
+            brace = re.search(r",\s*\{([^{}'\"]*)\}\s*$", line)
+            rest = line[brace.start() :] if brace else ""
+            cells = list(self._tokens(line[: brace.start()] if brace else line))
+        if rest.strip(" \t,"):
+            weight = self._number(rest.strip(" \t,{}"), "the weight")
+        if len(cells) != len(self._attributes):
+            raise self._error(f"{len(cells)} values; there are {len(self._attributes)} attributes")
+        self._rows.append([self._cell(i, cell) for i, cell in enumerate(cells)])
+        self._weights.append(weight)
+
+    def _sparse(self, inside: str) -> list[str]:
+        cells = ["0" if a.values is None else a.values[0] for a in self._attributes]
+        for pair in inside.split(","):
+            if not pair.strip():
+                continue
+            index, _, value = pair.strip().partition(" ")
+            if not index.isdigit() or int(index) >= len(cells):
+                raise self._error(f"sparse index {index!r}; allowed: 0..{len(cells) - 1}")
+            match = _TOKEN.match(value)
+            cells[int(index)] = _text(match) if match else ""
+        return cells
+
+    def _cell(self, column: int, cell: str) -> float:
+        if cell == _MISSING:
+            return float("nan")
+        attribute = self._attributes[column]
+        if attribute.values is None:
+            return self._number(cell, attribute.name)
+        code = self._codes[column].get(cell)
+        if code is None:
+            raise self._error(f"{attribute.name} is {cell!r}; declared: {', '.join(attribute.values)}")
+        return float(code)
+
+    def _number(self, cell: str, name: str) -> float:
+        try:
+            return float(cell)
+        except ValueError:
+            raise self._error(f"{name} is {cell!r}; it must be a number, or ? where missing") from None
+
+    def _tokens(self, text: str) -> Iterator[str]:
+        at = 0
+        while True:
+            match = _TOKEN.match(text, at)
+            if match is None:
+                raise self._error(f"cannot read {text[at:].strip()!r} as a value; quote it, or write ? where missing")
+            yield _text(match)
+            rest = text[match.end() :].lstrip()
+            if not rest or rest.startswith("%"):
+                return
+            at = len(text) - len(rest) + (1 if rest.startswith(",") else 0)
+            if not text[at:].strip():
+                return
+
+    def _error(self, message: str) -> ArffError:
+        return ArffError(f"{self._source}:{self._line}: {message}")
+
+
+def _text(match: re.Match[str]) -> str:
+    quoted = match.group(1) if match.group(1) is not None else match.group(2)
+    if quoted is None:
+        return match.group(3)
+    return _ESCAPE.sub(lambda escape: _ESCAPED.get(escape.group(1), escape.group(1)), quoted)

@@ -1,0 +1,78 @@
+"""The rows a tree is grown from, checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from graspsense_c45.schema import Schema
+
+MISSING_CLASS = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows of attribute values, class indices and weights.
+
+    values: float64, rows x attributes; NaN is missing; a nominal column holds the index of its value.
+    labels: int64 class indices; -1 is a missing class (the row is not learned from, but its values are seen).
+    weights: float64, finite, not negative.
+    """
+
+    schema: Schema
+    values: NDArray[np.float64]
+    labels: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+
+def make_table(schema: Schema, values: ArrayLike, labels: ArrayLike, weights: ArrayLike | None = None) -> Table:
+    """A checked table.
+
+    Raises ValueError: shapes that do not fit, infinite values, a nominal column holding anything but indices of its
+    declared values, labels outside the declared classes, weights that are negative, not finite or all zero, no row.
+    """
+    x = np.asarray(values, dtype=np.float64)
+    y = np.asarray(labels, dtype=np.int64)
+    if x.ndim != 2 or x.shape[1] != len(schema.attributes):
+        raise ValueError(f"values have the shape {x.shape}; expected (rows, {len(schema.attributes)})")
+    if y.shape != (x.shape[0],):
+        raise ValueError(f"labels have the shape {y.shape}; expected ({x.shape[0]},), one a row")
+    w = np.ones(x.shape[0]) if weights is None else np.asarray(weights, dtype=np.float64)
+    if w.shape != y.shape:
+        raise ValueError(f"weights have the shape {w.shape}; expected {y.shape}, one a row")
+    check_values(schema, x)
+    if y.size and (y.min() < MISSING_CLASS or y.max() >= len(schema.classes)):
+        raise ValueError(f"labels must be in 0..{len(schema.classes) - 1} or {MISSING_CLASS} (missing class)")
+    if not np.all(np.isfinite(w)) or np.any(w < 0):
+        raise ValueError("weights must be finite and not negative")
+    known = y != MISSING_CLASS
+    if not known.any():
+        raise ValueError("no row has a class; there is nothing to learn")
+    if not w[known].any():
+        raise ValueError("all rows with a class have the weight 0; there is nothing to learn")
+    return Table(schema, x, y, w)
+
+
+def check_values(schema: Schema, x: NDArray[Any]) -> None:
+    """Raise ValueError where a value is infinite or a nominal column holds no index of a declared value."""
+    # One pass for the usual case: a sum is finite unless something in it is not (or it overflows).
+    with np.errstate(over="ignore", invalid="ignore"):
+        suspicious = not np.isfinite(x.sum())
+    if suspicious and np.isinf(x).any():
+        row, column = np.argwhere(np.isinf(x))[0]
+        raise ValueError(
+            f"infinite value (infinity) in row {row}, column {schema.attributes[column].name}; "
+            "values must be finite, NaN where missing"
+        )
+    for column, attribute in enumerate(schema.attributes):
+        if attribute.values is not None:
+            codes = x[:, column]
+            codes = codes[~np.isnan(codes)]
+            if codes.size and not np.all((codes >= 0) & (codes < len(attribute.values)) & (codes == np.floor(codes))):
+                raise ValueError(
+                    f"nominal column {attribute.name} must hold the indices 0..{len(attribute.values) - 1} "
+                    "of its declared values, NaN where missing"
+                )
