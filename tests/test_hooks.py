@@ -1,0 +1,275 @@
+"""Every hook has a test `test_hook_NAME`, its exact signature in the documentation, and an example that runs."""
+
+from __future__ import annotations
+
+import inspect
+import logging
+import re
+import types
+from pathlib import Path
+
+import click
+import pytest
+
+from graspsense.core import hookspecs
+from graspsense.core.entries import FoundDevice
+from graspsense.core.features import Features
+from graspsense.core.plugins import IsolatedPlugins
+from graspsense.core.signals import Outcome, Phase
+from graspsense.core.trace import trace_of
+from graspsense.core.trial import GraspEvent, RunInfo, Trial
+from graspsense.plugin_api import CommandEntry, collect, hookimpl
+
+HOOKS = {name: spec for name, spec in vars(hookspecs).items() if name.startswith("graspsense_")}
+DOCS = (Path(__file__).parents[1] / "docs" / "hooks.md").read_text()
+RUN = RunInfo(components={"gripper": "graspsense/replay 0.1.0"}, settings={"run": {"seed": 7}}, seed=7)
+EVENT = GraspEvent(1.5, Phase.SQUEEZE, "both pads touch")
+
+
+def example(hook: str) -> types.ModuleType:
+    """Return the plugin module that the documentation gives for this hook."""
+    section = re.search(rf"^## {hook}\(.*?```python\n(.*?)```", DOCS, re.DOTALL | re.MULTILINE)
+    assert section, f"docs/hooks.md has no example of {hook}"
+    module = types.ModuleType(f"example_of_{hook}")
+    exec(section[1], vars(module))
+    return module
+
+
+def trial() -> Trial:
+    return Trial(
+        run=RUN,
+        trace=trace_of([], [], [], []),
+        outcome=Outcome.NEVER_STEADY,
+        reason="",
+        features=Features(names=(), values=(), units=()),
+        prediction=None,
+        device={},
+        report={},
+        counts={},
+        events=(),
+        seconds_simulated=None,
+        seconds_wall=0.0,
+    )
+
+
+@pytest.mark.parametrize("hook", HOOKS)
+def test_every_hook_has_a_test(hook):
+    assert f"test_hook_{hook}" in globals()
+
+
+@pytest.mark.parametrize("hook", HOOKS)
+def test_every_hook_is_documented_with_its_exact_signature(hook):
+    signature = f"{hook}{inspect.signature(HOOKS[hook])}".replace("'", "")
+    assert f"\n## {signature}\n" in DOCS
+
+
+@pytest.mark.parametrize("hook", HOOKS)
+def test_every_hook_says_what_it_is_for(hook):
+    assert inspect.getdoc(HOOKS[hook])
+
+
+def test_the_documentation_knows_no_other_hook():
+    documented = re.findall(r"^## (graspsense_\w+)\(", DOCS, re.MULTILINE)
+    assert sorted(documented) == sorted(HOOKS)
+
+
+@pytest.mark.parametrize(
+    ("role", "hook", "name"),
+    [
+        ("sensor-backend", "graspsense_sensor_backends", "lab-hand"),
+        ("controller", "graspsense_controllers", "gentle"),
+        ("feature-set", "graspsense_feature_sets", "stiffness"),
+        ("classifier", "graspsense_classifiers", "nearest"),
+    ],
+)
+def test_a_component_hook_gives_components_of_its_role(role, hook, name):
+    plugins = IsolatedPlugins(example(hook), builtins=False)
+
+    assert [(one.role, one.name) for one in plugins.components()] == [(role, name)]
+    assert plugins.find(role, name).qualified == f"graspsense-test/{name}"
+
+
+def test_hook_graspsense_sensor_backends():
+    entry = IsolatedPlugins(example("graspsense_sensor_backends")).find("sensor-backend", "lab-hand").entry
+
+    assert entry.accepts == ("position", "effort")
+    assert [one.name for one in entry.channels][-1] == "motor_temperature"
+
+
+def test_hook_graspsense_controllers():
+    entry = IsolatedPlugins(example("graspsense_controllers")).find("controller", "gentle").entry
+
+    assert entry.requires[0].rate_hz == 50.0
+    assert entry.commands == ("velocity",)
+
+
+def test_hook_graspsense_feature_sets():
+    entry = IsolatedPlugins(example("graspsense_feature_sets")).find("feature-set", "stiffness").entry
+
+    assert entry.features == (("stiffness", "N/m"),)
+
+
+def test_hook_graspsense_classifiers():
+    entry = IsolatedPlugins(example("graspsense_classifiers")).find("classifier", "nearest").entry
+
+    assert entry.target == "lab_hand.nearest:Nearest"
+
+
+def test_hook_graspsense_pipelines():
+    plugins = IsolatedPlugins(example("graspsense_pipelines"))
+
+    assert [one.name for one in plugins.pipelines()] == ["default", "lab"]
+    assert "[gripper]" in plugins.pipeline("graspsense/default").resource().read_text()
+
+
+def test_hook_graspsense_models():
+    plugins = IsolatedPlugins(example("graspsense_models"))
+
+    assert plugins.model("lab-cans").entry.resource == "lab_hand:models/cans.json"
+
+
+def test_hook_graspsense_datasets():
+    plugins = IsolatedPlugins(example("graspsense_datasets"))
+
+    assert plugins.dataset("lab-csv").entry.target == "lab_hand.csv:read"
+
+
+def test_hook_graspsense_commands():
+    class Plugin:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl
+        def graspsense_commands(self):
+            return [CommandEntry("again", "click:Command", "a class that is there to be imported")]
+
+    plugins = IsolatedPlugins(example("graspsense_commands"), Plugin())
+
+    assert [one.name for one in plugins.commands()] == ["again", "home-hand"]
+    assert plugins.command("again").load() is click.Command
+
+
+def test_hook_graspsense_probe_devices():
+    class Failing:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl
+        def graspsense_probe_devices(self):
+            raise PermissionError("cannot list the bus")
+
+    class Timed:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl
+        def graspsense_probe_devices(self, timeout_s):
+            return [FoundDevice("mine", str(timeout_s), "bus 1", ready=True)]
+
+    plugins = IsolatedPlugins(builtins=False)
+    plugins.add(Failing(), "lab-a")
+    plugins.add(example("graspsense_probe_devices"), "lab-b")
+    plugins.add(Timed(), "lab-c")
+
+    failed, found, timed = plugins.probe_devices(0.25)
+
+    assert (failed.distribution, failed.found) == ("lab-a", ())
+    assert failed.error == "PermissionError: cannot list the bus"
+    assert (found.error, found.found[0].advice) == ("", "add yourself to the group dialout")
+    assert timed.found[0].serial == "0.25"
+
+
+def test_a_probe_that_gives_something_else_is_reported_as_failed():
+    class Plugin:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl
+        def graspsense_probe_devices(self):
+            return ["/dev/ttyUSB0"]
+
+    (probe,) = IsolatedPlugins(Plugin(), builtins=False).probe_devices(1.0)
+
+    assert probe.error == "graspsense_probe_devices gave '/dev/ttyUSB0': it takes FoundDevice only"
+
+
+def test_hook_graspsense_run_starting():
+    module = example("graspsense_run_starting")
+
+    IsolatedPlugins(module).run_starting(RUN)
+
+    assert module.started == [7]
+
+
+def test_hook_graspsense_grasp_event():
+    module = example("graspsense_grasp_event")
+
+    IsolatedPlugins(module).grasp_event(RUN, EVENT)
+
+    assert module.events == ["both pads touch"]
+
+
+def test_hook_graspsense_run_finished():
+    module = example("graspsense_run_finished")
+
+    IsolatedPlugins(module).run_finished(RUN, trial())
+
+    assert module.outcomes == ["never steady"]
+
+
+def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog):
+    class Raising:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl
+        def graspsense_grasp_event(self, event):
+            raise RuntimeError("no room on the disk")
+
+    seen = example("graspsense_grasp_event")
+    plugins = IsolatedPlugins()
+    plugins.add(Raising(), "lab-first")
+    plugins.add(seen, "lab-seen")
+    plugins.add(Raising(), "lab-last")
+
+    with caplog.at_level(logging.WARNING, "graspsense.plugins"):
+        plugins.grasp_event(RUN, EVENT)
+        plugins.grasp_event(RUN, EVENT)
+
+    assert seen.events == ["both pads touch", "both pads touch"]
+    assert [one.getMessage() for one in caplog.records] == [
+        f"{name} 0.1 failed in graspsense_grasp_event and is passed over: RuntimeError: no room on the disk"
+        for name in ("lab-first", "lab-last")
+    ]
+
+
+def test_an_observer_does_not_swallow_an_interrupt():
+    class Interrupted:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl
+        def graspsense_run_starting(self):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        IsolatedPlugins(Interrupted()).run_starting(RUN)
+
+
+def test_a_hook_that_a_plugin_owns_collects_from_all_that_implement_it(caplog):
+    class Stiff:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl(optionalhook=True)
+        def lab_terms(self, scale):
+            return 2.0 * scale
+
+    class Broken:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl(optionalhook=True)
+        def lab_terms(self, scale):
+            raise ValueError("no such term")
+
+    with IsolatedPlugins(builtins=False) as plugins:
+        plugins.add(Stiff(), "lab-a")
+        plugins.add(Broken(), "lab-b")
+        plugins.add(Stiff(), "lab-c")
+
+        assert collect("lab_terms", scale=3.0) == (("lab-a", 6.0), ("lab-c", 6.0))
+        assert collect("nobody_implements_this") == ()
+    assert "lab-b 0.1 failed in lab_terms" in caplog.text
