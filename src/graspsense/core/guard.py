@@ -72,6 +72,11 @@ def guard(
         value = max(value, 0.0)
     if value != asked:
         acted += 1
+    elif kind == EFFORT:
+        # Within its limits already, which say nothing more to whoever applies an effort.
+        if contact_seen != state.contact_seen:
+            state = GuardState(contact_seen, acted, 0)
+        return command, state
     if contact_seen != state.contact_seen or acted != state.acted:
         state = GuardState(contact_seen, acted, 0)
     return Command(kind, value, effort_limit, speed_limit), state

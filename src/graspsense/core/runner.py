@@ -213,7 +213,8 @@ class _Grasp:
                 self.first_t_s = frame.t_s
             command, state = advance(params, state, frame, pads)
             self.state = state
-            if phase == TARING and pads.counter > newest:
+            stepped = phase != TARING
+            if not stepped and pads.counter > newest:
                 newest = pads.counter
                 images.append(pads)
             if state.phase != phase:
@@ -225,7 +226,8 @@ class _Grasp:
                 self._guard_event(frame, watcher, state.guard)
                 watcher = state.guard
             apply(command)
-            if phase >= APPROACH:
+            # The frame that ended the taring still has the old zero.
+            if phase >= APPROACH and stepped:
                 record(frame, pads, phase, command)
                 for sink in sinks:
                     sink.take(frame, pads, phase, command)

@@ -72,41 +72,37 @@ step: Callable[[Any, Any, Frame, Pads], tuple[Command, Any]] = _unbound
 def tick(params: TickParams, state: TickState, frame: Frame, pads: Pads) -> tuple[Command, TickState]:
     """Return the command for this tick and the next state."""
     schedule = params.schedule
-    phase, since, still, first_image = state.phase, state.since_t_s, state.still, state.first_image
-    law, done = state.law, state.done
-
+    phase, since, still, first_image, law, watcher, done = state
     if phase == -1:
-        since, still = frame.t_s, Stillness(frame.t_s, frame.gap_m)
-        phase = OPENING if schedule.opens == 1 else APPROACH
-    elif phase == OPENING or phase == RELEASE:
+        phase, since, still = OPENING, frame.t_s, Stillness(frame.t_s, frame.gap_m)
+        if schedule.opens == 0:
+            phase = APPROACH
+
+    if phase >= APPROACH and phase != RELEASE:
+        command, law = step(params.law, law, frame, pads)
+        phase = law.phase
+        if law.outcome == RUNNING:
+            since = frame.t_s
+        elif law.outcome != STEADY or frame.t_s - since >= schedule.hold_s:
+            since, still = frame.t_s, Stillness(frame.t_s, frame.gap_m)
+            if schedule.opens == 1:
+                phase = RELEASE
+            else:
+                done = 1
+    elif phase == TARING:
+        command = schedule.relaxed
+        waited = frame.t_s - since
+        if pads.counter >= first_image + schedule.tare_images or waited >= schedule.opening_timeout_s:
+            # The zero holds from the next frame on, so the approach begins with that.
+            phase, since = APPROACH, frame.t_s
+    else:
+        command = schedule.opening
         still = watch(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
-        elapsed = frame.t_s - since
-        if at_rest(still, frame.t_s, OPEN_WINDOW_S) or elapsed >= schedule.opening_timeout_s:
+        waited = frame.t_s - since
+        if at_rest(still, frame.t_s, OPEN_WINDOW_S) or waited >= schedule.opening_timeout_s:
             if phase == RELEASE:
                 done = 1
             else:
                 phase, since, first_image = TARING, frame.t_s, pads.counter
-    elif phase == TARING and (
-        pads.counter >= first_image + schedule.tare_images or frame.t_s - since >= schedule.opening_timeout_s
-    ):
-        # The zero holds from the next frame on, so this tick still commands what the taring did.
-        return schedule.relaxed, TickState(APPROACH, frame.t_s, still, 0, law, state.guard, done)
-
-    if phase == OPENING or phase == RELEASE:
-        command = schedule.opening
-    elif phase == TARING:
-        command = schedule.relaxed
-    else:
-        command, law = step(params.law, law, frame, pads)
-        if law.outcome == RUNNING:
-            phase, since = law.phase, frame.t_s
-        else:
-            phase = law.phase
-            if law.outcome != STEADY or frame.t_s - since >= schedule.hold_s:
-                still = Stillness(frame.t_s, frame.gap_m)
-                if schedule.opens == 1:
-                    phase, since = RELEASE, frame.t_s
-                else:
-                    done = 1
-    command, watcher = guard(params.guard, state.guard, frame, command)
+    command, watcher = guard(params.guard, watcher, frame, command)
     return command, TickState(phase, since, still, first_image, law, watcher, done)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -94,7 +95,9 @@ def trace_of(
     units: Mapping[str, str] = SI_UNITS,
 ) -> Trace:
     """Return the columns of these ticks and images. `frames`, `phases` and `commands` have one length."""
-    table = np.array(frames, dtype=np.float64).reshape(len(frames), len(_FRAME_COLUMNS))
+    width = len(_FRAME_COLUMNS)
+    numbers = np.fromiter(chain.from_iterable(frames), dtype=np.float64, count=len(frames) * width)
+    table = numbers.reshape(len(frames), width)
     columns: dict[str, Any] = {
         name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(_FRAME_COLUMNS) if name != "dt_s"
     }

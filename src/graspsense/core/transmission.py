@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 
 class ScrewLinkage(NamedTuple):
-    """Constants of the map, in metres and radians; build with `screw_linkage`."""
+    """Constants of the map, in metres; build with `screw_linkage`."""
 
     pitch_m: float
     """Travel of the screw in one revolution of the motor."""
@@ -23,7 +23,9 @@ class ScrewLinkage(NamedTuple):
     """(a^2 + b^2 - h^2) / 2ab"""
     cosine_m2: float
     """1 / 2ab"""
-    angle0_rad: float
+    base_sine: float
+    """Sine of theta0 - phi0, what the finger's angle adds to the triangle's."""
+    base_cosine: float
     finger_m: float
     half_gap0_m: float
 
@@ -48,7 +50,8 @@ def screw_linkage(
         length0_m=length0_mm / 1e3,
         cosine0=(a_mm * a_mm + b_mm * b_mm - h_mm * h_mm) / (2.0 * a_mm * b_mm),
         cosine_m2=1e6 / (2.0 * a_mm * b_mm),
-        angle0_rad=theta0 - math.radians(phi0_deg),
+        base_sine=math.sin(theta0 - math.radians(phi0_deg)),
+        base_cosine=math.cos(theta0 - math.radians(phi0_deg)),
         finger_m=r_mm / 1e3,
         half_gap0_m=(t0_mm - r_mm * math.sin(theta0)) / 1e3,
     )
@@ -91,20 +94,29 @@ PR2_ENCODER_TICKS: Final = 1200
 
 
 def gap_and_rate(link: ScrewLinkage, revolutions: float) -> tuple[float, float]:
-    """Return the gap (m) at this motor angle (revolutions), and how fast it changes with it (m/revolution)."""
-    length = link.length0_m + revolutions * link.pitch_m
-    u = link.cosine0 - length * length * link.cosine_m2
-    u = min(max(u, -1.0), 1.0)
-    theta = link.angle0_rad + math.acos(u)
-    gap = 2.0 * (link.half_gap0_m + link.finger_m * math.sin(theta))
+    """Return the gap (m) at this motor angle (revolutions), and how fast it changes with it (m/revolution).
+
+    Published as gap = 2 (t0 + r (sin theta - sin theta0)) with theta = theta0 - phi0 + acos(u); the sum of angles
+    is written out here, which leaves one square root.
+    """
+    pitch, length0, cosine0, cosine_m2, base_sine, base_cosine, finger, half_gap0 = link
+    length = length0 + revolutions * pitch
+    u = cosine0 - length * length * cosine_m2
+    if u > 1.0:
+        u = 1.0
+    elif u < -1.0:
+        u = -1.0
     sine = math.sqrt(1.0 - u * u)
-    rate = 4.0 * link.finger_m * math.cos(theta) * length * link.pitch_m * link.cosine_m2 / max(sine, 1e-12)
-    return gap, rate
+    gap = 2.0 * (half_gap0 + finger * (base_sine * u + base_cosine * sine))
+    if sine < 1e-12:
+        sine = 1e-12
+    turned = finger * (base_cosine * u - base_sine * sine)
+    return gap, 4.0 * turned * length * pitch * cosine_m2 / sine
 
 
 def revolutions_at(link: ScrewLinkage, gap_m: float) -> float:
     """Return the motor angle (revolutions) at which the gap is `gap_m`: the inverse of `gap_and_rate`."""
-    theta = math.asin((0.5 * gap_m - link.half_gap0_m) / link.finger_m)
-    u = math.cos(theta - link.angle0_rad)
+    sine = (0.5 * gap_m - link.half_gap0_m) / link.finger_m
+    u = math.sqrt(1.0 - sine * sine) * link.base_cosine + sine * link.base_sine
     length = math.sqrt(max((link.cosine0 - u) / link.cosine_m2, 0.0))
     return (length - link.length0_m) / link.pitch_m

@@ -11,6 +11,7 @@ from graspsense.core.signals import Outcome, Phase
 
 if TYPE_CHECKING:
     from graspsense.core.features import Features, Prediction
+    from graspsense.core.roles import DeviceInfo
     from graspsense.core.trace import Trace
 
 
@@ -48,9 +49,48 @@ class Trial:
     reason: str
     features: Features
     prediction: Prediction | None
-    device: Mapping[str, Any]
+    device: DeviceInfo
     report: Mapping[str, Any]
     counts: Mapping[str, int]
     events: tuple[GraspEvent, ...]
     seconds_simulated: float | None
     seconds_wall: float
+
+
+def trial_as_json(trial: Trial) -> dict[str, Any]:
+    """Return what `graspsense run --json` prints: everything but the trace, a missing feature as None."""
+    features, prediction, device = trial.features, trial.prediction, trial.device
+    return {
+        "outcome": trial.outcome.words,
+        "reason": trial.reason,
+        "features": features.as_dict(),
+        "units": dict(zip(features.names, features.units, strict=True)),
+        "reasons": dict(features.reasons),
+        "prediction": None
+        if prediction is None
+        else {
+            "label": prediction.label,
+            "probabilities": dict(prediction.probabilities),
+            "because": list(prediction.because),
+            "warnings": list(prediction.warnings),
+        },
+        "components": dict(trial.run.components),
+        "seed": trial.run.seed,
+        "labels": dict(trial.run.labels),
+        "device": {
+            "name": device.name,
+            "serial": device.serial,
+            "firmware": device.firmware,
+            "clock": device.clock,
+            "rate_hz": device.rate_hz,
+            "notes": list(device.notes),
+        },
+        "report": dict(trial.report),
+        "counts": dict(trial.counts),
+        "events": [
+            {"t_s": event.t_s, "phase": event.phase.name.lower(), "what": event.what}
+            for event in trial.events
+        ],
+        "seconds_simulated": trial.seconds_simulated,
+        "seconds_wall": trial.seconds_wall,
+    }

@@ -1,6 +1,6 @@
 """Composing a scene's step, and compiling the whole loop where many grasps are wanted.
 
-`sum_of` folds a scene's terms in pairs; `world_of` binds them into the plant. Everything runs as it is in the
+`sum_of` makes one term of a scene's, `plant_of` binds it into the plant. Everything runs as it is in the
 interpreter. `compiled` compiles a bound function with all it reaches. This is the only module that imports numba,
 and only when a loop is compiled.
 
@@ -32,21 +32,49 @@ def _nothing(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[
 
 
 first: Any = _nothing
+second: Any = _nothing
+third: Any = _nothing
 rest: Any = _nothing
 
 
-def _pair(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
+def _one(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
     force, state = first(params[0], states[0], d0, d1, h)
-    others, left = rest(params[1:], states[1:], d0, d1, h)
-    return force + others, (state, *left)
+    return force, (state,)
+
+
+def _two(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
+    force1, state1 = first(params[0], states[0], d0, d1, h)
+    force2, state2 = second(params[1], states[1], d0, d1, h)
+    return force1 + force2, (state1, state2)
+
+
+def _three(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
+    force1, state1 = first(params[0], states[0], d0, d1, h)
+    force2, state2 = second(params[1], states[1], d0, d1, h)
+    force3, state3 = third(params[2], states[2], d0, d1, h)
+    return force1 + force2 + force3, (state1, state2, state3)
+
+
+def _three_and_more(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
+    force1, state1 = first(params[0], states[0], d0, d1, h)
+    force2, state2 = second(params[1], states[1], d0, d1, h)
+    force3, state3 = third(params[2], states[2], d0, d1, h)
+    more, others = rest(params[3:], states[3:], d0, d1, h)
+    return force1 + force2 + force3 + more, (state1, state2, state3, *others)
 
 
 def sum_of(laws: Sequence[Law]) -> Law:
     """Return one term that is the sum of these: parameters and states become tuples in the same order."""
-    total: Any = _nothing
-    for law in reversed(laws):
-        total = bind(_pair, first=law, rest=total)
-    return total  # type: ignore[no-any-return]
+    if not laws:
+        return _nothing
+    if len(laws) == 1:
+        return bind(_one, first=laws[0])
+    if len(laws) == 2:
+        return bind(_two, first=laws[0], second=laws[1])
+    if len(laws) == 3:
+        return bind(_three, first=laws[0], second=laws[1], third=laws[2])
+    more = sum_of(laws[3:])
+    return bind(_three_and_more, first=laws[0], second=laws[1], third=laws[2], rest=more)
 
 
 def plant_of(laws: Sequence[Law]) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
@@ -95,6 +123,7 @@ def grasp(
             image_times[count - 1] = sensor.image_t_s
         pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
         command, state = control(tick_params, state, frame, pads)
+        stepped = phase != TARING
         if state.phase != phase:
             if phase == TARING and count > untared:
                 _tare(images, untared, count, left_zero, right_zero)
@@ -102,7 +131,7 @@ def grasp(
             phase = state.phase
             untared = count
         effort = command.value
-        if phase > TARING:
+        if phase > TARING and stepped:
             row = columns[recorded]
             row[0] = frame.t_s
             row[1] = frame.gap_m

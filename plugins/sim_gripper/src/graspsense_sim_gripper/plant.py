@@ -26,7 +26,7 @@ EVENTS_A_STEP: Final = 16
 """A step is cut at most this often; the rest is then taken whole."""
 SEARCH: Final = 40
 """Most steps of the search for the object's share of the compression."""
-FORCE_ROUNDING_N: Final = 1e-9
+FORCE_ROUNDING_N: Final = 1e-7
 FORCE_ROUNDING: Final = 1e-9
 """The search ends where the force balances to this, absolute and relative."""
 

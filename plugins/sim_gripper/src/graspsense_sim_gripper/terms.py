@@ -104,17 +104,25 @@ class GasState(NamedTuple):
 
 def gas(params: Gas, state: GasState, d0: float, d1: float, h: float) -> tuple[float, GasState]:
     """Return the force of the pressure rise: p' = A d' / (V / (n p) + C_w), midpoint rule."""
-    swept0 = params.area_m2 * d0 + 0.5 * params.area_slope_m * d0 * d0
-    swept1 = params.area_m2 * d1 + 0.5 * params.area_slope_m * d1 * d1
+    area, slope, whole, pressure, exponent, bulge = params
     rise = state.rise_pa
-    volume = max(params.volume_m3 - swept0 + params.bulge_m3_pa * rise, 1e-9)
-    give = volume / (params.exponent * (params.pressure_pa + rise)) + params.bulge_m3_pa
+    swept0 = area * d0 + 0.5 * slope * d0 * d0
+    swept1 = area * d1 + 0.5 * slope * d1 * d1
+    lowest = -0.9 * pressure
+    give = _give(whole - swept0 + bulge * rise, pressure + rise, exponent) + bulge
     middle = rise + 0.5 * (swept1 - swept0) / give
-    middle = max(middle, -0.9 * params.pressure_pa)
-    volume = max(params.volume_m3 - 0.5 * (swept0 + swept1) + params.bulge_m3_pa * middle, 1e-9)
-    give = volume / (params.exponent * (params.pressure_pa + middle)) + params.bulge_m3_pa
-    rise = max(rise + (swept1 - swept0) / give, -0.9 * params.pressure_pa)
-    return (params.area_m2 + params.area_slope_m * d1) * rise, GasState(rise)
+    if middle < lowest:
+        middle = lowest
+    volume = whole - 0.5 * (swept0 + swept1) + bulge * middle
+    rise += (swept1 - swept0) / (_give(volume, pressure + middle, exponent) + bulge)
+    if rise < lowest:
+        rise = lowest
+    return (area + slope * d1) * rise, GasState(rise)
+
+
+def _give(volume_m3: float, pressure_pa: float, exponent: float) -> float:
+    """Return how much volume (m3) the gas gives a pascal; a millilitre in a thousand is the least it holds."""
+    return (volume_m3 if volume_m3 > 1e-9 else 1e-9) / (exponent * pressure_pa)
 
 
 class Loss(NamedTuple):

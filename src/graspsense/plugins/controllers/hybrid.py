@@ -56,23 +56,26 @@ class HybridState(NamedTuple):
     integral_n: float
     force_effort_n: float
     approach_effort_n: float
+    approached_t_s: float
+    """When the velocity loop was last in charge; the ramp runs from there."""
 
 
 def step(params: HybridParams, state: HybridState, frame: Frame, pads: Pads) -> tuple[Command, HybridState]:
     """Velocity until both pads touch, then force."""
     progress = supervise(params.supervision, state.progress, frame)
-    integral, force_effort, approach_effort = state.integral_n, state.force_effort_n, state.approach_effort_n
+    _, _, _, integral, force_effort, approach_effort, contact_t = state
     if progress.phase == APPROACH:
         effort, integral = closing_effort(params.velocity, integral, frame)
         approach_effort = effort
+        contact_t = frame.t_s
     else:
         force_effort = squeezing_effort(params.force, force_effort, frame)
         effort = force_effort
-        elapsed = frame.t_s - progress.contact_t_s
+        elapsed = frame.t_s - contact_t
         if elapsed < params.ramp_s:
             effort = approach_effort + (effort - approach_effort) * (elapsed / params.ramp_s)
     return Command(EFFORT, effort, inf, inf), HybridState(
-        progress.phase, progress.outcome, progress, integral, force_effort, approach_effort
+        progress.phase, progress.outcome, progress, integral, force_effort, approach_effort, contact_t
     )
 
 
@@ -99,5 +102,6 @@ class HybridController(Controller[HybridConfig]):
             progress,
             float(self.config.preload_n),
             float(self.config.probing_force_n),
+            0.0,
             0.0,
         )

@@ -88,13 +88,13 @@ class Progress(NamedTuple):
     phase: int
     outcome: int
     begun: int
-    start_t_s: float
     start_gap_m: float
-    contact_t_s: float
+    deadline_s: float
+    """When the approach, then the squeeze, has taken too long."""
     still: Stillness
     peak_force_n: float
     peak_gap_m: float
-    held_t_s: float
+    felt_t_s: float
     """When a pad was last felt after contact."""
 
 
@@ -118,78 +118,66 @@ def supervision(config: SupervisionConfig, slowest_m_s: float) -> Supervision:
 
 def not_begun() -> Progress:
     """Return the progress before the first tick."""
-    return Progress(APPROACH, RUNNING, 0, 0.0, 0.0, 0.0, Stillness(0.0, 0.0), 0.0, 0.0, 0.0)
+    return Progress(APPROACH, RUNNING, 0, 0.0, 0.0, Stillness(0.0, 0.0), 0.0, 0.0, 0.0)
 
 
 def supervise(params: Supervision, now: Progress, frame: Frame) -> Progress:
     """Return the progress after this frame; the same object where nothing has changed."""
     if now.outcome != RUNNING:
         return now
-    t, gap = frame.t_s, frame.gap_m
     if now.phase == APPROACH:
-        return _approaching(params, now, frame, t, gap)
-    return _squeezing(params, now, frame, t, gap)
+        return _approaching(params, now, frame)
+    return _squeezing(params, now, frame)
 
 
-def _approaching(params: Supervision, now: Progress, frame: Frame, t: float, gap: float) -> Progress:
-    start_t, start_gap = now.start_t_s, now.start_gap_m
-    if now.begun == 0:
-        start_t, start_gap = t, gap
-    left, right = frame.force_left_n, frame.force_right_n
+def _approaching(params: Supervision, now: Progress, frame: Frame) -> Progress:
+    t, _, gap, _, _, left, right, edge_left, edge_right, _ = frame
+    contact, edge = params.contact_force_n, params.edge_force_n
+    begun, start_gap, deadline = now.begun, now.start_gap_m, now.deadline_s
+    if begun == 0:
+        start_gap = gap
+        allowed = params.move_timeout_s
+        if params.slowest_m_s > 0.0:
+            allowed = max(allowed, 1.5 * gap / params.slowest_m_s)
+        deadline = t + allowed
     outcome = RUNNING
-    if frame.edge_left_n > params.edge_force_n or frame.edge_right_n > params.edge_force_n:
+    if edge_left > edge or edge_right > edge:
         outcome = SIDE_IMPACT
-    elif both_touch(left, right, params.contact_force_n):
-        if start_gap - gap < params.too_wide_m and now.begun == 1:
-            outcome = TOO_WIDE
-        else:
-            still = Stillness(t, gap)
-            return Progress(SQUEEZE, RUNNING, 1, start_t, start_gap, t, still, 0.5 * (left + right), gap, t)
+    elif both_touch(left, right, contact):
+        if start_gap - gap >= params.too_wide_m or begun == 0:
+            force = 0.5 * (left + right)
+            deadline = t + params.steady_timeout_s
+            return Progress(SQUEEZE, RUNNING, 1, start_gap, deadline, Stillness(t, gap), force, gap, t)
+        outcome = TOO_WIDE
     elif gap <= params.closed_gap_m:
         outcome = NOTHING_THERE
-    else:
-        limit = params.move_timeout_s
-        if params.slowest_m_s > 0.0:
-            limit = max(limit, 1.5 * start_gap / params.slowest_m_s)
-        if t - start_t > limit:
-            one = left >= params.contact_force_n or right >= params.contact_force_n
-            outcome = ONE_FINGER if one else NOTHING_THERE
-    if outcome == RUNNING and now.begun == 1:
+    elif t > deadline:
+        outcome = ONE_FINGER if left >= contact or right >= contact else NOTHING_THERE
+    if outcome == RUNNING and begun == 1:
         return now
-    return Progress(APPROACH, outcome, 1, start_t, start_gap, 0.0, Stillness(t, gap), 0.0, gap, t)
+    return Progress(APPROACH, outcome, 1, start_gap, deadline, Stillness(t, gap), 0.0, gap, t)
 
 
-def _squeezing(params: Supervision, now: Progress, frame: Frame, t: float, gap: float) -> Progress:
-    left, right = frame.force_left_n, frame.force_right_n
+def _squeezing(params: Supervision, now: Progress, frame: Frame) -> Progress:
+    t, gap, left, right = frame.t_s, frame.gap_m, frame.force_left_n, frame.force_right_n
     force = 0.5 * (left + right)
     still = watch(now.still, t, gap, params.rest_speed_m_s, params.rest_window_s)
-    peak_force, peak_gap, held_t = now.peak_force_n, now.peak_gap_m, now.held_t_s
+    peak_force, peak_gap, felt_t = now.peak_force_n, now.peak_gap_m, now.felt_t_s
     if force > peak_force:
         peak_force, peak_gap = force, gap
     half = 0.5 * params.contact_force_n
     if left >= half or right >= half:
-        held_t = t
+        felt_t = t
 
     phase, outcome = SQUEEZE, RUNNING
-    if force < params.crush_share * peak_force and gap < peak_gap - params.crush_travel_m:
+    if gap <= params.closed_gap_m or (
+        force < params.crush_share * peak_force and gap < peak_gap - params.crush_travel_m
+    ):
         outcome = CRUSHED
-    elif gap <= params.closed_gap_m:
-        outcome = CRUSHED
-    elif t - held_t > params.slip_time_s and gap < peak_gap:
+    elif t - felt_t > params.slip_time_s and gap < peak_gap:
         outcome = SLIPPED
     elif at_rest(still, t, params.rest_window_s):
         phase, outcome = HOLD, STEADY
-    elif t - now.contact_t_s > params.steady_timeout_s:
+    elif t > now.deadline_s:
         outcome = NEVER_STEADY
-    return Progress(
-        phase,
-        outcome,
-        1,
-        now.start_t_s,
-        now.start_gap_m,
-        now.contact_t_s,
-        still,
-        peak_force,
-        peak_gap,
-        held_t,
-    )
+    return Progress(phase, outcome, 1, now.start_gap_m, now.deadline_s, still, peak_force, peak_gap, felt_t)

@@ -66,10 +66,14 @@ def velocity_loop(config: VelocityLoopConfig) -> VelocityLoop:
 
 def closing_effort(loop: VelocityLoop, integral_n: float, frame: Frame) -> tuple[float, float]:
     """Return the effort (N) that keeps the closing speed, and the integral (N) after this tick."""
-    error = loop.closing_speed_m_s + frame.velocity_m_s
-    integral_n += loop.integral_gain_n_m * error * frame.dt_s
-    integral_n = min(max(integral_n, -loop.integral_limit_n), loop.integral_limit_n)
-    return loop.velocity_gain_n_s_m * error + integral_n, integral_n
+    speed, gain, integral_gain, limit, _ = loop
+    error = speed + frame.velocity_m_s
+    integral_n += integral_gain * error * frame.dt_s
+    if integral_n > limit:
+        integral_n = limit
+    elif integral_n < -limit:
+        integral_n = -limit
+    return gain * error + integral_n, integral_n
 
 
 class VelocityParams(NamedTuple):

@@ -1,0 +1,177 @@
+"""`graspsense run`: one grasp, live in the terminal."""
+
+from __future__ import annotations
+
+import signal
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from graspsense.cli.options import pipeline_options, settings_of
+from graspsense.cli.output import echo_json, talk
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+    from graspsense.core.config import Settings
+    from graspsense.core.signals import Command, Frame, Pads
+    from graspsense.core.trial import Trial
+
+EXIT_ABORTED: Final = 4
+BAR: Final = 24
+
+
+@click.command(short_help="Grasp once, live in the terminal.")
+@pipeline_options
+@click.option("--save", metavar="DIR", help="Keep the trial in a new folder below DIR.")
+@click.option("--dry-run", is_flag=True, help="Say what would be done; open nothing.")
+@click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
+def run(
+    pipeline: str | None,
+    gripper: str | None,
+    object_name: str | None,
+    options: tuple[str, ...],
+    seed: int | None,
+    save: str | None,
+    dry_run: bool,
+    as_json: bool,
+) -> None:
+    """Open, tare, close, squeeze, release; print the outcome, the features and what they say.
+
+    Without any option a simulated gripper squeezes a full, closed bottle. Exit code 0 means the grasp ended by
+    itself, whatever its outcome; 2 a mistake in the settings, 3 no such device, 4 aborted or device lost.
+    """
+    from graspsense.core.pipeline import grasp_with
+    from graspsense.core.plugins import installed
+    from graspsense.core.signals import Outcome
+    from graspsense.core.trial import trial_as_json
+    from graspsense.core.wiring import check
+
+    settings = settings_of(pipeline, gripper, object_name, options, seed)
+    check(settings)
+    if dry_run:
+        _say_what_would_be_done(settings, as_json)
+        return
+    folder = None
+    if save is not None:
+        from graspsense.trials.folder import new_trial_folder
+
+        folder = new_trial_folder(save)
+
+    sinks = () if as_json else (LiveRows(),)
+    previous = signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        trial = grasp_with(settings, installed(), sinks=sinks)
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+
+    if folder is not None:
+        from graspsense.core.config import to_toml
+        from graspsense.trials.folder import keep
+
+        keep(folder, trial, to_toml(settings))
+        talk(f"kept in {folder}")
+    if as_json:
+        echo_json(trial_as_json(trial))
+    else:
+        _print(trial)
+    if trial.outcome in (Outcome.ABORTED, Outcome.DEVICE_LOST):
+        raise click.exceptions.Exit(EXIT_ABORTED)
+
+
+class LiveRows:
+    """Prints a row of gap, force and phase whenever one of them has changed enough to be worth a line."""
+
+    def __init__(self) -> None:
+        self._phase = -1
+        self._t_s = self._gap_m = self._force_n = 0.0
+        self._widest_m = 0.0
+        self._quiet_s = 0.5
+
+    def take(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
+        """Take one tick."""
+        del pads, command
+        force = frame.force_left_n + frame.force_right_n
+        if (
+            phase == self._phase
+            and frame.t_s - self._t_s < self._quiet_s
+            and abs(force - self._force_n) < 4.0
+            and abs(frame.gap_m - self._gap_m) < 0.01
+        ):
+            return
+        if self._phase == -1:
+            self._widest_m = max(frame.gap_m, 1e-9)
+            # On a clock of frames, not seconds, every frame is worth a line.
+            self._quiet_s = max(0.5, frame.dt_s) if frame.dt_s < 0.5 else 0.0
+            talk("      t  phase       gap                                    left     right")
+        self._phase, self._t_s, self._gap_m, self._force_n = phase, frame.t_s, frame.gap_m, force
+        share = min(max(frame.gap_m / self._widest_m, 0.0), 1.0)
+        bar = "█" * round(BAR * share)
+        talk(
+            f"{frame.t_s:7.3f}  {_phase_name(phase):<10}{frame.gap_m * 1e3:6.1f} mm  {bar:<{BAR}}"
+            f"{frame.force_left_n:7.2f} N {frame.force_right_n:7.2f} N"
+        )
+
+
+def _phase_name(phase: int) -> str:
+    from graspsense.core.signals import Phase
+
+    return Phase(phase).name.lower()
+
+
+def _interrupt(signum: int, frame: FrameType | None) -> None:
+    """Turn SIGTERM into what Ctrl-C raises, so that the runner lets go of the gripper."""
+    del signum, frame
+    raise KeyboardInterrupt
+
+
+def _print(trial: Trial) -> None:
+    click.echo()
+    reason = f": {trial.reason}" if trial.reason else ""
+    click.echo(f"outcome     {trial.outcome.words}{reason}")
+    features = trial.features
+    for name, value, unit in zip(features.names, features.values, features.units, strict=True):
+        click.echo(f"{name:<12}{_shown(value, unit, features.reasons.get(name, ''))}")
+    if trial.prediction is not None:
+        prediction = trial.prediction
+        probability = prediction.probabilities.get(prediction.label)
+        sure = "" if probability is None else f"  ({probability:.0%})"
+        click.echo(f"prediction  {prediction.label}{sure}")
+        for step in prediction.because:
+            click.echo(f"            {step}")
+        for warning in prediction.warnings:
+            talk(f"warning: {warning}")
+    for note in trial.device.notes:
+        click.echo(f"note        {note}")
+    if trial.seconds_simulated is not None:
+        length = (
+            f"{trial.seconds_simulated:.2f} {trial.trace.units['t']} of grasp in {trial.seconds_wall:.2f} s"
+        )
+        click.echo(f"took        {length}")
+
+
+def _shown(value: float, unit: str, reason: str) -> str:
+    if value != value:
+        return f"{'-':>9}  ({reason})"
+    if unit == "m" or unit.startswith("m/"):
+        return f"{value * 1e3:9.3f} m{unit}"
+    return f"{value:9.3f} {unit}"
+
+
+def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
+    if as_json:
+        plan: dict[str, Any] = {
+            "dry_run": True,
+            "components": dict(settings.components),
+            "settings": settings.values,
+        }
+        echo_json(plan)
+        return
+    click.echo("would open, tare, close, hold and release with:")
+    for table, component in settings.components.items():
+        click.echo(f"  {table:<11}{component}")
+    for table, values in settings.values.items():
+        for key, value in values.items():
+            if key != "type":
+                click.echo(f"    {table}.{key} = {value}")
+    click.echo("nothing was opened")

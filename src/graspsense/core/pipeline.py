@@ -1,0 +1,110 @@
+"""A pipeline: gripper, controller, features and classifier wired together, ready to grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+
+from attrs import frozen
+
+from graspsense.core.config import Flag, Settings, resolve
+from graspsense.core.features import Prediction
+from graspsense.core.plugins import Plugins, installed
+from graspsense.core.runner import Sink, run_grasp
+from graspsense.core.trial import GraspEvent, RunInfo, Trial
+from graspsense.core.wiring import check
+
+
+@frozen(eq=False, kw_only=True)
+class Pipeline:
+    """A resolved and checked pipeline. Nothing is opened before `grasp`."""
+
+    settings: Settings
+    options: tuple[str, ...] = ()
+    plugins: Plugins
+
+    def grasp(
+        self,
+        *,
+        object: str | None = None,
+        seed: int | None = None,
+        labels: Mapping[str, str] | None = None,
+        sinks: Iterable[Sink] = (),
+        on_event: Callable[[GraspEvent], None] | None = None,
+    ) -> Trial:
+        """Do one grasp and return the trial, whatever its outcome.
+
+        `object` and `seed` stand for `gripper.object` and `run.seed`. Raises ConfigError where the gripper takes
+        no object, UnknownName for an object it does not know, NoDevice where it is not there.
+        """
+        if object is not None or seed is not None:
+            flags = (Flag("object", "gripper.object", object), Flag("seed", "run.seed", seed))
+            settings = resolve(
+                self.settings.pipeline,
+                plugins=self.plugins,
+                options=self.options,
+                flags=[flag for flag in flags if flag.value is not None],
+            )
+        else:
+            settings = self.settings
+        return grasp_with(settings, self.plugins, labels=labels, sinks=sinks, on_event=on_event)
+
+
+def load_pipeline(
+    pipeline: str | Path = "default", *, options: Sequence[str] = (), plugins: Plugins | None = None
+) -> Pipeline:
+    """Return a pipeline by name or file, with options as after `-o` (`"controller.probing_force_n=17"`).
+
+    Raises ConfigError with every error at once, WiringError where components do not fit each other.
+    """
+    plugins = installed() if plugins is None else plugins
+    settings = resolve(str(pipeline), plugins=plugins, options=options)
+    check(settings)
+    return Pipeline(settings=settings, options=tuple(options), plugins=plugins)
+
+
+def grasp_with(
+    settings: Settings,
+    plugins: Plugins,
+    *,
+    labels: Mapping[str, str] | None = None,
+    sinks: Iterable[Sink] = (),
+    on_event: Callable[[GraspEvent], None] | None = None,
+) -> Trial:
+    """Do one grasp with these settings: build the components, run, draw features, predict, tell the observers."""
+    backend, controller = settings.gripper.create(), settings.controller.create()
+    feature_set = settings.features.create()
+    run = RunInfo(
+        components=settings.components,
+        settings=settings.values,
+        seed=settings.run.seed,
+        labels=dict(labels or {}),
+    )
+
+    def tell(event: GraspEvent) -> None:
+        plugins.grasp_event(run, event)
+        if on_event is not None:
+            on_event(event)
+
+    plugins.run_starting(run)
+    grasp = run_grasp(backend, controller, settings.run, sinks=sinks, on_event=tell)
+    features = feature_set.extract(grasp.trace)
+    prediction: Prediction | None = None
+    if settings.classifier is not None:
+        prediction = settings.classifier.create().explain(features)
+    trial = Trial(
+        run=run,
+        trace=grasp.trace,
+        outcome=grasp.outcome,
+        reason=grasp.reason,
+        features=features,
+        prediction=prediction,
+        device=grasp.device,
+        report=grasp.report,
+        counts=grasp.counts,
+        events=grasp.events,
+        seconds_simulated=grasp.seconds_simulated,
+        seconds_wall=grasp.seconds_wall,
+    )
+    plugins.run_finished(run, trial)
+    return trial
