@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
+import subprocess
+import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from itertools import chain
@@ -284,3 +287,67 @@ def test_nothing_in_the_hand_is_no_contact_and_a_full_bottle_is() -> None:
 
     assert [touched(f"none_{k}.txt") for k in range(1, 23)] == [False] * 22
     assert [touched(f"full_vitamin_water_{k}.txt") for k in range(1, 21)] == [True] * 20
+
+
+def run(recording: str) -> subprocess.CompletedProcess[str]:
+    program = [sys.executable, "-c", "from graspsense.cli.main import main; main()"]
+    arguments = ["run", "--json", "--gripper", "replay", "-o", f"gripper.recording={recording}"]
+    return subprocess.run([*program, *arguments], capture_output=True, text=True, timeout=60)
+
+
+def test_run_ends_a_recorded_grasp_with_outcome_and_features(tmp_path: Path) -> None:
+    """Contact in frame 2, at rest from frame 3 on, shown by frame 4: all of it worked out by hand."""
+    path = write(
+        tmp_path / "g.txt",
+        frame_lines(),
+        frame_lines(moved(j9=8.0), {THUMB: 4, INDEX: 30}),  # the thumb at 0.4 N: not yet
+        frame_lines(moved(j9=16.0), {THUMB: 10, INDEX: 40}),
+        frame_lines(moved(j9=20.0), {THUMB: 30, INDEX: 50}),
+        frame_lines(moved(j9=20.0), {THUMB: 50, INDEX: 70}),
+        frame_lines(moved(j9=40.0), {THUMB: 90, INDEX: 90}),
+    )
+    done = run(f"icub:{path}")
+    assert done.returncode == 0, done.stderr
+    grasp = json.loads(done.stdout)
+    assert grasp["outcome"] == "steady"
+    assert grasp["features"] == pytest.approx(
+        {
+            "p_first": 0.076,  # 16 degrees of one thumb joint close by a quarter of a millimetre each
+            "p_steady": 0.075,
+            "f_steady": 6.0,
+            "delta_t": 1.0,
+            "dp_dt": -0.001,
+            "df_dt": 6.0 - 2.5,
+        }
+    )
+    assert grasp["units"]["delta_t"] == "frame"
+    assert any("times are frame numbers" in note for note in grasp["device"]["notes"])
+
+
+def test_run_over_before_contact_says_so(tmp_path: Path) -> None:
+    done = run(f"icub:{write(tmp_path / 'g.txt', *[frame_lines()] * 4)}")
+    assert done.returncode == 0, done.stderr
+    grasp = json.loads(done.stdout)
+    assert grasp["outcome"] == "nothing there"
+    assert "the recording ended before" in grasp["reason"]
+    assert set(grasp["features"].values()) == {None}
+
+
+@pytest.mark.parametrize(("content", "exit_code"), [(b"", 5), (None, 2)])
+def test_run_on_a_bad_file_is_no_traceback(tmp_path: Path, content: bytes | None, exit_code: int) -> None:
+    path = tmp_path / "g.txt"
+    if content is not None:
+        path.write_bytes(content)
+    done = run(f"icub:{path}")
+    assert done.returncode == exit_code
+    assert str(path) in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@real_data
+def test_run_on_a_real_grasp_ends_steady_with_all_features() -> None:
+    done = run(f"icub:{os.environ['GRASPSENSE_ICUB']}/full_vitamin_water_1.txt")
+    assert done.returncode == 0, done.stderr
+    grasp = json.loads(done.stdout)
+    assert grasp["outcome"] == "steady"
+    assert None not in grasp["features"].values()

@@ -1,0 +1,54 @@
+"""The README's examples do what they say."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from graspsense.cli.main import COMMANDS
+
+README = (Path(__file__).parents[1] / "README.md").read_text()
+
+
+def block(language: str) -> str:
+    (found,) = re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+    return str(found)
+
+
+@pytest.fixture
+def pipeline_file(tmp_path: Path) -> Path:
+    path = tmp_path / "my.toml"
+    path.write_text(block("toml"))
+    return path
+
+
+def test_pipeline_example_is_valid(pipeline_file: Path) -> None:
+    program = [sys.executable, "-c", "from graspsense.cli.main import main; main()"]
+    arguments = ["config", "validate", pipeline_file.name]
+    done = subprocess.run([*program, *arguments], cwd=pipeline_file.parent, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert pipeline_file.name in done.stdout
+
+
+def test_python_example_runs_on_the_pipeline_example(pipeline_file: Path) -> None:
+    command = [sys.executable, "-c", block("python")]
+    done = subprocess.run(command, cwd=pipeline_file.parent, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("steady {'p_first': 0.0")
+
+
+def test_every_command_of_the_tour_exists() -> None:
+    named = {line.split()[1] for line in re.findall(r"`(graspsense [^`]+)`", README)}
+    assert {"run", "plugins", "config", "devices"} <= named
+    assert named <= set(COMMANDS)
+
+
+def test_links_lead_somewhere() -> None:
+    targets = re.findall(r"\]\((?!https?:)([^)]+)\)", README)
+    assert "docs/icub.md" in targets
+    for target in targets:
+        assert (Path(__file__).parents[1] / target).is_file(), target
