@@ -68,8 +68,8 @@ def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> Co
             )
         except Misfit as misfit:
             problems += misfit.under(name)
-        except cattrs.errors.StructureHandlerNotFoundError:
-            problems.append(Problem((name,), f"its type {field.type} cannot be written in TOML"))
+        except Exception as error:  # a type that is not among those below
+            problems.append(Problem((name,), f"cannot be read as {field.type}: {_words(error)}"))
     if not problems:
         try:
             return cls(**given)
@@ -299,18 +299,18 @@ def _has_origin(*origins: Any) -> Callable[[Any], bool]:
     return lambda cls: get_origin(cls) in origins or cls in origins
 
 
-def _is(kind: Any) -> Callable[[Any], bool]:
-    return lambda cls: cls is kind
-
-
 _CONVERTER: Final = cattrs.Converter()
+_plain_rules: dict[Any, Callable[[Any, Any], Any]] = {
+    bool: _bool,
+    int: _int,
+    float: _float,
+    str: _str,
+    Path: _path,
+    type(None): _none,
+}
+for _kind, _rule in _plain_rules.items():
+    _CONVERTER.register_structure_hook(_kind, _rule)
 for _predicate, _rule in (
-    (_is(bool), _bool),
-    (_is(int), _int),
-    (_is(float), _float),
-    (_is(str), _str),
-    (_is(Path), _path),
-    (_is(type(None)), _none),
     (lambda cls: cast(Any, get_origin(cls)) is Literal or _is_enum(cls), _choice),
     (_has_origin(Union, types.UnionType), _union),
     (_has_origin(list, tuple, Sequence), _sequence),

@@ -1,0 +1,635 @@
+"""Settings: layers, origins, strictness, and every error at once."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from attrs import asdict
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.core.config import (
+    Flag,
+    Layer,
+    build,
+    create,
+    read_layer,
+    resolve,
+    to_toml,
+    toml_key,
+    toml_value,
+)
+from graspsense.core.errors import ConfigError, UnknownName
+from graspsense.core.plugins import IsolatedPlugins
+from graspsense.core.toml_lines import key_lines
+
+PARTS = """
+    from __future__ import annotations
+    from pathlib import Path
+    from typing import Literal
+    from attrs import field, frozen
+    from attrs.validators import ge, gt, in_, instance_of
+    from graspsense.plugin_api import ClassifierEntry, Channel, ControllerEntry, FeatureSetEntry
+    from graspsense.plugin_api import PipelineEntry, SensorBackendEntry, hookimpl
+
+    GRASPSENSE_API = (1, 0)
+
+    @frozen
+    class Filter:
+        cutoff_hz: float = field(default=50.0, validator=gt(0.0))
+        order: int = 2
+
+    @frozen(kw_only=True)
+    class Hand:
+        port: str
+        rate_hz: float = field(default=100.0, validator=gt(0.0))
+        retries: int = 3
+        echo: bool = False
+        transport: Literal["usb", "emulated"] = "usb"
+        offsets_n: tuple[float, ...] = ()
+        serial: str | None = None
+        gains: dict[str, float] = {}
+        log: Path | None = None
+        filter: Filter = Filter()
+
+    @frozen
+    class Other:
+        transport: Literal["tcp", "emulated"] = "tcp"
+
+    @frozen
+    class Law:
+        force_n: float = field(default=10.0, validator=ge(0.0))
+        speed_m_s: float = field(default=0.01, validator=gt(0.0))
+        low_n: float = field(default=0.0)
+
+        @low_n.validator
+        def _below(self, attribute, value):
+            if value > self.force_n:
+                raise ValueError(f"low_n {value} is above force_n {self.force_n}")
+
+    @frozen
+    class Empty:
+        pass
+
+    def entry(kind, name, config, **more):
+        return kind(name=name, target="lab_parts:Nothing", config=f"lab_parts:{config}", summary=name, **more)
+
+    @hookimpl
+    def graspsense_sensor_backends():
+        yield entry(SensorBackendEntry, "hand", "Hand", channels=(), accepts=())
+        yield entry(SensorBackendEntry, "other", "Other", channels=(), accepts=())
+
+    @hookimpl
+    def graspsense_controllers():
+        yield entry(ControllerEntry, "law", "Law", requires=(), commands=())
+
+    @hookimpl
+    def graspsense_feature_sets():
+        yield entry(FeatureSetEntry, "none-at-all", "Empty", requires=(), features=())
+
+    @hookimpl
+    def graspsense_classifiers():
+        yield entry(ClassifierEntry, "guess", "Law")
+"""
+
+BASE = """\
+[gripper]
+type = "hand"
+port = "a"
+
+[controller]
+type = "law"
+force_n = 12
+
+[features]
+type = "none-at-all"
+"""
+
+
+@pytest.fixture
+def plugins(site):
+    site.write(lab_parts=PARTS)
+    import lab_parts
+
+    with IsolatedPlugins() as plugins:
+        plugins.add(lab_parts, "lab-parts", "0.3")
+        yield plugins
+
+
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def write(text: str, name: str = "lab.toml") -> str:
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_text(text)
+        return name
+
+    return write
+
+
+def complaint(*arguments, **keywords) -> str:
+    with pytest.raises(ConfigError) as caught:
+        resolve(*arguments, **keywords)
+    return str(caught.value)
+
+
+def test_defaults_file_options_and_flags_are_laid_over_each_other(plugins, write):
+    settings = resolve(
+        write(BASE),
+        options=["gripper.retries=5", "gripper.port=b", "controller.speed_m_s=0.02"],
+        flags=[Flag("--speed", "controller.speed_m_s", 0.03)],
+    )
+
+    assert settings.gripper.config.port == "b"
+    assert settings.gripper.config.retries == 5
+    assert settings.controller.config.speed_m_s == 0.03
+    assert settings.values["controller"] == {
+        "type": "lab-parts/law",
+        "force_n": 12.0,
+        "speed_m_s": 0.03,
+        "low_n": 0.0,
+    }
+    assert settings.components["gripper"] == "lab-parts/hand 0.3"
+    assert settings.classifier is None
+    origins = settings.origins
+    assert origins["gripper.type"] == "lab.toml:2"
+    assert origins["gripper.port"] == "-o"
+    assert origins["gripper.filter.cutoff_hz"] == "default"
+    assert origins["controller.force_n"] == "lab.toml:7"
+    assert origins["controller.speed_m_s"] == "--speed"
+    assert origins["run.seed"] == "default"
+
+
+def test_a_whole_number_is_taken_for_a_number_and_becomes_one(plugins, write):
+    force = resolve(write(BASE)).controller.config.force_n
+
+    assert (force, type(force)) == (12.0, float)
+
+
+def test_every_leaf_has_an_origin_and_every_origin_a_leaf(plugins, write):
+    settings = resolve(write(BASE), options=["gripper.gains.left=2", "gripper.filter.order=4"])
+
+    def leaves(values, path=()):
+        for key, value in values.items():
+            if isinstance(value, dict) and value:
+                yield from leaves(value, (*path, key))
+            else:
+                yield ".".join((*path, key))
+
+    assert sorted(settings.origins) == sorted(leaves(settings.values))
+    assert settings.origins["gripper.gains.left"] == "-o"
+    assert settings.origins["gripper.filter.order"] == "-o"
+    assert settings.origins["gripper.filter.cutoff_hz"] == "default"
+
+
+def test_an_experiment_lies_between_the_file_and_the_options(plugins, write):
+    layer = Layer.of({"controller": {"force_n": 15, "speed_m_s": 0.5}}, "experiment paper")
+
+    settings = resolve(write(BASE), experiment=layer, options=["controller.speed_m_s=0.25"])
+
+    assert (settings.controller.config.force_n, settings.controller.config.speed_m_s) == (15.0, 0.25)
+    assert settings.origins["controller.force_n"] == "experiment paper"
+
+
+def test_lists_replace_and_tables_merge(plugins, write):
+    text = BASE.replace(
+        'port = "a"', 'port = "a"\noffsets_n = [1, 2, 3]\nfilter = { cutoff_hz = 5, order = 1 }'
+    )
+
+    config = resolve(write(text), options=["gripper.offsets_n=[9]", "gripper.filter.order=3"]).gripper.config
+
+    assert config.offsets_n == (9.0,)
+    assert asdict(config.filter) == {"cutoff_hz": 5.0, "order": 3}
+
+
+def test_extends_lays_a_file_over_another_with_paths_from_its_own_folder(plugins, write):
+    write(BASE, "shared/base.toml")
+    write('extends = "base.toml"\n[controller]\nforce_n = 13', "shared/middle.toml")
+    top = write('extends = "shared/middle.toml"\n\n[controller]\nspeed_m_s = 0.5', "top.toml")
+
+    settings = resolve(top)
+
+    assert settings.controller.config == settings.controller.component.config_class()(13.0, 0.5)
+    assert settings.origins["controller.force_n"] == "shared/middle.toml:3"
+    assert settings.origins["controller.speed_m_s"] == "top.toml:4"
+    assert settings.origins["gripper.port"] == "shared/base.toml:3"
+
+
+def test_a_file_extends_a_named_pipeline(plugins, write):
+    top = write('extends = "default"\n[gripper]\ntype = "hand"\nport = "a"\n')
+
+    settings = resolve(top)
+
+    assert settings.controller.component.qualified == "graspsense/hybrid"
+    assert settings.origins["controller.probing_force_n"] == "pipeline graspsense/default:10"
+
+
+def test_extends_in_a_circle_is_an_error(plugins, write):
+    write('extends = "b.toml"', "a.toml")
+    write('\nextends = "a.toml"', "b.toml")
+
+    assert complaint("a.toml") == "b.toml:2: extends goes round in a circle: a.toml -> b.toml -> a.toml"
+
+
+def test_a_file_that_extends_nothing_known_is_named_with_its_line(plugins, write):
+    assert complaint(write('extends = "defualt"')).startswith(
+        "lab.toml:1: no pipeline named 'defualt'. Known: default. Did you mean 'default'?"
+    )
+    assert complaint(write("extends = 3")) == (
+        "lab.toml:1: extends: expected the name of a pipeline or the path of a .toml file, "
+        "found 3 (a whole number)"
+    )
+
+
+class TestChangeOfType:
+    def test_keys_of_the_files_other_component_are_dropped(self, plugins, write):
+        settings = resolve(write(BASE), flags=[Flag("--gripper", "gripper.type", "other")])
+
+        assert settings.values["gripper"] == {"type": "lab-parts/other", "transport": "tcp"}
+
+    def test_options_apply_to_the_final_type_whatever_their_order(self, plugins, write):
+        settings = resolve(
+            write(BASE),
+            options=["gripper.transport=emulated"],
+            flags=[Flag("--gripper", "gripper.type", "other")],
+        )
+
+        assert settings.gripper.config.transport == "emulated"
+
+    def test_an_option_for_the_other_type_is_an_error_not_dropped(self, plugins, write):
+        assert (
+            complaint(
+                write(BASE), options=["gripper.port=b"], flags=[Flag("--gripper", "gripper.type", "other")]
+            )
+            == "-o gripper.port=b: lab-parts/other has no key 'port'. "
+            "Did you mean 'transport'? It has: transport"
+        )
+
+    def test_the_same_type_under_its_qualified_name_keeps_the_keys(self, plugins, write):
+        settings = resolve(write(BASE), flags=[Flag("--gripper", "gripper.type", "lab-parts/hand")])
+
+        assert settings.gripper.config.port == "a"
+
+    def test_a_file_that_changes_the_type_starts_afresh_and_one_that_does_not_inherits(self, plugins, write):
+        write(BASE, "base.toml")
+        write('extends = "base.toml"\n[gripper]\ntype = "other"\ntransport = "emulated"', "middle.toml")
+        top = write('extends = "middle.toml"\n[run]\nseed = 4', "top.toml")
+
+        assert resolve(top).values["gripper"] == {"type": "lab-parts/other", "transport": "emulated"}
+
+    def test_a_type_given_late_takes_the_keys_given_before_any_type(self, plugins, write):
+        text = BASE.replace('type = "hand"\n', "")
+
+        assert resolve(write(text), options=["gripper.type=hand"]).gripper.config.port == "a"
+
+
+class TestClassifier:
+    def test_a_table_names_one(self, plugins, write):
+        settings = resolve(write(BASE + '[classifier]\ntype = "guess"\nforce_n = 3\n'))
+
+        assert settings.classifier is not None
+        assert settings.classifier.config.force_n == 3.0
+        assert [one.component.table for one in settings.chosen] == [
+            "gripper",
+            "controller",
+            "features",
+            "classifier",
+        ]
+
+    def test_none_removes_it(self, plugins, write):
+        settings = resolve(
+            write(BASE + '[classifier]\ntype = "guess"\nforce_n = 3\n'), options=["classifier.type=none"]
+        )
+
+        assert settings.classifier is None
+        assert "classifier" not in settings.values
+
+    def test_a_key_for_none_is_an_error(self, plugins, write):
+        assert complaint(write(BASE), options=["classifier.type=none", "classifier.force_n=3"]) == (
+            '-o classifier.force_n=3: classifier.type is "none", so nothing takes this key'
+        )
+
+    def test_a_table_without_a_type_is_an_error(self, plugins, write):
+        assert complaint(write(BASE + "[classifier]\nforce_n = 3\n")) == (
+            "lab.toml:11: classifier.type is not given: name a classifier. Known: guess"
+        )
+
+
+def test_every_error_is_told_at_once_with_its_line(plugins, write):
+    text = """\
+[gripper]
+type = "hand"
+rate_hz = "100 Hz"
+retries = 2.5
+echo = "false"
+transport = "ubs"
+offsets_n = [1, "two", true]
+
+[gripper.filter]
+cutof_hz = 3
+
+[controler]
+type = "law"
+
+[controller]
+type = "law"
+force_n = -1
+speed_m_s = 0
+forse_n = 3
+
+[run]
+seed = true
+"""
+    assert (
+        complaint(write(text), options=["features.type=nosuch", "nonsense"])
+        == """\
+15 errors in the settings:
+  -o nonsense: expected TABLE.KEY=VALUE, as in -o run.seed=3
+  lab.toml:12: controler: there is no table 'controler'. Did you mean 'controller'? \
+There are: gripper, controller, features, classifier, run
+  lab.toml:1: gripper: lab-parts/hand needs the key 'port', which is not given
+  lab.toml:3: gripper.rate_hz: expected a number, found '100 Hz' (text): \
+give the number alone, in the unit that the key ends with, or SI
+  lab.toml:4: gripper.retries: expected a whole number, found 2.5 (a number)
+  lab.toml:5: gripper.echo: expected true or false, found 'false' (text)
+  lab.toml:6: gripper.transport: expected one of 'usb', 'emulated', found 'ubs' (text). Did you mean 'usb'?
+  lab.toml:7: gripper.offsets_n[1]: expected a number, found 'two' (text)
+  lab.toml:7: gripper.offsets_n[2]: expected a number, found true (a boolean)
+  lab.toml:10: gripper.filter.cutof_hz: this table has no key 'cutof_hz'. Did you mean 'cutoff_hz'? \
+It has: cutoff_hz, order
+  lab.toml:19: controller.forse_n: lab-parts/law has no key 'forse_n'. Did you mean 'force_n'? \
+It has: force_n, low_n, speed_m_s
+  lab.toml:17: controller.force_n: 'force_n' must be >= 0.0: -1.0
+  lab.toml:18: controller.speed_m_s: 'speed_m_s' must be > 0.0: 0.0
+  -o features.type=nosuch: no feature set named 'nosuch'. Known: chitta, none-at-all.
+  lab.toml:22: run.seed: expected a whole number, found true (a boolean)"""
+    )
+
+
+def test_a_validator_that_looks_at_other_keys_keeps_its_words(plugins, write):
+    assert complaint(write(BASE), options=["controller.low_n=13"]) == (
+        "-o controller.low_n=13: low_n 13.0 is above force_n 12.0"
+    )
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ("gripper.retries=3.0", "expected a whole number, found 3.0 (a number)"),
+        ("gripper.retries=true", "expected a whole number, found true (a boolean)"),
+        ("gripper.rate_hz=true", "expected a number, found true (a boolean)"),
+        ("gripper.rate_hz=nan", "expected a number, found nan (a number)"),
+        ("gripper.rate_hz=fast", "expected a number, found 'fast' (text)"),
+        ("gripper.echo=1", "expected true or false, found 1 (a whole number)"),
+        (
+            "gripper.port=5",
+            "expected text, found 5 (a whole number): put it in quotes, with -o as 'KEY=\"...\"'",
+        ),
+        ("gripper.port=2024-01-02", "expected text, found 2024-01-02 (a date)"),
+        ("gripper.offsets_n=5", "expected a list, found 5 (a whole number)"),
+        ("gripper.offsets_n=abc", "expected a list, found 'abc' (text)"),
+        ("gripper.filter=3", "expected a table, found 3 (a whole number)"),
+        ("gripper.gains={left = true}", "expected a number, found true (a boolean)"),
+        (
+            "gripper.serial=4",
+            "expected text, found 4 (a whole number): put it in quotes, with -o as 'KEY=\"...\"'",
+        ),
+        ("gripper.type=3", "expected text, found 3 (a whole number)"),
+        ("gripper=other", "expected a table, found 'other' (text): write gripper.type = \"other\""),
+        ("run=3", "expected a table, found 3 (a whole number)"),
+        ("gripper.port.x=3", "expected text, found a table"),
+    ],
+)
+def test_nothing_is_coerced(plugins, write, option, said):
+    assert complaint(write(BASE), options=[option]) == f"-o {option}: {said}"
+
+
+@pytest.mark.parametrize(
+    ("typed", "value"),
+    [
+        ("usb", "usb"),
+        ('"17"', "17"),
+        ("/dev/tty USB#0", "/dev/tty USB#0"),
+        ("1 # not a comment", "1 # not a comment"),
+        ("1,", "1,"),
+        ("1\nretries = 7", "1\nretries = 7"),
+        ("a=b", "a=b"),
+        ("", ""),
+    ],
+)
+def test_what_is_no_toml_value_is_text(plugins, write, typed, value):
+    assert resolve(write(BASE), options=[f"gripper.port={typed}"]).gripper.config.port == value
+
+
+def test_an_infinity_is_a_number(plugins, write):
+    assert resolve(write(BASE), options=["gripper.rate_hz=inf"]).gripper.config.rate_hz == float("inf")
+
+
+def test_tables_that_are_missing_altogether_are_named(plugins, write):
+    assert (
+        complaint(write(""))
+        == """\
+3 errors in the settings:
+  gripper.type is not given: name a sensor backend. Known: hand, other, replay
+  controller.type is not given: name a controller. Known: force, hybrid, law, velocity
+  features.type is not given: name a feature set. Known: chitta, none-at-all"""
+    )
+
+
+class TestFiles:
+    def test_no_such_pipeline(self, plugins, write):
+        write(BASE, "mine")
+        assert complaint("defualt").startswith(
+            "no pipeline named 'defualt'. Known: default. Did you mean 'default'?"
+        )
+        assert complaint("mine").endswith(
+            "A file is given with its ending .toml; there is a file 'mine' without it: rename it"
+        )
+        write(BASE, "yours.toml")
+        assert complaint("yours").endswith("A file is given with its ending .toml: yours.toml")
+
+    def test_no_such_file(self, plugins, write):
+        write("", "x/y")
+        assert complaint("nosuch.toml") == f"no pipeline file 'nosuch.toml' in {Path.cwd()}"
+
+    def test_a_folder(self, plugins, write):
+        write("", "folder.toml/inside")
+        assert complaint("folder.toml") == "cannot read the pipeline file 'folder.toml': Is a directory"
+
+    def test_not_utf8(self, plugins, write):
+        name = write("")
+        Path(name).write_bytes(b"[gripper]\nname = \xff\xfe\n")
+        assert complaint(name) == (
+            "lab.toml:2: not UTF-8 text (byte 0xff): TOML files are UTF-8; is this the right file?"
+        )
+
+    @pytest.mark.parametrize(
+        ("text", "said"),
+        [
+            (
+                "[gripper]\ntype hand",
+                "lab.toml:2, column 6: not TOML: Expected '=' after a key in a key/value pair",
+            ),
+            ("a = 1\na = 2\n", "lab.toml:2, column 6: not TOML: Cannot overwrite a value"),
+            ('a = """\n', "lab.toml:2: not TOML: Unterminated string"),
+            ("a = " + "9" * 5000, "lab.toml:1: not TOML: Exceeds the limit (4300 digits)"),
+            ("a = " + "[" * 50000, "lab.toml: lists or tables nested too deep"),
+        ],
+    )
+    def test_not_toml(self, plugins, write, text, said):
+        assert complaint(write(text)).startswith(said)
+
+    def test_a_byte_order_mark_is_no_matter(self, plugins, write):
+        assert resolve(write("\ufeff" + BASE)).gripper.config.port == "a"
+
+    def test_windows_line_ends_are_no_matter(self, plugins, write):
+        Path(write("")).write_bytes(BASE.replace("\n", "\r\n").encode())
+        assert resolve("lab.toml").origins["controller.force_n"] == "lab.toml:7"
+
+
+def test_a_layer_can_be_read_by_itself(plugins, write):
+    layer = read_layer(write("[sweep]\nseeds = [\n 1,\n 2]\n"))
+
+    assert layer.where(("sweep", "seeds", 1)) == "lab.toml:4"
+
+
+def test_create_makes_a_component_as_strictly_as_a_file():
+    with IsolatedPlugins():
+        controller = create("controller", "hybrid", probing_force_n=17)
+        assert controller.config.probing_force_n == 17.0
+        with pytest.raises(ConfigError, match=r"^controller\.probing_forse_n: graspsense/hybrid has no key"):
+            create("controller", "hybrid", probing_forse_n=17)
+        with pytest.raises(UnknownName, match="no controller named 'hybird'"):
+            create("controller", "hybird")
+
+
+def test_build_tells_every_error(plugins):
+    with pytest.raises(ConfigError, match="2 errors"):
+        build(plugins.find("controller", "law"), {"force_n": -1, "speed_m_s": "x"})
+
+
+class TestToToml:
+    def test_the_file_resolves_by_itself_to_the_same_values(self, plugins, write):
+        first = resolve(
+            write(BASE),
+            options=[
+                'gripper.port="C:\\\\tty\\n\\u007f\\"x\\" ü 🤖"',
+                "gripper.rate_hz=inf",
+                "gripper.offsets_n=[0.1, 1e-300, -3]",
+                'gripper.gains={ left = 2, "to the right" = 1 }',
+                "gripper.log=out/run.log",
+                "gripper.echo=true",
+                "run.seed=7",
+                "classifier.type=guess",
+            ],
+        )
+        again = resolve(write(to_toml(first), "again.toml"))
+
+        assert again.values == first.values
+        assert again.gripper.config == first.gripper.config
+        assert again.run == first.run
+        assert set(again.origins.values()) - {"default"} == {
+            one for one in again.origins.values() if one.startswith("again.toml:")
+        }
+        assert to_toml(again).replace("again.toml", "lab.toml") == to_toml(first)
+
+    def test_with_origins_it_is_still_the_same_file(self, plugins, write):
+        settings = resolve(write(BASE), options=["gripper.filter.order=3"])
+        text = to_toml(settings, origins=True)
+
+        assert tomllib.loads(text) == tomllib.loads(to_toml(settings))
+        assert 'port = "a"                                # lab.toml:3\n' in text
+        assert "filter = { cutoff_hz = 50.0, order = 3 }  # default, -o\n" in text
+        assert "# serial is not set                       # default\n" in text
+
+
+PLAIN = st.recursive(
+    st.booleans()
+    | st.integers(-(2**63), 2**63 - 1)
+    | st.floats(allow_nan=False)
+    | st.text(st.characters(exclude_categories=["Cs"])),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(st.text(st.characters(exclude_categories=["Cs"])), inner, max_size=4)
+    ),
+    max_leaves=12,
+)
+
+
+@given(st.dictionaries(st.text(st.characters(exclude_categories=["Cs"])), PLAIN, max_size=5))
+def test_any_plain_value_survives_being_written_as_toml(values):
+    text = "\n".join(f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items())
+
+    assert tomllib.loads(text) == values
+
+
+def paths(value, path=()):
+    if isinstance(value, dict):
+        for key, one in value.items():
+            yield (*path, key)
+            yield from paths(one, (*path, key))
+    elif isinstance(value, list):
+        for index, one in enumerate(value):
+            yield (*path, index)
+            yield from paths(one, (*path, index))
+
+
+@given(st.dictionaries(st.text(st.characters(exclude_categories=["Cs"])), PLAIN, max_size=5))
+def test_every_key_has_the_line_on_which_it_stands(values):
+    text = "# first\n" + "\n\n".join(
+        f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items()
+    )
+
+    lines = key_lines(text)
+
+    assert set(lines) == set(paths(values))
+    for number, key in enumerate(values):
+        assert lines[(key,)] == 2 + 2 * number
+
+
+def test_lines_of_everything_that_toml_can_write():
+    text = '''\
+a.b."c.d" = 1 # [no]
+text = """
+[not.a.table]
+x = 1
+"""
+raw = \'\'\'it's
+x = 1\'\'\'
+list = [ # one
+  1, "]", # two
+  { k = [3], m.n = 4 },
+]
+[t . u]
+when = 1979-05-27 07:32:00
+[[s]]
+n = 1
+[[s]]
+[s.t]
+n = 2
+[[s.deep]]
+[[s.deep]]
+"" = 'end'
+'''
+    lines = key_lines(text)
+
+    assert set(lines) == set(paths(tomllib.loads(text)))
+    at = {
+        ("a", "b", "c.d"): 1,
+        ("text",): 2,
+        ("raw",): 6,
+        ("list",): 8,
+        ("list", 1): 9,
+        ("list", 2, "m", "n"): 10,
+        ("t", "u"): 12,
+        ("t", "u", "when"): 13,
+        ("s", 0, "n"): 15,
+        ("s", 1): 16,
+        ("s", 1, "t", "n"): 18,
+        ("s", 1, "deep", 1): 20,
+        ("s", 1, "deep", 1, ""): 21,
+    }
+    assert {path: lines[path] for path in at} == at
