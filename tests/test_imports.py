@@ -1,0 +1,205 @@
+"""The import rules of the house, held on the source text and in a fresh interpreter."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import graspsense
+from graspsense import plugin_api
+
+ROOT = Path(__file__).parents[1]
+SOURCE = ROOT / "src" / "graspsense"
+
+MAY_KNOW = {
+    "core": {"core"},
+    "plugins": {"plugin_api", "plugins"},
+    "trials": {"core", "trials"},
+    "evaluation": {"core", "trials", "evaluation"},
+    "experiments": {"core", "trials", "evaluation", "experiments"},
+    "report": {"core", "trials", "evaluation", "report"},
+    "cli": {"core", "trials", "evaluation", "experiments", "report", "cli"},
+    "testing": {"core", "plugin_api", "testing"},
+    "plugin_api": {"core"},
+    "__init__": {"core"},
+}
+"""Room to the rooms it may import from; every room may import the package itself, for its version."""
+
+HEAVY = {
+    "numpy",
+    "scipy",
+    "sklearn",
+    "numba",
+    "pandas",
+    "matplotlib",
+    "hid",
+    "hidraw",
+    "usb",
+    "rich",
+    "cattrs",
+}
+
+
+def imported(tree: ast.AST, package: str) -> Iterator[str]:
+    """Yield every module that this source imports, at whatever depth; `package` is what holds it."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            # `from graspsense import core` imports a room as well as `from graspsense.core import ...`.
+            yield from (
+                f"{module}.{alias.name}" if module == "graspsense" else module for alias in node.names
+            )
+
+
+def rooms_known(path: Path, package: str) -> set[str]:
+    """Return the rooms of graspsense that a file imports from."""
+    names = imported(ast.parse(path.read_text()), package)
+    within = (name.split(".")[1] for name in names if name.startswith("graspsense."))
+    return {room for room in within if (SOURCE / room).is_dir() or (SOURCE / f"{room}.py").is_file()}
+
+
+def files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.rglob("*.py") if "tests" not in path.relative_to(folder).parts)
+
+
+def distributions() -> list[Path]:
+    return sorted(path.parent for path in (ROOT / "plugins").glob("*/pyproject.toml"))
+
+
+@pytest.mark.parametrize("path", files(SOURCE), ids=lambda path: str(path.relative_to(SOURCE)))
+def test_a_room_knows_only_the_rooms_it_may(path):
+    parts = path.relative_to(SOURCE).with_suffix("").parts
+    room = parts[0]
+    package = ".".join(["graspsense", *parts[:-1]])
+
+    assert rooms_known(path, package) <= MAY_KNOW[room]
+
+
+def test_the_rule_sees_every_way_of_importing():
+    source = """
+import graspsense.trials.store
+from graspsense import report
+from graspsense.core import config
+from ..cli import main
+def late():
+    from graspsense.evaluation.rates import wilson
+"""
+    names = set(imported(ast.parse(source), "graspsense.core"))
+
+    assert names == {
+        "graspsense.trials.store",
+        "graspsense.report",
+        "graspsense.core",
+        "graspsense.cli",
+        "graspsense.evaluation.rates",
+    }
+
+
+def test_core_names_the_other_rooms_in_one_place_only():
+    for path in files(SOURCE / "core"):
+        strings = [
+            node.value for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Constant)
+        ]
+        named = [one for one in strings if isinstance(one, str) and _is_target(one)]
+        assert not named or path.name == "firstparty.py", f"{path.name} names {named}"
+
+
+def _is_target(text: str) -> bool:
+    return any(text.startswith(f"graspsense.{room}.") for room in MAY_KNOW.keys() - {"core", "plugin_api"})
+
+
+@pytest.mark.parametrize("folder", distributions(), ids=lambda folder: folder.name)
+def test_a_distribution_knows_the_door_for_authors_only(folder):
+    (package,) = [path for path in (folder / "src").iterdir() if path.is_dir() and path.name != "__pycache__"]
+    for path in files(package):
+        names = set(imported(ast.parse(path.read_text()), package.name))
+        known = {name for name in names if name.split(".")[0] == "graspsense"}
+        allowed = {"graspsense.plugin_api"}
+        if folder.name == "c45" and path.name != "plugin.py":
+            allowed = set()
+        assert known <= allowed, f"{path.relative_to(folder)} imports {sorted(known - allowed)}"
+
+
+@pytest.mark.parametrize("folder", distributions(), ids=lambda folder: folder.name)
+def test_a_distribution_knows_no_other(folder):
+    others = {f"graspsense_{one.name}" for one in distributions()} - {f"graspsense_{folder.name}"}
+    for path in files(folder / "src"):
+        roots = {name.split(".")[0] for name in imported(ast.parse(path.read_text()), "")}
+        assert not roots & others, f"{path.relative_to(folder)} imports {sorted(roots & others)}"
+
+
+def loaded_after(code: str, *arguments: str) -> set[str]:
+    """Run code in a fresh interpreter; return the top-level names of the modules it loaded."""
+    code += "\nimport sys; print('loaded:', *{name.split('.')[0] for name in sys.modules}, file=sys.stderr)"
+    ran = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=60)
+    assert ran.returncode == 0, ran.stderr
+    (line,) = [line for line in ran.stderr.splitlines() if line.startswith("loaded:")]
+    return set(line.split()[1:])
+
+
+def test_importing_the_doors_is_light_and_loads_no_plugin():
+    loaded = loaded_after("import graspsense, graspsense.plugin_api")
+
+    assert not loaded & (HEAVY | {"pluggy", "attr", "click"})
+
+
+def test_a_plugin_module_is_light():
+    assert not loaded_after("import graspsense.plugins.builtin") & (HEAVY | {"click"})
+
+
+COMMAND = """
+import sys
+sys.argv[0] = "graspsense"
+from graspsense.cli.main import main
+try:
+    main()
+except SystemExit as ended:
+    assert ended.code == 0, ended.code
+"""
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], []])
+def test_help_and_version_load_no_plugin(arguments):
+    loaded = loaded_after(COMMAND, *arguments)
+
+    assert not loaded & (HEAVY | {"pluggy", "attr"})
+    assert not [name for name in loaded if name.startswith("graspsense_")]
+
+
+@pytest.mark.parametrize("arguments", [["plugins", "list"], ["plugins", "list", "--json"]])
+def test_listing_plugins_loads_no_driver_and_nothing_heavy(arguments):
+    assert not loaded_after(COMMAND, *arguments) & HEAVY
+
+
+@pytest.mark.parametrize(
+    ("door", "path"),
+    [(graspsense, SOURCE / "__init__.py"), (plugin_api, SOURCE / "plugin_api.py")],
+    ids=["graspsense", "plugin_api"],
+)
+def test_what_a_door_offers_is_what_type_checkers_see_there(door, path):
+    (block,) = [
+        node
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    ]
+    seen = {
+        alias.asname: node.module
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+
+    assert seen == {name: f"graspsense.core.{home}" for name, home in door._HOME_OF.items()}
+    for name in door._HOME_OF:
+        assert getattr(door, name) is not None
+        assert name in dir(door)
+    with pytest.raises(AttributeError, match="has no attribute 'nosuch'"):
+        door.nosuch  # noqa: B018
