@@ -1,0 +1,443 @@
+"""The command line: what is printed where, exit codes, and no traceback for a user's mistake."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from importlib import import_module
+
+import click
+import pytest
+
+from graspsense import __version__
+from graspsense.cli.main import COMMANDS, main
+from graspsense.core import plugins as loader
+from graspsense.core.entries import CommandEntry, FoundDevice
+from graspsense.core.errors import DeviceLost, NoDevice
+from graspsense.core.plugins import IsolatedPlugins
+from graspsense.plugin_api import hookimpl
+
+REPLAY = ["--gripper", "replay", "-o", "gripper.recording=icub:some/file.txt"]
+
+
+class Ran:
+    def __init__(self, code: int, out: str, err: str) -> None:
+        self.code, self.out, self.err = code, out, err
+
+    @property
+    def json(self):
+        return json.loads(self.out)
+
+
+@pytest.fixture
+def run(capsys, monkeypatch):
+    monkeypatch.delenv("GRASPSENSE_TRACEBACK", raising=False)
+
+    def run(*arguments: str) -> Ran:
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        out, err = capsys.readouterr()
+        return Ran(ended.value.code, out, err)
+
+    with IsolatedPlugins():
+        yield run
+
+
+def adding(name: str, command: click.Command):
+    """Return a plugin that adds this command."""
+    module = f"command_{name}"
+    sys.modules[module] = type(sys)(module)
+    sys.modules[module].command = command
+
+    class Plugin:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl
+        def graspsense_commands(self):
+            return [CommandEntry(name, f"{module}:command", "a command of a plugin")]
+
+    return Plugin()
+
+
+def failing(error: Exception):
+    @click.command()
+    @click.option("--json", "as_json", is_flag=True)
+    def fail(as_json):
+        raise error
+
+    return adding("fail", fail)
+
+
+def test_the_table_names_commands_that_are_there():
+    for target, summary in COMMANDS.values():
+        module, _, name = target.partition(":")
+        assert isinstance(getattr(import_module(module), name), click.Command)
+        assert summary.endswith(".")
+
+
+def test_help_lists_the_commands(run):
+    for arguments in ([], ["--help"], ["-h"]):
+        ran = run(*arguments)
+        assert (ran.code, ran.err) == (0, "")
+        assert re.findall(r"^  (\w+)  +\w", ran.out, re.MULTILINE) == list(COMMANDS)
+
+
+def test_version(run):
+    assert run("--version").out == f"graspsense, version {__version__}\n"
+
+
+def test_version_is_that_of_the_distribution():
+    root = os.path.dirname(os.path.dirname(__file__))
+    with open(os.path.join(root, "pyproject.toml"), "rb") as file:
+        assert tomllib.load(file)["project"]["version"] == __version__
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ["plugin"],
+            f"graspsense: no command named 'plugin'. Known: {', '.join(COMMANDS)}. Did you mean 'plugins'?\n",
+        ),
+        (
+            ["--jsn"],
+            "graspsense: No such option '--jsn'.\n  graspsense --help shows what there is\n",
+        ),
+        (
+            ["config", "shwo"],
+            "graspsense: No such command 'shwo'. Did you mean 'show'?\n"
+            "  graspsense config --help shows what there is\n",
+        ),
+        (
+            ["config", "show", "a.toml", "--pipeline", "b.toml"],
+            "graspsense: the pipeline is given twice: a.toml and --pipeline b.toml\n"
+            "  graspsense config show --help shows what there is\n",
+        ),
+        (
+            ["config", "validate", "nosuch"],
+            "graspsense: no pipeline named 'nosuch'. Known: default.\n"
+            "  A file is given with its ending .toml\n",
+        ),
+        (
+            ["plugins", "show", "replai"],
+            "graspsense: no plugin or component named 'replai'. "
+            "Known: chitta, force, graspsense, hybrid, replay, velocity. Did you mean 'replay'?\n",
+        ),
+    ],
+)
+def test_a_mistake_is_told_on_stderr_with_code_2(run, arguments, said):
+    ran = run(*arguments)
+
+    assert (ran.code, ran.out, ran.err) == (2, "", said)
+
+
+def test_with_json_an_error_is_an_object_on_stdout_too(run):
+    ran = run("config", "show", *REPLAY, "-o", "controller.ramp_s=-1", "--json")
+
+    message = "-o controller.ramp_s=-1: 'ramp_s' must be >= 0.0: -1.0"
+    assert ran.code == 2
+    assert ran.err == f"graspsense: {message}\n"
+    assert ran.json == {"error": {"kind": "ConfigError", "message": message, "exit_code": 2}}
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (NoDevice("no gripper on any bus"), 3, "graspsense: no gripper on any bus\n"),
+        (DeviceLost("no frame for 100 ms"), 4, "graspsense: no frame for 100 ms\n"),
+        (PermissionError(13, "Permission denied", "/root/x"), 2, "graspsense: Permission denied: /root/x\n"),
+        (KeyboardInterrupt(), 130, "interrupted\n"),
+        (
+            KeyError("gap"),
+            70,
+            "graspsense: internal error: KeyError: 'gap'\n  This is a bug, ours or a plugin's. "
+            "Run it again with GRASPSENSE_TRACEBACK=1 to see where it happened.\n",
+        ),
+    ],
+)
+def test_every_error_has_its_code_and_no_traceback(run, error, code, said):
+    loader.installed().add(failing(error))
+
+    ran = run("fail")
+
+    assert (ran.code, ran.out, ran.err) == (code, "", said)
+
+
+def test_the_traceback_is_there_on_demand(run, monkeypatch):
+    monkeypatch.setenv("GRASPSENSE_TRACEBACK", "1")
+    loader.installed().add(failing(KeyError("gap")))
+
+    ran = run("fail", "--json")
+
+    assert ran.code == 70
+    assert ran.err.startswith("Traceback (most recent call last):")
+    assert "raise error" in ran.err
+    assert ran.json["error"] == {"kind": "KeyError", "message": "KeyError: 'gap'", "exit_code": 70}
+
+
+class TestCommandsOfPlugins:
+    def test_one_is_found_by_its_short_and_its_qualified_name(self, run):
+        @click.command()
+        @click.argument("word")
+        def say(word):
+            click.echo(word)
+
+        loader.installed().add(adding("say", say), "lab-a")
+
+        assert run("say", "hello").out == "hello\n"
+        assert run("lab-a/say", "hello").out == "hello\n"
+        assert "Did you mean 'say'?" in run("sya").err
+
+    def test_one_that_is_no_command_says_so(self, run):
+        loader.installed().add(adding("say", print), "lab-a")
+
+        ran = run("say")
+
+        assert ran.code == 2
+        assert ran.err == (
+            "graspsense: command 'say' of lab-a 0.1 cannot be used here: command_say:command is no click command\n"
+        )
+
+    def test_two_of_one_name_are_an_error_naming_both(self, run):
+        loader.installed().add(adding("say", click.Command("say")), "lab-a")
+        loader.installed().add(adding("say", click.Command("say")), "lab-b")
+
+        ran = run("say")
+
+        assert ran.code == 2
+        assert ran.err == "graspsense: command 'say' is provided by lab-a and lab-b; write \"lab-a/say\"\n"
+
+
+class TestPluginsList:
+    def test_json_has_one_object_a_component(self, run):
+        rows = run("plugins", "list", "--json").json
+
+        assert {"role", "name", "distribution", "version", "state"} <= set(rows[0])
+        named = {(row["role"], row["name"]): row for row in rows}
+        hybrid = named["controller", "hybrid"]
+        assert (hybrid["distribution"], hybrid["version"], hybrid["state"]) == (
+            "graspsense",
+            __version__,
+            "loaded",
+        )
+        c45 = named["classifier", "c45"]
+        assert (c45["version"], c45["state"]) == (None, "not installed")
+        assert c45["reason"].startswith("in a clone: pip install -e . -e ./plugins/c45 ")
+
+    def test_a_broken_and_an_observing_plugin_are_listed(self, run, site, monkeypatch):
+        site.install("lab-broken", "import no_such_driver", version="3.1")
+        observer = """
+            from graspsense.plugin_api import hookimpl
+            GRASPSENSE_API = (1, 0)
+            @hookimpl
+            def graspsense_run_starting(run): pass
+            """
+        site.install("lab-observer", observer)
+        monkeypatch.setattr(loader, "_current", site.discover(GRASPSENSE_DISABLED_PLUGINS="lab-off"))
+
+        rows = {row["distribution"]: row for row in run("plugins", "list", "--json").json}
+        table = run("plugins", "list").out
+
+        broken = rows["lab-broken"]
+        assert (broken["role"], broken["name"], broken["version"]) == (None, "main", "3.1")
+        assert (broken["state"], broken["reason"]) == (
+            "broken",
+            "ModuleNotFoundError: No module named 'no_such_driver'",
+        )
+        assert rows["lab-observer"]["summary"] == "graspsense_run_starting"
+        assert re.search(
+            r"^- +main +lab-broken +3\.1 +broken +ModuleNotFoundError: No module named 'no_such_driver'$",
+            table,
+            re.MULTILINE,
+        )
+
+        shown = run("plugins", "show", "lab-broken")
+        assert shown.code == 0
+        assert "state        broken: ModuleNotFoundError" in shown.out
+        assert "import no_such_driver" in shown.out
+        (status,) = run("plugins", "show", "lab-broken", "--json").json["plugins"]
+        assert status["state"] == "broken"
+
+
+class TestPluginsShow:
+    def test_a_component_with_its_keys(self, run):
+        ran = run("plugins", "show", "hybrid")
+
+        assert "controller graspsense/hybrid" in ran.out
+        assert "requires     gap in m, velocity in m/s, force_left in N, force_right in N\n" in ran.out
+        assert "    loop: 'open' | 'closed' = \"open\"\n" in ran.out
+        assert "recording: str, must be given" in run("plugins", "show", "graspsense/replay").out
+
+    def test_json(self, run):
+        (component,) = run("plugins", "show", "hybrid", "--json").json["components"]
+
+        assert component["qualified"] == "graspsense/hybrid"
+        assert component["keys"]["ramp_s"] == {"type": "float", "required": False, "default": 0.0}
+        assert component["entry"]["commands"] == ["effort"]
+
+    def test_a_component_whose_config_cannot_be_imported_is_shown_with_the_reason(
+        self, run, site, monkeypatch
+    ):
+        plugin = """
+            from graspsense.plugin_api import ClassifierEntry, hookimpl
+            GRASPSENSE_API = (1, 0)
+            @hookimpl
+            def graspsense_classifiers():
+                yield ClassifierEntry("odd", "no_lab:A", "no_lab:B", "odd", needs="pip install lab")
+            """
+        site.install("lab-odd", plugin)
+        monkeypatch.setattr(loader, "_current", site.discover())
+
+        ran = run("plugins", "show", "odd")
+
+        assert ran.code == 0
+        assert "not usable here: classifier 'odd' of lab-odd 0.2" in ran.out
+        assert "needs: pip install lab" in ran.out
+
+
+class TestConfig:
+    def test_show_prints_a_file_that_shows_the_same(self, run, tmp_path):
+        first = run("config", "show", *REPLAY, "--seed", "3")
+        assert (first.code, first.err) == (0, "")
+        file = tmp_path / "again.toml"
+        file.write_text(first.out)
+
+        again = run("config", "show", str(file), "--json").json
+        asked = run("config", "show", *REPLAY, "--seed", "3", "--json").json
+
+        assert again["values"] == asked["values"]
+        assert asked["origins"]["run.seed"] == "--seed"
+        assert asked["origins"]["controller.probing_force_n"] == "pipeline graspsense/default:10"
+        assert asked["origins"]["controller.ramp_s"] == "default"
+        assert "seed = 3                                  # --seed\n" in first.out
+
+    def test_show_takes_the_pipeline_either_way(self, run):
+        assert run("config", "show", "default", *REPLAY).out == run("config", "show", *REPLAY).out
+        assert (
+            run("config", "show", "--pipeline", "default", *REPLAY).out == run("config", "show", *REPLAY).out
+        )
+
+    def test_json_has_no_infinity(self, run):
+        ran = run("config", "show", *REPLAY, "-o", "run.hold_s=inf", "--json")
+
+        assert ran.json["values"]["run"]["hold_s"] == "inf"
+
+    def test_validate_says_yes_and_names_the_components(self, run):
+        ran = run("config", "validate", *REPLAY)
+        assert (ran.code, ran.err) == (0, "")
+        assert ran.out == (
+            "default is valid: graspsense/replay 0.1.0, graspsense/hybrid 0.1.0, graspsense/chitta 0.1.0\n"
+        )
+        assert run("config", "validate", *REPLAY, "--json").json["valid"] is True
+
+    def test_validate_checks_the_wiring(self, run, site, monkeypatch):
+        plugin = """
+            from attrs import frozen
+            from graspsense.plugin_api import SensorBackendEntry, hookimpl
+            GRASPSENSE_API = (1, 0)
+            @frozen
+            class Config: pass
+            @hookimpl
+            def graspsense_sensor_backends():
+                yield SensorBackendEntry("deaf", "x:Y", "lab_deaf_plugin:Config", "", (), ("effort",))
+            """
+        site.install("lab-deaf", plugin)
+        monkeypatch.setattr(loader, "_current", site.discover())
+
+        ran = run("config", "validate", "--gripper", "deaf", "--json")
+
+        assert ran.code == 2
+        assert ran.json["error"]["kind"] == "WiringError"
+        assert "gripper lab-deaf/deaf does not have (it has: none)" in ran.err
+
+
+class TestDevices:
+    def test_nobody_looks(self, run):
+        ran = run("devices")
+        assert (ran.code, ran.out) == (0, "")
+        assert ran.err == "no installed plugin looks for devices (graspsense plugins list)\n"
+
+    def test_found_and_failed(self, run):
+        class Looking:
+            GRASPSENSE_API = (1, 0)
+
+            @hookimpl
+            def graspsense_probe_devices(self, timeout_s):
+                assert timeout_s == 0.5
+                return [FoundDevice("hand", "42", "bus 1", ready=False, advice="add a udev rule")]
+
+        class Failing:
+            GRASPSENSE_API = (1, 0)
+
+            @hookimpl
+            def graspsense_probe_devices(self, timeout_s):
+                raise OSError("no bus")
+
+        loader.installed().add(Failing(), "lab-a")
+        loader.installed().add(Looking(), "lab-b")
+
+        ran = run("devices", "--timeout", "0.5")
+        assert ran.code == 0
+        assert ran.err == "lab-a could not look for its devices: OSError: no bus\n"
+        assert ran.out == (
+            "GRIPPER  SERIAL  WHERE  STATE      ADVICE\nhand     42      bus 1  not ready  add a udev rule\n"
+        )
+        found = run("devices", "--timeout", "0.5", "--json").json
+        assert found["devices"] == [
+            {
+                "backend": "hand",
+                "serial": "42",
+                "where": "bus 1",
+                "ready": False,
+                "advice": "add a udev rule",
+                "distribution": "lab-b",
+            }
+        ]
+        assert found["failed"] == {"lab-a": "OSError: no bus"}
+
+    def test_a_timeout_is_positive(self, run):
+        assert run("devices", "--timeout", "0").code == 2
+
+
+class TestCompletion:
+    @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+    def test_the_script_calls_us_back(self, run, shell):
+        ran = run("completion", shell)
+
+        assert ran.code == 0
+        assert f"_GRASPSENSE_COMPLETE={shell}_complete" in ran.out
+
+    @pytest.mark.parametrize(
+        ("words", "offered"),
+        [
+            ("graspsense ", list(COMMANDS)),
+            ("graspsense p", ["plugins"]),
+            ("graspsense config ", ["show", "validate"]),
+            ("graspsense config show --g", ["--gripper"]),
+        ],
+    )
+    def test_what_is_offered(self, run, monkeypatch, words, offered):
+        monkeypatch.setenv("_GRASPSENSE_COMPLETE", "bash_complete")
+        monkeypatch.setenv("COMP_WORDS", words)
+        monkeypatch.setenv("COMP_CWORD", str(len(words.split(" ")) - 1))
+
+        lines = run().out.split()
+
+        assert [line.partition(",")[2] for line in lines] == offered
+
+
+def test_a_reader_that_goes_away_is_no_error():
+    code = "from graspsense.cli.main import main; main(['plugins', 'show', 'graspsense'])"
+    child = subprocess.Popen(
+        [sys.executable, "-u", "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    child.stdout.close()
+    err = child.stderr.read()
+    child.stderr.close()
+
+    assert child.wait(timeout=60) == 141
+    assert err == ""
