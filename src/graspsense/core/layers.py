@@ -12,7 +12,7 @@ from typing import Any
 
 from attrs import define, field, frozen
 
-from graspsense.core.errors import ConfigError, UnknownName
+from graspsense.core.errors import ConfigError, UnknownName, suggestion
 from graspsense.core.plugins import Plugins
 from graspsense.core.strict import Problem, shown
 from graspsense.core.toml_lines import KeyPath, key_lines
@@ -157,7 +157,7 @@ def _read(source: Traversable, label: str, what: str) -> Layer:
     try:
         data = source.read_bytes()
     except FileNotFoundError:
-        raise ConfigError(f"no {what} {label!r} in {Path.cwd()}") from None
+        raise ConfigError(f"no {what} {label!r}{_nearby(source)}") from None
     except OSError as error:
         raise ConfigError(f"cannot read the {what} {label!r}: {error.strerror or error}") from None
     try:
@@ -179,6 +179,17 @@ def _read(source: Traversable, label: str, what: str) -> Layer:
         column = f", column {place[2]}" if place and place[2] else ""
         raise ConfigError(f"{label}:{line}{column}: not TOML: {said}") from None
     return Layer(label=label, values=values, lines=key_lines(text))
+
+
+def _nearby(missing: Traversable) -> str:
+    """Return where a file was looked for and which file there has nearly its name."""
+    if not isinstance(missing, Path):
+        return ""
+    folder = missing.absolute().parent
+    if not folder.is_dir():
+        return f": there is no folder {str(folder)!r}"
+    names = [one.name for one in folder.iterdir() if one.suffix == ".toml"]
+    return f" in {folder}.{suggestion(missing.name, names)}"
 
 
 def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
 from attrs import field, frozen
 
@@ -129,15 +129,18 @@ StepLaw = Callable[[Any, Any, Frame, Pads], tuple[Command, Any]]
 class Controller(ABC, Generic[ConfigT]):
     """A control law: a pure step over named tuples of numbers.
 
-    `step` is a class attribute: a plain function `step(params, state, frame, pads) -> (command, state)` without
-    clock, input, output or objects, in the subset of Python that a just-in-time compiler takes, so that the one
-    law drives a gripper, runs in a debugger and is compiled together with a simulated plant.
+    Write `step` as a plain module function and assign it: `step = staticmethod(step)`. It has no clock, no input,
+    no output and no objects, and keeps to the subset of Python that a just-in-time compiler takes, so that the
+    one law drives a gripper, runs in a debugger and is compiled together with a simulated plant.
     """
-
-    step: ClassVar[StepLaw]
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config
+
+    @staticmethod
+    @abstractmethod
+    def step(params: Any, state: Any, frame: Frame, pads: Pads) -> tuple[Command, Any]:
+        """Return the command for this tick, and the state after it."""
 
     @abstractmethod
     def params(self) -> Any:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from typing import Any, Protocol
 
 from attrs import field, frozen
@@ -268,10 +269,8 @@ class _Grasp:
                         break
         except (KeyboardInterrupt, Exception):
             pass
-        try:
+        with suppress(KeyboardInterrupt, Exception):
             self.backend.apply(info.relaxed)
-        except (KeyboardInterrupt, Exception):
-            pass
 
     def _recording_ended(self) -> tuple[Outcome, str]:
         if self.state.law.outcome != RUNNING:

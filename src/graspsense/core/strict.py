@@ -208,6 +208,10 @@ def _str(value: object, _: object) -> str:
     if not isinstance(value, str):
         simple = isinstance(value, bool | int | float)
         raise _expected("text", value, ": put it in quotes, with -o as 'KEY=\"...\"'" if simple else "")
+    try:
+        value.encode()
+    except UnicodeEncodeError:  # bytes of a command line that were no text
+        raise _expected("UTF-8 text", value) from None
     return value
 
 

@@ -245,8 +245,9 @@ def _described(function: types.FunctionType, above: tuple[int, ...]) -> Iterator
         yield name
         if isinstance(value, types.FunctionType):
             yield from _described(value, (*above, id(function)))
-        elif isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields"):
-            yield f"{value.__module__} {value.__qualname__} {value._fields} {value._field_defaults}"
+        elif isinstance(value, type) and issubclass(value, tuple):
+            fields, defaults = getattr(value, "_fields", ()), getattr(value, "_field_defaults", {})
+            yield f"{value.__module__} {value.__qualname__} {fields} {defaults}"
         elif isinstance(value, int | float | str | bool | tuple):
             yield repr(value)
         else:
@@ -287,4 +288,5 @@ def _use_cache_folder() -> None:
 
     if "NUMBA_CACHE_DIR" not in os.environ:
         base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-        numba.config.CACHE_DIR = str(Path(base) / "graspsense" / "compiled")
+        folder = str(Path(base) / "graspsense" / "compiled")
+        setattr(numba.config, "CACHE_DIR", folder)  # noqa: B010  numba fills its config at run time

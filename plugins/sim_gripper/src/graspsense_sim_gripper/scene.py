@@ -25,11 +25,11 @@ PATCHES: Final = ("line", "face", "point")
 
 
 def _positive() -> float:
-    return field(validator=gt(0.0))  # type: ignore[no-any-return]
+    return field(validator=gt(0.0))
 
 
 def _not_negative() -> float:
-    return field(validator=ge(0.0))  # type: ignore[no-any-return]
+    return field(validator=ge(0.0))
 
 
 @frozen(kw_only=True)

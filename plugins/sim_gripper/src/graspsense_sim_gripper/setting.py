@@ -1,0 +1,156 @@
+"""From a config, an object's name and a seed to the numbers of one grasp."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import (
+    CELLS,
+    EFFORT,
+    PR2_LINKAGES,
+    Command,
+    DeviceInfo,
+    gap_and_rate,
+    revolutions_at,
+)
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.plant import Drive, PlantParams, PlantState, Squeezed, Thing
+from graspsense_sim_gripper.scene import Instance, cell_weights, find, instance_of
+from graspsense_sim_gripper.sensing import PAD_PERIOD_S, SensorParams, SensorState, first_sensed
+from graspsense_sim_gripper.terms import TERMS, Law
+
+EFFORT_LIMIT_N: Final = 100.0
+SPEED_LIMIT_M_S: Final = 0.2
+"""Software limits of the PR2 gripper at the time of the paper."""
+OPENING_N: Final = -20.0
+"""The authors' recordings show +17 and +20 N (opening) between squeezes."""
+TARE_IMAGES: Final = 6
+CELL_OFFSET: Final = (3300.0, 250.0)
+"""Mean and spread of an unloaded cell's counts: 2900 to 3800 are reported."""
+RESOLVED: Final = 0.05
+"""Natural frequency times step stays below this: peaks are then good to better than 1 %."""
+STIFFEST_N_M: Final = 1e9
+
+
+def device_info(config: SimConfig) -> DeviceInfo:
+    """Return how this gripper presents itself."""
+    return DeviceInfo(
+        name="simulated PR2 gripper",
+        clock="virtual",
+        rate_hz=config.rate_hz,
+        effort_limit_n=EFFORT_LIMIT_N,
+        speed_limit_m_s=SPEED_LIMIT_M_S,
+        opening=Command(EFFORT, OPENING_N, math.inf, math.inf),
+        relaxed=Command(EFFORT, 0.0, math.inf, math.inf),
+        tare_images=0 if config.sensor == "ideal" else TARE_IMAGES,
+        notes=("simulated: every figure below comes from a model",),
+    )
+
+
+@frozen(kw_only=True)
+class Setting:
+    """One grasp before it begins: the numbers of plant and sensor, their first states, what the seed still gives."""
+
+    kinds: tuple[str, ...]
+    """The object's terms."""
+    plant: PlantParams
+    body: PlantState
+    sensor: SensorParams
+    sensed: SensorState
+    dt_s: float
+    rng: np.random.Generator
+
+    def noise(self, images: int) -> NDArray[np.float64]:
+        """Return the next `images` rows of 44 standard normal numbers, the same however they are asked for."""
+        return self.rng.standard_normal((images, 2 * CELLS))
+
+
+def set_scene(config: SimConfig, scene: str, seed: int) -> Setting:
+    """Return the grasp of this object (`none`: nothing there) with this seed. Raises UnknownName."""
+    rng = np.random.default_rng(seed)
+    instance = None
+    if scene != "none":
+        instance = instance_of(find(scene), rng if config.spread else None)
+    plant, body = _plant(config, instance, rng)
+    sensor = _sensor(config, instance, rng)
+    return Setting(
+        kinds=instance.kinds if instance else (),
+        plant=plant,
+        body=body,
+        sensor=sensor,
+        sensed=first_sensed(sensor, body),
+        dt_s=1.0 / config.rate_hz,
+        rng=rng,
+    )
+
+
+def laws_of(kinds: Sequence[str]) -> list[Law]:
+    """Return the laws of these terms, in order."""
+    return [TERMS[kind][1] for kind in kinds]
+
+
+def _plant(
+    config: SimConfig, instance: Instance | None, rng: np.random.Generator
+) -> tuple[PlantParams, PlantState]:
+    """Return the plant's numbers and its state before the grasp: open, at rest, nothing touched.
+
+    Friction varies between trials, so it is drawn here.
+    """
+    link = PR2_LINKAGES[config.transmission]
+    friction_n = float(config.coulomb_n)
+    if config.spread:
+        friction_n = max(friction_n + config.coulomb_spread_n * float(rng.standard_normal()), 0.0)
+    drive = Drive(
+        link=link,
+        inertia=4.0 * math.pi * math.pi * config.rotor_kg_m2,
+        coulomb_n=friction_n,
+        breakaway_n=max(float(config.breakaway_n), friction_n),
+        stribeck_m_s=float(config.stribeck_m_s),
+        load_share=float(config.load_share),
+        damping_n_s_m=float(config.damping_n_s_m),
+        closed_rev=revolutions_at(link, 0.0),
+        open_rev=revolutions_at(link, config.open_gap_m),
+    )
+    thing = Thing(
+        # Nothing there: thinner than the closed gap, so that no finger ever touches it.
+        width_m=instance.width_m if instance else -1.0,
+        table_n=instance.table_n if instance else 0.0,
+        skins_n_m=0.5 * float(config.skin_n_m),
+        terms=instance.terms if instance else (),
+    )
+    gap, rate = gap_and_rate(link, drive.open_rev)
+    at_rest = Squeezed(0.0, 0.0, 0.0, tuple(TERMS[kind][2] for kind in instance.kinds) if instance else ())
+    offset = instance.offset_m if instance else 0.0
+    state = PlantState(drive.open_rev, 0.0, gap, rate, 0.0, 0.0, offset, 0, at_rest, 0.0)
+    return PlantParams(drive, thing, _substeps(drive, thing, rate, 1.0 / config.rate_hz)), state
+
+
+def _sensor(config: SimConfig, instance: Instance | None, rng: np.random.Generator) -> SensorParams:
+    """Return the sensing chain; the cells' offsets and the phase of the pads' clock are drawn here."""
+    mean, spread = CELL_OFFSET
+    offsets = (mean + spread * rng.standard_normal((2, CELLS))).tolist()
+    weights = cell_weights(instance.spec.patch, instance.patch_row) if instance else (1.0 / 15.0,) * 15
+    return SensorParams(
+        ideal=1 if config.sensor == "ideal" else 0,
+        link=PR2_LINKAGES[config.transmission],
+        pad_phase_s=float(rng.random()) * PAD_PERIOD_S,
+        share=float(instance.share) if instance else 1.0,
+        noise_counts=float(config.noise_counts),
+        left_weights=weights,
+        right_weights=weights,
+        left_offset=tuple(offsets[0]),
+        right_offset=tuple(offsets[1]),
+    )
+
+
+def _substeps(drive: Drive, thing: Thing, rate_m_rev: float, dt: float) -> int:
+    """Return into how many steps a tick is cut near the object, from the stiffest it can feel."""
+    stiffest = min(thing.skins_n_m, STIFFEST_N_M)
+    mass = drive.inertia / (rate_m_rev * rate_m_rev)
+    return max(1, math.ceil(math.sqrt(stiffest / mass) * dt / RESOLVED))
