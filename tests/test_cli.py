@@ -179,6 +179,21 @@ def test_the_traceback_is_there_on_demand(run, monkeypatch):
     assert ran.json["error"] == {"kind": "KeyError", "message": "KeyError: 'gap'", "exit_code": 70}
 
 
+def test_with_strict_plugins_the_broken_one_is_named(run, site, monkeypatch):
+    site.install("lab-broken", "import no_such_driver")
+    monkeypatch.setattr(loader, "_current", None)
+    monkeypatch.setenv("GRASPSENSE_STRICT_PLUGINS", "1")
+    monkeypatch.setenv("GRASPSENSE_PLUGINS", "lab-broken")
+
+    ran = run("plugins", "list")
+
+    assert ran.code == 70
+    assert ran.err.startswith(
+        "graspsense: internal error: ModuleNotFoundError: No module named 'no_such_driver'\n"
+        "  while loading main of lab-broken 0.2\n"
+    )
+
+
 class TestCommandsOfPlugins:
     def test_one_is_found_by_its_short_and_its_qualified_name(self, run):
         @click.command()

@@ -401,6 +401,7 @@ def test_a_validator_that_looks_at_other_keys_keeps_its_words(plugins, write):
         ("gripper=other", "expected a table, found 'other' (text): write gripper.type = \"other\""),
         ("run=3", "expected a table, found 3 (a whole number)"),
         ("gripper.port.x=3", "expected text, found a table"),
+        ("gripper.port=\udcff", "expected UTF-8 text, found '\\udcff' (text)"),
     ],
 )
 def test_nothing_is_coerced(plugins, write, option, said):
@@ -452,8 +453,12 @@ class TestFiles:
         assert complaint("yours").endswith("A file is given with its ending .toml: yours.toml")
 
     def test_no_such_file(self, plugins, write):
-        write("", "x/y")
+        write("", "x/y.txt")
+        write("", "gentle.toml")
         assert complaint("nosuch.toml") == f"no pipeline file 'nosuch.toml' in {Path.cwd()}"
+        assert complaint("x/y.toml") == f"no pipeline file 'x/y.toml' in {Path.cwd()}/x"
+        assert complaint("gentel.toml").endswith("Did you mean 'gentle.toml'?")
+        assert complaint("z/y.toml") == f"no pipeline file 'z/y.toml': there is no folder '{Path.cwd()}/z'"
 
     def test_a_folder(self, plugins, write):
         write("", "folder.toml/inside")

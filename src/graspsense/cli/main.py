@@ -119,7 +119,8 @@ def _exit_code(arguments: list[str]) -> int:
             if os.environ.get("NO_COLOR"):
                 ctx.color = False
             cli.invoke(ctx)
-        sys.stdout.flush()
+        if sys.stdout is not None:  # it is where the shell has closed it
+            sys.stdout.flush()
         return 0
     except click.exceptions.Exit as ended:
         return ended.exit_code
@@ -147,9 +148,9 @@ def _report(error: Exception, as_json: bool) -> int:
         message, code = f"{error.strerror or error}{place}", EXIT_USAGE
     else:
         message, code = f"{type(error).__name__}: {error}", EXIT_BUG
-    talk = message
+    talk = "\n  ".join([message, *getattr(error, "__notes__", ())])
     if code == EXIT_BUG:
-        talk = f"internal error: {message}\n  This is a bug, ours or a plugin's."
+        talk = f"internal error: {talk}\n  This is a bug, ours or a plugin's."
         if os.environ.get(TRACEBACK_VARIABLE) != "1":
             talk += f" Run it again with {TRACEBACK_VARIABLE}=1 to see where it happened."
     if os.environ.get(TRACEBACK_VARIABLE) == "1":

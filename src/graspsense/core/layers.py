@@ -6,13 +6,14 @@ import os
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
 from attrs import define, field, frozen
 
-from graspsense.core.errors import ConfigError, UnknownName, suggestion
+from graspsense.core.errors import ConfigError, UnknownName
 from graspsense.core.plugins import Plugins
 from graspsense.core.strict import Problem, shown
 from graspsense.core.toml_lines import KeyPath, key_lines
@@ -188,8 +189,9 @@ def _nearby(missing: Traversable) -> str:
     folder = missing.absolute().parent
     if not folder.is_dir():
         return f": there is no folder {str(folder)!r}"
-    names = [one.name for one in folder.iterdir() if one.suffix == ".toml"]
-    return f" in {folder}.{suggestion(missing.name, names)}"
+    # The ending, which all have in common, must not make them alike.
+    near = get_close_matches(missing.stem, [one.stem for one in folder.glob("*.toml")], n=1)
+    return f" in {folder}" + (f". Did you mean {near[0] + '.toml'!r}?" if near else "")
 
 
 def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:
