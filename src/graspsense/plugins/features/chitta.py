@@ -87,15 +87,17 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         force = self._force(trace)
         f_first, f_steady = float(force[first]), float(force[shown])
         delta_t = float(trace.t_s[steady] - trace.t_s[first])
+        reasons = {}
+        rates = (math.nan, math.nan)
         if delta_t > 0.0:
             rates = ((p_steady - p_first) / delta_t, (f_steady - f_first) / delta_t)
-            return Features(names=NAMES, values=(p_first, p_steady, f_steady, delta_t, *rates), units=units)
-        return Features(
-            names=NAMES,
-            values=(p_first, p_steady, f_steady, delta_t, math.nan, math.nan),
-            units=units,
-            reasons=missing(RATES, "delta_t is zero: at rest from the first contact on, so there is no rate"),
-        )
+        else:
+            reasons = missing(RATES, "delta_t is zero: at rest from the first contact on, so there is no rate")
+        if not math.isfinite(f_steady):
+            f_steady, rates = math.nan, (rates[0], math.nan)
+            reasons |= missing(("f_steady", "df_dt"), "the pads gave no number when the fingers were at rest")
+        values = (p_first, p_steady, f_steady, delta_t, *rates)
+        return Features(names=NAMES, values=values, units=units, reasons=reasons)
 
     def _units(self, trace: Trace) -> tuple[str, ...]:
         t, gap, force = trace.units["t"], trace.units["gap"], trace.units["force_left"]
@@ -117,7 +119,7 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
     def _first(self, trace: Trace) -> int | None:
         tau_1 = self.config.contact_force_n
         touch = (trace.force_left_n >= tau_1) & (trace.force_right_n >= tau_1)
-        touch &= (trace.phase >= APPROACH) & (trace.phase <= HOLD)
+        touch &= (trace.phase >= APPROACH) & (trace.phase <= HOLD) & (trace.gap_m == trace.gap_m)
         return int(touch.argmax()) if touch.any() else None
 
     def _rest(self, trace: Trace, first: int) -> tuple[int, int] | None:

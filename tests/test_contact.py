@@ -1,0 +1,78 @@
+"""First contact and rest: the two instants every feature hangs on."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.core.contact import (
+    REST_SPEED_M_S,
+    REST_WINDOW_S,
+    Stillness,
+    at_rest,
+    both_touch,
+    watch,
+)
+
+
+def test_contact_needs_both_pads_at_or_over_the_threshold():
+    # Equation 1 as the text means it: one finger first is no contact, exactly tau_1 is.
+    assert both_touch(0.625, 0.7, 0.625)
+    assert not both_touch(5.0, 0.6249, 0.625)
+    assert not both_touch(0.0, 5.0, 0.625)
+    assert not both_touch(float("nan"), 5.0, 0.625)
+
+
+def still_after(gaps, dt=0.001):
+    still = Stillness(0.0, gaps[0])
+    for k, gap in enumerate(gaps):
+        still = watch(still, k * dt, gap, REST_SPEED_M_S, REST_WINDOW_S)
+    return still, (len(gaps) - 1) * dt
+
+
+def test_one_encoder_tick_does_not_end_the_stillness():
+    # 0.33 um in 1 ms is 0.33 mm/s, over tau_2: a test of single samples would never see rest.
+    still, now = still_after([0.05] * 20 + [0.05 + 0.33e-6] * 31)
+    assert still.since_t_s == 0.0
+    assert at_rest(still, now, REST_WINDOW_S)
+
+
+def test_a_gap_that_creeps_faster_than_tau_2_is_never_at_rest():
+    creeping = [0.05 - 1.2e-4 * 0.001 * k for k in range(2000)]
+    still, now = still_after(creeping)
+    assert not at_rest(still, now, REST_WINDOW_S)
+
+
+def test_a_gap_that_creeps_slower_than_tau_2_is_at_rest():
+    creeping = [0.05 - 0.8e-4 * 0.001 * k for k in range(51)]
+    still, now = still_after(creeping)
+    assert at_rest(still, now, REST_WINDOW_S)
+
+
+def test_fifty_ticks_of_a_millisecond_fill_the_window_despite_rounding():
+    still = Stillness(3 * 0.001, 0.05)
+    assert at_rest(still, 53 * 0.001, REST_WINDOW_S)
+    assert not at_rest(still, 52 * 0.001, REST_WINDOW_S)
+
+
+def test_a_gap_that_is_no_number_is_never_still():
+    still = watch(Stillness(0.0, 0.05), 0.001, float("nan"), REST_SPEED_M_S, REST_WINDOW_S)
+    again = watch(still, 0.1, float("nan"), REST_SPEED_M_S, REST_WINDOW_S)
+    assert not at_rest(again, 0.1, REST_WINDOW_S)
+
+
+def test_on_a_clock_slower_than_the_window_the_bound_grows_with_the_time_elapsed():
+    still = Stillness(0.0, 0.05)
+    assert watch(still, 1.0, 0.05 - 0.9e-4, REST_SPEED_M_S, REST_WINDOW_S) is still
+    assert watch(still, 1.0, 0.05 - 1.1e-4, REST_SPEED_M_S, REST_WINDOW_S) is not still
+
+
+@given(st.lists(st.floats(-1e-3, 1e-3), min_size=60, max_size=200))
+def test_at_rest_means_the_gap_stayed_within_bounds_over_the_whole_window(steps):
+    gap, t = 0.05, 0.0
+    still, seen = Stillness(t, gap), [(t, gap)]
+    for step in steps:
+        t, gap = t + 0.001, gap + step * 0.01
+        seen.append((t, gap))
+        still = watch(still, t, gap, REST_SPEED_M_S, REST_WINDOW_S)
+        if at_rest(still, t, REST_WINDOW_S):
+            within = [g for when, g in seen if when >= still.since_t_s]
+            assert max(abs(g - within[0]) for g in within) <= REST_SPEED_M_S * (t - still.since_t_s) + 1e-15

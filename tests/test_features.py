@@ -1,0 +1,158 @@
+"""The six features of Table I: their definitions, and a defined answer for every degenerate trace."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from traces import made_trace
+
+from graspsense.core.signals import Phase
+from graspsense.core.trace import SI_UNITS
+from graspsense.plugins.features.chitta import NAMES, ChittaConfig, ChittaFeatures
+
+FEATURES = ChittaFeatures(ChittaConfig())
+
+
+def squeeze(before=100, during=400, after=200, p0=0.0600, p1=0.0540, f0=0.625, f1=8.0):
+    """Contact after `before` ticks, a straight squeeze of `during` ticks from p0 to p1, then rest."""
+    rows = [(p0 + 1e-5 * (before - k), 0.0, 0.0) for k in range(before)]
+    rows += [(p0 + (p1 - p0) * k / during, f0 + (f1 - f0) * k / during, f0 + (f1 - f0) * k / during) for k in range(during)]
+    return rows + [(p1, f1, f1)] * after
+
+
+def test_the_six_features_of_a_straight_squeeze():
+    f = FEATURES.extract(made_trace(squeeze()))
+    assert f.names == NAMES
+    assert f.units == ("m", "m", "N", "s", "m/s", "N/s")
+    assert f["p_first"] == pytest.approx(0.0600)
+    # Rest begins where the remaining way is within tau_2 times its window: 5 um before the end, at 15 mm/s.
+    assert f["p_steady"] == pytest.approx(0.0540, abs=2e-5)
+    assert f["f_steady"] == pytest.approx(8.0)
+    assert f["delta_t"] == pytest.approx(0.4, abs=0.0021)
+    assert f["dp_dt"] == pytest.approx((f["p_steady"] - f["p_first"]) / f["delta_t"])
+    assert f["df_dt"] == pytest.approx((8.0 - 0.625) / f["delta_t"])
+    assert not f.reasons
+
+
+def test_contact_counts_only_once_both_fingers_touch():
+    rows = squeeze()
+    # The left finger alone, long before: no contact yet.
+    rows[:100] = [(gap, 3.0, 0.0) for gap, _, _ in rows[:100]]
+    assert FEATURES.extract(made_trace(rows))["p_first"] == pytest.approx(0.0600)
+
+
+@pytest.mark.parametrize(
+    ("choice", "expected"), [("mean", 5.0), ("left", 4.0), ("right", 6.0), ("min", 4.0), ("sum", 10.0)]
+)
+def test_which_force(choice, expected):
+    rows = [(0.06, 0.0, 0.0)] * 5 + [(0.06, 4.0, 6.0)] * 100
+    rows[5] = (0.061, 4.0, 6.0)
+    f = ChittaFeatures(ChittaConfig(force=choice)).extract(made_trace(rows))
+    assert f["f_steady"] == expected
+
+
+def missing_of(trace):
+    f = FEATURES.extract(trace)
+    assert f.names == NAMES
+    assert all((value != value) == (name in f.reasons) for name, value in zip(f.names, f.values, strict=True))
+    return {n for n, v in zip(f.names, f.values, strict=True) if v != v}, f.reasons
+
+
+@pytest.mark.parametrize(
+    ("rows", "why"),
+    [
+        ([], "empty"),
+        ([(0.06, 0.0, 0.0)] * 50, "no pad felt"),
+        ([(0.06, 9.0, 0.0)] * 50, "only the left pad"),
+        ([(0.06, 0.0, 9.0)] * 50, "only the right pad"),
+        ([(0.06, 9.0, 0.0)] * 25 + [(0.06, 0.0, 9.0)] * 25, "at the same time"),
+        ([(0.06, math.nan, math.nan)] * 50, "no pad felt"),
+    ],
+)
+def test_without_contact_all_six_are_missing_with_the_reason(rows, why):
+    missing, reasons = missing_of(made_trace(rows))
+    assert missing == set(NAMES)
+    assert all(why in reason for reason in reasons.values())
+
+
+def test_contact_but_never_steady_leaves_only_p_first():
+    rows = [(0.06 - 1e-5 * k, 5.0, 5.0) for k in range(500)]
+    missing, reasons = missing_of(made_trace(rows))
+    assert missing == set(NAMES) - {"p_first"}
+    assert "not at rest" in reasons["delta_t"]
+
+
+def test_a_rigid_thing_at_rest_from_the_contact_on_has_no_rates():
+    missing, reasons = missing_of(made_trace([(0.03, 9.0, 9.0)] * 100))
+    assert missing == {"dp_dt", "df_dt"}
+    assert "delta_t is zero" in reasons["dp_dt"]
+
+
+def test_the_release_is_no_part_of_the_squeeze():
+    rows = [(0.06 - 1e-5 * k, 5.0, 5.0) for k in range(100)] + [(0.059, 5.0, 5.0)] * 100
+    phases = [Phase.SQUEEZE] * 100 + [Phase.RELEASE] * 100
+    missing, _ = missing_of(made_trace(rows, phases=phases))
+    assert missing == set(NAMES) - {"p_first"}
+
+
+def test_a_gap_that_drops_out_after_contact_is_not_rest():
+    rows = [(0.06, 9.0, 9.0)] * 10 + [(math.nan, 9.0, 9.0)] * 500
+    missing, _ = missing_of(made_trace(rows))
+    assert "p_steady" in missing
+
+
+def test_units_of_a_recording_carry_over():
+    trace = made_trace(squeeze(), units={**SI_UNITS, "t": "frame"})
+    assert FEATURES.extract(trace).units == ("m", "m", "N", "frame", "m/frame", "N/frame")
+
+
+def test_early_features_appear_one_after_the_other_as_time_passes():
+    trace = made_trace(squeeze())
+    assert len(missing_of(trace.until(0.05))[0]) == 6
+    assert len(missing_of(trace.until(0.2))[0]) == 5
+    whole = FEATURES.extract(trace)
+    assert FEATURES.extract(trace.until(0.56)).values == whole.values
+
+
+def test_until_is_a_trace_of_what_had_been_seen_by_then():
+    trace = made_trace(squeeze())
+    early = trace.until(0.2)
+    assert len(early) == 201
+    assert early.t_s[-1] <= 0.2
+    assert len(trace.until(-1.0)) == 0
+    assert len(trace.until(1e9)) == len(trace)
+
+
+rows_strategy = st.lists(
+    st.tuples(
+        st.floats(0.0, 0.09) | st.just(math.nan),
+        st.floats(-1.0, 100.0) | st.just(math.nan),
+        st.floats(-1.0, 100.0) | st.just(math.nan),
+    ),
+    max_size=120,
+)
+
+
+@settings(max_examples=200)
+@given(rows_strategy, st.floats(-0.01, 0.2), st.sampled_from([0.001, 0.02, 1.0]))
+def test_every_trace_gives_numbers_or_reasons(rows, until, dt):
+    trace = made_trace(rows, dt=dt).until(until)
+    f = FEATURES.extract(trace)
+    for name, value in zip(f.names, f.values, strict=True):
+        assert not math.isinf(value)
+        assert (value != value) == bool(f.reasons.get(name))
+
+
+def test_columns_and_images_are_cut_together():
+    trace = made_trace([(0.05, 1.0, 1.0)] * 10)
+    assert np.array_equal(trace.until(0.004).gap_m, trace.gap_m[:5])
+    assert trace.until(0.004).pad_left.shape == (0, 22)
+
+
+def test_pads_that_drop_out_before_the_rest_leave_the_gaps():
+    rows = [(0.06, 9.0, 9.0)] * 5 + [(0.059, math.nan, math.nan)] * 100
+    missing, reasons = missing_of(made_trace(rows))
+    assert missing == {"f_steady", "df_dt"}
+    assert "no number" in reasons["f_steady"]

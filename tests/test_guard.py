@@ -1,0 +1,91 @@
+"""The guard: nothing leaves it that is over a limit or no number."""
+
+import math
+from math import inf, nan
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.core.guard import GuardParams, GuardState, guard
+from graspsense.core.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame
+
+LIMITS = GuardParams(100.0, 0.2, inf, inf, 0.625)
+FRESH = GuardState(0, 0, 0)
+REAL = GuardParams(100.0, 0.2, 12.0, 0.015, 0.625)
+
+
+def frame(velocity=0.0, left=0.0, right=0.0):
+    return Frame(0.0, 0.001, 0.05, velocity, 0.0, left, right, 0.0, 0.0, 0)
+
+
+@pytest.mark.parametrize(("asked", "given_"), [(150.0, 100.0), (-150.0, -100.0), (99.0, 99.0), (inf, 100.0)])
+def test_effort_is_clamped_to_the_gripper_both_ways(asked, given_):
+    command, state = guard(LIMITS, FRESH, frame(), Command(EFFORT, asked, inf, inf))
+    assert command.value == given_
+    assert state.acted == (asked != given_)
+
+
+def test_the_commands_own_limit_is_tighter():
+    command, _ = guard(LIMITS, FRESH, frame(), Command(EFFORT, 50.0, 10.0, inf))
+    assert command.value == 10.0
+
+
+@pytest.mark.parametrize(
+    ("effort", "velocity", "expected"),
+    [(20.0, -0.21, 0.0), (20.0, -0.19, 20.0), (-20.0, 0.21, 0.0), (-20.0, -0.3, -20.0), (20.0, 0.3, 20.0)],
+)
+def test_effort_that_would_drive_past_the_speed_limit_is_taken_away(effort, velocity, expected):
+    # Braking stays allowed: only effort in the direction of the motion is cut.
+    command, _ = guard(LIMITS, FRESH, frame(velocity), Command(EFFORT, effort, inf, inf))
+    assert command.value == expected
+
+
+@pytest.mark.parametrize(
+    "command",
+    [Command(EFFORT, nan, inf, inf), Command(EFFORT, 1.0, nan, inf), Command(VELOCITY, 0.1, inf, nan)],
+)
+def test_a_command_that_is_no_number_stops_the_grasp_for_good(command):
+    halted, state = guard(LIMITS, FRESH, frame(), command)
+    assert (halted.kind, halted.value, state.stopped) == (EFFORT, 0.0, 1)
+    later, state = guard(LIMITS, state, frame(), Command(EFFORT, 20.0, inf, inf))
+    assert (later.value, state.stopped) == (0.0, 1)
+
+
+def test_a_negative_limit_stops_too():
+    halted, state = guard(LIMITS, FRESH, frame(), Command(EFFORT, 5.0, -1.0, inf))
+    assert (halted.value, state.stopped) == (0.0, 1)
+
+
+def test_other_kinds_are_held_to_the_limit_that_bounds_them():
+    assert guard(LIMITS, FRESH, frame(), Command(VELOCITY, -1.0, inf, inf))[0].value == -0.2
+    assert guard(LIMITS, FRESH, frame(), Command(FORCE, 500.0, inf, inf))[0].value == 100.0
+    assert guard(LIMITS, FRESH, frame(), Command(FORCE, -5.0, inf, inf))[0].value == 0.0
+    assert guard(LIMITS, FRESH, frame(), Command(POSITION, -0.01, inf, inf))[0].value == 0.0
+    position, _ = guard(LIMITS, FRESH, frame(), Command(POSITION, 0.05, inf, inf))
+    assert (position.effort_limit_n, position.speed_limit_m_s) == (100.0, 0.2)
+
+
+def test_a_real_gripper_is_weak_and_slow_until_a_pad_has_felt_something():
+    strong = Command(EFFORT, 80.0, inf, inf)
+    command, state = guard(REAL, FRESH, frame(), strong)
+    assert (command.value, state.contact_seen) == (12.0, 0)
+    assert guard(REAL, state, frame(velocity=-0.016), strong)[0].value == 0.0
+    command, state = guard(REAL, state, frame(left=0.7), strong)
+    assert (command.value, state.contact_seen) == (80.0, 1)
+    # Once seen, it stays seen.
+    assert guard(REAL, state, frame(), strong)[0].value == 80.0
+
+
+numbers = st.floats(allow_nan=True, allow_infinity=True)
+
+
+@given(st.sampled_from([EFFORT, VELOCITY, POSITION, FORCE]), numbers, numbers, numbers, numbers, numbers)
+def test_whatever_is_asked_nothing_leaves_over_a_limit_or_not_a_number(kind, value, effort, speed, v, left):
+    command, state = guard(REAL, FRESH, frame(v, left), Command(kind, value, effort, speed))
+    assert not math.isnan(command.value)
+    if command.kind in (EFFORT, FORCE):
+        assert abs(command.value) <= 100.0
+    if command.kind == VELOCITY:
+        assert abs(command.value) <= 0.2
+    assert state.acted in (0, 1)

@@ -1,0 +1,265 @@
+"""The runner: order of things, every way out, and a gripper that is never left squeezing."""
+
+import math
+
+import pytest
+from grippers import CONTACT_S, REST_S, Scripted, bottle, squeezing
+
+from graspsense.core.errors import NoDevice, RecordingEnded, TareRefused
+from graspsense.core.roles import Controller
+from graspsense.core.runner import RunConfig, run_grasp
+from graspsense.core.signals import EFFORT, Command, Outcome, Phase
+from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
+from graspsense.plugins.controllers.supervision import not_begun
+from graspsense.plugins.controllers.velocity import VelocityState
+
+HYBRID = HybridController(HybridConfig())
+RUN = RunConfig()
+
+
+def phases_of(grasp):
+    seen = []
+    for phase in grasp.trace.phase.tolist():
+        if not seen or seen[-1] != phase:
+            seen.append(phase)
+    return [Phase(p) for p in seen]
+
+
+def test_a_grasp_from_opening_to_release():
+    gripper = Scripted(squeezing, bottle)
+    grasp = run_grasp(gripper, HYBRID, RUN)
+    assert grasp.outcome is Outcome.STEADY
+    assert phases_of(grasp) == [Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD, Phase.RELEASE]
+    assert [event.what for event in grasp.events if "guard" not in event.what] == [
+        "opening",
+        "taring",
+        "approach",
+        "squeeze",
+        "hold",
+        "release",
+    ]
+    assert (gripper.opened, gripper.closed) == (1, 1)
+    # Three whole images, all of them taken after the taring began.
+    assert [len(images) for images in gripper.tares] == [3]
+    assert gripper.tares[0][0].t_s > 0.1
+    # Opened first and last; the probing force in between.
+    assert gripper.commands[0].value == gripper.commands[-1].value == -20.0
+    assert 20.0 in {c.value for c in gripper.commands}
+
+
+def test_the_hold_lasts_as_long_as_asked():
+    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RunConfig(hold_s=0.5))
+    held = grasp.trace.t_s[grasp.trace.phase == Phase.HOLD]
+    assert held[-1] - held[0] == pytest.approx(0.5, abs=0.003)
+
+
+def test_contact_and_rest_are_where_the_script_puts_them():
+    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN)
+    squeeze = grasp.trace.t_s[grasp.trace.phase == Phase.SQUEEZE]
+    assert squeeze[0] == pytest.approx(CONTACT_S, abs=0.0011)
+    # At rest is known once the window of 50 ms is full.
+    assert squeeze[-1] == pytest.approx(REST_S + 0.05, abs=0.002)
+
+
+def let_go(gripper):
+    """Whether the last commands opened the fingers and then relaxed."""
+    values = [c.value for c in gripper.commands]
+    return values[-1] == 0.0 and -20.0 in values[-110:]
+
+
+@pytest.mark.parametrize("at", [0, 1, 50, 200, 600, 1200, 1600])
+def test_a_device_lost_in_any_phase_is_an_outcome_with_the_trace_to_the_last_frame(at):
+    gripper = Scripted(squeezing, bottle, lose_at=at)
+    grasp = run_grasp(gripper, HYBRID, RUN)
+    assert grasp.outcome is Outcome.DEVICE_LOST
+    assert "unplugged" in grasp.reason
+    assert gripper.closed == 1
+    assert len(grasp.trace) == 0 or grasp.trace.t_s[-1] == pytest.approx((at - 1) * 0.001)
+
+
+@pytest.mark.parametrize("silent_from", [0, 700])
+def test_a_silent_device_is_lost_too(silent_from):
+    gripper = Scripted(squeezing, bottle, clock="device", silent_from=silent_from)
+    grasp = run_grasp(gripper, HYBRID, RUN)
+    assert grasp.outcome is Outcome.DEVICE_LOST
+    assert "no frame from scripted for 100 ms" in grasp.reason
+    assert gripper.closed == 1
+
+
+def controller_that(act, after):
+    """The hybrid law, but from its `after`-th step on `act` decides."""
+    calls = [0]
+
+    def step(params, state, frame, pads):
+        calls[0] += 1
+        if calls[0] >= after:
+            act()
+        return HybridController.step(params, state, frame, pads)
+
+    class Faulty(HybridController):
+        pass
+
+    Faulty.step = staticmethod(step)
+    return Faulty(HybridConfig())
+
+
+def interrupt():
+    raise KeyboardInterrupt
+
+
+def fail():
+    raise ZeroDivisionError("float division by zero")
+
+
+@pytest.mark.parametrize(("act", "reason"), [(interrupt, "interrupted"), (fail, "ZeroDivisionError: float div")])
+@pytest.mark.parametrize("after", [1, 900, 1100])
+def test_whatever_stops_the_loop_the_fingers_are_opened(act, reason, after):
+    gripper = Scripted(squeezing, bottle)
+    grasp = run_grasp(gripper, controller_that(act, after), RUN)
+    assert grasp.outcome is Outcome.ABORTED
+    assert reason in grasp.reason
+    assert let_go(gripper)
+    assert gripper.closed == 1
+
+
+def test_the_second_interrupt_still_relaxes_the_gripper():
+    class Impatient(Scripted):
+        interrupted = False
+
+        def read(self, timeout_s):
+            if self.interrupted or self.k == 1200:
+                self.interrupted = True
+                raise KeyboardInterrupt
+            return super().read(timeout_s)
+
+    gripper = Impatient(squeezing, bottle)
+    grasp = run_grasp(gripper, HYBRID, RUN)
+    assert grasp.outcome is Outcome.ABORTED
+    assert gripper.commands[-1].value == 0.0
+    assert gripper.closed == 1
+
+
+def test_a_command_that_is_no_number_ends_the_grasp_safely():
+    class Broken(Controller):
+        @staticmethod
+        def step(params, state, frame, pads):
+            value = math.nan if frame.t_s > 0.5 else 5.0
+            return Command(EFFORT, value, math.inf, math.inf), state
+
+        def params(self):
+            return ()
+
+        def init(self):
+            progress = not_begun()
+            return VelocityState(progress.phase, progress.outcome, progress, 0.0)
+
+    gripper = Scripted(squeezing, bottle)
+    grasp = run_grasp(gripper, Broken(None), RUN)
+    assert grasp.outcome is Outcome.ABORTED
+    assert "NaN" in grasp.reason
+    assert all(c.value == c.value for c in gripper.commands)
+    assert let_go(gripper)
+    assert any("commanded no number" in event.what for event in grasp.events)
+
+
+def test_a_refused_tare_aborts_before_anything_closes():
+    class Loaded(Scripted):
+        def tare(self, images):
+            raise TareRefused("the left pad is loaded")
+
+    gripper = Loaded(squeezing, bottle)
+    grasp = run_grasp(gripper, HYBRID, RUN)
+    assert (grasp.outcome, grasp.reason) == (Outcome.ABORTED, "the left pad is loaded")
+    assert all(c.value <= 0.0 for c in gripper.commands)
+
+
+def test_pads_that_never_report_end_the_taring_in_time():
+    class Padless(Scripted):
+        def read(self, timeout_s):
+            frame, pads = super().read(timeout_s)
+            return frame, pads._replace(counter=7)
+
+        def tare(self, images):
+            if not images:
+                raise TareRefused("no cell image came")
+
+    grasp = run_grasp(Padless(squeezing, bottle), HYBRID, RunConfig(opening_timeout_s=1.0))
+    assert grasp.outcome is Outcome.ABORTED
+    assert "no cell image" in grasp.reason
+
+
+def test_a_gripper_that_is_not_there_is_an_error_not_an_outcome():
+    class Absent(Scripted):
+        def open(self, seed):
+            raise NoDevice("looked for a gripper")
+
+    gripper = Absent(squeezing, bottle)
+    with pytest.raises(NoDevice):
+        run_grasp(gripper, HYBRID, RUN)
+    assert gripper.closed == 1
+
+
+def recorded(length):
+    class Recorded(Scripted):
+        def open(self, seed):
+            from attrs import evolve
+
+            return evolve(super().open(seed), opening=None, tare_images=0)
+
+        def read(self, timeout_s):
+            if self.k >= length - 1:
+                raise RecordingEnded
+            return super().read(timeout_s)
+
+    return Recorded(squeezing, bottle)
+
+
+@pytest.mark.parametrize(
+    ("length", "outcome"),
+    [(0, Outcome.NOTHING_THERE), (500, Outcome.NOTHING_THERE), (1200, Outcome.NEVER_STEADY), (3000, Outcome.STEADY)],
+)
+def test_a_recording_ends_as_what_it_showed(length, outcome):
+    grasp = run_grasp(recorded(length), HYBRID, RUN)
+    assert grasp.outcome is outcome
+
+
+def test_late_frames_are_counted_on_a_device_clock_only():
+    class Jerky(Scripted):
+        def read(self, timeout_s):
+            frame, pads = super().read(timeout_s)
+            return (frame._replace(dt_s=0.006) if self.k % 100 == 50 else frame), pads
+
+    late = run_grasp(Jerky(squeezing, bottle, clock="device"), HYBRID, RUN).counts["late"]
+    assert late == pytest.approx(18, abs=3)
+    assert run_grasp(Jerky(squeezing, bottle), HYBRID, RUN).counts["late"] == 0
+
+
+def test_a_real_gripper_is_held_weak_until_first_contact():
+    gripper = Scripted(squeezing, bottle, clock="device")
+    run_grasp(gripper, HYBRID, RUN)
+    before = [c.value for c in gripper.commands[: int(CONTACT_S * 1000)]]
+    assert max(before) <= RUN.first_effort_n
+    assert max(c.value for c in gripper.commands) == 20.0
+
+
+def test_every_tick_reaches_the_sinks_and_a_failing_sink_leaves_the_gripper_safe():
+    class Counting:
+        def __init__(self):
+            self.ticks = 0
+
+        def take(self, frame, pads, phase, command):
+            self.ticks += 1
+
+    sink = Counting()
+    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN, sinks=[sink])
+    assert sink.ticks == len(grasp.trace) == grasp.counts["ticks"]
+
+    class Full:
+        def take(self, frame, pads, phase, command):
+            raise OSError("No space left on device")
+
+    gripper = Scripted(squeezing, bottle)
+    grasp = run_grasp(gripper, HYBRID, RUN, sinks=[Full()])
+    assert grasp.outcome is Outcome.ABORTED
+    assert "No space left" in grasp.reason
+    assert let_go(gripper)
