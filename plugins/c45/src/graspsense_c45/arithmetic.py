@@ -26,13 +26,18 @@ _SQRT_HALF = 0.7071067811865476
 Array = NDArray[Any]
 
 
+def select(condition: Any, where_true: Any, where_false: Any) -> Any:
+    """One of two numbers, elementwise; the compiled engine has a branch of its own for this."""
+    return np.where(condition, where_true, where_false)
+
+
 def ln_of_parts(mantissa: Any, exponent: Any) -> Any:
     """Natural logarithm of ``mantissa * 2**exponent``, mantissa in [0.5, 1) as ``frexp`` gives it.
 
     The series of 2 artanh((m - 1) / (m + 1)) for m in [sqrt(1/2), sqrt(2)), to below one unit in the last place.
     """
     low = mantissa < _SQRT_HALF
-    m = np.where(low, mantissa + mantissa, mantissa)
+    m = select(low, mantissa + mantissa, mantissa)
     e = exponent - low
     f = (m - 1.0) / (m + 1.0)
     z = f * f
@@ -51,27 +56,29 @@ def ln_of_parts(mantissa: Any, exponent: Any) -> Any:
     return e * _LN2_HIGH + (2.0 * f + tail)
 
 
-def exp_of_nonpositive(y: Any) -> Any:
-    """Exponential of ``y <= 0``; below -700 it is that of -700 (1e-304)."""
-    y = np.maximum(y, -700.0)
-    k = np.floor(y * (1.0 / LN2) + 0.5)
-    r = y - k * _LN2_HIGH
-    r = r - k * _LN2_LOW
-    p = 1.0 / 6227020800.0
-    p = p * r + 1.0 / 479001600.0
-    p = p * r + 1.0 / 39916800.0
-    p = p * r + 1.0 / 3628800.0
-    p = p * r + 1.0 / 362880.0
-    p = p * r + 1.0 / 40320.0
-    p = p * r + 1.0 / 5040.0
-    p = p * r + 1.0 / 720.0
-    p = p * r + 1.0 / 120.0
-    p = p * r + 1.0 / 24.0
-    p = p * r + 1.0 / 6.0
-    p = p * r + 0.5
-    p = p * r + 1.0
-    p = p * r + 1.0
-    return np.ldexp(p, np.int64(k) if np.ndim(k) == 0 else k.astype(np.int64))
+def one_minus_exp(y: Any) -> Any:
+    """``1 - exp(y)`` for ``y <= 0``, exact for small y too; below -700 it is that of -700.
+
+    The series of exp(r) - 1 for r = y / 1024, then ten times (1 + q)**2 - 1.
+    """
+    r = np.maximum(y, -700.0) / 1024.0
+    q = 1.0 / 14.0
+    q = (q * r + 1.0) / 13.0
+    q = (q * r + 1.0) / 12.0
+    q = (q * r + 1.0) / 11.0
+    q = (q * r + 1.0) / 10.0
+    q = (q * r + 1.0) / 9.0
+    q = (q * r + 1.0) / 8.0
+    q = (q * r + 1.0) / 7.0
+    q = (q * r + 1.0) / 6.0
+    q = (q * r + 1.0) / 5.0
+    q = (q * r + 1.0) / 4.0
+    q = (q * r + 1.0) / 3.0
+    q = (q * r + 1.0) / 2.0
+    q = (q * r + 1.0) * r
+    for _ in range(10):
+        q = q * (2.0 + q)
+    return -q
 
 
 def ln(x: float) -> float:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from graspsense_c45.arithmetic import LN2, TOLERANCE
+from graspsense_c45.arithmetic import LN2, TOLERANCE, select
 
 GAP = 1e-5
 """A cut needs ``v[i] + GAP < v[i + 1]``: an absolute gap, whatever the column's scale."""
@@ -34,8 +34,8 @@ def is_pure_or_small(weight: Any, majority_weight: Any, min_objects: Any) -> Any
 def min_side_weight(known_weight: Any, n_classes: Any, min_objects: Any) -> Any:
     """The least weight of each side of a numeric cut: a tenth of the mean class weight, within [M, 25]."""
     tenth = 0.1 * known_weight / n_classes
-    capped = np.where(tenth - 25.0 > TOLERANCE, 25.0, tenth)
-    return np.where(tenth - min_objects < TOLERANCE, min_objects, capped)
+    capped = select(tenth - 25.0 > TOLERANCE, 25.0, tenth)
+    return select(tenth - min_objects < TOLERANCE, min_objects, capped)
 
 
 def has_enough_rows(known_rows: Any, min_side: Any) -> Any:
@@ -50,7 +50,22 @@ def gain(numerator: Any, known_weight: Any, weight: Any) -> Any:
     """
     unknown_rate = (weight - known_weight) / weight
     total = (1.0 - unknown_rate) * (numerator / LN2)
-    return np.where(np.abs(total) < TOLERANCE, 0.0, total / known_weight)
+    return select(np.abs(total) < TOLERANCE, 0.0, total / known_weight)
+
+
+def gain_tolerance(weight: Any, term_bits: Any) -> Any:
+    """The tolerance of a gain, as a difference of numerators in units of ``2**-term_bits`` (whole units matter)."""
+    return np.floor(np.ldexp(TOLERANCE * LN2 * weight, term_bits))
+
+
+def least_numerator(weight: Any, known_weight: Any, term_bits: Any) -> Any:
+    """Below this numerator, in units of ``2**-term_bits``, a gain counts as none."""
+    return np.ceil(np.ldexp(TOLERANCE * LN2 * weight / known_weight, term_bits))
+
+
+def least_units(weight: Any, weight_bits: Any) -> Any:
+    """The least number of units of ``2**-weight_bits`` that counts as ``weight`` or more."""
+    return np.floor(np.ldexp(weight - TOLERANCE, weight_bits)) + 1.0
 
 
 def mdl_cost(ln_cuts: Any, weight: Any) -> Any:
@@ -62,4 +77,4 @@ def gain_ratio(gain_value: Any, split_numerator: Any, weight: Any) -> Any:
     """Gain over split information; ``split_numerator`` is L(W) - sum L(side) - L(W - T)."""
     split_information = split_numerator / LN2
     trivial = np.abs(split_information) < TOLERANCE
-    return np.where(trivial, 0.0, gain_value / (np.where(trivial, 1.0, split_information) / weight))
+    return select(trivial, 0.0, gain_value / (select(trivial, 1.0, split_information) / weight))

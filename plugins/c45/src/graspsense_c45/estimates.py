@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from graspsense_c45.arithmetic import TOLERANCE, exp_of_nonpositive, ln
+from graspsense_c45.arithmetic import TOLERANCE, ln, one_minus_exp, select
 
 
 class Confidence(NamedTuple):
@@ -30,16 +30,16 @@ def prepare_confidence(factor: float) -> Confidence:
 def estimated_errors(weight: Any, errors: Any, ln_factor: float, z: float, adds: bool) -> Any:
     """Errors to be expected of a leaf that made ``errors`` on the training weight ``weight`` (elementwise)."""
     if not adds:
-        return np.where(weight < TOLERANCE, 0.0, errors)
-    n = np.where(weight < TOLERANCE, 1.0, weight)
+        return select(weight < TOLERANCE, 0.0, errors)
+    n = select(weight < TOLERANCE, 1.0, weight)
     e = np.maximum(errors, 0.0)
     # From one error on: Wilson's upper limit with a continuity correction.
     whole = np.maximum(e, 1.0)
     f = (whole + 0.5) / n
     spread = np.sqrt(np.maximum(f / n - f * f / n + z * z / (4.0 * n * n), 0.0))
     limit = (f + z * z / (2.0 * n) + z * spread) / (1.0 + z * z / n) * n - whole
-    added_whole = np.where(whole + 0.5 >= n, np.maximum(n - whole, 0.0), limit)
+    added_whole = select(whole + 0.5 >= n, np.maximum(n - whole, 0.0), limit)
     # Below one error: exact at none, linear to one.
-    added_none = n * (1.0 - exp_of_nonpositive(ln_factor / n))
-    added = np.where(e < 1.0, added_none + e * (added_whole - added_none), added_whole)
-    return np.where(weight < TOLERANCE, 0.0, e + added)
+    added_none = n * one_minus_exp(ln_factor / n)
+    added = select(e < 1.0, added_none + e * (added_whole - added_none), added_whole)
+    return select(weight < TOLERANCE, 0.0, e + added)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from types import ModuleType
+
 import numpy as np
 from numpy.typing import NDArray
 
 from graspsense_c45.arithmetic import Array
 from graspsense_c45.branches import LEAF, Branches
+from graspsense_c45.engines import choose_fast
 from graspsense_c45.grow import grow
-from graspsense_c45.options import J48, Options
+from graspsense_c45.options import J48, Engine, Options
 from graspsense_c45.problem import Problem, pose
 from graspsense_c45.prune import collapse, prune_pessimistic, prune_reduced_error
 from graspsense_c45.rows_of_one import RowsOfOne
@@ -18,8 +21,8 @@ from graspsense_c45.tree import Tree, finish
 from graspsense_c45.weka_folds import hold_out
 
 
-def fit(table: Table, options: Options = J48, held_out: Array | None = None) -> Tree:
-    """Grow and prune a tree.
+def fit(table: Table, options: Options = J48, held_out: Array | None = None, engine: Engine = "auto") -> Tree:
+    """Grow and prune a tree; both engines give the same one, to the bit.
 
     held_out: rows of the table kept for reduced-error pruning; where None, those that J48 would hold out.
     Raises ValueError: rows are held out but the pruning is another one, or no row is left to grow on.
@@ -28,13 +31,14 @@ def fit(table: Table, options: Options = J48, held_out: Array | None = None) -> 
         if held_out is not None:
             raise ValueError(f"held_out goes with pruning='reduced_error'; pruning is {options.pruning!r}")
         problem = pose(table, None, options)
-        branches, leaf_of_row = _grow(problem)
+        fast = _fast(engine, problem)
+        branches, rows = fast.grow(problem) if fast else _grow(problem)
         if options.actual_split_value:
             _take_actual_values(branches, table.values)
         if options.collapse:
-            collapse(branches, problem, leaf_of_row)
+            collapse(branches, problem, np.zeros(0, dtype=np.int32) if fast else rows)
         if options.pruning == "pessimistic":
-            prune_pessimistic(branches, problem, leaf_of_row)
+            (fast.prune_pessimistic if fast else prune_pessimistic)(branches, problem, rows)
         return finish(branches, problem.weight_bits, table.schema, options.laplace)
     with_class = np.flatnonzero(table.labels != MISSING_CLASS)
     if held_out is None:
@@ -46,11 +50,21 @@ def fit(table: Table, options: Options = J48, held_out: Array | None = None) -> 
         raise ValueError("all rows are held out (or the others weigh nothing); leave some to grow the tree on")
     held_out = np.intersect1d(with_class, held_out)
     problem = pose(table, grown_on, options)
-    branches, _ = _grow(problem)
+    fast = _fast(engine, problem)
+    branches, _ = fast.grow(problem) if fast else _grow(problem)
     if options.actual_split_value:
         _take_actual_values(branches, table.values)
     prune_reduced_error(branches, problem, table.values[held_out], table.labels[held_out], table.weights[held_out])
     return finish(branches, problem.weight_bits, table.schema, options.laplace)
+
+
+def _fast(engine: Engine, problem: Problem) -> ModuleType | None:
+    """The compiled engine where it is to be used and can grow this tree."""
+    if not choose_fast(engine, problem.values.size):
+        return None
+    from graspsense_c45 import fast
+
+    return fast if fast.takes(problem) else None
 
 
 def _grow(problem: Problem) -> tuple[Branches, NDArray[np.int32]]:

@@ -60,7 +60,7 @@ def majority_class(counts: Array, problem: Problem) -> NDArray[np.int64]:
     """The lowest class not beaten by more than the tolerance, for each row of counts."""
     if problem.weight_bits == 0:
         return np.argmax(counts, axis=1)
-    margin = problem.units_at_least(np.float64(0.0)) * -1 + 1
+    margin = problem.weight_margin
     best = np.zeros(len(counts), dtype=np.int64)
     chosen = np.zeros(len(counts), dtype=np.int64)
     for k in range(counts.shape[1]):

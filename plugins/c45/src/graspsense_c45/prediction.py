@@ -8,11 +8,13 @@ from numpy.typing import ArrayLike, NDArray
 from graspsense_c45.arithmetic import TOLERANCE, Array
 from graspsense_c45.branches import LEAF
 from graspsense_c45.descent import CHUNK, reach
+from graspsense_c45.engines import choose_fast
+from graspsense_c45.options import Engine
 from graspsense_c45.table import check_values
 from graspsense_c45.tree import Tree, first_maximum
 
 
-def distributions(tree: Tree, values: ArrayLike) -> NDArray[np.float64]:
+def distributions(tree: Tree, values: ArrayLike, engine: Engine = "auto") -> NDArray[np.float64]:
     """The probability of every class for every row (rows x classes); NaN in ``values`` is missing.
 
     Raises ValueError: columns that do not fit the tree, infinite values, nominal columns holding no declared index.
@@ -21,16 +23,16 @@ def distributions(tree: Tree, values: ArrayLike) -> NDArray[np.float64]:
     answers = answers_of_nodes(tree, tree.laplace)
     complete, partial = _by_completeness(x)
     if partial is None:
-        return answers[reach(tree.tests, x, np.arange(len(x)), np.zeros(len(x), dtype=np.int64))]
+        return answers[_leaves(tree, x, engine)]
     result = np.empty((len(x), answers.shape[1]))
-    result[complete] = answers[reach(tree.tests, x, complete, np.zeros(len(complete), dtype=np.int64))]
+    result[complete] = answers[_leaves(tree, x[complete], engine)]
     for begin in range(0, len(partial), CHUNK):
         some = partial[begin : begin + CHUNK]
         result[some] = _spread(tree, x[some], answers)
     return result
 
 
-def class_indices(tree: Tree, values: ArrayLike) -> NDArray[np.int64]:
+def class_indices(tree: Tree, values: ArrayLike, engine: Engine = "auto") -> NDArray[np.int64]:
     """The index of the class of every row, as J48 classifies: the first largest unsmoothed probability.
 
     Raises ValueError as ``distributions`` does.
@@ -40,9 +42,9 @@ def class_indices(tree: Tree, values: ArrayLike) -> NDArray[np.int64]:
     complete, partial = _by_completeness(x)
     labels = first_maximum(answers)
     if partial is None:
-        return labels[reach(tree.tests, x, np.arange(len(x)), np.zeros(len(x), dtype=np.int64))]
+        return labels[_leaves(tree, x, engine)]
     result = np.empty(len(x), dtype=np.int64)
-    result[complete] = labels[reach(tree.tests, x, complete, np.zeros(len(complete), dtype=np.int64))]
+    result[complete] = labels[_leaves(tree, x[complete], engine)]
     for begin in range(0, len(partial), CHUNK):
         some = partial[begin : begin + CHUNK]
         result[some] = first_maximum(_spread(tree, x[some], answers))
@@ -60,6 +62,15 @@ def answers_of_nodes(tree: Tree, laplace: bool) -> NDArray[np.float64]:
     empty = np.flatnonzero((tree.weight < TOLERANCE) & (tree.parent >= 0))
     answers[empty] = answers[tree.parent[empty]]
     return np.asarray(answers)
+
+
+def _leaves(tree: Tree, x: Array, engine: Engine) -> NDArray[np.int64]:
+    """The leaf of each row; nothing is missing."""
+    if choose_fast(engine, x.size) and not any(attribute.is_nominal for attribute in tree.schema.attributes):
+        from graspsense_c45 import fast
+
+        return fast.reach(tree.tests, x)
+    return reach(tree.tests, x, np.arange(len(x)), np.zeros(len(x), dtype=np.int64))
 
 
 def _spread(tree: Tree, x: Array, answers: Array) -> NDArray[np.float64]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense_c45.arithmetic import LN2, TOLERANCE, Array, bits_below, x_ln_x_array
-from graspsense_c45.criteria import MANY_VALUES
+from graspsense_c45 import criteria
+from graspsense_c45.arithmetic import TOLERANCE, Array, bits_below, x_ln_x_array
 from graspsense_c45.options import Options
 from graspsense_c45.table import MISSING_CLASS, Table
 
@@ -54,17 +54,22 @@ class Problem:
         """Fixed-point terms as numbers."""
         return np.ldexp(terms.astype(np.float64), -self.term_bits)
 
+    @property
+    def weight_margin(self) -> int:
+        """A weight is larger than another one when it is so by more than this many units."""
+        return int(np.floor(np.ldexp(TOLERANCE, self.weight_bits)))
+
     def gain_tolerance(self, weight: Array) -> NDArray[np.int64]:
         """The tolerance of a gain, as a difference of numerators at nodes of this weight."""
-        return np.floor(np.ldexp(TOLERANCE * LN2 * weight, self.term_bits)).astype(np.int64)
+        return np.asarray(criteria.gain_tolerance(weight, self.term_bits), dtype=np.int64)
 
     def zero_numerator(self, weight: Array, known_weight: Array) -> NDArray[np.int64]:
         """Below this numerator a gain counts as none."""
-        return np.ceil(np.ldexp(TOLERANCE * LN2 * weight / known_weight, self.term_bits)).astype(np.int64)
+        return np.asarray(criteria.least_numerator(weight, known_weight, self.term_bits), dtype=np.int64)
 
     def units_at_least(self, weight: Array) -> NDArray[np.int64]:
         """The least fixed-point weight that counts as ``weight`` or more."""
-        return np.floor(np.ldexp(weight - TOLERANCE, self.weight_bits)).astype(np.int64) + 1
+        return np.asarray(criteria.least_units(weight, self.weight_bits), dtype=np.int64)
 
 
 def pose(table: Table, rows: NDArray[np.int64] | None, options: Options) -> Problem:
@@ -87,7 +92,7 @@ def pose(table: Table, rows: NDArray[np.int64] | None, options: Options) -> Prob
     value_counts = np.array(
         [0 if attribute.values is None else len(attribute.values) for attribute in table.schema.attributes], dtype=np.int64
     )
-    few = value_counts - MANY_VALUES * len(table.labels) < -TOLERANCE
+    few = value_counts - criteria.MANY_VALUES * len(table.labels) < -TOLERANCE
     averaged = (value_counts == 0) | few
     if not averaged.any():
         averaged[:] = True
