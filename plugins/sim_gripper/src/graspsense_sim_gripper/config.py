@@ -43,3 +43,5 @@ class SimConfig:
     """Stiffness of one fingertip's cover: 1e4 to 1e5 N/m (an assumption); `inf` for a rigid one."""
     noise_counts: float = field(default=15.0, validator=ge(0.0))
     """Noise of a cell, standard deviation: margins of 125 to 225 counts are in use on the robot."""
+    pad_delay_s: float = field(default=0.0, validator=and_(ge(0.0), le(0.04)))
+    """How long after it was taken a cell image arrives: 0.01 as through the PR2 driver's reports."""

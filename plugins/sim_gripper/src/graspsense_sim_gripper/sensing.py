@@ -4,7 +4,8 @@ The encoder counts motor ticks; the gap is their image through the transmission,
 first-order filter. A cell image is taken every 41 ms, beside frames at the control rate: the force that lands on
 the gripping face is spread over its fifteen cells by the patch of contact, the rest lands beside them; each cell
 has an offset of its own, noise, whole counts and 16 bits. The ideal sensor gives gap, rate and force exactly, at
-every tick, and has no cells.
+every tick, and has no cells. An image can be told to arrive later than it was taken, as over a bus that carries
+it in pieces.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ class SensorParams(NamedTuple):
     ideal: int
     link: ScrewLinkage
     pad_phase_s: float
+    pad_delay_s: float
     share: float
     noise_counts: float
     left_weights: Any
@@ -56,7 +58,10 @@ class Felt(NamedTuple):
 
 
 class SensorState(NamedTuple):
-    """What was last read: encoder, gap and its rate, how many images so far, the forces of the last."""
+    """What was last read: encoder, gap and its rate, how many images so far, the forces of the last.
+
+    `under_way` is 1 while an image is taken and has not arrived; `taken_*` are the forces on the pads it shows.
+    """
 
     ticks: float
     gap_m: float
@@ -64,13 +69,16 @@ class SensorState(NamedTuple):
     images: int
     image_t_s: float
     felt: Felt
+    under_way: int
+    taken_left_n: float
+    taken_right_n: float
 
 
 def first_sensed(params: SensorParams, plant: PlantState) -> SensorState:
     """Return the sensor before the first tick; the filter starts at rest."""
     ticks = float(math.floor(plant.revolutions * PR2_ENCODER_TICKS))
     gap, _ = gap_and_rate(params.link, ticks / PR2_ENCODER_TICKS)
-    return SensorState(ticks, gap, 0.0, 0, 0.0, Felt(0.0, 0.0, 0.0, 0.0))
+    return SensorState(ticks, gap, 0.0, 0, 0.0, Felt(0.0, 0.0, 0.0, 0.0), 0, 0.0, 0.0)
 
 
 def sense(
@@ -95,7 +103,7 @@ def sense(
         frame = Frame(t_s, dt_s, plant.gap_m, velocity, effort_n, plant.left_n, plant.right_n, 0.0, 0.0, 0)
         return frame, state
 
-    ticks, gap, velocity, count, image_t, felt = state
+    ticks, gap, velocity, count, image_t, felt, under_way, taken_left, taken_right = state
     now = float(math.floor(plant.revolutions * PR2_ENCODER_TICKS))
     moved = 0.0
     if now != ticks:
@@ -106,17 +114,19 @@ def sense(
     velocity += dt_s / (VELOCITY_FILTER_S + dt_s) * (moved / dt_s - velocity)
 
     # A tenth of a nanosecond of grace, as ticks and image times are sums of different steps.
-    due_s = params.pad_phase_s + count * PAD_PERIOD_S
-    if t_s + 1e-10 >= due_s:
+    due_s = params.pad_phase_s + count * PAD_PERIOD_S - 1e-10
+    if under_way == 0 and t_s >= due_s:
+        under_way, taken_left, taken_right = 1, plant.left_n, plant.right_n
+    if under_way == 1 and t_s >= due_s + params.pad_delay_s:
         left, right, drawn = images[count][0], images[count][1], noise[count]
-        _image(params, params.left_weights, params.left_offset, plant.left_n, drawn, 0, left)
-        _image(params, params.right_weights, params.right_offset, plant.right_n, drawn, CELLS, right)
+        _image(params, params.left_weights, params.left_offset, taken_left, drawn, 0, left)
+        _image(params, params.right_weights, params.right_offset, taken_right, drawn, CELLS, right)
         felt = feel(left, right, left_zero, right_zero)
-        count, image_t = count + 1, t_s
+        count, image_t, under_way = count + 1, t_s - params.pad_delay_s, 0
     frame = Frame(
         t_s, dt_s, gap, velocity, effort_n, felt.left_n, felt.right_n, felt.left_edge_n, felt.right_edge_n, 0
     )
-    return frame, SensorState(ticks, gap, velocity, count, image_t, felt)
+    return frame, SensorState(ticks, gap, velocity, count, image_t, felt, under_way, taken_left, taken_right)
 
 
 def feel(left: Any, right: Any, left_zero: Any, right_zero: Any) -> Felt:
@@ -133,7 +143,17 @@ def felt_again(state: SensorState, images: Any, left_zero: Any, right_zero: Any)
     """Return the sensor with the last image's forces taken over a new zero."""
     last = images[state.images - 1]
     felt = feel(last[0], last[1], left_zero, right_zero)
-    return SensorState(state.ticks, state.gap_m, state.velocity_m_s, state.images, state.image_t_s, felt)
+    return SensorState(
+        state.ticks,
+        state.gap_m,
+        state.velocity_m_s,
+        state.images,
+        state.image_t_s,
+        felt,
+        state.under_way,
+        state.taken_left_n,
+        state.taken_right_n,
+    )
 
 
 def _image(

@@ -140,6 +140,7 @@ def _sensor(config: SimConfig, instance: Instance | None, rng: np.random.Generat
         ideal=1 if config.sensor == "ideal" else 0,
         link=PR2_LINKAGES[config.transmission],
         pad_phase_s=float(rng.random()) * PAD_PERIOD_S,
+        pad_delay_s=float(config.pad_delay_s),
         share=float(instance.share) if instance else 1.0,
         noise_counts=float(config.noise_counts),
         left_weights=weights,
