@@ -7,6 +7,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+
 from graspsense.plugin_api import DeviceLost, NoDevice, PluginUnavailable
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import Pr2Config

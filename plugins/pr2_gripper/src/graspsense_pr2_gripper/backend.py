@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import NoReturn, final
 
 from graspsense.plugin_api import Command, DeviceInfo, DeviceLost, NoDevice, Pads, Reading, SensorBackend
-
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.discovery import search
 

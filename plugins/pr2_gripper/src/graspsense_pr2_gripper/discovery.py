@@ -9,8 +9,8 @@ from glob import glob
 from importlib import import_module
 
 from attrs import frozen
-from graspsense.plugin_api import FoundDevice, PluginUnavailable
 
+from graspsense.plugin_api import FoundDevice, PluginUnavailable
 from graspsense_pr2_gripper.config import Pr2Config
 
 BACKEND = "pr2"
