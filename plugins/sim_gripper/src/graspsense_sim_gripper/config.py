@@ -15,7 +15,9 @@ class SimConfig:
     """A PR2 gripper as a model: what stands in it, its drive, its sensors. SI units."""
 
     object: str = "odwalla:full_closed"
-    """Name in the catalogue, with its state: `odwalla:full_closed`, `can:empty_open`, `block`; `none`: nothing."""
+    """Name in the catalogue, with its state: `odwalla:full_closed`, `can:empty_open`, `block`; `none`: nothing.
+
+    `can:empty_open#3` is one certain can: its width and stiffness are the same in every trial."""
     spread: bool = True
     """Whether instance, placement and friction vary with the seed."""
     sensor: Literal["pads", "ideal"] = field(default="pads", validator=in_(("pads", "ideal")))

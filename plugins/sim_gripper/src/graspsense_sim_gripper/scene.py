@@ -86,6 +86,19 @@ def catalogue() -> Mapping[str, ObjectSpec]:
     return specs
 
 
+def numbered(name: str) -> tuple[str, int | None]:
+    """Return the name without its instance, and the number of the instance: `can:full_open#3` is one certain can.
+
+    Raises UnknownName where what stands behind `#` is no whole number.
+    """
+    plain, mark, number = name.partition("#")
+    if not mark:
+        return plain, None
+    if not (number.isascii() and number.isdigit()):
+        raise UnknownName(f"object {name!r}: behind # stands the number of an instance, as in {plain}#3")
+    return plain, int(number)
+
+
 def find(name: str) -> ObjectSpec:
     """Return the object of this name. Raises UnknownName with what there is."""
     known = catalogue()
@@ -107,9 +120,16 @@ def find(name: str) -> ObjectSpec:
     raise UnknownName(f"no object named {kind!r}. Known: {', '.join(kinds)}.{suggestion(kind, kinds)}")
 
 
-def instance_of(spec: ObjectSpec, rng: np.random.Generator | None) -> Instance:
-    """Return an instance drawn from the spec's spreads; with no generator, the spec's own figures, centred."""
+def instance_of(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None = None) -> Instance:
+    """Return an instance drawn from the spec's spreads; with no generator, the spec's own figures, centred.
+
+    With a number it is one certain thing: its stiffness and width follow from the kind and the number, the same
+    in every state and every trial, and only its placement is drawn from `rng`.
+    """
     draws = rng.standard_normal(5).tolist() if rng is not None else [0.0] * 5
+    if rng is not None and number is not None:
+        kind = spec.name.partition(":")[0].encode()
+        draws[:2] = np.random.default_rng([number, *kind]).standard_normal(2).tolist()
     # Lognormal, so that no draw makes a stiffness negative; two standard deviations at the most elsewhere.
     stiffer = math.exp(spec.stiffness_spread * draws[0])
     clipped = [min(max(d, -2.0), 2.0) for d in draws]
@@ -148,7 +168,8 @@ def cell_weights(patch: str, row: float) -> tuple[float, ...]:
     return tuple(weight / total for weight in weights)
 
 
-_STIFFNESSES: Final = frozenset({"k1_n_m", "k3_n_m3", "k_n_m", "hertz_n_m15"})
+# A thicker wall is stiffer and as much stronger.
+_STIFFNESSES: Final = frozenset({"k1_n_m", "k3_n_m3", "k_n_m", "hertz_n_m15", "crush_force_n"})
 
 
 def _spec(name: str, table: Mapping[str, Any]) -> ObjectSpec:

@@ -21,7 +21,7 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant import Drive, PlantParams, PlantState, Squeezed, Thing
-from graspsense_sim_gripper.scene import Instance, cell_weights, find, instance_of
+from graspsense_sim_gripper.scene import Instance, cell_weights, find, instance_of, numbered
 from graspsense_sim_gripper.sensing import PAD_PERIOD_S, SensorParams, SensorState, first_sensed
 from graspsense_sim_gripper.terms import TERMS, Law
 
@@ -76,7 +76,8 @@ def set_scene(config: SimConfig, scene: str, seed: int) -> Setting:
     rng = np.random.default_rng(seed)
     instance = None
     if scene != "none":
-        instance = instance_of(find(scene), rng if config.spread else None)
+        name, number = numbered(scene)
+        instance = instance_of(find(name), rng if config.spread else None, number)
     plant, body = _plant(config, instance, rng)
     sensor = _sensor(config, instance, rng)
     return Setting(

@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.scene import find, instance_of, numbered
+from graspsense_sim_gripper.setting import set_scene
+
+from graspsense.core.errors import UnknownName
+
+
+def drawn(name, seed):
+    plain, number = numbered(name)
+    return instance_of(find(plain), np.random.default_rng(seed), number)
+
+
+def test_a_numbered_thing_is_the_same_in_every_trial_and_state_but_placed_anew():
+    first, again = drawn("odwalla:full_open#3", 1), drawn("odwalla:full_open#3", 2)
+    empty = drawn("odwalla:empty_open#3", 5)
+
+    assert first.width_m == again.width_m == empty.width_m
+    assert first.terms == again.terms
+    assert first.offset_m != again.offset_m
+    assert first.share != again.share
+
+
+def test_other_numbers_and_kinds_are_other_things():
+    widths = {drawn(f"odwalla:full_open#{k}", 1).width_m for k in range(20)}
+    odwalla, naked = drawn("odwalla:full_open#3", 1), drawn("naked:full_open#3", 1)
+    deviation = [(one.width_m - one.spec.width_m) / one.spec.width_spread_m for one in (odwalla, naked)]
+
+    # Draws further out than two standard deviations are clipped to one width; the others all differ.
+    assert len(widths) >= 18
+    assert deviation[0] != deviation[1]
+
+
+def test_the_number_changes_nothing_else_of_a_trial():
+    with_number, without = (set_scene(SimConfig(), name, 7) for name in ("can:full_open#2", "can:full_open"))
+
+    assert with_number.sensor == without.sensor
+    assert with_number.plant.drive == without.plant.drive
+    assert with_number.body.offset_m == without.body.offset_m
+    assert with_number.plant.thing.width_m != without.plant.thing.width_m
+
+
+@pytest.mark.parametrize(
+    "name", ["can:full_open#", "can:full_open#x", "can:full_open#-1", "can:full_open#1.5"]
+)
+def test_a_wrong_number_is_refused(name):
+    with pytest.raises(UnknownName, match="number of an instance"):
+        set_scene(SimConfig(), name, 0)
