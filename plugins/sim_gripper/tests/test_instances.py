@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
+from graspsense.core.errors import UnknownName
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.scene import find, instance_of, numbered
 from graspsense_sim_gripper.setting import set_scene
-
-from graspsense.core.errors import UnknownName
 
 
 def drawn(name, seed):

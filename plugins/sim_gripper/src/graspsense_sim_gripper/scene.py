@@ -128,8 +128,8 @@ def instance_of(spec: ObjectSpec, rng: np.random.Generator | None, number: int |
     """
     draws = rng.standard_normal(5).tolist() if rng is not None else [0.0] * 5
     if rng is not None and number is not None:
-        kind = spec.name.partition(":")[0].encode()
-        draws[:2] = np.random.default_rng([number, *kind]).standard_normal(2).tolist()
+        letters = spec.name.partition(":")[0].encode()
+        draws[:2] = np.random.default_rng([number, *letters]).standard_normal(2).tolist()
     # Lognormal, so that no draw makes a stiffness negative; two standard deviations at the most elsewhere.
     stiffer = math.exp(spec.stiffness_spread * draws[0])
     clipped = [min(max(d, -2.0), 2.0) for d in draws]
