@@ -49,14 +49,18 @@ if TYPE_CHECKING:
     from graspsense.core.features import Features as Features
     from graspsense.core.features import FeatureTable as FeatureTable
     from graspsense.core.features import Prediction as Prediction
+    from graspsense.core.features import in_words as in_words
     from graspsense.core.features import missing as missing
     from graspsense.core.features import table_of as table_of
     from graspsense.core.guard import GuardParams as GuardParams
     from graspsense.core.guard import GuardState as GuardState
     from graspsense.core.hookspecs import hookimpl as hookimpl
+    from graspsense.core.labelled import Control as Control
+    from graspsense.core.labelled import Labelled as Labelled
     from graspsense.core.plugins import collect as collect
     from graspsense.core.roles import BatchBackend as BatchBackend
     from graspsense.core.roles import Classifier as Classifier
+    from graspsense.core.roles import ClassifierConfig as ClassifierConfig
     from graspsense.core.roles import Controller as Controller
     from graspsense.core.roles import ControllerState as ControllerState
     from graspsense.core.roles import DeviceInfo as DeviceInfo
@@ -153,14 +157,18 @@ _HOME_OF: Final = {
     "Features": "features",
     "FeatureTable": "features",
     "Prediction": "features",
+    "in_words": "features",
     "missing": "features",
     "table_of": "features",
     "GuardParams": "guard",
     "GuardState": "guard",
     "hookimpl": "hookspecs",
+    "Control": "labelled",
+    "Labelled": "labelled",
     "collect": "plugins",
     "BatchBackend": "roles",
     "Classifier": "roles",
+    "ClassifierConfig": "roles",
     "Controller": "roles",
     "ControllerState": "roles",
     "DeviceInfo": "roles",

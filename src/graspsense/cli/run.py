@@ -139,6 +139,7 @@ def _print(trial: Trial) -> None:
         click.echo(f"prediction  {prediction.label}{sure}")
         for step in prediction.because:
             click.echo(f"            {step}")
+        click.echo(f"model       {prediction.model}")
         for warning in prediction.warnings:
             talk(f"warning: {warning}")
     for note in trial.device.notes:

@@ -63,6 +63,26 @@ class FeatureTable:
         """Return the number of trials."""
         return len(self.values)
 
+    def rows(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> FeatureTable:
+        """Return the table of these trials, by number or by a mask."""
+        return FeatureTable(names=self.names, units=self.units, values=self.values[which])
+
+    def columns(self, names: Sequence[str]) -> FeatureTable:
+        """Return the table of these features, in this order. KeyError names the known ones."""
+        for name in names:
+            if name not in self.names:
+                raise KeyError(f"no feature {name!r}; there are {', '.join(self.names)}")
+        which = [self.names.index(name) for name in names]
+        return FeatureTable(
+            names=tuple(names), units=tuple(self.units[i] for i in which), values=self.values[:, which]
+        )
+
+    def row(self, i: int, reason: str = "missing in the table") -> Features:
+        """Return the features of one trial; a table keeps no reasons, so each missing one has this."""
+        values = tuple(float(v) for v in self.values[i])
+        absent = missing((n for n, v in zip(self.names, values, strict=True) if math.isnan(v)), reason)
+        return Features(names=self.names, values=values, units=self.units, reasons=absent)
+
 
 def table_of(rows: Sequence[Features]) -> FeatureTable:
     """Return the table of these features, which must agree in names and units. ValueError if they do not."""
@@ -80,18 +100,24 @@ def table_of(rows: Sequence[Features]) -> FeatureTable:
     return FeatureTable(names=first.names, units=first.units, values=values)
 
 
+def _texts(items: Iterable[str]) -> tuple[str, ...]:
+    return tuple(items)
+
+
 @frozen(kw_only=True)
 class Prediction:
     """What a classifier says of one trial.
 
-    `label` is a class, or `unknown` where the trial lies far outside the training data. `probabilities` sum to 1.
-    `because` is the reason in words and units, one step an item.
+    `label` is a class, or `unknown` where the trial lies far outside the training data. `probabilities` sum to 1;
+    they are empty where the model could not be asked. `because` is the reason in words and units, one step an
+    item. `model` says in one line what the model was trained on.
     """
 
     label: str
     probabilities: Mapping[str, float]
-    because: tuple[str, ...] = field(converter=tuple)
-    warnings: tuple[str, ...] = field(default=(), converter=tuple)
+    because: tuple[str, ...] = field(converter=_texts)
+    warnings: tuple[str, ...] = field(default=(), converter=_texts)
+    model: str = ""
 
 
 UNKNOWN = "unknown"
@@ -100,3 +126,10 @@ UNKNOWN = "unknown"
 def missing(names: Iterable[str], reason: str) -> dict[str, str]:
     """Return one reason for each of these features."""
     return dict.fromkeys(names, reason)
+
+
+def in_words(value: float, unit: str) -> str:
+    """Return a value with its unit, lengths in mm."""
+    if unit == "m" or unit.startswith("m/"):
+        return f"{value * 1e3:.4g} m{unit}"
+    return f"{value:.4g} {unit}".rstrip()

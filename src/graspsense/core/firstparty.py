@@ -40,3 +40,6 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("classifier", "c45"): _C45,
 }
 """Components that this project ships in distributions of their own: the hint where one is not installed."""
+
+MODELS: Final[dict[str, Shipped]] = {"default": _SIM}
+"""Models that this project ships, and with which distribution."""

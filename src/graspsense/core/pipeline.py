@@ -8,7 +8,7 @@ from pathlib import Path
 from attrs import frozen
 
 from graspsense.core.config import Flag, Settings, resolve
-from graspsense.core.features import Prediction
+from graspsense.core.model import model_for
 from graspsense.core.plugins import Plugins, installed
 from graspsense.core.runner import Sink, run_grasp
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
@@ -72,6 +72,8 @@ def grasp_with(
     on_event: Callable[[GraspEvent], None] | None = None,
 ) -> Trial:
     """Do one grasp with these settings: build the components, run, draw features, predict, tell the observers."""
+    # The model comes first: a missing one must not be found out after the grasp.
+    model = model_for(settings, plugins)
     backend, controller = settings.gripper.create(), settings.controller.create()
     feature_set = settings.features.create()
     run = RunInfo(
@@ -89,9 +91,7 @@ def grasp_with(
     plugins.run_starting(run)
     grasp = run_grasp(backend, controller, settings.run, sinks=sinks, on_event=tell)
     features = feature_set.extract(grasp.trace)
-    prediction: Prediction | None = None
-    if settings.classifier is not None:
-        prediction = settings.classifier.create().explain(features)
+    prediction = None if model is None else model.predict(features, settings, grasp.device)
     trial = Trial(
         run=run,
         trace=grasp.trace,

@@ -162,15 +162,30 @@ class FeatureSet(ABC, Generic[ConfigT]):
         """Return the features of this trace, defined or NaN with a reason for every trace there can be."""
 
 
+@frozen(kw_only=True)
+class ClassifierConfig:
+    """What every classifier's config has; a classifier's own config class extends it."""
+
+    model: str | None = None
+    """The trained model: the name of one that a plugin offers, or a .json file."""
+
+
 class Classifier(ABC, Generic[ConfigT]):
-    """Learns labels from a table of features, and predicts with reasons."""
+    """Learns labels from a table of features, and predicts with reasons.
+
+    A NaN in a table is missing, and every classifier has an answer to it. Which trials are `unknown` is not its
+    business: one rule for all stands in `graspsense.core.novelty`.
+    """
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config
 
     @abstractmethod
     def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
-        """Learn from these trials. The same table, labels and seed give the same model."""
+        """Learn from these trials. The same table, labels and seed give the same model.
+
+        Raises ValueError where nothing can be learned from them.
+        """
 
     @abstractmethod
     def classes(self) -> tuple[str, ...]:
@@ -190,4 +205,7 @@ class Classifier(ABC, Generic[ConfigT]):
 
     @abstractmethod
     def from_json(self, model: Mapping[str, Any]) -> None:
-        """Become the model that `to_json` gave. Raises DataDamaged; runs nothing that the model names."""
+        """Become the model that `to_json` gave; run and import nothing that the model names.
+
+        Raises KeyError, TypeError, ValueError or DataDamaged where it is no such model.
+        """

@@ -73,6 +73,7 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
             "probabilities": dict(prediction.probabilities),
             "because": list(prediction.because),
             "warnings": list(prediction.warnings),
+            "model": prediction.model,
         },
         "components": dict(trial.run.components),
         "seed": trial.run.seed,

@@ -1,0 +1,126 @@
+"""Trials with labels: what a classifier is trained and judged on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from attrs import evolve, field, frozen
+
+from graspsense.core.errors import ConfigError, suggestion
+from graspsense.core.features import FeatureTable
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+Target = Literal["both", "class", "state"]
+TARGETS: Final[tuple[Target, ...]] = ("both", "class", "state")
+"""What a label stands for: `class:state` as it is, what is before the colon, or what is behind it."""
+
+
+@frozen(kw_only=True, eq=False)
+class Control:
+    """Other features of the same trials, to be judged beside the main ones; `what` says in words which they are."""
+
+    table: FeatureTable
+    what: str
+
+
+@frozen(kw_only=True, eq=False)
+class Labelled:
+    """Trials with their features and labels.
+
+    `labels` are `class:state`, or just a class. `instances` name the one object that was grasped in each trial
+    (`odwalla#3`), None where that was not recorded, with the reason in `no_instances`. `order` numbers the trials
+    in the order in which they were recorded. `before_contact` are features from before the contact only, None
+    with the reason in `no_before_contact`; `width` is the width alone. `variants` are further tables to judge.
+    `notes` say what a reader of a rate must know; `provenance` what made the trials.
+    """
+
+    source: str
+    table: FeatureTable
+    labels: tuple[str, ...]
+    instances: tuple[str, ...] | None = None
+    no_instances: str = ""
+    order: tuple[int, ...] | None = None
+    no_order: str = ""
+    before_contact: Control | None = None
+    no_before_contact: str = ""
+    width: Control | None = None
+    no_width: str = ""
+    variants: Mapping[str, Control] = field(factory=dict)
+    notes: tuple[str, ...] = ()
+    provenance: Mapping[str, Any] = field(factory=dict)
+
+    def __attrs_post_init__(self) -> None:
+        for name in ("labels", "instances", "order"):
+            column = getattr(self, name)
+            if column is not None and len(column) != len(self.table):
+                raise ValueError(f"{len(self.table)} trials and {len(column)} {name}: give one a trial")
+
+    def __len__(self) -> int:
+        """Return the number of trials."""
+        return len(self.labels)
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """Labels that occur, sorted."""
+        return tuple(sorted(set(self.labels)))
+
+    def rows(self, which: NDArray[np.int64]) -> Labelled:
+        """Return these trials, in this order."""
+        numbers = which.tolist()
+        return evolve(
+            self,
+            table=self.table.rows(which),
+            labels=_picked(self.labels, numbers),
+            instances=None if self.instances is None else _picked(self.instances, numbers),
+            order=None if self.order is None else _picked(self.order, numbers),
+            before_contact=_control_rows(self.before_contact, which),
+            width=_control_rows(self.width, which),
+            variants={
+                name: Control(table=one.table.rows(which), what=one.what)
+                for name, one in self.variants.items()
+            },
+        )
+
+    def of_class(self, name: str) -> Labelled:
+        """Return the trials of one class. Raises ConfigError where there is none."""
+        import numpy as np
+
+        of = np.array([class_of(label) == name for label in self.labels])
+        if not of.any():
+            known = sorted({class_of(label) for label in self.labels})
+            raise ConfigError(
+                f"no trial of class {name!r} in {self.source}. Known: {', '.join(known)}."
+                + suggestion(name, known)
+            )
+        return self.rows(np.flatnonzero(of))
+
+    def aimed(self, target: Target) -> Labelled:
+        """Return the trials labelled with their class, their state, or both. Raises ConfigError."""
+        if target == "both":
+            return self
+        if target == "class":
+            return evolve(self, labels=tuple(class_of(label) for label in self.labels))
+        for label in self.labels:
+            if ":" not in label:
+                raise ConfigError(
+                    f"label {label!r} in {self.source} has no state: labels are CLASS:STATE, as in can:full_open. "
+                    "Choose --target both, which takes labels as they are"
+                )
+        return evolve(self, labels=tuple(label.partition(":")[2] for label in self.labels))
+
+
+def class_of(label: str) -> str:
+    """Return what is before the colon of `class:state`."""
+    return label.partition(":")[0]
+
+
+def _picked(column: Sequence[Any], numbers: Sequence[int]) -> tuple[Any, ...]:
+    return tuple(column[i] for i in numbers)
+
+
+def _control_rows(control: Control | None, which: NDArray[np.int64]) -> Control | None:
+    return None if control is None else Control(table=control.table.rows(which), what=control.what)

@@ -1,0 +1,356 @@
+"""A trained model: a fitted classifier with what it was trained on, as one JSON file that runs no code.
+
+The file names its classifier, which is looked up among the installed plugins like any other; nothing in it is
+imported, evaluated or unpickled. Its `sha256` is that of the rest, so that a damaged file is found out.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import numpy as np
+from attrs import evolve, frozen
+
+from graspsense import __version__
+from graspsense.core.errors import ConfigError, DataDamaged, UnknownName
+from graspsense.core.features import UNKNOWN, Features, FeatureTable, Prediction
+from graspsense.core.firstparty import MODELS
+from graspsense.core.novelty import Novelty, novelty_from, novelty_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.config import Settings
+    from graspsense.core.labelled import Labelled
+    from graspsense.core.plugins import Component, Plugins
+    from graspsense.core.roles import Classifier, DeviceInfo
+
+FORMAT: Final = "graspsense model"
+VERSION: Final = 1
+
+_NOT_COMPARED: Final = frozenset({"type", "object", "recording", "model"})
+"""Keys that differ from grasp to grasp, or say where something lies."""
+_COMPARED_TABLES: Final = ("gripper", "controller", "features", "classifier")
+_UNITS: Final = (("_m_s", "mm/s", 1e3), ("_n", "N", 1.0), ("_hz", "Hz", 1.0), ("_s", "s", 1.0))
+
+
+@frozen(kw_only=True, eq=False)
+class Model:
+    """A fitted classifier, the features it takes, what it has seen, and where it comes from.
+
+    `component` is the classifier's qualified name and `settings` the config it was fitted with. `target` is what
+    its labels mean. `provenance` is empty where nothing is known of the trials.
+    """
+
+    name: str
+    component: str
+    settings: Mapping[str, Any]
+    classifier: Classifier[Any]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    target: str
+    novelty: Novelty
+    provenance: Mapping[str, Any]
+
+    @property
+    def simulated(self) -> bool:
+        """Whether it was trained on simulated grasps."""
+        return bool(self.provenance.get("simulated", False))
+
+    @property
+    def in_a_line(self) -> str:
+        """What was trained on what."""
+        kind = "simulated grasps" if self.simulated else f"trials of {self.provenance.get('source', '?')}"
+        settings = self.provenance.get("settings", {}).get("controller", {})
+        at = [
+            _worded(key, settings[key])[1]
+            for key in ("probing_force_n", "closing_speed_m_s")
+            if key in settings
+        ]
+        number = self.provenance.get("trials", "?")
+        return f"{self.name}: {self.component} trained on {number} {kind}" + (
+            f" at {', '.join(at)}" if at else ""
+        )
+
+    def predict(
+        self, features: Features, settings: Settings | None = None, device: DeviceInfo | None = None
+    ) -> Prediction:
+        """Return what the model says of one trial, and what speaks against believing it.
+
+        `settings` and `device` are those of the grasp, where there was one. A trial that lacks a feature of the
+        model, or has it in another unit, cannot be judged: it is unknown, with that as the reason.
+        """
+        warnings = tuple(self._warnings(settings, device))
+        probabilities: Mapping[str, float] = {}
+        because: tuple[str, ...]
+        misfit = self._misfit(features)
+        if misfit:
+            because = (misfit,)
+        else:
+            chosen = _chosen(features, self.names)
+            prediction = self.classifier.explain(chosen)
+            warnings = (*prediction.warnings, *warnings)
+            strange = self.novelty.unlike(chosen)
+            if strange is None:
+                return evolve(prediction, warnings=warnings, model=self.in_a_line)
+            probabilities = prediction.probabilities
+            because = (strange, f"its nearest answer would be {prediction.label}")
+        return Prediction(
+            label=UNKNOWN,
+            probabilities=probabilities,
+            because=because,
+            warnings=warnings,
+            model=self.in_a_line,
+        )
+
+    def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
+        """Return shape (trials, classes), in the order of the classifier's classes. Raises ConfigError."""
+        return self.classifier.probabilities(self._table(table))
+
+    def unlike(self, table: FeatureTable) -> NDArray[np.bool_]:
+        """Return for each trial whether it is unlike everything trained on. Raises ConfigError."""
+        return self.novelty.unlike_rows(self._table(table))
+
+    def _table(self, table: FeatureTable) -> FeatureTable:
+        misfit = self._misfit(table)
+        if misfit:
+            raise ConfigError(misfit)
+        return table.columns(self.names)
+
+    def _misfit(self, given: Features | FeatureTable) -> str:
+        lacking = [name for name in self.names if name not in given.names]
+        if lacking:
+            return (
+                f"model {self.name!r} takes the features {', '.join(self.names)}; there is no "
+                f"{', '.join(lacking)} here (there are: {', '.join(given.names)})"
+            )
+        units = dict(zip(given.names, given.units, strict=True))
+        for name, unit in zip(self.names, self.units, strict=True):
+            if unit and units[name] and unit != units[name]:
+                return f"model {self.name!r} takes {name} in {unit}; here it is in {units[name]}"
+        return ""
+
+    def _warnings(self, settings: Settings | None, device: DeviceInfo | None) -> Iterator[str]:
+        kind = "simulated grasps" if self.simulated else "grasps"
+        if self.simulated:
+            if device is not None and device.clock == "device":
+                yield (
+                    "trained on simulated grasps, but this gripper is real: expect wrong answers until a model is "
+                    "trained on grasps of its own"
+                )
+            else:
+                yield "trained on simulated grasps: right for the simulator, untested on real things"
+        if settings is None:
+            return
+        trained = dict(self.provenance.get("settings", {}))
+        for table in _COMPARED_TABLES:
+            then, now = trained.get(table), settings.values.get(table)
+            if then is None or now is None:
+                continue
+            if then.get("type") != now.get("type"):
+                yield f"trained on {kind} with {table} {then.get('type')}, this one was with {now.get('type')}"
+                continue
+            for key in sorted((then.keys() & now.keys()) - _NOT_COMPARED):
+                if then[key] != now[key]:
+                    what, value = _worded(key, then[key])
+                    yield (
+                        f"trained on {kind} with {what} {value}, this one was with {_worded(key, now[key])[1]} "
+                        f"({table}.{key})"
+                    )
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the content of the model's file."""
+        content = {
+            "format": FORMAT,
+            "version": VERSION,
+            "classifier": self.component,
+            "settings": dict(self.settings),
+            "target": self.target,
+            "features": [[name, unit] for name, unit in zip(self.names, self.units, strict=True)],
+            "provenance": dict(self.provenance),
+            "unknown": self.novelty.to_json(),
+            "model": self.classifier.to_json(),
+        }
+        return {**content, "sha256": _digest(content)}
+
+
+def train(
+    component: Component,
+    config: Any,
+    labelled: Labelled,
+    *,
+    name: str,
+    seed: int = 0,
+    target: str = "both",
+    provenance: Mapping[str, Any] | None = None,
+) -> Model:
+    """Return the model that a classifier of this config makes of these trials.
+
+    Raises ConfigError where nothing can be learned from them.
+    """
+    from graspsense.core.strict import plain
+
+    classifier = component.create(config)
+    try:
+        classifier.fit(labelled.table, labelled.labels, seed)
+    except ValueError as error:
+        raise ConfigError(f"{component.qualified} cannot learn from {labelled.source}: {error}") from error
+    settings = {key: value for key, value in plain(config).items() if key != "model"}
+    return Model(
+        name=name,
+        component=component.qualified,
+        settings=settings,
+        classifier=classifier,
+        names=labelled.table.names,
+        units=labelled.table.units,
+        target=target,
+        novelty=novelty_of(labelled.table, labelled.labels),
+        provenance={
+            "source": labelled.source,
+            "trials": len(labelled),
+            "by_label": dict(sorted(Counter(labelled.labels).items())),
+            "seed": seed,
+            "versions": {
+                "graspsense": __version__,
+                component.distribution: component.version,
+                "numpy": np.__version__,
+                "python": platform.python_version(),
+            },
+            **labelled.provenance,
+            **(provenance or {}),
+        },
+    )
+
+
+def write_model(path: Path, model: Model) -> None:
+    """Write a model's file, whole or not at all. Raises OSError."""
+    text = json.dumps(model.as_json(), indent=1, ensure_ascii=False, allow_nan=False)
+    part = path.with_name(path.name + ".part")
+    part.write_text(text + "\n", encoding="utf-8")
+    os.replace(part, path)
+
+
+def load_model(name: str, plugins: Plugins, component: Component | None = None) -> Model:
+    """Return a model: one that a plugin offers, by name, or a `.json` file.
+
+    `component` is the classifier that is to use it, where that is chosen. Raises ConfigError where there is none
+    or another classifier made it, DataDamaged where the file is not what it claims to be.
+    """
+    text = _text(name, plugins)
+    content = _content(name, text)
+    made_by = content["classifier"]
+    if component is None:
+        component = plugins.find("classifier", made_by)
+    elif component.qualified != made_by:
+        raise ConfigError(
+            f"model {name!r} was made by {made_by}, but the classifier here is {component.qualified}. "
+            f'Write classifier.type = "{made_by}", or train a model: graspsense train --help'
+        )
+    from graspsense.core.config import build
+
+    classifier = component.create(build(component, content["settings"]))
+    try:
+        names = tuple(str(one[0]) for one in content["features"])
+        units = tuple(str(one[1]) for one in content["features"])
+        classifier.from_json(content["model"])
+        return Model(
+            name=name,
+            component=made_by,
+            settings=content["settings"],
+            classifier=classifier,
+            names=names,
+            units=units,
+            target=str(content["target"]),
+            novelty=novelty_from(names, units, content["unknown"]),
+            provenance=content["provenance"],
+        )
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise DataDamaged(f"model {name!r} is damaged: {type(error).__name__}: {error}") from error
+
+
+def model_for(settings: Settings, plugins: Plugins) -> Model | None:
+    """Return the model that a pipeline's classifier uses, None where the pipeline has no classifier.
+
+    Raises ConfigError where it names none, and what `load_model` raises.
+    """
+    chosen = settings.classifier
+    if chosen is None:
+        return None
+    name = getattr(chosen.config, "model", None)
+    if name is None:
+        raise ConfigError(
+            f"classifier {chosen.component.qualified} has no model (classifier.model is not given).\n"
+            f"  train one: graspsense train simulated --classifier {chosen.component.name} --out model.json\n"
+            "  then use it: -o classifier.model=model.json     or do without: -o classifier.type=none"
+        )
+    return load_model(name, plugins, chosen.component)
+
+
+def _text(name: str, plugins: Plugins) -> bytes:
+    if not name.endswith(".json"):
+        try:
+            return plugins.model(name).resource().read_bytes()
+        except UnknownName as error:
+            shipped = MODELS.get(name)
+            hint = f"\n  It comes with {shipped.distribution}:\n  {shipped.hint}" if shipped else ""
+            raise UnknownName(
+                f"{error}{hint}\n  A model of your own is a file: write its name with .json"
+            ) from error
+    try:
+        return Path(name).expanduser().read_bytes()
+    except OSError as error:
+        raise ConfigError(f"model {name} cannot be read: {error.strerror}") from error
+
+
+def _content(name: str, text: bytes) -> dict[str, Any]:
+    try:
+        content = json.loads(text)
+    except (UnicodeDecodeError, ValueError) as error:
+        raise DataDamaged(f"model {name!r} is no JSON: {error}") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise DataDamaged(f'{name!r} is no model of graspsense: it lacks "format": "{FORMAT}"')
+    if content.get("version") != VERSION:
+        raise DataDamaged(
+            f"model {name!r} has version {content.get('version')!r}; this graspsense ({__version__}) reads {VERSION}"
+        )
+    rest = {key: value for key, value in content.items() if key != "sha256"}
+    if content.get("sha256") != _digest(rest):
+        raise DataDamaged(f"model {name!r} was changed or damaged: it is not what its sha256 says")
+    expected = {"classifier": str, "settings": dict, "features": list, "provenance": dict, "unknown": dict}
+    for key, kind in expected.items():
+        if not isinstance(content.get(key), kind):
+            raise DataDamaged(f"model {name!r} is damaged: {key!r} is missing or no {kind.__name__}")
+    return cast("dict[str, Any]", content)
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    text = json.dumps(content, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _chosen(features: Features, names: Sequence[str]) -> Features:
+    if features.names == tuple(names):
+        return features
+    at = [features.names.index(name) for name in names]
+    return Features(
+        names=tuple(names),
+        values=tuple(features.values[i] for i in at),
+        units=tuple(features.units[i] for i in at),
+        reasons={name: why for name, why in features.reasons.items() if name in names},
+    )
+
+
+def _worded(key: str, value: Any) -> tuple[str, str]:
+    """Return a key and its value as a person says them: `probing_force_n`, 20 as `probing force`, `20 N`."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        for ending, unit, factor in _UNITS:
+            if key.endswith(ending):
+                return key.removesuffix(ending).replace("_", " "), f"{value * factor:g} {unit}"
+    return key.replace("_", " "), str(value)
