@@ -80,8 +80,9 @@ class Branches(Tests):
 
 def ranges(starts: Array, lengths: Array) -> Array:
     """The integers of several ranges, one range after the other."""
-    lengths = lengths.astype(np.int64)
-    ends = np.cumsum(lengths)
-    if not ends.size or not ends[-1]:
-        return np.zeros(0, dtype=np.int64)
-    return np.repeat(starts - (ends - lengths), lengths) + np.arange(ends[-1])
+    ends = lengths.cumsum(dtype=np.int64)
+    if not ends.size:
+        return ends
+    result: Array = (starts + lengths - ends).repeat(lengths)
+    result += np.arange(ends[-1])
+    return result

@@ -109,6 +109,14 @@ def grow(problem: Problem) -> tuple[Branches, Intervals]:
     return branches, Intervals(order[0].copy(), start, end)
 
 
+def collapse(branches: Branches, problem: Problem) -> None:
+    """As ``prune.collapse``."""
+    slack = np.ldexp(criteria.COLLAPSE_SLACK, problem.weight_bits)
+    tree = (branches.attribute, branches.threshold, branches.first_son, branches.counts)
+    _collapse(tree, problem.weight_margin, slack)
+    branches.n_sons[branches.attribute == LEAF] = 0
+
+
 def prune_pessimistic(branches: Branches, problem: Problem, intervals: Intervals) -> None:
     """As ``prune.prune_pessimistic``."""
     confidence = estimates.prepare_confidence(problem.options.confidence_factor)
@@ -377,6 +385,21 @@ def _leaf_below(tree: Any, node: int, values: Array, row: int) -> int:
     while attribute[node] != LEAF:
         node = first_son[node] + (values[row, attribute[node]] > threshold[node])
     return node
+
+
+@_compile
+def _collapse(tree: Any, margin: int, slack: float) -> None:
+    attribute, _, first_son, counts = tree
+    # Every node is grown before its sons; those whose parent is cut are no longer reached, whatever becomes of them.
+    errors = np.zeros(len(attribute), dtype=np.int64)
+    for node in range(len(attribute) - 1, -1, -1):
+        as_leaf = counts[node].sum() - counts[node, _majority(counts[node], margin)]
+        errors[node] = as_leaf
+        if attribute[node] != LEAF:
+            left = first_son[node]
+            errors[node] = errors[left] + errors[left + 1]
+            if errors[node] >= as_leaf - slack:
+                _make_leaf(node, tree)
 
 
 @_compile

@@ -36,7 +36,7 @@ def fit(table: Table, options: Options = J48, held_out: Array | None = None, eng
         if options.actual_split_value:
             _take_actual_values(branches, table.values)
         if options.collapse:
-            collapse(branches, problem, np.zeros(0, dtype=np.int32) if fast else rows)
+            fast.collapse(branches, problem) if fast else collapse(branches, problem, rows)
         if options.pruning == "pessimistic":
             (fast.prune_pessimistic if fast else prune_pessimistic)(branches, problem, rows)
         return finish(branches, problem.weight_bits, table.schema, options.laplace)

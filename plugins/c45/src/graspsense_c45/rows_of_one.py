@@ -8,6 +8,7 @@ scan is a gather and a running sum. Passing to the sons keeps both orders, by se
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ from graspsense_c45.branches import ALL_VALUES, ranges
 from graspsense_c45.cuts import NOT_ADMISSIBLE, best_cuts
 from graspsense_c45.grow import midpoints
 from graspsense_c45.problem import Problem
-from graspsense_c45.selection import NONE, Offers, offer_cuts, offer_values
+from graspsense_c45.selection import Offers, offer_cuts, offer_values
 
 JOINT_SIZE = 60_000
 """Attributes are worked on together while that many entries (attributes x rows) still fit the caches."""
@@ -80,35 +81,23 @@ class RowsOfOne:
         return offers
 
     def thresholds(self, attribute: Array) -> NDArray[np.float64]:
-        result = np.full(attribute.shape, np.nan)
+        low, high = np.zeros(attribute.shape), np.full(attribute.shape, np.nan)
         for block in self._blocks:
-            for a, values in zip(block.attributes, block.values, strict=True):
-                nodes = np.flatnonzero(attribute == a)
-                at = self._starts[nodes] + self._cut[a, nodes]
-                result[nodes] = midpoints(values[at], values[at + 1])
-        return result
+            nodes, at = self._begins(block, attribute)
+            at = at + self._cut[attribute[nodes], nodes]
+            values = block.values.reshape(-1)
+            low[nodes], high[nodes] = values[at], values[at + 1]
+        return midpoints(low, high)
 
     def split(self, attribute: Array, value: Array, n_sons: Array) -> NDArray[np.int64]:
         problem = self._problem
         first_son = np.cumsum(n_sons) - n_sons
         n_all = int(n_sons.sum())
-        counts = np.zeros(n_all * problem.n_classes, dtype=np.int64)
         self._slots = int(n_sons.max(initial=0))
-        self._slot_of_row = np.full(len(problem.labels), 0, dtype=np.min_scalar_type(self._slots))
+        self._slot_of_row = np.zeros(len(problem.labels), dtype=np.min_scalar_type(self._slots))
         self._son_first, self._n_sons = first_son, n_sons
-        for a in np.unique(attribute[attribute != NONE]):
-            nodes = np.flatnonzero(attribute == a)
-            at = ranges(self._starts[nodes], self._sizes[nodes])
-            if problem.value_counts[a] == 0:
-                rows = self._sorted_rows(a)[at]
-                left = self._cut[a, nodes] + 1
-                slots = np.ones(len(rows), dtype=np.int64)
-                slots[ranges(np.cumsum(self._sizes[nodes]) - self._sizes[nodes], left)] = 0
-            else:
-                rows = self._node_rows()[at]
-                code = problem.values[rows, a].astype(np.int64)
-                one = np.repeat(value[nodes], self._sizes[nodes])
-                slots = np.where(one == ALL_VALUES, code, code != one)
+        counts = np.zeros(n_all * problem.n_classes, dtype=np.int64)
+        for nodes, rows, slots in self._slots_of_rows(attribute, value):
             sons = np.repeat(first_son[nodes], self._sizes[nodes]) + slots
             self._slot_of_row[rows] = slots + 1
             self.leaf_of_row[rows] = self._n_nodes + sons
@@ -168,15 +157,31 @@ class RowsOfOne:
                 )
             ]
 
-    def _sorted_rows(self, attribute: int) -> NDArray[np.int32]:
-        for block in self._blocks:
-            at = np.flatnonzero(block.attributes == attribute)
-            if at.size:
-                return block.rows[at[0]]
-        raise KeyError(attribute)
+    def _begins(self, block: _Block, attribute: Array) -> tuple[Array, Array]:
+        """The nodes that split on an attribute of the block, and where their rows begin in its flattened arrays."""
+        number = np.full(len(self._problem.value_counts) + 1, -1)
+        number[block.attributes] = np.arange(len(block.attributes))
+        place = number[attribute]
+        nodes = np.flatnonzero(place >= 0)
+        return nodes, place[nodes] * block.rows.shape[1] + self._starts[nodes]
 
-    def _node_rows(self) -> NDArray[np.int32]:
-        return self._rows
+    def _slots_of_rows(self, attribute: Array, value: Array) -> Iterator[tuple[Array, Array, Array]]:
+        """Piece by piece: nodes that split, their rows (node by node), and the son each row goes to, counted from 0."""
+        for block in self._blocks:
+            nodes, begins = self._begins(block, attribute)
+            if nodes.size:
+                sizes = self._sizes[nodes]
+                rows = block.rows.reshape(-1)[ranges(begins, sizes)]
+                slots = np.ones(len(rows), dtype=np.int64)
+                slots[ranges(np.cumsum(sizes) - sizes, self._cut[attribute[nodes], nodes] + 1)] = 0
+                yield nodes, rows, slots
+        for a in self._nominal:
+            nodes = np.flatnonzero(attribute == a)
+            if nodes.size:
+                rows = self._rows[ranges(self._starts[nodes], self._sizes[nodes])]
+                code = self._problem.values[rows, a].astype(np.int64)
+                one = np.repeat(value[nodes], self._sizes[nodes])
+                yield nodes, rows, np.where(one == ALL_VALUES, code, code != one)
 
     def _share_levels_work(self) -> None:
         """What one level needs once: the step of every place, the sides' terms of every position."""
@@ -237,7 +242,7 @@ class RowsOfOne:
         """How often each (node, value, class) occurs."""
         problem = self._problem
         n_values = int(problem.value_counts[attribute])
-        rows = self._node_rows()
+        rows = self._rows
         key = self._node * np.int64(n_values) + problem.values[rows, attribute].astype(np.int64)
         key = key * problem.n_classes + self._labels[rows]
         shape = (len(self._sizes), n_values, problem.n_classes)
