@@ -85,7 +85,9 @@ class _Reader:
         at = len(names) - 1 if class_attribute is None else names.index(class_attribute)
         classes = self._attributes[at].values
         if classes is None:
-            raise ArffError(f"{self._source}: the class {names[at]!r} is numeric; name a nominal attribute as the class")
+            raise ArffError(
+                f"{self._source}: the class {names[at]!r} is numeric; name a nominal attribute as the class"
+            )
         values = np.array(self._rows)
         labels = np.where(np.isnan(values[:, at]), MISSING_CLASS, values[:, at]).astype(np.int64)
         schema = Schema(tuple(a for i, a in enumerate(self._attributes) if i != at), classes)
@@ -97,7 +99,9 @@ class _Reader:
     def _attribute(self, rest: str) -> None:
         match = _TOKEN.match(rest)
         if match is None:
-            raise self._error("@attribute without a name; write @attribute NAME numeric or @attribute NAME {a, b}")
+            raise self._error(
+                "@attribute without a name; write @attribute NAME numeric or @attribute NAME {a, b}"
+            )
         name, kind = _text(match), rest[match.end() :].strip()
         if kind.startswith("{"):
             if not kind.endswith("}"):
@@ -111,13 +115,18 @@ class _Reader:
             self._attributes.append(Attribute(name))
             self._codes.append({})
         else:
-            raise self._error(f"attribute {name!r} is {kind!r}; allowed: {', '.join(_NUMERIC)}, or {{value, value}}")
+            raise self._error(
+                f"attribute {name!r} is {kind!r}; allowed: {', '.join(_NUMERIC)}, or {{value, value}}"
+            )
 
     def _row(self, line: str) -> None:
         weight = 1.0
         if line.startswith("{"):
             end = line.find("}")
-            cells, rest = self._sparse(line[1:end] if end > 0 else line[1:]), line[end + 1 :] if end > 0 else ""
+            cells, rest = (
+                self._sparse(line[1:end] if end > 0 else line[1:]),
+                line[end + 1 :] if end > 0 else "",
+            )
         else:
             brace = re.search(r",\s*\{([^{}'\"]*)\}\s*$", line)
             rest = line[brace.start() :] if brace else ""
@@ -163,7 +172,9 @@ class _Reader:
         while True:
             match = _TOKEN.match(text, at)
             if match is None:
-                raise self._error(f"cannot read {text[at:].strip()!r} as a value; quote it, or write ? where missing")
+                raise self._error(
+                    f"cannot read {text[at:].strip()!r} as a value; quote it, or write ? where missing"
+                )
             yield _text(match)
             rest = text[match.end() :].lstrip()
             if not rest or rest.startswith("%"):

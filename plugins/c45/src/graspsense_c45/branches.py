@@ -30,7 +30,8 @@ class Tests:
 
     def inner(self, nodes: Array) -> Array:
         """Those of the nodes that are no leaves."""
-        return nodes[self.attribute[nodes] != LEAF]
+        chosen: Array = nodes[self.attribute[nodes] != LEAF]
+        return chosen
 
     def sons(self, nodes: Array) -> Array:
         """All sons of these nodes, in the order of the nodes."""

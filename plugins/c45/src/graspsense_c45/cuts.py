@@ -10,7 +10,9 @@ NOT_ADMISSIBLE = -(2**62)
 _ADMISSIBLE = -(2**60)
 
 
-def best_cuts(scores: Array, starts: Array, lengths: Array, offset: Array, tolerance: Array, zero: Array) -> Array:
+def best_cuts(
+    scores: Array, starts: Array, lengths: Array, offset: Array, tolerance: Array, zero: Array
+) -> Array:
     """The position J48's scan ends on in each run, or -1.
 
     The scan takes a cut when its numerator beats the best one so far (at first: none, 0) by more than the tolerance.

@@ -21,7 +21,7 @@ def reach(tree: Tests, values: NDArray[np.float64], rows: Array, nodes: Array) -
     result = nodes.astype(np.int64)
     for begin in range(0, len(rows), CHUNK):
         chunk = slice(begin, begin + CHUNK)
-        at = result[chunk].copy()
+        at: Array = result[chunk].copy()
         offset = rows[chunk] * np.int64(width)
         index = np.arange(len(at))
         while True:

@@ -8,7 +8,8 @@ rows being one interval of it; a split partitions the interval in place.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numba
 import numpy as np
@@ -20,7 +21,16 @@ from graspsense_c45.arithmetic import TOLERANCE, Array, bits_below
 from graspsense_c45.branches import ALL_VALUES, LEAF, Branches, Tests
 from graspsense_c45.problem import WEIGHT_BITS, Problem
 
-_compile = numba.njit(cache=True, error_model="numpy", nogil=True)
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def _compile(function: _Function) -> _Function:
+    return cast(_Function, numba.njit(cache=True, error_model="numpy", nogil=True)(function))
+
+
+
+Number = Any
+"""A number of the type the compiler finds."""
 
 for _law in (
     arithmetic.ln_of_parts,
@@ -39,7 +49,7 @@ for _law in (
     register_jitable(error_model="numpy")(_law)
 
 
-@overload(arithmetic.select)  # type: ignore[untyped-decorator]
+@overload(arithmetic.select)
 def _select(condition: Any, where_true: Any, where_false: Any) -> Any:
     def one_of_two(condition: Any, where_true: Any, where_false: Any) -> Any:
         return where_true if condition else where_false
@@ -136,7 +146,7 @@ def reach(tests: Tests, values: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 @_compile
-def _term(units: int, weight_bits: int, term_bits: int) -> int:
+def _term(units: Number, weight_bits: Number, term_bits: Number) -> Number:
     x = math.ldexp(float(units), -weight_bits)
     if x < TOLERANCE:
         return np.int64(0)
@@ -145,7 +155,7 @@ def _term(units: int, weight_bits: int, term_bits: int) -> int:
 
 
 @_compile
-def _majority(counts: Array, margin: int) -> int:
+def _majority(counts: Array, margin: Number) -> Number:
     best, chosen = np.int64(0), 0
     for k in range(len(counts)):
         if counts[k] - best > margin:
@@ -181,7 +191,9 @@ def _grow(order: Array, values: Array, labels: Array, weights: Array, terms: Arr
         node = stack.pop()
         total = counts[node].sum()
         weight = math.ldexp(float(total), -laws.weight_bits)
-        heaviest = math.ldexp(float(counts[node, _majority(counts[node], laws.weight_margin)]), -laws.weight_bits)
+        heaviest = math.ldexp(
+            float(counts[node, _majority(counts[node], laws.weight_margin)]), -laws.weight_bits
+        )
         if criteria.is_pure_or_small(weight, heaviest, laws.min_objects):
             continue
         begin, stop = start[node], end[node]
@@ -201,7 +213,7 @@ def _grow(order: Array, values: Array, labels: Array, weights: Array, terms: Arr
             inside = whole
             best = np.int64(0)
             n_cuts = 0
-            cut = np.int64(-1)
+            cut: Number = np.int64(-1)
             cut_left = np.int64(0)
             for i in range(begin, stop - 1):
                 row = order[a, i]
@@ -297,14 +309,14 @@ def _grow(order: Array, values: Array, labels: Array, weights: Array, terms: Arr
 
 
 @_compile
-def _longer(array: Array, length: int, fill: Any) -> Array:
+def _longer(array: Array, length: Number, fill: Any) -> Array:
     result = np.full(length, fill, dtype=array.dtype)
     result[: len(array)] = array
     return result
 
 
 @_compile
-def _midpoint(low: float, high: float) -> float:
+def _midpoint(low: Number, high: Number) -> Number:
     middle = (low + high) / 2.0
     if not np.isfinite(middle):
         middle = low / 2.0 + high / 2.0
@@ -312,7 +324,7 @@ def _midpoint(low: float, high: float) -> float:
 
 
 @_compile
-def _choose(usable: Array, gains: Array, ratios: Array, by_ratio: bool) -> int:
+def _choose(usable: Array, gains: Array, ratios: Array, by_ratio: bool) -> Number:
     average = -np.inf
     if by_ratio:
         total, number = 0.0, 0.0
@@ -331,7 +343,13 @@ def _choose(usable: Array, gains: Array, ratios: Array, by_ratio: bool) -> int:
 
 @_compile
 def _partition(
-    rows: Array, values: Array, begin: int, stop: int, goes_left: Array, spare_rows: Array, spare_values: Array
+    rows: Array,
+    values: Array,
+    begin: Number,
+    stop: Number,
+    goes_left: Array,
+    spare_rows: Array,
+    spare_values: Array,
 ) -> None:
     """Move the rows that go left to the front, both parts keeping their order."""
     at, kept = begin, 0
@@ -348,7 +366,7 @@ def _partition(
 
 
 @_compile
-def _estimate(counts: Array, estimate: Any) -> int:
+def _estimate(counts: Array, estimate: Any) -> Number:
     confidence, bits, weight_bits, margin = estimate
     total = counts.sum()
     errors = total - counts[_majority(counts, margin)]
@@ -363,7 +381,7 @@ def _estimate(counts: Array, estimate: Any) -> int:
 
 
 @_compile
-def _below(tree: Any, root: int) -> Array:
+def _below(tree: Any, root: Number) -> Array:
     """The nodes below a root, itself first, every parent before its sons."""
     attribute, _, first_son, _ = tree
     found = [np.int64(root)]
@@ -380,7 +398,7 @@ def _below(tree: Any, root: int) -> Array:
 
 
 @_compile
-def _leaf_below(tree: Any, node: int, values: Array, row: int) -> int:
+def _leaf_below(tree: Any, node: Number, values: Array, row: Number) -> Number:
     attribute, threshold, first_son, _ = tree
     while attribute[node] != LEAF:
         node = first_son[node] + (values[row, attribute[node]] > threshold[node])
@@ -388,7 +406,7 @@ def _leaf_below(tree: Any, node: int, values: Array, row: int) -> int:
 
 
 @_compile
-def _collapse(tree: Any, margin: int, slack: float) -> None:
+def _collapse(tree: Any, margin: Number, slack: Number) -> None:
     attribute, _, first_son, counts = tree
     # Every node is grown before its sons; those whose parent is cut are no longer reached, whatever becomes of them.
     errors = np.zeros(len(attribute), dtype=np.int64)
@@ -403,7 +421,7 @@ def _collapse(tree: Any, margin: int, slack: float) -> None:
 
 
 @_compile
-def _prune(tree: Any, rows: Any, data: Any, estimate: Any, limit: int, raising: bool) -> None:
+def _prune(tree: Any, rows: Any, data: Any, estimate: Any, limit: Number, raising: bool) -> None:
     attribute, _, _, counts = tree
     n_nodes = len(attribute)
     as_leaf = np.zeros(n_nodes, dtype=np.int64)
@@ -419,12 +437,12 @@ def _prune(tree: Any, rows: Any, data: Any, estimate: Any, limit: int, raising: 
 
 @_compile
 def _prune_at(
-    node: int,
+    node: Number,
     tree: Any,
     rows: Any,
     data: Any,
     estimate: Any,
-    limit: int,
+    limit: Number,
     raising: bool,
     as_leaf: Array,
     as_tree: Array,
@@ -455,7 +473,11 @@ def _prune_at(
             return
         if as_branch - as_tree[node] >= limit:
             return
-        attribute[node], threshold[node], first_son[node] = attribute[heavy], threshold[heavy], first_son[heavy]
+        attribute[node], threshold[node], first_son[node] = (
+            attribute[heavy],
+            threshold[heavy],
+            first_son[heavy],
+        )
         nodes = _below(tree, node)
         _resettle(nodes, tree, rows, data)
         for below in nodes:
@@ -465,15 +487,22 @@ def _prune_at(
 
 
 @_compile
-def _make_leaf(node: int, tree: Any) -> None:
+def _make_leaf(node: Number, tree: Any) -> None:
     attribute, threshold, first_son, _ = tree
     attribute[node], threshold[node], first_son[node] = LEAF, np.nan, 0
 
 
 @_compile
 def _growth(
-    node: int, heavy: int, tree: Any, rows: Any, data: Any, estimate: Any, as_leaf: Array, joining: Array
-) -> int:
+    node: Number,
+    heavy: Number,
+    tree: Any,
+    rows: Any,
+    data: Any,
+    estimate: Any,
+    as_leaf: Array,
+    joining: Array,
+) -> Number:
     """By how much the estimates of the heaviest son's leaves grow when the node's other rows join them."""
     order, start, end = rows
     values, labels, weights = data

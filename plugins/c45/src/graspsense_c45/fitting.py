@@ -43,18 +43,24 @@ def fit(table: Table, options: Options = J48, held_out: Array | None = None, eng
     with_class = np.flatnonzero(table.labels != MISSING_CLASS)
     if held_out is None:
         if len(with_class) < options.rep_folds:
-            raise ValueError(f"{len(with_class)} rows cannot be cut into rep_folds={options.rep_folds} folds; lower it")
+            raise ValueError(
+                f"{len(with_class)} rows cannot be cut into rep_folds={options.rep_folds} folds; lower it"
+            )
         held_out = with_class[hold_out(table.labels[with_class], options.rep_folds)]
     grown_on = np.setdiff1d(with_class, held_out)
     if not grown_on.size or not table.weights[grown_on].any():
-        raise ValueError("all rows are held out (or the others weigh nothing); leave some to grow the tree on")
+        raise ValueError(
+            "all rows are held out (or the others weigh nothing); leave some to grow the tree on"
+        )
     held_out = np.intersect1d(with_class, held_out)
     problem = pose(table, grown_on, options)
     fast = _fast(engine, problem)
     branches, _ = fast.grow(problem) if fast else _grow(problem)
     if options.actual_split_value:
         _take_actual_values(branches, table.values)
-    prune_reduced_error(branches, problem, table.values[held_out], table.labels[held_out], table.weights[held_out])
+    prune_reduced_error(
+        branches, problem, table.values[held_out], table.labels[held_out], table.weights[held_out]
+    )
     return finish(branches, problem.weight_bits, table.schema, options.laplace)
 
 
@@ -79,4 +85,6 @@ def _take_actual_values(branches: Branches, values: NDArray[np.float64]) -> None
         if nodes.size:
             # NaN sorts to the end, behind every threshold.
             column = np.sort(values[:, a])
-            branches.threshold[nodes] = column[np.searchsorted(column, branches.threshold[nodes], side="right") - 1]
+            branches.threshold[nodes] = column[
+                np.searchsorted(column, branches.threshold[nodes], side="right") - 1
+            ]

@@ -32,7 +32,9 @@ class Level(Protocol):
 
 def grow(problem: Problem, level: Level) -> Branches:
     """The unpruned tree; thresholds are midpoints."""
-    counts = np.bincount(problem.labels, weights=problem.weights, minlength=problem.n_classes).astype(np.int64)[None, :]
+    counts = np.bincount(problem.labels, weights=problem.weights, minlength=problem.n_classes).astype(
+        np.int64
+    )[None, :]
     grown = _Growing(counts)
     nodes = np.zeros(1 if is_open(counts, problem)[0] else 0, dtype=np.int64)
     while nodes.size:
@@ -53,13 +55,14 @@ def is_open(counts: Array, problem: Problem) -> NDArray[np.bool_]:
     """Whether nodes with these counts may be split."""
     weight = problem.real_weights(counts.sum(axis=1))
     majority = problem.real_weights(counts[np.arange(len(counts)), majority_class(counts, problem)])
-    return np.logical_not(criteria.is_pure_or_small(weight, majority, problem.options.min_objects))
+    closed: NDArray[np.bool_] = criteria.is_pure_or_small(weight, majority, problem.options.min_objects)
+    return ~closed
 
 
 def majority_class(counts: Array, problem: Problem) -> NDArray[np.int64]:
     """The lowest class not beaten by more than the tolerance, for each row of counts."""
     if problem.weight_bits == 0:
-        return np.argmax(counts, axis=1)
+        return np.asarray(np.argmax(counts, axis=1))
     margin = problem.weight_margin
     best = np.zeros(len(counts), dtype=np.int64)
     chosen = np.zeros(len(counts), dtype=np.int64)
@@ -76,7 +79,7 @@ class _Growing:
     def __init__(self, root_counts: Array) -> None:
         self._n_nodes = 1
         self._counts = [root_counts]
-        self._splits: list[tuple[Array, Array, Array, Array, Array, Array]] = []
+        self._splits: list[tuple[Array, ...]] = []
 
     def split(
         self, nodes: Array, attribute: Array, thresholds: Array, value: Array, n_sons: Array, sons: Array

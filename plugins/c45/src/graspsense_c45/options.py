@@ -44,7 +44,9 @@ class Options:
         """Raise ValueError on the first option outside its range."""
         _one_of("criterion", self.criterion, get_args(Criterion))
         _one_of("pruning", self.pruning, get_args(Pruning))
-        _in_range("confidence_factor", self.confidence_factor, 0.0 < self.confidence_factor < 1.0, "in (0, 1)")
+        _in_range(
+            "confidence_factor", self.confidence_factor, 0.0 < self.confidence_factor < 1.0, "in (0, 1)"
+        )
         _in_range("min_objects", self.min_objects, self.min_objects >= 1, "at least 1")
         _in_range("rep_folds", self.rep_folds, self.rep_folds >= 2, "at least 2")
 

@@ -108,6 +108,8 @@ def _by_completeness(x: Array) -> tuple[Array, Array | None]:
 def _checked(tree: Tree, values: ArrayLike) -> NDArray[np.float64]:
     x = np.asarray(values, dtype=np.float64)
     if x.ndim != 2 or x.shape[1] != len(tree.schema.attributes):
-        raise ValueError(f"values have the shape {x.shape}; the tree takes (rows, {len(tree.schema.attributes)})")
+        raise ValueError(
+            f"values have the shape {x.shape}; the tree takes (rows, {len(tree.schema.attributes)})"
+        )
     check_values(tree.schema, x)
     return x

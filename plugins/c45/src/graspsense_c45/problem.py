@@ -67,7 +67,7 @@ class Problem:
         """Below this numerator a gain counts as none."""
         return np.asarray(criteria.least_numerator(weight, known_weight, self.term_bits), dtype=np.int64)
 
-    def units_at_least(self, weight: Array) -> NDArray[np.int64]:
+    def units_at_least(self, weight: Array | np.float64) -> NDArray[np.int64]:
         """The least fixed-point weight that counts as ``weight`` or more."""
         return np.asarray(criteria.least_units(weight, self.weight_bits), dtype=np.int64)
 
@@ -90,7 +90,8 @@ def pose(table: Table, rows: NDArray[np.int64] | None, options: Options) -> Prob
     weight_bits = 0 if complete and whole_numbers else bits_below(total, WEIGHT_BITS)
     largest_term = float(x_ln_x_array(np.array([total]))[0])
     value_counts = np.array(
-        [0 if attribute.values is None else len(attribute.values) for attribute in table.schema.attributes], dtype=np.int64
+        [0 if attribute.values is None else len(attribute.values) for attribute in table.schema.attributes],
+        dtype=np.int64,
     )
     few = value_counts - criteria.MANY_VALUES * len(table.labels) < -TOLERANCE
     averaged = (value_counts == 0) | few

@@ -84,7 +84,11 @@ def training_errors(counts: Array, problem: Problem) -> NDArray[np.int64]:
 
 
 def _sum_in_runs(numbers: Array, lengths: Array) -> NDArray[np.int64]:
-    return np.add.reduceat(numbers, np.cumsum(lengths) - lengths) if len(lengths) else np.zeros(0, dtype=np.int64)
+    return (
+        np.add.reduceat(numbers, np.cumsum(lengths) - lengths)
+        if len(lengths)
+        else np.zeros(0, dtype=np.int64)
+    )
 
 
 def _sum_over_sons(tree: Branches, inner: Array, numbers: Array) -> NDArray[np.int64]:
@@ -222,13 +226,17 @@ class _Pruner:
     def _heaviest_son(self, inner: Array) -> Array:
         """The heaviest son, the last of those within the tolerance."""
         tree = self._tree
-        weight = self._problem.real_weights(tree.counts.sum(axis=1)) if inner.size * 8 > len(tree.counts) else None
+        weight = (
+            self._problem.real_weights(tree.counts.sum(axis=1)) if inner.size * 8 > len(tree.counts) else None
+        )
         best = np.zeros(len(inner))
         chosen = tree.first_son[inner].astype(np.int64)
         for slot in range(int(tree.n_sons[inner].max(initial=0))):
             has = tree.n_sons[inner] > slot
             son = tree.first_son[inner] + np.where(has, slot, 0)
-            son_weight = self._problem.real_weights(tree.counts[son].sum(axis=1)) if weight is None else weight[son]
+            son_weight = (
+                self._problem.real_weights(tree.counts[son].sum(axis=1)) if weight is None else weight[son]
+            )
             better = has & (best - son_weight < TOLERANCE)
             best = np.where(better, son_weight, best)
             chosen = np.where(better, son, chosen)
@@ -243,7 +251,8 @@ class _Pruner:
         problem = self._problem
         weight = problem.real_weights(counts.sum(axis=1))
         errors = problem.real_weights(training_errors(counts, problem))
-        return np.rint(np.ldexp(estimated_errors(weight, errors, *self._confidence), self._bits)).astype(np.int64)
+        expected = estimated_errors(weight, errors, *self._confidence)
+        return np.asarray(np.rint(np.ldexp(expected, self._bits)), dtype=np.int64)
 
     def _growth(self, leaf: Array, labels: Array, weights: Array, owner: Array) -> NDArray[np.int64]:
         """By how much the estimates of leaves grow when these rows join them, summed by owner (indexed by node)."""
@@ -253,7 +262,9 @@ class _Pruner:
         joined[leaf] = True
         leaves = np.flatnonzero(joined)
         number = self._scatter(leaves, np.arange(len(leaves)))
-        added = np.bincount(number[leaf] * n_classes + labels, weights=weights, minlength=len(leaves) * n_classes)
+        added = np.bincount(
+            number[leaf] * n_classes + labels, weights=weights, minlength=len(leaves) * n_classes
+        )
         counts = tree.counts[leaves] + added.astype(np.int64).reshape(-1, n_classes)
         owner_of_leaf = np.zeros(len(leaves), dtype=np.int64)
         owner_of_leaf[number[leaf]] = owner
@@ -284,7 +295,7 @@ class _Pruner:
     def _recount(self, roots: Array, rows: Array) -> None:
         """Set the counts and estimates below the roots from the rows' leaves."""
         tree, problem = self._tree, self._problem
-        n_nodes, n_classes = tree.counts.shape
+        n_classes = tree.counts.shape[1]
         levels = tree.levels(roots)
         nodes = np.concatenate(levels)
         number = self._scatter(nodes, np.arange(len(nodes)))

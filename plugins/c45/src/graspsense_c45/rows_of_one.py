@@ -47,7 +47,7 @@ class RowsOfOne:
         self._nominal = np.flatnonzero(problem.value_counts > 0)
         self._terms = problem.terms(np.arange(n + 1))
         self._step = np.diff(self._terms)
-        self._blocks = [self._sorted_block(a) for a in self._numeric]
+        self._blocks = [self._sorted_block(a) for a in self._numeric.tolist()]
         self._rows = np.arange(n, dtype=np.int32)
         self._counts = np.bincount(problem.labels, minlength=problem.n_classes)[None, :]
         self._n_nodes = 1
@@ -55,6 +55,7 @@ class RowsOfOne:
         self._measure()
 
     def offers(self) -> Offers:
+        """See ``grow.Level``."""
         problem = self._problem
         offers = Offers.none(len(problem.value_counts), len(self._sizes))
         self._share_levels_work()
@@ -76,11 +77,12 @@ class RowsOfOne:
             self._sizes[node],
             problem,
         )
-        for a in self._nominal:
-            offer_values(offers, int(a), self._value_counts(a), self._sizes, problem)
+        for a in self._nominal.tolist():
+            offer_values(offers, a, self._value_counts(a), self._sizes, problem)
         return offers
 
     def thresholds(self, attribute: Array) -> NDArray[np.float64]:
+        """See ``grow.Level``."""
         low, high = np.zeros(attribute.shape), np.full(attribute.shape, np.nan)
         for block in self._blocks:
             nodes, at = self._begins(block, attribute)
@@ -90,6 +92,7 @@ class RowsOfOne:
         return midpoints(low, high)
 
     def split(self, attribute: Array, value: Array, n_sons: Array) -> NDArray[np.int64]:
+        """See ``grow.Level``."""
         problem = self._problem
         first_son = np.cumsum(n_sons) - n_sons
         n_all = int(n_sons.sum())
@@ -107,6 +110,7 @@ class RowsOfOne:
         return self._son_counts
 
     def descend(self, open_sons: NDArray[np.bool_]) -> Array:
+        """See ``grow.Level``."""
         if not open_sons.any():
             return np.zeros(0, dtype=np.int64)
         # Slot 0 marks rows that have come to a leaf; slot s + 1 goes to son s.
@@ -125,8 +129,8 @@ class RowsOfOne:
         sons = np.concatenate(kept)
         for i, block in enumerate(self._blocks):
             self._blocks[i] = self._descend_block(block)
-        slot = self._slot_of_row[self._rows]
-        self._rows = np.concatenate([self._rows[slot == s + 1] for s in range(self._slots)])
+        slots = self._slot_of_row[self._rows]
+        self._rows = np.concatenate([self._rows[slots == s + 1] for s in range(self._slots)])
         self._counts = self._son_counts[sons]
         del self._slot_of_row
         self._measure()
@@ -175,7 +179,7 @@ class RowsOfOne:
                 slots = np.ones(len(rows), dtype=np.int64)
                 slots[ranges(np.cumsum(sizes) - sizes, self._cut[attribute[nodes], nodes] + 1)] = 0
                 yield nodes, rows, slots
-        for a in self._nominal:
+        for a in self._nominal.tolist():
             nodes = np.flatnonzero(attribute == a)
             if nodes.size:
                 rows = self._rows[ranges(self._starts[nodes], self._sizes[nodes])]

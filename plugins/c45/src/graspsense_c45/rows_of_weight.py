@@ -39,6 +39,7 @@ class RowsOfWeight:
         self.leaf_of_row = np.zeros(n, dtype=np.int32)
 
     def offers(self) -> Offers:
+        """See ``grow.Level``."""
         problem = self._problem
         n_nodes = len(self._node_weight)
         offers = Offers.none(len(problem.value_counts), n_nodes)
@@ -57,6 +58,7 @@ class RowsOfWeight:
         return offers
 
     def thresholds(self, attribute: Array) -> NDArray[np.float64]:
+        """See ``grow.Level``."""
         problem = self._problem
         self._threshold = np.full(attribute.shape, np.nan)
         for a in self._numeric:
@@ -69,6 +71,7 @@ class RowsOfWeight:
         return self._threshold
 
     def split(self, attribute: Array, value: Array, n_sons: Array) -> NDArray[np.int64]:
+        """See ``grow.Level``."""
         problem = self._problem
         first_son = np.cumsum(n_sons) - n_sons
         n_all = int(n_sons.sum())
@@ -84,7 +87,9 @@ class RowsOfWeight:
         son = first_son[node] + slot
         known_weight = np.bincount(son[~missing], weights=self._weights[at][~missing], minlength=n_all)
         # The parts of a row that does not know the value: in proportion to what is known.
-        gone, parts, part_weights = share(node[missing], self._weights[at[missing]], first_son, n_sons, known_weight)
+        gone, parts, part_weights = share(
+            node[missing], self._weights[at[missing]], first_son, n_sons, known_weight
+        )
         self._entry = np.concatenate((at[~missing], at[missing][gone]))
         self._son = np.concatenate((son[~missing], parts))
         self._son_weight = np.concatenate((self._weights[at[~missing]], part_weights))
@@ -98,6 +103,7 @@ class RowsOfWeight:
         return self._son_counts
 
     def descend(self, open_sons: NDArray[np.bool_]) -> Array:
+        """See ``grow.Level``."""
         n_old, n_slots = len(self._rows), int(self._n_sons.max(initial=0))
         rows, weights, nodes, sons = [], [], [], []
         maps = []
@@ -208,7 +214,7 @@ class RowsOfWeight:
 def share(
     node: Array, weights: Array, first_son: Array, n_sons: Array, known_weight: Array
 ) -> tuple[Array, Array, Array]:
-    """Share rows at ``node`` out among all its sons in proportion to the sons' known weight (evenly where none is known).
+    """Share rows at ``node`` out among its sons in proportion to their known weight (evenly where none is known).
 
     ``first_son`` and ``n_sons`` are indexed by node, ``known_weight`` by son. Returns for every part the index of its
     row, its son and its fixed-point weight; sons of a proportion within the tolerance of 0 get no part.

@@ -30,7 +30,9 @@ class Offers:
     def none(cls, n_attributes: int, n_nodes: int) -> Offers:
         """No usable split anywhere."""
         shape = (n_attributes, n_nodes)
-        return cls(np.zeros(shape, dtype=bool), np.zeros(shape), np.zeros(shape), np.full(shape, -1, dtype=np.int32))
+        return cls(
+            np.zeros(shape, dtype=bool), np.zeros(shape), np.zeros(shape), np.full(shape, -1, dtype=np.int32)
+        )
 
     def choose(self, problem: Problem) -> NDArray[np.int64]:
         """The attribute to split on at each node, or -1: the first one not beaten by more than the tolerance."""
@@ -40,7 +42,7 @@ class Offers:
         if by_ratio:
             total = np.zeros(n_nodes)
             number = np.zeros(n_nodes)
-            for a in np.flatnonzero(problem.averaged):
+            for a in np.flatnonzero(problem.averaged).tolist():
                 total = total + np.where(self.usable[a], self.gain[a], 0.0)
                 number = number + self.usable[a]
             average = total / np.maximum(number, 1.0)
@@ -72,7 +74,12 @@ def offer_cuts(
     gain = criteria.gain(problem.real_terms(numerator), real_known, real_weight)
     if problem.options.mdl_correction:
         gain = gain - criteria.mdl_cost(ln_of_parts(*np.frexp(n_cuts.astype(np.float64))), real_weight)
-    split = problem.terms(weight) - problem.terms(left) - problem.terms(known - left) - problem.terms(weight - known)
+    split = (
+        problem.terms(weight)
+        - problem.terms(left)
+        - problem.terms(known - left)
+        - problem.terms(weight - known)
+    )
     offers.usable[attribute, node] = gain >= TOLERANCE
     offers.gain[attribute, node] = gain
     offers.ratio[attribute, node] = criteria.gain_ratio(gain, problem.real_terms(split), real_weight)
@@ -103,7 +110,12 @@ def offer_values(offers: Offers, attribute: int, counts: Array, weight: Array, p
         rest = counts.sum(axis=1) - counts[:, value]
         rest_weight = known - bags[:, value]
         possible = (bags[:, value] >= enough) & (rest_weight >= enough)
-        sides = inside_terms[:, value] - bag_terms[:, value] + problem.terms(rest).sum(axis=1) - problem.terms(rest_weight)
+        sides = (
+            inside_terms[:, value]
+            - bag_terms[:, value]
+            + problem.terms(rest).sum(axis=1)
+            - problem.terms(rest_weight)
+        )
         gain = criteria.gain(problem.real_terms(before + sides), real_known, real_weight)
         split = outside - bag_terms[:, value] - problem.terms(rest_weight)
         ratio = criteria.gain_ratio(gain, problem.real_terms(split), real_weight)

@@ -28,7 +28,9 @@ class Table:
     weights: NDArray[np.float64]
 
 
-def make_table(schema: Schema, values: ArrayLike, labels: ArrayLike, weights: ArrayLike | None = None) -> Table:
+def make_table(
+    schema: Schema, values: ArrayLike, labels: ArrayLike, weights: ArrayLike | None = None
+) -> Table:
     """A checked table.
 
     Raises ValueError: shapes that do not fit, infinite values, a nominal column holding anything but indices of its
@@ -71,7 +73,9 @@ def check_values(schema: Schema, x: NDArray[Any]) -> None:
         if attribute.values is not None:
             codes = x[:, column]
             codes = codes[~np.isnan(codes)]
-            if codes.size and not np.all((codes >= 0) & (codes < len(attribute.values)) & (codes == np.floor(codes))):
+            if codes.size and not np.all(
+                (codes >= 0) & (codes < len(attribute.values)) & (codes == np.floor(codes))
+            ):
                 raise ValueError(
                     f"nominal column {attribute.name} must hold the indices 0..{len(attribute.values) - 1} "
                     "of its declared values, NaN where missing"

@@ -41,7 +41,9 @@ class Tree:
         return (
             self.schema == other.schema
             and self.laplace == other.laplace
-            and all(mine.shape == theirs.shape and mine.tobytes() == theirs.tobytes() for mine, theirs in pairs)
+            and all(
+                mine.shape == theirs.shape and mine.tobytes() == theirs.tobytes() for mine, theirs in pairs
+            )
         )
 
     def __hash__(self) -> int:
@@ -87,7 +89,7 @@ class Tree:
 
     def attribute(self, node: int) -> Attribute:
         """The attribute an inner node tests."""
-        return self.schema.attributes[self.tests.attribute[node]]
+        return self.schema.attributes[int(self.tests.attribute[node])]
 
     def sons(self, node: int) -> range:
         """The sons of a node; none at a leaf."""

@@ -87,7 +87,9 @@ def stratified_folds(labels: ArrayLike, n_folds: int = 10, seed: int = 1) -> lis
     """
     given = np.asarray(labels).tolist()
     if len(given) < n_folds or n_folds < 2:
-        raise ValueError(f"{len(given)} rows cannot be cut into {n_folds} folds; allowed: 2 up to the number of rows")
+        raise ValueError(
+            f"{len(given)} rows cannot be cut into {n_folds} folds; allowed: 2 up to the number of rows"
+        )
     random = JavaRandom(seed)
     order = list(range(len(given)))
     random.shuffle(order)
