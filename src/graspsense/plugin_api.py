@@ -13,10 +13,17 @@ if TYPE_CHECKING:
     from graspsense.core.binding import bind as bind
     from graspsense.core.calibration import EDGE_COUNTS_PER_N as EDGE_COUNTS_PER_N
     from graspsense.core.calibration import PAD_COUNTS_PER_N as PAD_COUNTS_PER_N
+    from graspsense.core.calibration import LoadTable as LoadTable
     from graspsense.core.calibration import edge_force as edge_force
+    from graspsense.core.calibration import load_of as load_of
+    from graspsense.core.calibration import masked as masked
     from graspsense.core.calibration import pad_force as pad_force
     from graspsense.core.calibration import tare as tare
     from graspsense.core.calibration import zero_of as zero_of
+    from graspsense.core.calibration_files import calibrations_of as calibrations_of
+    from graspsense.core.calibration_files import stored_friction as stored_friction
+    from graspsense.core.calibration_files import stored_tables as stored_tables
+    from graspsense.core.calibration_files import stored_zero as stored_zero
     from graspsense.core.config import create as create
     from graspsense.core.contact import CONTACT_FORCE_N as CONTACT_FORCE_N
     from graspsense.core.contact import REST_SPEED_M_S as REST_SPEED_M_S
@@ -121,10 +128,17 @@ _HOME_OF: Final = {
     "bind": "binding",
     "EDGE_COUNTS_PER_N": "calibration",
     "PAD_COUNTS_PER_N": "calibration",
+    "LoadTable": "calibration",
     "edge_force": "calibration",
+    "load_of": "calibration",
+    "masked": "calibration",
     "pad_force": "calibration",
     "tare": "calibration",
     "zero_of": "calibration",
+    "calibrations_of": "calibration_files",
+    "stored_friction": "calibration_files",
+    "stored_tables": "calibration_files",
+    "stored_zero": "calibration_files",
     "create": "config",
     "CONTACT_FORCE_N": "contact",
     "REST_SPEED_M_S": "contact",

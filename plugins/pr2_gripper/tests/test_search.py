@@ -58,10 +58,16 @@ def test_device_is_known_by_its_numbers_and_serial() -> None:
 
 
 @pytest.mark.usefixtures("two_grippers_and_a_mouse")
-def test_found_device_is_not_passed_off_as_usable() -> None:
-    with pytest.raises(NoDevice, match=r"was found .*/dev/hidraw0.* cannot drive it yet"):
+def test_two_grippers_and_no_serial_is_a_question_back() -> None:
+    with pytest.raises(NoDevice, match=r"there are 2 devices 1209:0001\n.*gripper.serial"):
         Pr2Backend(Pr2Config()).open(seed=0)
+
+
+@pytest.mark.usefixtures("two_grippers_and_a_mouse")
+def test_device_that_may_not_be_opened_is_not_passed_off_as_ready() -> None:
+    """The nodes of this listing do not exist, so nobody may open them."""
     assert [(one.serial, one.ready) for one in found_devices()] == [("L7", False), ("R2", False)]
+    assert "no permission on /dev/hidraw0" in found_devices()[0].advice
 
 
 def test_missing_library_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,16 +1,18 @@
-"""From raw cell counts to newtons: the tare, and the force on a fingertip.
+"""From raw cell counts to newtons: the tare, the force on a fingertip, and a load cell's word on that.
 
 Raw counts have an offset of some thousands that differs by cell, finger and run, so every force is a difference
 from images taken with nothing touching. Counts per newton are those of the PR2 fingertip
-(`fingertip_pressure/fingertip_geometry.py`); the viewer and this module divide by them.
+(`fingertip_pressure/fingertip_geometry.py`) where nothing else is given; the viewer and this module divide by them.
+A cell that reads 0 or 65535 does not answer (`ethercat_hardware`, wg06.cpp): it is left out of every sum.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final
+from bisect import bisect_right
+from collections.abc import Iterable, Sequence
+from typing import Final, NamedTuple
 
-from graspsense.core.errors import TareRefused
+from graspsense.core.errors import ConfigError, TareRefused
 from graspsense.core.signals import CELLS, FIRST_PAD_CELL, Pads
 
 PAD_COUNTS_PER_N: Final = 1600.0
@@ -20,25 +22,49 @@ EDGE_COUNTS_PER_N: Final = (600.0, 400.0, 600.0, 600.0, 600.0, 600.0, 400.0)
 TARE_SPREAD_N: Final = 0.5
 """A tare is refused where the pad sum varies by more than this while nothing should touch."""
 
+TARE_DRIFT_N: Final = 1.0
+"""A tare is refused where a pad's zero lies further than this from its stored one: it is loaded."""
+LARGEST_COUNT: Final = 65535.0
+
 Cells = tuple[float, ...]
 
 
-def pad_force(cells: Cells, zero: Cells) -> float:
+def pad_force(cells: Cells, zero: Cells, counts_per_n: float = PAD_COUNTS_PER_N) -> float:
     """Return the force (N) on the fifteen cells of the gripping face, edges left out."""
     total = 0.0
     for i in range(FIRST_PAD_CELL, CELLS):
         total += cells[i] - zero[i]
-    return total / PAD_COUNTS_PER_N
+    return total / counts_per_n
 
 
-def edge_force(cells: Cells, zero: Cells) -> float:
+def edge_force(cells: Cells, zero: Cells, counts_per_n: tuple[float, ...] = EDGE_COUNTS_PER_N) -> float:
     """Return the largest force (N) on a single edge cell (0-6)."""
-    largest = (cells[0] - zero[0]) / EDGE_COUNTS_PER_N[0]
+    largest = (cells[0] - zero[0]) / counts_per_n[0]
     for i in range(1, FIRST_PAD_CELL):
-        force = (cells[i] - zero[i]) / EDGE_COUNTS_PER_N[i]
+        force = (cells[i] - zero[i]) / counts_per_n[i]
         if force > largest:
             largest = force
     return largest
+
+
+def answers(count: float) -> bool:
+    """Return whether a cell with this count answers at all."""
+    return 0.0 < count < LARGEST_COUNT
+
+
+def masked(cells: Cells, zero: Cells) -> tuple[Cells, int]:
+    """Return the cells with each that does not answer at its zero, where it adds no force, and how many those are.
+
+    A cell whose zero is 0 did not answer during the tare, and stays out.
+    """
+    for cell, none in zip(cells, zero, strict=True):
+        if not answers(cell) or none == 0.0:
+            break
+    else:
+        return cells, 0
+    good = [answers(c) and z != 0.0 for c, z in zip(cells, zero, strict=True)]
+    kept = tuple([c if ok else z for c, z, ok in zip(cells, zero, good, strict=True)])
+    return kept, good.count(False)
 
 
 def zero_of(images: Sequence[Cells]) -> Cells:
@@ -49,25 +75,99 @@ def zero_of(images: Sequence[Cells]) -> Cells:
     return tuple([cell / len(images) for cell in total])
 
 
-def tare(images: Sequence[Pads]) -> tuple[Cells, Cells]:
+def tare(
+    images: Sequence[Pads], stored: tuple[Cells, Cells] | None = None, counts_per_n: float = PAD_COUNTS_PER_N
+) -> tuple[Cells, Cells]:
     """Return the zero of the left and of the right fingertip from images taken with nothing touching.
 
-    Raises TareRefused where there is no image, a value is no number, or a pad's sum varies by more than
-    `TARE_SPREAD_N` over the images: something touches or moves.
+    The zero of a cell is the mean of the images in which it answers, 0 where it answers in none. `stored` is the
+    zero of an earlier tare, known to be unloaded. Raises TareRefused where there is no image, a value is no number,
+    a fingertip does not answer, a pad's sum varies by more than `TARE_SPREAD_N` over the images (something touches
+    or moves), or lies more than `TARE_DRIFT_N` from the stored one (something presses steadily).
     """
     if not images:
         raise TareRefused("no cell image came while taring: check the fingertips' cables, then try again")
     zeros: list[Cells] = []
-    for side, cells in (("left", [i.left for i in images]), ("right", [i.right for i in images])):
+    for i, (side, cells) in enumerate(
+        (("left", [i.left for i in images]), ("right", [i.right for i in images]))
+    ):
         zero = zero_of(cells)
         if any(value != value for value in zero):
             raise TareRefused(f"the {side} fingertip gives cells that are no numbers, so it cannot be tared")
-        forces = [pad_force(image, zero) for image in cells]
+        if not all(answers(value) for image in cells for value in image):
+            zero = _zero_of_answering(cells)
+            if not any(zero):
+                raise TareRefused(
+                    f"all cells of the {side} fingertip read 0 or {LARGEST_COUNT:.0f}: it may not be connected"
+                )
+        forces = [pad_force(masked(image, zero)[0], zero, counts_per_n) for image in cells]
         spread = max(forces) - min(forces)
         if spread > TARE_SPREAD_N:
             raise TareRefused(
                 f"the {side} pad varied by {spread:.2f} N while taring, and {TARE_SPREAD_N} N is allowed: "
                 "take everything out of the gripper, wait until it is still, and try again"
             )
+        if stored is not None:
+            load = pad_force(masked(zero, stored[i])[0], stored[i], counts_per_n)
+            if abs(load) > TARE_DRIFT_N:
+                raise TareRefused(
+                    f"the {side} pad is {load:+.2f} N off its stored tare, and {TARE_DRIFT_N} N is allowed: take "
+                    "everything out of the gripper and try again; or, if nothing touches it, store a new tare with "
+                    "`graspsense calibrate tare --replace`"
+                )
         zeros.append(zero)
     return zeros[0], zeros[1]
+
+
+def _zero_of_answering(images: Sequence[Cells]) -> Cells:
+    zero = []
+    for cell in zip(*images, strict=True):
+        good = [value for value in cell if answers(value)]
+        zero.append(sum(good) / len(good) if good else 0.0)
+    return tuple(zero)
+
+
+class LoadTable(NamedTuple):
+    """What a load cell says against what a pad says, both in N and rising, from (0, 0) on."""
+
+    pad_n: tuple[float, ...]
+    load_n: tuple[float, ...]
+
+
+def load_table(readings: Iterable[tuple[float, float]]) -> LoadTable:
+    """Return the table that fits these readings of (pad, load cell) in N: Fig. 4 of Chitta et al., one fingertip's.
+
+    Readings of one pad force are averaged; where the load would fall, neighbours are averaged until it does not
+    (pool adjacent violators). Raises ConfigError for fewer than two readings above zero, and for one that is negative
+    or no number.
+    """
+    sums: dict[float, list[float]] = {}
+    for pad, load in readings:
+        if not (0.0 <= pad < float("inf") and 0.0 <= load < float("inf")):
+            raise ConfigError(f"load-cell reading ({pad}, {load}): both must be forces of 0 N or more")
+        sums.setdefault(pad, []).append(load)
+    sums.pop(0.0, None)
+    if len(sums) < 2:
+        raise ConfigError(f"a load table needs readings at two pad forces above 0 N or more, not {len(sums)}")
+    pools: list[tuple[float, list[float]]] = []  # mean load, the pad forces it holds for
+    for pad in sorted(sums):
+        load, pads = sum(sums[pad]) / len(sums[pad]), [pad]
+        while pools and pools[-1][0] > load:
+            before, more = pools.pop()
+            load = (before * len(more) + load * len(pads)) / (len(more) + len(pads))
+            pads = more + pads
+        pools.append((load, pads))
+    pad_n = [pad for _, pads in pools for pad in pads]
+    load_n = [load for load, pads in pools for _ in pads]
+    return LoadTable((0.0, *pad_n), (0.0, *load_n))
+
+
+def load_of(table: LoadTable, pad_n: float) -> tuple[float, bool]:
+    """Return the load (N) at this pad force, and whether the table reaches there.
+
+    Linear between the readings, hence monotone; beyond the last the last slope goes on, below zero the first.
+    """
+    pads, loads = table
+    i = min(max(bisect_right(pads, pad_n), 1), len(pads) - 1)
+    slope = (loads[i] - loads[i - 1]) / (pads[i] - pads[i - 1])
+    return loads[i - 1] + slope * (pad_n - pads[i - 1]), pad_n <= pads[-1]

@@ -38,6 +38,7 @@ class DeviceInfo:
     On a `virtual` clock, apply-then-read advances one tick and nothing waits; on a `device` clock a read waits
     for the next frame. `opening` is the command that opens the fingers and `relaxed` the one that lets go; a
     recording has no opening (None). `tare_images` is how many unloaded cell images the tare needs (0: none).
+    `calibration` names each stored calibration in use and the hash of its content.
     `units` names units that are not SI, as of a recording: `{"t": "frame"}`. `frames_due` is the number of
     frames a recording holds, None where there is no end to them.
     """
@@ -52,6 +53,7 @@ class DeviceInfo:
     opening: Command | None
     relaxed: Command
     tare_images: int = 0
+    calibration: Mapping[str, str] = field(factory=dict)
     units: Mapping[str, str] = field(factory=dict)
     notes: tuple[str, ...] = ()
 

@@ -84,6 +84,7 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
             "firmware": device.firmware,
             "clock": device.clock,
             "rate_hz": device.rate_hz,
+            "calibration": dict(device.calibration),
             "notes": list(device.notes),
         },
         "report": dict(trial.report),

@@ -1,51 +1,210 @@
-"""The PR2 gripper as a sensor backend. This version looks for it; the driver for its reports comes later."""
+"""The PR2 gripper as a sensor backend."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NoReturn, final
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, final
 
-from graspsense.plugin_api import Command, DeviceInfo, DeviceLost, NoDevice, Pads, Reading, SensorBackend
+from attrs import asdict, evolve
+
+from graspsense.plugin_api import (
+    EFFORT,
+    Command,
+    DeviceInfo,
+    DeviceLost,
+    Pads,
+    Reading,
+    SensorBackend,
+    calibrations_of,
+    stored_friction,
+    stored_tables,
+    stored_zero,
+)
 from graspsense_pr2_gripper.config import Pr2Config
-from graspsense_pr2_gripper.discovery import search
+from graspsense_pr2_gripper.link import LockStepLink
+from graspsense_pr2_gripper.measure import Measure
+from graspsense_pr2_gripper.opening import Opened, open_board
+from graspsense_pr2_gripper.protocol import (
+    EFFORT_KIND,
+    RELEASE_KIND,
+    Identity,
+    OutputReport,
+    encode_output,
+    limit,
+    micro,
+)
+
+OPENING_N: Final = -20.0
+"""The authors' recordings show +17 and +20 N, opening, between squeezes."""
+TARE_IMAGES: Final = 6
+UNHEARD_S: Final = 0.1
+"""A command that is not echoed for this long does not arrive: the device counts as lost."""
+TEST_NUMBER: Final = (0x1209, 0x0001)
 
 
 @final
 class Pr2Backend(SensorBackend[Pr2Config]):
-    """Looks for the gripper and says what is missing; nothing can be read before it is open."""
+    """Reads and commands one gripper over the transport that the settings name."""
+
+    _opened: Opened | None = None
+    _report: Mapping[str, float | int | str | bool] = {}
+    _lost_serial = ""
+    _sent = _echo = _heard_us = 0
 
     def open(self, seed: int) -> DeviceInfo:
-        """Look for the gripper. Raises NoDevice, also where it is found, for want of a driver."""
-        found = search(self.config)
-        if not found.matching:
-            raise NoDevice(
-                f"no PR2 gripper: looked for {found.wanted}\n"
-                f"  {found.looked}\n"
-                "  try: plug it in and switch it on, then `graspsense devices`\n"
-                "       other numbers: -o gripper.vendor_id=0x1209 -o gripper.product_id=0x0001\n"
-                "       no gripper at hand: `graspsense run --gripper sim`"
-            )
-        paths = ", ".join(one.path for one in found.matching)
-        raise NoDevice(
-            f"the PR2 gripper was found ({found.wanted}, at {paths}), but this version of "
-            "graspsense-pr2-gripper cannot drive it yet: it only looks for the device\n"
-            "  try: a later version, or `graspsense run --gripper sim`"
-        )
+        """Open the gripper; a seed matters to an emulated one alone.
+
+        After a loss the gripper of the same serial is waited for. Raises NoDevice, ConfigError where a stored
+        calibration is of another device, DataDamaged.
+        """
+        self.close()
+        config = self.config
+        wait_s = 0.0
+        if self._lost_serial and config.transport != "emulated":
+            config, wait_s = evolve(config, serial=self._lost_serial), config.reconnect_s
+        opened = open_board(config, seed, wait_s)
+        self._opened = opened
+        try:
+            return self._described(opened)
+        except BaseException:
+            self.close()
+            raise
 
     def read(self, timeout_s: float) -> Reading | None:
-        """Raise DeviceLost: it is never open."""
-        self._not_open()
+        """Return the newest frame with the last whole cell image. Raises DeviceLost."""
+        link = self._open().link
+        try:
+            arrival = link.next(timeout_s)
+        except DeviceLost:
+            self._lost_serial = self._open().identity.serial
+            raise
+        if arrival is None:
+            return None
+        report = arrival.report
+        behind = (self._sent - report.echo) & 0xFFFF
+        if behind and self._sent:
+            if report.echo != self._echo:
+                self._heard_us = report.time_us
+            elif report.time_us - self._heard_us > UNHEARD_S * 1e6:
+                raise DeviceLost(
+                    f"the PR2 gripper reports but takes no commands: {behind} were not echoed in {UNHEARD_S} s; its "
+                    "watchdog lets go. Unplug it and plug it in again"
+                )
+        else:
+            self._heard_us = report.time_us
+        self._echo = report.echo
+        return self._measure.reading(report, arrival.image)
 
     def apply(self, command: Command) -> None:
-        """Raise DeviceLost: it is never open."""
-        self._not_open()
+        """Send an effort, within the device's own limits. Raises DeviceLost.
+
+        Anything but an effort that is a number lets go.
+        """
+        opened = self._open()
+        if command.kind == EFFORT and command.value == command.value:
+            most = self._effort_limit_n
+            self._send(
+                opened,
+                EFFORT_KIND,
+                micro(min(max(command.value, -most), most)),
+                limit(min(command.effort_limit_n, most)),
+                limit(command.speed_limit_m_s),
+            )
+        else:
+            self._send(opened, RELEASE_KIND, 0, 0, 0)
 
     def tare(self, images: Sequence[Pads]) -> None:
-        """Raise DeviceLost: it is never open."""
-        self._not_open()
+        """Set the zero of the pads. Raises TareRefused."""
+        self._open()
+        self._measure.tare(images)
 
     def close(self) -> None:
-        """Do nothing: there is nothing to let go of."""
+        """Tell the gripper to let go, as far as it can still be told, and close it within two seconds."""
+        opened, self._opened = self._opened, None
+        if opened is None:
+            return
+        try:
+            if self._sent:
+                self._send(opened, RELEASE_KIND, 0, 0, 0)
+        except DeviceLost:
+            self._lost_serial = opened.identity.serial
+        clean = opened.link.close()
+        self._report = self._counted(opened, clean)
 
-    def _not_open(self) -> NoReturn:
-        raise DeviceLost("the PR2 gripper is not open")
+    def report(self) -> Mapping[str, float | int | str | bool]:
+        """Return what was counted on the wire, until now or until it was closed."""
+        return self._report if self._opened is None else self._counted(self._opened, True)
+
+    def _described(self, opened: Opened) -> DeviceInfo:
+        config, identity, emulation = self.config, opened.identity, opened.emulation
+        found = calibrations_of(config.calibration, identity.serial, device_numbers(identity))
+        self._measure = Measure(
+            identity,
+            config,
+            stored_zero(found["tare"]) if "tare" in found else None,
+            stored_tables(found["load-cell"]) if "load-cell" in found else None,
+        )
+        self._effort_limit_n = identity.effort_limit_un * 1e-6
+        self._sent = self._echo = 0
+        self._heard_us = 0
+        notes = [f"calibration {kind} of {one.made} is in use" for kind, one in found.items()]
+        if "friction" in found:
+            _, closing, _ = stored_friction(found["friction"])
+            notes.append(f"breakaway {min(closing):.1f} to {max(closing):.1f} N, closing")
+        if emulation is not None:
+            notes += ["emulated: no gripper was touched", *emulation.body_info.notes]
+        elif (config.vendor_id, config.product_id) == TEST_NUMBER:
+            notes.append("1209:0001 is a number for private tests: do not pass on a device that has it")
+        return DeviceInfo(
+            name="PR2 gripper" if emulation is None else f"emulated PR2 gripper over {config.body}",
+            serial=identity.serial,
+            firmware=".".join(map(str, identity.firmware)),
+            clock="virtual" if isinstance(opened.link, LockStepLink) else "device",
+            rate_hz=identity.report_rate_hz,
+            effort_limit_n=self._effort_limit_n,
+            speed_limit_m_s=identity.speed_limit_um_s * 1e-6,
+            opening=Command(EFFORT, OPENING_N, math.inf, math.inf),
+            relaxed=Command(EFFORT, 0.0, math.inf, math.inf),
+            tare_images=TARE_IMAGES,
+            calibration={kind: one.sha256 for kind, one in found.items()},
+            notes=tuple(notes),
+        )
+
+    def _send(
+        self, opened: Opened, kind: int, effort_un: int, effort_limit_un: int, speed_limit_um_s: int
+    ) -> None:
+        self._sent += 1
+        counter = self._sent & 0xFFFF
+        opened.link.send(
+            encode_output(OutputReport(counter, kind, effort_un, effort_limit_un, speed_limit_um_s))
+        )
+
+    def _counted(self, opened: Opened, clean: bool) -> dict[str, float | int | str | bool]:
+        link, emulation = opened.link, opened.emulation
+        counted: dict[str, float | int | str | bool] = dict(emulation.body.report()) if emulation else {}
+        counted.update(asdict(link.stream.counts))
+        counted.update(
+            discarded=link.discarded,
+            skipped=link.skipped,
+            bad_cells=self._measure.bad_cells,
+            commands_sent=self._sent,
+            clock_offset_s=link.clock.offset_s,
+            closed_cleanly=clean,
+        )
+        return counted
+
+    def _open(self) -> Opened:
+        if self._opened is None:
+            raise DeviceLost("the PR2 gripper is not open")
+        return self._opened
+
+
+def device_numbers(identity: Identity) -> dict[str, Any]:
+    """Return what a calibration of this device depends on, besides its serial."""
+    return {
+        "transmission": identity.transmission,
+        "pad_counts_per_n": identity.pad_counts_per_n,
+        "side_counts_per_n": identity.side_counts_per_n,
+        "edge_counts_per_n": identity.edge_counts_per_n,
+    }

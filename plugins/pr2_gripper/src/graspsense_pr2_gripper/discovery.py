@@ -78,10 +78,8 @@ def found_devices() -> Sequence[FoundDevice]:
             backend=BACKEND,
             serial=one.serial,
             where=one.path,
-            ready=False,
-            advice="its driver is not part of this version"
-            if one.readable
-            else f"no permission on {one.path}",
+            ready=one.readable,
+            advice="" if one.readable else f"no permission on {one.path}: the udev rule in the README",
         )
         for one in search(Pr2Config()).matching
     ]

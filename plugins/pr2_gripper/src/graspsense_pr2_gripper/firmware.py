@@ -1,0 +1,182 @@
+"""The board's firmware in software: commands in, a report a millisecond out, and a watchdog between.
+
+It drives a body, any gripper backend with a virtual clock, and knows no host: what carries its reports is a
+transport's matter. One call of `step` is one period of the device's own clock.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+from graspsense.plugin_api import (
+    CELLS,
+    EFFORT,
+    PR2_LINKAGES,
+    Command,
+    Frame,
+    Pads,
+    SensorBackend,
+    gap_and_rate,
+    revolutions_at,
+)
+from graspsense_pr2_gripper.protocol import (
+    ACCEPTED,
+    CLAMPED,
+    EFFORT_KIND,
+    ENCODER_FAULT,
+    IMAGE_CELLS,
+    LAST_IMAGE,
+    LEFT_ABSENT,
+    LET_GO,
+    LIMITED,
+    NO_COMMAND,
+    OWN_LIMIT,
+    REFUSED,
+    RIGHT_ABSENT,
+    SLICE_CELLS,
+    SLICES,
+    Identity,
+    InputReport,
+    ProtocolError,
+    decode_output,
+    encode_identity,
+    encode_input,
+)
+
+_LARGEST: Final = 2**31 - 1
+
+
+class Firmware:
+    """A board with this identity that drives `body`, which has been opened."""
+
+    def __init__(self, body: SensorBackend[Any], identity: Identity) -> None:
+        self.identity = identity
+        self.effort_un = 0
+        """What the motor is given now, before the limits of speed; 0 is let go."""
+        self._body = body
+        self._link = PR2_LINKAGES[identity.transmission]
+        self._period_us = round(1e6 / identity.report_rate_hz)
+        self._watchdog_us = identity.watchdog_ms * 1000
+        self._step = 0
+        self._commanded_us = 0
+        self._speed_limit_um_s = identity.speed_limit_um_s
+        self._status = 0
+        self._echo = 0
+        self._result = NO_COMMAND
+        self._velocity_um_s = 0.0
+        self._ticks = 0
+        self._velocity_mtick_s = 0
+        self._body_image = 0
+        self._image = 0
+        self._image_us = 0
+        self._slice = 0
+        self._gone_out = True
+        self._cells = [0] * IMAGE_CELLS
+
+    @property
+    def time_us(self) -> int:
+        """The device's time at its last report."""
+        return max(self._step - 1, 0) * self._period_us
+
+    def feature(self) -> bytes:
+        """Return the feature report."""
+        return encode_identity(self.identity)
+
+    def output(self, data: bytes) -> None:
+        """Take a command; one that did not arrive whole changes nothing but the result."""
+        try:
+            command = decode_output(data)
+        except ProtocolError:
+            self._result = REFUSED
+            return
+        own = self.identity
+        most = min(command.effort_limit_un, own.effort_limit_un)
+        effort = command.effort_un if command.kind == EFFORT_KIND else 0
+        self.effort_un = max(-most, min(effort, most))
+        self._speed_limit_um_s = min(command.speed_limit_um_s, own.speed_limit_um_s)
+        if command.speed_limit_um_s == OWN_LIMIT:
+            self._speed_limit_um_s = own.speed_limit_um_s
+        self._result = ACCEPTED if self.effort_un == effort else CLAMPED
+        self._status &= ~(LET_GO | LIMITED)
+        if self._result == CLAMPED:
+            self._status |= LIMITED
+        self._echo = command.counter
+        self._commanded_us = self.time_us
+
+    def step(self) -> bytes:
+        """Let a period pass and return the report that ends it."""
+        now_us = self._step * self._period_us
+        if self._result != NO_COMMAND and now_us - self._commanded_us >= self._watchdog_us:
+            self.effort_un = 0
+            self._status |= LET_GO
+        if self._step > 0:
+            self._body.apply(Command(EFFORT, self._within_speed(), math.inf, math.inf))
+        reading = self._body.read(1.0)
+        if reading is None:
+            raise RuntimeError("the body of an emulated gripper gave no frame: it needs a virtual clock")
+        frame, pads = reading
+        self._step += 1
+        self._measure(frame)
+        self._latch(pads, now_us)
+        report = InputReport(
+            sequence=(self._step - 1) & 0xFFFFFFFF,
+            time_us=now_us,
+            encoder_ticks=self._ticks,
+            velocity_mtick_s=self._velocity_mtick_s,
+            effort_un=0 if math.isnan(frame.effort_n) else _clamped(frame.effort_n * 1e6),
+            status=self._status,
+            echo=self._echo,
+            samples=(),
+            image=self._image,
+            slice=self._slice,
+            cells=tuple(self._cells[self._slice * SLICE_CELLS :][:SLICE_CELLS]),  # type: ignore[arg-type]
+            command_result=self._result,
+            image_age_us=min(now_us - self._image_us, 0xFFFF),
+        )
+        if self._image:
+            self._slice = (self._slice + 1) % SLICES
+            self._gone_out = self._gone_out or self._slice == 0
+        return encode_input(report)
+
+    def _within_speed(self) -> float:
+        effort = self.effort_un
+        closing_um_s = -self._velocity_um_s
+        if (effort > 0 and closing_um_s > self._speed_limit_um_s) or (
+            effort < 0 and -closing_um_s > self._speed_limit_um_s
+        ):
+            return 0.0
+        return effort * 1e-6
+
+    def _measure(self, frame: Frame) -> None:
+        if not (math.isfinite(frame.gap_m) and math.isfinite(frame.velocity_m_s)):
+            self._status |= ENCODER_FAULT
+            return
+        self._status &= ~ENCODER_FAULT
+        ticks_rev = self.identity.encoder_ticks_rev
+        self._ticks = round(revolutions_at(self._link, frame.gap_m) * ticks_rev)
+        _, rate = gap_and_rate(self._link, self._ticks / ticks_rev)
+        self._velocity_mtick_s = _clamped(frame.velocity_m_s / rate * ticks_rev * 1e3)
+        self._velocity_um_s = frame.velocity_m_s * 1e6
+
+    def _latch(self, pads: Pads, now_us: int) -> None:
+        if pads.counter in (0, self._body_image) or not self._gone_out:
+            return
+        self._body_image = pads.counter
+        self._image = self._image % LAST_IMAGE + 1
+        self._image_us = now_us
+        self._slice, self._gone_out = 0, False
+        for first, cells, absent in ((0, pads.left, LEFT_ABSENT), (CELLS, pads.right, RIGHT_ABSENT)):
+            raw = _raw(cells)
+            self._cells[first : first + CELLS] = raw
+            self._status = self._status & ~absent | (0 if any(raw) else absent)
+
+
+def _raw(cells: Sequence[float]) -> list[int]:
+    """Return cells as the board reads them: 16 bits, and 0 for one that does not answer."""
+    return [0 if cell != cell else min(max(round(cell), 0), 0xFFFF) for cell in cells]
+
+
+def _clamped(value: float) -> int:
+    return round(min(max(value, -_LARGEST), _LARGEST))

@@ -1,0 +1,176 @@
+"""From the board's counts to metres and newtons: transmission, tare, counts per newton, load tables, bad cells."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from graspsense.plugin_api import (
+    CELLS,
+    FIRST_PAD_CELL,
+    NO_PADS,
+    PR2_LINKAGES,
+    Frame,
+    LoadTable,
+    Pads,
+    Reading,
+    TareRefused,
+    edge_force,
+    gap_and_rate,
+    load_of,
+    masked,
+    pad_force,
+    tare,
+)
+from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.protocol import LEFT_ABSENT, RIGHT_ABSENT, Identity, InputReport
+from graspsense_pr2_gripper.stream import Image
+
+BAD_CELL: Final = 1 << 16
+"""Status: a cell of the last image does not answer and is left out of the forces."""
+BEYOND_TABLE: Final = 1 << 17
+"""Status: a pad force lies beyond its load table."""
+UNLOADED_COUNTS: Final = 4500.0
+"""Without a stored tare, a pad whose cells read more than this in the mean is taken to be loaded: users report
+2900 to 3800 without a load (public PressureListener scripts for the PR2, differing by finger and run)."""
+
+Tips = tuple[tuple[float, ...], tuple[float, ...]]
+
+_MIRRORED: Final = (
+    0,
+    6,
+    5,
+    4,
+    3,
+    2,
+    1,
+    *(FIRST_PAD_CELL + 3 * row + c for row in range(5) for c in (2, 1, 0)),
+)
+"""A tip's cells with its -z and +z sides swapped: sides, corners and tip cells, and the pad's columns."""
+
+
+class _Felt(NamedTuple):
+    left_n: float
+    right_n: float
+    left_edge_n: float
+    right_edge_n: float
+    status: int
+
+
+_NOTHING: Final = _Felt(math.nan, math.nan, math.nan, math.nan, 0)
+
+
+class Measure:
+    """Makes readings of the reports of one device, in order.
+
+    `stored` is the zero of a stored tare, `tables` are the load tables of left and right, where there are any.
+    """
+
+    def __init__(
+        self,
+        identity: Identity,
+        config: Pr2Config,
+        stored: Tips | None,
+        tables: tuple[LoadTable, LoadTable] | None,
+    ) -> None:
+        self._link = PR2_LINKAGES[identity.transmission]
+        self._period_us = round(1e6 / identity.report_rate_hz)
+        self._ticks_rev = float(identity.encoder_ticks_rev)
+        self._pad_per_n = float(identity.pad_counts_per_n)
+        side, edge = float(identity.side_counts_per_n), float(identity.edge_counts_per_n)
+        self._edge_per_n = (edge, side, edge, edge, edge, edge, side)
+        self._swap, self._mirror = config.swap_fingers, (config.mirror_left, config.mirror_right)
+        self._stored, self._tables = stored, tables
+        self._zero: Tips | None = stored
+        self._pads = NO_PADS
+        self._felt = _NOTHING
+        self._first_us: int | None = None
+        self._last_us = 0
+        self.bad_cells = 0
+        """Most cells of one image that did not answer."""
+
+    def reading(self, report: InputReport, image: Image | None) -> Reading:
+        """Return the reading of this report, with the last whole cell image."""
+        if self._first_us is None:
+            self._first_us = report.time_us
+            self._last_us = report.time_us - self._period_us
+        if image is not None and image.counter != self._pads.counter:
+            self._take(image)
+        gap, rate = gap_and_rate(self._link, report.encoder_ticks / self._ticks_rev)
+        felt, status = self._felt, report.status
+        left, right = felt.left_n, felt.right_n
+        if status & (LEFT_ABSENT | RIGHT_ABSENT):
+            swap = self._swap
+            left = math.nan if status & (RIGHT_ABSENT if swap else LEFT_ABSENT) else left
+            right = math.nan if status & (LEFT_ABSENT if swap else RIGHT_ABSENT) else right
+        frame = Frame(
+            (report.time_us - self._first_us) / 1e6,
+            (report.time_us - self._last_us) / 1e6,
+            gap,
+            report.velocity_mtick_s * 1e-3 / self._ticks_rev * rate,
+            report.effort_un * 1e-6,
+            left,
+            right,
+            felt.left_edge_n,
+            felt.right_edge_n,
+            status | felt.status,
+        )
+        self._last_us = report.time_us
+        return Reading(frame, self._pads)
+
+    def tare(self, images: Sequence[Pads]) -> None:
+        """Set the zero from these images. Raises TareRefused."""
+        zero = tare(images, self._stored, self._pad_per_n)
+        if self._stored is None:
+            for side, cells in zip(("left", "right"), zero, strict=True):
+                good = [cell for cell in cells[FIRST_PAD_CELL:] if cell]
+                mean = sum(good) / len(good) if good else 0.0
+                if mean > UNLOADED_COUNTS:
+                    raise TareRefused(
+                        f"the {side} pad reads {mean:.0f} counts a cell, and up to {UNLOADED_COUNTS:.0f} pass for "
+                        "unloaded: take everything out of the gripper and try again; or, if nothing touches it, store "
+                        "its zero once with `graspsense calibrate tare --replace`"
+                    )
+        self._zero = zero
+        if self._pads.counter:
+            self._feel()
+
+    def _take(self, image: Image) -> None:
+        cells = tuple(map(float, image.cells))
+        left, right = cells[:CELLS], cells[CELLS:]
+        if self._swap:
+            left, right = right, left
+        if self._mirror[0]:
+            left = tuple([left[i] for i in _MIRRORED])
+        if self._mirror[1]:
+            right = tuple([right[i] for i in _MIRRORED])
+        first_us = self._first_us if self._first_us is not None else 0
+        self._pads = Pads((image.time_us - first_us) / 1e6, image.counter, left, right)
+        self._feel()
+
+    def _feel(self) -> None:
+        zero = self._zero
+        if zero is None:
+            # Untared there is no force: the offsets alone are some thousand counts a cell.
+            self._felt = _Felt(0.0, 0.0, 0.0, 0.0, 0)
+            return
+        left, left_bad = masked(self._pads.left, zero[0])
+        right, right_bad = masked(self._pads.right, zero[1])
+        bad = left_bad + right_bad
+        self.bad_cells = max(self.bad_cells, bad)
+        status = BAD_CELL if bad else 0
+        left_n = pad_force(left, zero[0], self._pad_per_n)
+        right_n = pad_force(right, zero[1], self._pad_per_n)
+        if self._tables is not None:
+            left_n, left_inside = load_of(self._tables[0], left_n)
+            right_n, right_inside = load_of(self._tables[1], right_n)
+            if not (left_inside and right_inside):
+                status |= BEYOND_TABLE
+        self._felt = _Felt(
+            math.nan if left_bad == CELLS else left_n,
+            math.nan if right_bad == CELLS else right_n,
+            edge_force(left, zero[0], self._edge_per_n),
+            edge_force(right, zero[1], self._edge_per_n),
+            status,
+        )

@@ -1,0 +1,154 @@
+"""Opening the board that the settings ask for: over a real wire by serial, or one in software."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Final, NamedTuple
+
+from graspsense.plugin_api import ConfigError, DeviceInfo, NoDevice, SensorBackend, create
+from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.discovery import search
+from graspsense_pr2_gripper.faults import Wire
+from graspsense_pr2_gripper.firmware import Firmware
+from graspsense_pr2_gripper.link import Link, LockStepLink, ThreadedLink
+from graspsense_pr2_gripper.protocol import FEATURE_ID, Identity, ProtocolError, decode_identity
+from graspsense_pr2_gripper.transports.emulated import LockStepTransport, PacedTransport
+from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
+
+POLL_S: Final = 0.25
+"""A device that went away is looked for this often."""
+EMULATED_SERIAL: Final = "EMULATED"
+EFFORT_LIMIT_UN: Final = 100_000_000
+SPEED_LIMIT_UM_S: Final = 200_000
+"""Software limits of the PR2 gripper at the time of the paper (pr2_defs, gripper_defs.urdf.xacro, August 2009)."""
+IMAGE_PERIOD_US: Final = 41_000
+WATCHDOG_MS: Final = 100
+
+
+class Emulation(NamedTuple):
+    """The software board behind an emulated transport: its wire, its body and what the body says of itself."""
+
+    wire: Wire
+    body: SensorBackend[Any]
+    body_info: DeviceInfo
+
+
+class Opened(NamedTuple):
+    """An open board: the link to it, who it is, and the software behind it where it is emulated."""
+
+    link: Link
+    identity: Identity
+    emulation: Emulation | None
+
+
+def open_board(config: Pr2Config, seed: int, wait_s: float) -> Opened:
+    """Open the board and check that it is one.
+
+    `wait_s` is how long to wait for a device that is not there. Raises NoDevice, ConfigError, PluginUnavailable.
+    """
+    if config.transport == "emulated":
+        return _emulated(config, seed)
+    transport = _open_transport(config, wait_s)
+    try:
+        identity = decode_identity(transport.feature(FEATURE_ID))
+        if config.serial and identity.serial != config.serial:
+            raise ProtocolError(
+                f"its feature report says serial {identity.serial!r}, asked for is {config.serial!r}"
+            )
+    except (ProtocolError, TransportGone) as error:
+        transport.close()
+        raise NoDevice(
+            f"a device {config.vendor_id:04x}:{config.product_id:04x} is there, but is no PR2 gripper to this driver: "
+            f"{error}\n  try: other numbers with -o gripper.vendor_id and gripper.product_id, or -o gripper.serial"
+        ) from error
+    return Opened(ThreadedLink(transport), identity, None)
+
+
+def _emulated(config: Pr2Config, seed: int) -> Opened:
+    values = dict(config.body_config)
+    if config.object is not None:
+        values["object"] = config.object
+    body: SensorBackend[Any] = create("sensor-backend", config.body, **values)
+    info = body.open(seed)
+    if info.clock != "virtual":
+        raise ConfigError(
+            f"gripper.body {config.body!r} has a clock of its own, so no board can be emulated over it: name a gripper "
+            "with a virtual clock, such as sim"
+        )
+    identity = Identity(
+        firmware=(1, 0, 0),
+        serial=config.serial or EMULATED_SERIAL,
+        transmission=config.transmission,
+        pad_counts_per_n=1600,
+        side_counts_per_n=400,
+        edge_counts_per_n=600,
+        effort_limit_un=EFFORT_LIMIT_UN,
+        speed_limit_um_s=SPEED_LIMIT_UM_S,
+        report_rate_hz=round(info.rate_hz),
+        image_period_us=IMAGE_PERIOD_US,
+        watchdog_ms=WATCHDOG_MS,
+        encoder_ticks_rev=1200,
+        accelerometer_g=0,
+    )
+    wire = Wire(Firmware(body, identity), config.faults, seed)
+    identity = decode_identity(wire.firmware.feature())
+    link: Link
+    if config.pace == "lock-step":
+        link = LockStepLink(LockStepTransport(wire), 1.0 / identity.report_rate_hz)
+    else:
+        link = ThreadedLink(PacedTransport(wire))
+    return Opened(link, identity, Emulation(wire, body, info))
+
+
+def _open_transport(config: Pr2Config, wait_s: float) -> Transport:
+    look = _hidraw if config.transport == "hidraw" else _pyusb
+    give_up = time.monotonic() + wait_s
+    while True:
+        openers, missing = look(config)
+        if len(openers) == 1:
+            try:
+                return openers[0]()
+            except OSError as error:
+                # Just plugged in, a node may not be ours yet: udev is still at it.
+                missing = NoDevice(
+                    f"the PR2 gripper is there but cannot be opened: {error}\n"
+                    "  try: the udev rule in the README of graspsense-pr2-gripper, then plug it in again;\n"
+                    "       or close the other program that has it"
+                )
+        elif openers:
+            raise NoDevice(
+                f"there are {len(openers)} devices {config.vendor_id:04x}:{config.product_id:04x}\n"
+                "  try: -o gripper.serial=SERIAL, with a serial of `graspsense devices`"
+            )
+        if time.monotonic() >= give_up:
+            raise missing
+        time.sleep(POLL_S)
+
+
+def _hidraw(config: Pr2Config) -> tuple[Sequence[Callable[[], Transport]], NoDevice]:
+    from graspsense_pr2_gripper.transports.hidraw import HidrawTransport
+
+    found = search(config)
+    missing = NoDevice(
+        f"no PR2 gripper: looked for {found.wanted}\n"
+        f"  {found.looked}\n"
+        "  try: plug it in and switch it on, then `graspsense devices`\n"
+        "       other numbers: -o gripper.vendor_id=0x1209 -o gripper.product_id=0x0001\n"
+        "       no gripper at hand: -o gripper.transport=emulated, or `graspsense run --gripper sim`"
+    )
+    return [partial(HidrawTransport, one) for one in found.matching], missing
+
+
+def _pyusb(config: Pr2Config) -> tuple[Sequence[Callable[[], Transport]], NoDevice]:
+    from graspsense_pr2_gripper.transports.pyusb import PyusbTransport, find
+
+    devices = find(config)
+    serial = f" with serial number {config.serial!r}" if config.serial else ""
+    missing = NoDevice(
+        f"no PR2 gripper: looked for USB device {config.vendor_id:04x}:{config.product_id:04x}{serial} with libusb\n"
+        "  try: plug it in and switch it on; gripper.transport hidraw sees devices that are not on USB, too\n"
+        "       no gripper at hand: -o gripper.transport=emulated, or `graspsense run --gripper sim`"
+    )
+    return [partial(PyusbTransport, one) for one in devices], missing

@@ -1,0 +1,1 @@
+"""The ways to a board: one thin interface, a file for each wire."""

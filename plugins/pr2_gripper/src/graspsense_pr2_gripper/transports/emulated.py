@@ -1,0 +1,114 @@
+"""A software board in this process, in lock-step with its reader or running by the clock."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import deque
+from typing import Final, final
+
+from graspsense_pr2_gripper.faults import Wire
+from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
+
+_GONE: Final = "the emulated cable was pulled"
+QUEUE: Final = 64
+"""Reports that wait for a reader who lags; the newer ones are lost, as behind a Linux hidraw node."""
+
+
+@final
+class LockStepTransport(Transport):
+    """A period of device time passes whenever a read finds no report waiting, and at no other time."""
+
+    def __init__(self, wire: Wire) -> None:
+        self._wire = wire
+        self._period_s = 1.0 / wire.firmware.identity.report_rate_hz
+        self._waiting: deque[bytes] = deque()
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return a waiting report, or let up to `timeout_s` of device time pass until there is one."""
+        waiting = self._waiting
+        if not waiting:
+            for _ in range(math.ceil(timeout_s / self._period_s - 1e-9)):
+                waiting.extend(self._wire.step())
+                if self._wire.unplugged:
+                    raise TransportGone(_GONE)
+                if waiting:
+                    break
+        return waiting.popleft() if waiting else b""
+
+    def write(self, report: bytes) -> None:
+        """Hand a command to the board."""
+        if self._wire.unplugged:
+            raise TransportGone(_GONE)
+        self._wire.output(report)
+
+    def feature(self, report_id: int) -> bytes:
+        """Return the board's feature report."""
+        return self._wire.firmware.feature()
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+
+@final
+class PacedTransport(Transport):
+    """The board runs in a thread of its own, on a grid of absolute times."""
+
+    def __init__(self, wire: Wire) -> None:
+        self._wire = wire
+        self._period_s = 1.0 / wire.firmware.identity.report_rate_hz
+        self._waiting: deque[bytes] = deque()
+        self._arrived = threading.Condition()
+        self._stop = False
+        self._failed = ""
+        self._thread = threading.Thread(target=self._run, name="emulated PR2 board", daemon=True)
+        self._thread.start()
+
+    def read(self, timeout_s: float) -> bytes:
+        """Wait for a report."""
+        with self._arrived:
+            self._arrived.wait_for(lambda: self._waiting or self._gone(), timeout_s)
+            if self._waiting:
+                return self._waiting.popleft()
+            if self._gone():
+                raise TransportGone(self._failed or _GONE)
+            return b""
+
+    def write(self, report: bytes) -> None:
+        """Hand a command to the board."""
+        with self._arrived:
+            if self._gone():
+                raise TransportGone(self._failed or _GONE)
+            self._wire.output(report)
+
+    def feature(self, report_id: int) -> bytes:
+        """Return the board's feature report."""
+        return self._wire.firmware.feature()
+
+    def close(self) -> None:
+        """Stop the board's thread."""
+        self._stop = True
+        self._thread.join()
+
+    def _gone(self) -> bool:
+        return bool(self._wire.unplugged or self._failed)
+
+    def _run(self) -> None:
+        due = time.monotonic()
+        try:
+            while not self._stop:
+                with self._arrived:
+                    for report in self._wire.step():
+                        if len(self._waiting) < QUEUE:
+                            self._waiting.append(report)
+                    self._arrived.notify()
+                due += self._period_s
+                wait = due - time.monotonic()
+                if wait > 0.0:
+                    time.sleep(wait)
+        except Exception as error:
+            # A body of anybody's may fail; to the host that is a device that went away.
+            with self._arrived:
+                self._failed = f"the emulated board failed: {type(error).__name__}: {error}"
+                self._arrived.notify()

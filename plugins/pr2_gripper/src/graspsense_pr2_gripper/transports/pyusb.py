@@ -1,0 +1,126 @@
+"""The same reports through libusb, for a device that has no HID driver or for finding out what one does."""
+
+from __future__ import annotations
+
+import errno
+import math
+from contextlib import suppress
+from importlib import import_module
+from typing import Any, Final, final
+
+from graspsense.plugin_api import PluginUnavailable
+from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.protocol import REPORT_SIZE
+from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
+
+WRITE_TIMEOUT_MS: Final = 50
+FEATURE_TIMEOUT_MS: Final = 500
+_INTERFACE: Final = 0
+_GET_REPORT: Final = (0xA1, 0x01)
+_FEATURE_TYPE: Final = 3
+
+
+def find(config: Pr2Config) -> list[Any]:
+    """Return the USB devices of the wanted numbers and serial.
+
+    A device whose serial cannot be read, for want of permission, is not left out: opening it says so. Raises
+    PluginUnavailable where pyusb or the library libusb-1.0 is missing.
+    """
+    try:
+        core, util = import_module("usb.core"), import_module("usb.util")
+        devices = core.find(find_all=True, idVendor=config.vendor_id, idProduct=config.product_id)
+        found = list(devices)
+    except ImportError as error:
+        raise PluginUnavailable(f"transport pyusb needs pyusb: {error}\n  try: pip install pyusb") from error
+    except core.NoBackendError as error:
+        raise PluginUnavailable(
+            "transport pyusb needs the system's library libusb-1.0, which pyusb does not find\n"
+            "  try: apt install libusb-1.0-0, or -o gripper.transport=hidraw"
+        ) from error
+    if not config.serial:
+        return found
+    wanted = []
+    for device in found:
+        try:
+            serial = util.get_string(device, device.iSerialNumber)
+        except (ValueError, core.USBError):
+            serial = None
+        if serial in (config.serial, None):
+            wanted.append(device)
+    return wanted
+
+
+@final
+class PyusbTransport(Transport):
+    """A USB device, its HID interface claimed. Raises usb.core.USBError where it cannot be claimed."""
+
+    def __init__(self, device: Any) -> None:
+        self._core, self._util = import_module("usb.core"), import_module("usb.util")
+        self._device = device
+        self._detached = False
+        # No reset: it would enumerate the device anew and kill every handle.
+        try:
+            if device.is_kernel_driver_active(_INTERFACE):
+                device.detach_kernel_driver(_INTERFACE)
+                self._detached = True
+        except NotImplementedError:
+            pass  # only Linux has a driver to detach
+        self._util.claim_interface(device, _INTERFACE)
+        endpoints = device.get_active_configuration()[(_INTERFACE, 0)].endpoints()
+        addresses = [endpoint.bEndpointAddress for endpoint in endpoints]
+        self._in = next((one for one in addresses if one & 0x80), 0x81)
+        self._out = next((one for one in addresses if not one & 0x80), 0x01)
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return the next report; a time-out is the normal idle case."""
+        try:
+            data: bytes = self._device.read(
+                self._in, REPORT_SIZE, max(1, math.ceil(timeout_s * 1e3))
+            ).tobytes()
+        except self._core.USBTimeoutError:
+            return b""
+        except self._core.USBError as error:
+            if error.errno == errno.EPIPE and self._unstalled():
+                return b""
+            raise TransportGone(f"reading: {error}") from error
+        return data
+
+    def write(self, report: bytes) -> None:
+        """Send a report. A device that does not take it in time counts as gone: nobody knows what it does."""
+        try:
+            written = self._device.write(self._out, report, WRITE_TIMEOUT_MS)
+        except self._core.USBError as error:
+            raise TransportGone(f"writing: {error}") from error
+        if written != len(report):
+            raise TransportGone(f"writing: {written} of {len(report)} bytes were taken")
+
+    def feature(self, report_id: int) -> bytes:
+        """Return a feature report through the control endpoint."""
+        try:
+            data: bytes = self._device.ctrl_transfer(
+                *_GET_REPORT, _FEATURE_TYPE << 8 | report_id, _INTERFACE, REPORT_SIZE, FEATURE_TIMEOUT_MS
+            ).tobytes()
+        except self._core.USBError as error:
+            raise TransportGone(f"feature report {report_id}: {error}") from error
+        return data
+
+    def close(self) -> None:
+        """Release the interface and give it back to the kernel, as far as the device still lets us."""
+        for give_back in (self._release, self._reattach):
+            with suppress(self._core.USBError, NotImplementedError):
+                give_back()
+        self._util.dispose_resources(self._device)
+
+    def _release(self) -> None:
+        self._util.release_interface(self._device, _INTERFACE)
+
+    def _reattach(self) -> None:
+        if self._detached:
+            self._device.attach_kernel_driver(_INTERFACE)
+
+    def _unstalled(self) -> bool:
+        try:
+            self._device.clear_halt(self._in)
+        except self._core.USBError:
+            return False
+        return True

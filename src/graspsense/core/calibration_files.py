@@ -1,0 +1,201 @@
+"""Calibrations kept as files: one folder a device serial, one file a kind, each with its version and its hash.
+
+    FOLDER/SERIAL/tare.json, load-cell.json, friction.json
+
+A file says which device it was made on; one that is used with another is an error, never a guess.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Mapping
+from datetime import datetime
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
+
+from attrs import frozen
+
+from graspsense.core.calibration import Cells, LoadTable
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.signals import CELLS
+
+FORMAT: Final = "graspsense-calibration"
+VERSION: Final = 1
+KINDS: Final = ("tare", "load-cell", "friction")
+UNCALIBRATED: Final = "none"
+"""The folder name that stands for: use no calibration."""
+
+
+@frozen(kw_only=True)
+class Calibration:
+    """One calibration of one device.
+
+    `device` is what the numbers depend on besides the serial: transmission, counts per newton. `made` is when, in
+    ISO 8601 with the zone. `sha256` is of the content, empty until it was written.
+    """
+
+    kind: str
+    serial: str
+    device: Mapping[str, Any]
+    made: str
+    data: Mapping[str, Any]
+    sha256: str = ""
+
+
+def default_folder() -> Path:
+    """Return where the user's calibrations are kept."""
+    base = os.environ.get("XDG_DATA_HOME") or str(Path.home() / ".local" / "share")
+    return Path(base) / "graspsense" / "calibration"
+
+
+def calibration_path(folder: str | Path, serial: str, kind: str) -> Path:
+    """Return the file of this kind for this serial. Raises ConfigError for a serial that names no folder."""
+    if not re.fullmatch(r"[\w.+-]+", serial) or serial.startswith("."):
+        raise ConfigError(
+            f"calibrations are kept by serial number, and {serial!r} is none: letters, digits and . + - _ are allowed"
+        )
+    return Path(folder or default_folder()) / serial / f"{kind}.json"
+
+
+def write_calibration(path: Path, calibration: Calibration) -> Calibration:
+    """Write the file, whole or not at all, and return the calibration with its hash. Raises OSError."""
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "kind": calibration.kind,
+        "serial": calibration.serial,
+        "device": dict(calibration.device),
+        "made": calibration.made,
+        "data": dict(calibration.data),
+    }
+    sha256 = _hash(content)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(path.name + ".part")
+    with part.open("w", encoding="utf-8") as file:
+        json.dump({**content, "sha256": sha256}, file, indent=1)
+        file.flush()
+        os.fsync(file.fileno())
+    part.replace(path)
+    return read_calibration(path)
+
+
+def read_calibration(path: Path) -> Calibration:
+    """Return the calibration in this file.
+
+    Raises DataDamaged where it is no calibration of ours, was changed since it was written, or holds numbers that
+    mean nothing; FileNotFoundError where there is none.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError) as error:
+        raise DataDamaged(f"{path} cannot be read as a calibration: {error}") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise DataDamaged(f"{path} is no calibration of graspsense: its format is not {FORMAT!r}")
+    if content.get("version") != VERSION:
+        raise DataDamaged(
+            f"{path} has version {content.get('version')!r}, and this graspsense reads version {VERSION}"
+        )
+    sha256 = content.pop("sha256", None)
+    if sha256 != _hash(content):
+        raise DataDamaged(
+            f"{path} was changed after it was written (its hash does not fit): calibrate again, or put back the "
+            "file as it was"
+        )
+    try:
+        calibration = Calibration(
+            kind=content["kind"],
+            serial=content["serial"],
+            device=content["device"],
+            made=content["made"],
+            data=content["data"],
+            sha256=sha256,
+        )
+        datetime.fromisoformat(calibration.made)
+        _READERS[calibration.kind](calibration)
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataDamaged(f"{path}: {type(error).__name__}: {error}. Calibrate again") from error
+    return calibration
+
+
+def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) -> dict[str, Calibration]:
+    """Return the calibrations of this device, by kind; none where `folder` is `none`.
+
+    Raises ConfigError, with the two choices there are, where a file was made on another device or on this one as it
+    no longer is; DataDamaged.
+    """
+    if folder == UNCALIBRATED:
+        return {}
+    found: dict[str, Calibration] = {}
+    for kind in KINDS:
+        path = calibration_path(folder, serial, kind)
+        try:
+            calibration = read_calibration(path)
+        except FileNotFoundError:
+            continue
+        misfits = [
+            f"{name} was {calibration.device.get(name)!r} and is {value!r}"
+            for name, value in device.items()
+            if calibration.device.get(name) != value
+        ]
+        if calibration.serial != serial:
+            misfits.insert(0, f"serial was {calibration.serial!r} and is {serial!r}")
+        if calibration.kind != kind:
+            misfits.insert(0, f"kind is {calibration.kind!r}")
+        if misfits:
+            raise ConfigError(
+                f"{path} does not fit this device: {'; '.join(misfits)}. There are two choices:\n"
+                f"  calibrate this device:  graspsense calibrate {kind} (it replaces the file with --replace)\n"
+                "  run without:            -o gripper.calibration=none"
+            )
+        found[kind] = calibration
+    return found
+
+
+def stored_zero(calibration: Calibration) -> tuple[Cells, Cells]:
+    """Return the zero of both fingertips that a tare holds."""
+    left, right = _numbers(calibration.data["left"]), _numbers(calibration.data["right"])
+    if len(left) != CELLS or len(right) != CELLS:
+        raise ValueError(f"a tare has {CELLS} cells a fingertip, not {len(left)} and {len(right)}")
+    return left, right
+
+
+def stored_tables(calibration: Calibration) -> tuple[LoadTable, LoadTable]:
+    """Return the load tables of the left and of the right pad."""
+    tables = []
+    for side in ("left", "right"):
+        pads, loads = _numbers(calibration.data[side]["pad_n"]), _numbers(calibration.data[side]["load_n"])
+        if len(pads) != len(loads) or len(pads) < 2:
+            raise ValueError(f"the {side} load table has {len(pads)} and {len(loads)} numbers")
+        if any(a >= b for a, b in pairwise(pads)) or list(loads) != sorted(loads):
+            raise ValueError(f"the {side} load table does not rise")
+        tables.append(LoadTable(pads, loads))
+    return tables[0], tables[1]
+
+
+def stored_friction(calibration: Calibration) -> tuple[Cells, Cells, Cells]:
+    """Return gaps (m) and the breakaway (N) at each, closing and opening."""
+    columns = [_numbers(calibration.data[name]) for name in ("gap_m", "closing_n", "opening_n")]
+    if len({len(column) for column in columns}) != 1:
+        raise ValueError("the friction table's columns differ in length")
+    return columns[0], columns[1], columns[2]
+
+
+_READERS: Final = {"tare": stored_zero, "load-cell": stored_tables, "friction": stored_friction}
+
+
+def _numbers(values: Any) -> Cells:
+    if not isinstance(values, list) or not all(
+        isinstance(v, int | float) and not isinstance(v, bool) and -1e9 < v < 1e9 for v in values
+    ):
+        raise ValueError("expected a list of numbers")
+    return tuple(float(value) for value in values)
+
+
+def _hash(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
