@@ -39,10 +39,10 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     laplace, binary_splits, rep_folds: see ``Options``.
     classes: the declared classes in order, absent ones included (their number enters J48's least branch weight); None
         takes those that occur, sorted.
-    nominal: the nominal columns, as a boolean mask, indices or names; None takes the categorical columns of a data frame.
+    nominal: the nominal columns, as a boolean mask, indices or names; None takes a data frame's categorical columns.
         A value that was not there when fitting is treated as missing.
     units: the units of the columns, as a mapping of names or a sequence, for paths and rules.
-    random_state: with ``reduced_error`` pruning, an integer or a RandomState shuffles the rows before some are held out;
+    random_state: with ``reduced_error`` pruning, an integer or a RandomState shuffles the rows before holding some out;
         None takes them in their order, as J48 does (whose seed does not decide which rows are held out).
     engine: ``numpy``, ``fast`` (needs numba) or ``auto``; the tree is the same.
 
@@ -128,12 +128,12 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         weights = (
             None if sample_weight is None else _check_sample_weight(sample_weight, values, dtype=np.float64)
         )
-        schema = Schema(tuple(self._attributes()), tuple(label.item() for label in classes))
+        schema = Schema(tuple(self._attributes()), tuple(classes.tolist()))
         table = make_table(schema, values, labels, weights)
         held_out = None if holdout is None else _row_indices(holdout, len(values))
         if held_out is None and options.pruning == "reduced_error" and self.random_state is not None:
             order = check_random_state(self.random_state).permutation(len(values))
-            held_out = order[hold_out(labels[order], min(options.rep_folds, len(order)))]
+            held_out = order[hold_out(labels[order], options.rep_folds)]
         self._take(fit(table, options, held_out, self.engine), classes)  # type: ignore[arg-type]
         return self
 

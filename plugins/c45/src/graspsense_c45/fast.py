@@ -28,7 +28,6 @@ def _compile(function: _Function) -> _Function:
     return cast(_Function, numba.njit(cache=True, error_model="numpy", nogil=True)(function))
 
 
-
 Number = Any
 """A number of the type the compiler finds."""
 

@@ -42,10 +42,6 @@ def fit(table: Table, options: Options = J48, held_out: Array | None = None, eng
         return finish(branches, problem.weight_bits, table.schema, options.laplace)
     with_class = np.flatnonzero(table.labels != MISSING_CLASS)
     if held_out is None:
-        if len(with_class) < options.rep_folds:
-            raise ValueError(
-                f"{len(with_class)} rows cannot be cut into rep_folds={options.rep_folds} folds; lower it"
-            )
         held_out = with_class[hold_out(table.labels[with_class], options.rep_folds)]
     grown_on = np.setdiff1d(with_class, held_out)
     if not grown_on.size or not table.weights[grown_on].any():

@@ -21,7 +21,7 @@ class Level(Protocol):
         """The best split of every attribute at every open node."""
 
     def thresholds(self, attribute: Array) -> NDArray[np.float64]:
-        """The midpoints of the chosen numeric attributes, one an open node; NaN where none or a nominal one is chosen."""
+        """The midpoints of the chosen attributes, one an open node; NaN where none or a nominal one is chosen."""
 
     def split(self, attribute: Array, value: Array, n_sons: Array) -> NDArray[np.int64]:
         """Give the rows to the sons of the nodes; returns the sons' counts (sons x classes), in order."""

@@ -66,7 +66,7 @@ def prune_reduced_error(
 
 
 def prune_pessimistic(tree: Branches, problem: Problem, leaf_of_row: NDArray[np.int32]) -> None:
-    """Replace subtrees by leaves or by their heaviest branch where the estimated errors do not grow by more than 0.1."""
+    """Replace subtrees by leaves or by their heaviest branch where estimated errors grow by no more than 0.1."""
     pruner = _Pruner(tree, problem, leaf_of_row)
     root = np.zeros(1, dtype=np.int64)
     rows = np.arange(len(problem.labels))

@@ -1,7 +1,7 @@
 """The level-wise layout for rows of any weight, with missing values: entries that may be shared out among sons.
 
-An entry is a row, or a part of one, at one node. Every numeric attribute keeps the entries that know its value, sorted by
-(node, value).
+An entry is a row, or a part of one, at one node. Every numeric attribute keeps the entries that know its value,
+sorted by (node, value).
 """
 
 from __future__ import annotations

@@ -74,8 +74,12 @@ def test_block(n_rows: int, n_folds: int, fold: int) -> range:
 
 
 def hold_out(labels: ArrayLike, n_folds: int) -> NDArray[np.int64]:
-    """The rows that J48 -R -N n_folds holds out: the last stratified fold; the order of the rows decides, no seed."""
-    order = stratify(np.asarray(labels).tolist(), n_folds)
+    """The rows that J48 -R -N n_folds holds out: the last stratified fold; the order of the rows decides, no seed.
+
+    Raises ValueError where there are fewer rows than folds.
+    """
+    given = _cuttable(labels, n_folds)
+    order = stratify(given, n_folds)
     block = test_block(len(order), n_folds, n_folds - 1)
     return np.array([order[place] for place in block], dtype=np.int64)
 
@@ -85,11 +89,7 @@ def stratified_folds(labels: ArrayLike, n_folds: int = 10, seed: int = 1) -> lis
 
     labels: one hashable label a row. Raises ValueError where there are fewer rows than folds.
     """
-    given = np.asarray(labels).tolist()
-    if len(given) < n_folds or n_folds < 2:
-        raise ValueError(
-            f"{len(given)} rows cannot be cut into {n_folds} folds; allowed: 2 up to the number of rows"
-        )
+    given = _cuttable(labels, n_folds)
     random = JavaRandom(seed)
     order = list(range(len(given)))
     random.shuffle(order)
@@ -102,3 +102,12 @@ def stratified_folds(labels: ArrayLike, n_folds: int = 10, seed: int = 1) -> lis
         test = order[block.start : block.stop]
         folds.append(Fold(np.array(train, dtype=np.int64), np.array(test, dtype=np.int64)))
     return folds
+
+
+def _cuttable(labels: ArrayLike, n_folds: int) -> list[int]:
+    given: list[int] = np.asarray(labels).tolist()
+    if not 2 <= n_folds <= len(given):
+        raise ValueError(
+            f"n_samples={len(given)} rows cannot be cut into {n_folds} folds; allowed: 2 up to n_samples"
+        )
+    return given
