@@ -111,7 +111,9 @@ def fail():
     raise ZeroDivisionError("float division by zero")
 
 
-@pytest.mark.parametrize(("act", "reason"), [(interrupt, "interrupted"), (fail, "ZeroDivisionError: float div")])
+@pytest.mark.parametrize(
+    ("act", "reason"), [(interrupt, "interrupted"), (fail, "ZeroDivisionError: float div")]
+)
 @pytest.mark.parametrize("after", [1, 900, 1100])
 def test_whatever_stops_the_loop_the_fingers_are_opened(act, reason, after):
     gripper = Scripted(squeezing, bottle)
@@ -216,7 +218,12 @@ def recorded(length):
 
 @pytest.mark.parametrize(
     ("length", "outcome"),
-    [(0, Outcome.NOTHING_THERE), (500, Outcome.NOTHING_THERE), (1200, Outcome.NEVER_STEADY), (3000, Outcome.STEADY)],
+    [
+        (0, Outcome.NOTHING_THERE),
+        (500, Outcome.NOTHING_THERE),
+        (1200, Outcome.NEVER_STEADY),
+        (3000, Outcome.STEADY),
+    ],
 )
 def test_a_recording_ends_as_what_it_showed(length, outcome):
     grasp = run_grasp(recorded(length), HYBRID, RUN)

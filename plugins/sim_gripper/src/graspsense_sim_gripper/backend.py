@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any
 
 from graspsense.plugin_api import (
     CELLS,
@@ -22,8 +22,6 @@ from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.sensing import felt_again, sense
 from graspsense_sim_gripper.setting import CELL_OFFSET, device_info, laws_of, set_scene
 
-IMAGES_A_BLOCK: Final = 64
-
 
 class SimBackend(BatchBackend[SimConfig]):
     """A PR2 gripper, its fingertips and an object, as a model. Everything it says is simulated."""
@@ -36,6 +34,7 @@ class SimBackend(BatchBackend[SimConfig]):
         self._ticks = 0
         zero = (CELL_OFFSET[0],) * CELLS
         self._zero: tuple[Sequence[float], Sequence[float]] = (zero, zero)
+        self._blocks = setting.noise()
         self._noise: list[list[float]] = []
         self._images: list[tuple[list[float], list[float]]] = []
         self._pads = NO_PADS
@@ -97,8 +96,10 @@ class SimBackend(BatchBackend[SimConfig]):
         }
 
     def _draw(self) -> None:
-        self._noise.extend(self._setting.noise(IMAGES_A_BLOCK).tolist())
-        self._images.extend(([0.0] * CELLS, [0.0] * CELLS) for _ in range(IMAGES_A_BLOCK))
+        self._noise.extend(next(self._blocks).tolist())
+        self._images.extend(
+            ([0.0] * CELLS, [0.0] * CELLS) for _ in range(len(self._noise) - len(self._images))
+        )
 
     def run_many(
         self, controller: Controller[Any], scenes: Sequence[str], seeds: Sequence[int]

@@ -6,6 +6,7 @@ import os
 import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import repeat
 from typing import Any, Final
 
 import numpy as np
@@ -53,8 +54,8 @@ def run_many(
 ) -> list[Done]:
     """Grasp each scene with its seed and return what came of each in that order, the same for any number of cores.
 
-    `compiled` forces or forbids compiling; by default a composition is compiled from `WORTH_COMPILING` grasps
-    on. Where a controller or a term cannot be compiled the plain loop runs, and a warning says why.
+    `compiled` asks for compiling or forbids it; by default a composition is compiled from `WORTH_COMPILING`
+    grasps on. Where a controller or a term cannot be compiled the plain loop runs, and a warning says why.
     """
     if len(scenes) != len(seeds):
         raise ValueError(f"{len(scenes)} scenes and {len(seeds)} seeds: give one seed a scene")
@@ -71,45 +72,38 @@ def run_many(
 
     done: list[Done | None] = [None] * len(scenes)
     for kinds, members in groups.items():
-        loop = kernel.grasp_of(laws_of(kinds), step)
-        wanted = len(members) >= WORTH_COMPILING if compiled is None else compiled
-        fast = _compiled(loop, wanted, must=compiled is True)
+        plain = kernel.grasp_of(laws_of(kinds), step)
 
-        def one(i: int, loop: Callable[..., Any] = fast or loop, on_arrays: bool = fast is not None) -> None:
+        def one(i: int, loop: Callable[..., Any], on_arrays: bool) -> None:
             done[i] = _grasp(loop, on_arrays, settings[i], law_params, law_state)
 
-        if fast is None:
-            for i in members:
-                one(i)
-        else:
-            # The first call compiles; the others then run beside each other without the interpreter's lock.
-            one(members[0])
-            with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-                list(pool.map(one, members[1:]))
+        if compiled or (compiled is None and len(members) >= WORTH_COMPILING):
+            try:
+                fast = kernel.compiled(plain, _MEMO)
+                # The first call compiles; the others then run beside each other without the interpreter's lock.
+                with kernel.refusals():
+                    one(members[0], fast, True)
+            except kernel.NotCompilable as error:
+                warnings.warn(
+                    f"these grasps run in plain Python, about a hundred times slower: {error}", stacklevel=2
+                )
+            else:
+                with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+                    list(pool.map(one, members[1:], repeat(fast), repeat(True)))
+                continue
+        for i in members:
+            one(i, plain, False)
     return [one for one in done if one is not None]
-
-
-def _compiled(loop: Callable[..., Any], wanted: bool, must: bool) -> Callable[..., Any] | None:
-    if not wanted:
-        return None
-    try:
-        return kernel.compiled(loop, _MEMO)
-    except kernel.NotCompilable as error:
-        if must:
-            raise
-        warnings.warn(
-            f"these grasps run in plain Python, about a hundred times slower: {error}", stacklevel=3
-        )
-        return None
 
 
 def _grasp(
     loop: Callable[..., Any], on_arrays: bool, setting: Setting, law_params: Any, law_state: Any
 ) -> Done:
-    room = 1
+    room, blocks, noise = 1, setting.noise(), np.zeros((0, 2 * CELLS))
     while True:
         ticks, images = TICKS * room, IMAGES * room
-        noise = setting.noise(images)
+        while len(noise) < images:
+            noise = np.concatenate([noise, next(blocks)])
         cells = np.full((images, 2, CELLS), np.nan)
         times, columns = np.zeros(images), np.zeros((ticks, len(COLUMNS)))
         zeros = np.full((2, CELLS), CELL_OFFSET[0])

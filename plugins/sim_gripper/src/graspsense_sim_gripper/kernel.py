@@ -14,9 +14,11 @@ from __future__ import annotations
 import functools
 import hashlib
 import os
+import re
 import sys
 import types
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -174,6 +176,22 @@ def grasp_of(laws: Sequence[Law], step: Callable[..., Any]) -> Callable[..., Any
 
 class NotCompilable(Exception):
     """A function outside the subset that can be compiled; the text names it and the reason."""
+
+
+@contextmanager
+def refusals() -> Iterator[None]:
+    """Turn what numba refuses in here into NotCompilable, with the line that it names."""
+    from numba.core.errors import NumbaError, UnsupportedBytecodeError
+
+    try:
+        yield
+    except (NumbaError, UnsupportedBytecodeError) as error:
+        places = re.findall(r'(?:File "|Raised from )([^"]+?)(?:", line | \()(\d+)', str(error))
+        where = ":".join(places[-1]) if places else "a place it does not name"
+        reason = next(
+            (line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__
+        )
+        raise NotCompilable(f"the compiler refuses {where}: {reason}") from error
 
 
 def compiled(function: Callable[..., Any], memo: dict[str, Any]) -> Callable[..., Any]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
@@ -33,6 +33,7 @@ OPENING_N: Final = -20.0
 TARE_IMAGES: Final = 6
 CELL_OFFSET: Final = (3300.0, 250.0)
 """Mean and spread of an unloaded cell's counts: 2900 to 3800 are reported."""
+IMAGES_A_BLOCK: Final = 64
 RESOLVED: Final = 0.05
 """Natural frequency times step stays below this: peaks are then good to better than 1 %."""
 STIFFEST_N_M: Final = 1e9
@@ -64,11 +65,15 @@ class Setting:
     sensor: SensorParams
     sensed: SensorState
     dt_s: float
-    rng: np.random.Generator
+    drawn: Mapping[str, Any]
+    """State of the seed's generator after all of the above was drawn."""
 
-    def noise(self, images: int) -> NDArray[np.float64]:
-        """Return the next `images` rows of 44 standard normal numbers, the same however they are asked for."""
-        return self.rng.standard_normal((images, 2 * CELLS))
+    def noise(self) -> Iterator[NDArray[np.float64]]:
+        """Yield blocks of rows of 44 standard normal numbers, one row an image; the same at every call."""
+        rng = np.random.default_rng()
+        rng.bit_generator.state = self.drawn
+        while True:
+            yield rng.standard_normal((IMAGES_A_BLOCK, 2 * CELLS))
 
 
 def set_scene(config: SimConfig, scene: str, seed: int) -> Setting:
@@ -87,7 +92,7 @@ def set_scene(config: SimConfig, scene: str, seed: int) -> Setting:
         sensor=sensor,
         sensed=first_sensed(sensor, body),
         dt_s=1.0 / config.rate_hz,
-        rng=rng,
+        drawn=rng.bit_generator.state,
     )
 
 

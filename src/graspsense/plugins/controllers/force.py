@@ -32,6 +32,8 @@ class ForceLoopConfig:
     """`open`: a constant effort, as in the authors' code. `closed`: an integral loop on the pads' mean force."""
     force_gain_1_s: float = field(default=4.0, validator=ge(0.0))
     """Closed loop only: effort per second per newton of error; slow beside a cell image every 41 ms."""
+    force_tolerance_n: float = field(default=0.3, validator=gt(0.0))
+    """Closed loop only: steady needs the mean force this near the one asked for (as in pr2_gripper_sensor)."""
     effort_limit_n: float = field(default=100.0, validator=gt(0.0))
     """Closed loop only: the effort stays within 0 and this."""
 
@@ -69,6 +71,13 @@ def squeezing_effort(loop: ForceLoop, effort_n: float, frame: Frame) -> float:
     return min(max(effort_n, 0.0), loop.effort_limit_n)
 
 
+def settling(config: ForceLoopConfig) -> dict[str, float]:
+    """Return what `supervision` needs to know of the force: nothing where the loop is open."""
+    if config.loop == "open":
+        return {}
+    return {"target_force_n": config.probing_force_n, "force_tolerance_n": config.force_tolerance_n}
+
+
 class ForceParams(NamedTuple):
     """Numbers of the law."""
 
@@ -101,7 +110,9 @@ class ForceController(Controller[ForceConfig]):
 
     def params(self) -> ForceParams:
         """Return the law's numbers."""
-        return ForceParams(loop=force_loop(self.config), supervision=supervision(self.config, 0.0))
+        return ForceParams(
+            loop=force_loop(self.config), supervision=supervision(self.config, **settling(self.config))
+        )
 
     def init(self) -> ForceState:
         """Return the state before the first tick."""

@@ -13,7 +13,13 @@ from attrs import field, frozen
 from attrs.validators import ge
 
 from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, Pads
-from graspsense.plugins.controllers.force import ForceLoop, ForceLoopConfig, force_loop, squeezing_effort
+from graspsense.plugins.controllers.force import (
+    ForceLoop,
+    ForceLoopConfig,
+    force_loop,
+    settling,
+    squeezing_effort,
+)
 from graspsense.plugins.controllers.supervision import (
     Progress,
     Supervision,
@@ -89,7 +95,9 @@ class HybridController(Controller[HybridConfig]):
         return HybridParams(
             velocity=velocity_loop(self.config),
             force=force_loop(self.config),
-            supervision=supervision(self.config, self.config.closing_speed_m_s),
+            supervision=supervision(
+                self.config, slowest_m_s=self.config.closing_speed_m_s, **settling(self.config)
+            ),
             ramp_s=float(self.config.ramp_s),
         )
 

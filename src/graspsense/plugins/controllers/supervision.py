@@ -7,6 +7,7 @@ result codes of `GraspClosedLoop.srv`.
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 from attrs import field, frozen
@@ -66,7 +67,11 @@ class SupervisionConfig:
 
 
 class Supervision(NamedTuple):
-    """The numbers of `SupervisionConfig`, and the slowest speed that the time-out must allow for."""
+    """The numbers of `SupervisionConfig`, and what the law itself adds to them.
+
+    `slowest_m_s` is the closing speed that the time-out must allow for (0: none). A law that controls the force
+    is steady only when the mean force is within `force_tolerance_n` of `target_force_n`; for others that is inf.
+    """
 
     contact_force_n: float
     rest_speed_m_s: float
@@ -80,6 +85,8 @@ class Supervision(NamedTuple):
     crush_travel_m: float
     slip_time_s: float
     slowest_m_s: float
+    target_force_n: float
+    force_tolerance_n: float
 
 
 class Progress(NamedTuple):
@@ -98,8 +105,14 @@ class Progress(NamedTuple):
     """When a pad was last felt after contact."""
 
 
-def supervision(config: SupervisionConfig, slowest_m_s: float) -> Supervision:
-    """Return the numbers of this config; `slowest_m_s` stretches the move time-out (0: it does not)."""
+def supervision(
+    config: SupervisionConfig,
+    *,
+    slowest_m_s: float = 0.0,
+    target_force_n: float = 0.0,
+    force_tolerance_n: float = inf,
+) -> Supervision:
+    """Return the numbers of this config, with what the law adds."""
     return Supervision(
         contact_force_n=float(config.contact_force_n),
         rest_speed_m_s=float(config.rest_speed_m_s),
@@ -113,6 +126,8 @@ def supervision(config: SupervisionConfig, slowest_m_s: float) -> Supervision:
         crush_travel_m=float(config.crush_travel_m),
         slip_time_s=float(config.slip_time_s),
         slowest_m_s=float(slowest_m_s),
+        target_force_n=float(target_force_n),
+        force_tolerance_n=float(force_tolerance_n),
     )
 
 
@@ -176,7 +191,9 @@ def _squeezing(params: Supervision, now: Progress, frame: Frame) -> Progress:
         outcome = CRUSHED
     elif t - felt_t > params.slip_time_s and gap < peak_gap:
         outcome = SLIPPED
-    elif at_rest(still, t, params.rest_window_s):
+    elif at_rest(still, t, params.rest_window_s) and (
+        abs(force - params.target_force_n) <= params.force_tolerance_n
+    ):
         phase, outcome = HOLD, STEADY
     elif t > now.deadline_s:
         outcome = NEVER_STEADY

@@ -112,7 +112,7 @@ class VelocityController(Controller[VelocityConfig]):
         """Return the law's numbers."""
         return VelocityParams(
             loop=velocity_loop(self.config),
-            supervision=supervision(self.config, self.config.closing_speed_m_s),
+            supervision=supervision(self.config, slowest_m_s=self.config.closing_speed_m_s),
         )
 
     def init(self) -> VelocityState:

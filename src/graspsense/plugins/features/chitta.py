@@ -92,7 +92,9 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         if delta_t > 0.0:
             rates = ((p_steady - p_first) / delta_t, (f_steady - f_first) / delta_t)
         else:
-            reasons = missing(RATES, "delta_t is zero: at rest from the first contact on, so there is no rate")
+            reasons = missing(
+                RATES, "delta_t is zero: at rest from the first contact on, so there is no rate"
+            )
         if not math.isfinite(f_steady):
             f_steady, rates = math.nan, (rates[0], math.nan)
             reasons |= missing(("f_steady", "df_dt"), "the pads gave no number when the fingers were at rest")
@@ -127,6 +129,8 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         config = self.config
         times, gaps = trace.t_s[first:].tolist(), trace.gap_m[first:].tolist()
         phases = trace.phase[first:].tolist()
+        # A controller may wait for more than rest (for its force); where it said steady, that is the rest meant.
+        said = HOLD in phases
         still, since = Stillness(times[0], gaps[0]), 0
         for i, (t, gap, phase) in enumerate(zip(times, gaps, phases, strict=True)):
             if phase > HOLD:
@@ -134,7 +138,7 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
             now = watch(still, t, gap, config.rest_speed_m_s, config.rest_window_s)
             if now is not still:
                 still, since = now, i
-            if at_rest(still, t, config.rest_window_s):
+            if at_rest(still, t, config.rest_window_s) and (phase == HOLD or not said):
                 return first + since, first + i
         return None
 

@@ -1,0 +1,77 @@
+"""How much faster than real time one plain grasp runs in a warm process: plant, sensing, law, guard, trace, features.
+
+    python benchmarks/grasp.py [--json]
+
+The grasp is that of `graspsense run --object block` (about 7 s on the gripper's clock). Processor time of this
+process, the median of several grasps; the compiled loop of the same grasp stands beside it where numba is there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import statistics
+import time
+from datetime import date
+from importlib.metadata import version
+from importlib.util import find_spec
+
+from graspsense import load_pipeline
+from graspsense.plugin_api import create
+
+REPEATS = 9
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--json", action="store_true")
+    as_json = parser.parse_args().json
+
+    pipeline = load_pipeline("default", options=["gripper.object=block", "classifier.type=none"])
+    pipeline.grasp()
+    taken = []
+    for _ in range(REPEATS):
+        began = time.process_time()
+        trial = pipeline.grasp()
+        taken.append(time.process_time() - began)
+    seconds, simulated = statistics.median(taken), trial.seconds_simulated or 0.0
+    result = {
+        "date": date.today().isoformat(),
+        "machine": f"{platform.processor() or platform.machine()}, {platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        "graspsense": version("graspsense"),
+        "numpy": version("numpy"),
+        "outcome": trial.outcome.words,
+        "seconds_simulated": simulated,
+        "seconds_cpu": seconds,
+        "seconds_cpu_min": min(taken),
+        "seconds_cpu_max": max(taken),
+        "realtime_factor": simulated / seconds,
+        "us_per_tick": 1e6 * seconds / (simulated * 1000.0),
+        "realtime_factor_compiled": compiled_factor(simulated),
+    }
+    if as_json:
+        print(json.dumps(result, indent=2))
+        return
+    for key, value in result.items():
+        print(f"{key:<26}{value if not isinstance(value, float) else round(value, 4)}")
+
+
+def compiled_factor(simulated: float) -> float | None:
+    """Return the same for the compiled loop, trace included; None without numba."""
+    if find_spec("numba") is None:
+        return None
+    gripper = create("sensor-backend", "sim", object="block")
+    controller = create("controller", "hybrid")
+    many = 100
+    gripper.run_many(controller, ["block"] * many, range(many))
+    began = time.process_time()
+    gripper.run_many(controller, ["block"] * many, range(many))
+    return many * simulated / (time.process_time() - began)
+
+
+if __name__ == "__main__":
+    main()

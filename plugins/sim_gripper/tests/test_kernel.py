@@ -1,0 +1,243 @@
+"""One law, three ways to run it: the runner, the plain loop and the compiled loop agree to the bit."""
+
+import os
+import subprocess
+import sys
+import textwrap
+import warnings
+
+import numpy as np
+import pytest
+from attrs import evolve, fields
+
+from graspsense.core.runner import RunConfig, run_grasp
+from graspsense.plugin_api import EFFORT, Command, Trace, bind, create
+from graspsense_sim_gripper import kernel
+from graspsense_sim_gripper.backend import SimBackend
+from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.terms import Elastic, Loss, NoState, elastic, loss
+
+numba = pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+
+HYBRID = create("controller", "hybrid")
+
+
+def columns(trace):
+    return {f.name: np.asarray(getattr(trace, f.name), float) for f in fields(Trace) if f.name != "units"}
+
+
+def assert_same(one, other):
+    for name, column in columns(one).items():
+        np.testing.assert_allclose(columns(other)[name], column, rtol=1e-9, atol=1e-15, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("scene", "sensor"),
+    [
+        ("can:empty_open", "pads"),
+        ("can:empty_open", "ideal"),
+        pytest.param("odwalla:full_closed", "pads", marks=pytest.mark.slow),
+        pytest.param("none", "pads", marks=pytest.mark.slow),
+    ],
+)
+def test_runner_plain_loop_and_compiled_loop_give_one_trace(scene, sensor):
+    config = SimConfig(object=scene, sensor=sensor)
+    run = run_grasp(SimBackend(config), HYBRID, RunConfig(seed=5))
+    plain = run_many(config, HYBRID, [scene], [5], compiled=False)[0]
+    fast = run_many(config, HYBRID, [scene], [5], compiled=True)[0]
+    assert run.outcome == plain.outcome == fast.outcome
+    assert_same(run.trace, plain.trace)
+    assert_same(run.trace, fast.trace)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", ["velocity", "force", "hybrid"])
+def test_every_object_and_law_gives_one_trace_plain_and_compiled(controller):
+    from graspsense_sim_gripper.scene import catalogue
+
+    law, names = create("controller", controller), sorted(catalogue())
+    fast = run_many(SimConfig(), law, names, range(len(names)), compiled=True)
+    for seed, name in enumerate(names):
+        run = run_grasp(SimBackend(evolve(SimConfig(), object=name)), law, RunConfig(seed=seed))
+        assert (run.outcome, name) == (fast[seed].outcome, name)
+        assert_same(run.trace, fast[seed].trace)
+
+
+def test_the_backend_gives_the_same_whatever_stands_beside_a_grasp():
+    backend = SimBackend(SimConfig())
+    alone = backend.run_many(HYBRID, ["toy"], [3])[0]
+    among = backend.run_many(HYBRID, ["block", "toy", "block"], [1, 3, 3])[1]
+    assert_same(alone, among)
+
+
+@pytest.mark.slow
+def test_a_grasp_longer_than_the_room_made_for_it_is_whole():
+    # 3 mm/s: 30 s of approach, more than the loop first makes room for.
+    slow = create("controller", "hybrid", closing_speed_m_s=0.003)
+    config = SimConfig(object="block")
+    run = run_grasp(SimBackend(config), slow, RunConfig(seed=2))
+    assert run.outcome.name == "STEADY"
+    assert_same(run.trace, run_many(config, slow, ["block"], [2], compiled=True)[0].trace)
+
+
+def test_as_many_seeds_as_scenes():
+    with pytest.raises(ValueError, match="2 scenes and 1 seeds"):
+        run_many(SimConfig(), HYBRID, ["block", "toy"], [1])
+
+
+# ------------------------------------------------------------------------- a law that cannot be compiled
+
+
+def plain_only(params, state, frame, pads):
+    # An f-string of a float is outside the compiler's subset.
+    label = f"{frame.gap_m:.3f}"
+    command, state = type(HYBRID).step(params, state, frame, pads)
+    return Command(
+        EFFORT, command.value + 0.0 * len(label), command.effort_limit_n, command.speed_limit_m_s
+    ), state
+
+
+def test_a_law_that_cannot_be_compiled_runs_plain_and_the_warning_says_why():
+    class Odd(type(HYBRID)):
+        step = staticmethod(plain_only)
+
+    law = Odd(HYBRID.config)
+    seeds = range(2)
+    with pytest.warns(UserWarning, match=r"plain Python.*test_kernel.py:\d+"):
+        done = run_many(SimConfig(), law, ["toy"] * 2, seeds, compiled=True)
+    expected = run_many(SimConfig(), HYBRID, ["toy"] * 2, seeds, compiled=False)
+    for one, other in zip(done, expected, strict=True):
+        assert_same(other.trace, one.trace)
+
+
+def test_closures_and_recursion_are_refused_by_name():
+    factor = 2.0
+
+    def closing_over(x):
+        return factor * x
+
+    with pytest.raises(kernel.NotCompilable, match=r"closing_over is a closure over factor"):
+        kernel.compiled(closing_over, {})
+    with pytest.raises(kernel.NotCompilable, match="calls itself"):
+        kernel.compiled(_countdown, {})
+    with pytest.raises(kernel.NotCompilable, match="no plain function"):
+        kernel.compiled(len, {})
+
+
+def _countdown(n):
+    return 0 if n == 0 else _countdown(n - 1)
+
+
+# ------------------------------------------------------------------------- fingerprints and the cache on disk
+
+
+def test_a_fingerprint_changes_with_code_constants_parts_and_fields():
+    one, two = kernel.sum_of([elastic, loss]), kernel.sum_of([loss, elastic])
+    assert kernel.fingerprint(one) == kernel.fingerprint(kernel.sum_of([elastic, loss]))
+    assert kernel.fingerprint(one) != kernel.fingerprint(two)
+    assert kernel.fingerprint(bind(_scaled, FACTOR=2.0)) != kernel.fingerprint(bind(_scaled, FACTOR=3.0))
+    assert kernel.fingerprint(bind(_scaled, helper=_twice)) != kernel.fingerprint(
+        bind(_scaled, helper=_thrice)
+    )
+
+
+FACTOR = 2.0
+
+
+def _twice(x):
+    return 2.0 * x
+
+
+def _thrice(x):
+    return 3.0 * x
+
+
+helper = _twice
+
+
+def _scaled(x):
+    return FACTOR * helper(x)
+
+
+PROGRAM = """
+    import sys
+    from graspsense_sim_gripper import kernel
+    from graspsense_sim_gripper.terms import Elastic, NoState, Rigid, RigidState, elastic
+    from graspsense.plugin_api import bind
+
+    def soft(p, s, d0, d1, h):
+        return 1.0 * p.k1_n_m * d1, s
+
+    def hard(p, s, d0, d1, h):
+        return 5.0 * p.k1_n_m * d1, s
+
+    for name in sys.argv[1:]:
+        law = kernel.compiled(kernel.sum_of([{{"soft": soft, "hard": hard}}[name]]), {{}})
+        print(name, law((Elastic(100.0, 0.0),), (NoState(),), 0.0, 1.0, 1.0)[0])
+"""
+
+
+def test_compositions_compiled_in_two_processes_stay_themselves_in_a_third(tmp_path):
+    # Same functions, same types, different parts: from disk, one once ran the other's code without a word.
+    program = tmp_path / "compose.py"
+    program.write_text(textwrap.dedent(PROGRAM).replace("{{", "{").replace("}}", "}"))
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    def run(*names):
+        done = subprocess.run(
+            [sys.executable, str(program), *names],
+            capture_output=True,
+            text=True,
+            env=environment,
+            check=True,
+        )
+        return done.stdout.splitlines()
+
+    assert run("soft") == ["soft 100.0"]
+    assert run("hard") == ["hard 500.0"]
+    assert run("soft", "hard") == ["soft 100.0", "hard 500.0"]
+
+
+@pytest.mark.slow
+def test_an_edited_helper_is_noticed(tmp_path):
+    (tmp_path / "laws.py").write_text("def helper(x):\n    return 2.0 * x\n")
+    (tmp_path / "main.py").write_text(
+        "from laws import helper\n"
+        "from graspsense_sim_gripper import kernel\n"
+        "def law(x):\n    return helper(x)\n"
+        "print(kernel.compiled(law, {})(1.0))\n"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+
+    def run():
+        command = [sys.executable, str(tmp_path / "main.py")]
+        return subprocess.run(command, capture_output=True, text=True, env=environment, check=True).stdout
+
+    assert run() == "2.0\n"
+    (tmp_path / "laws.py").write_text("def helper(x):\n    return 3.0 * x\n")
+    assert run() == "3.0\n"
+
+
+def test_a_sum_of_many_terms_is_the_sum_of_each():
+    laws = [elastic, loss, elastic, loss, elastic]
+    params = (Elastic(1.0, 0.0), Loss(10.0), Elastic(100.0, 0.0), Loss(1e3), Elastic(1e4, 0.0))
+    states = (NoState(),) * 5
+    force, after = kernel.sum_of(laws)(params, states, 0.0, 1.0, 1.0)
+    assert force == pytest.approx(11111.0)
+    assert after == states
+    assert kernel.compiled(kernel.sum_of(laws), {})(params, states, 0.0, 1.0, 1.0)[0] == force
+    assert kernel.sum_of([])((), (), 0.0, 1.0, 1.0) == (0.0, ())
+
+
+def test_bind_refuses_what_it_cannot_bind():
+    with pytest.raises(TypeError, match="names no part"):
+        bind(_twice, nobody=1)
+    with pytest.raises(TypeError, match="no plain function"):
+        bind(len)
+
+
+def test_compiling_raises_no_warning():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        kernel.compiled(_scaled, {})(1.0)

@@ -1,0 +1,141 @@
+"""The catalogue is complete, strict, and says why for every figure; instances vary as it says."""
+
+import math
+import tomllib
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+from graspsense.plugin_api import ConfigError, UnknownName
+from graspsense_sim_gripper import scene
+from graspsense_sim_gripper.scene import catalogue, cell_weights, find, instance_of
+
+
+def test_the_four_containers_have_their_states_and_the_rest_is_there():
+    states = ["full_closed", "full_open", "empty_closed", "empty_open"]
+    for name in ("odwalla", "naked", "water"):
+        assert {f"{name}:{state}" for state in states} <= set(catalogue())
+    # A can is never closed and empty (section III.E).
+    assert {n for n in catalogue() if n.startswith("can:")} == {
+        "can:full_closed",
+        "can:full_open",
+        "can:empty_open",
+    }
+    assert {"block", "toy", "egg"} <= set(catalogue())
+
+
+def test_every_figure_has_its_reason():
+    text = files("graspsense_sim_gripper").joinpath("catalogue.toml").read_text(encoding="utf-8")
+
+    def figures(table):
+        for value in table.values():
+            if isinstance(value, dict):
+                if "value" in value:
+                    yield value
+                else:
+                    yield from figures(value)
+            elif isinstance(value, list):
+                for one in value:
+                    yield from figures(one)
+
+    found = list(figures(tomllib.loads(text)))
+    assert len(found) > 100
+    assert all(len(figure["reason"]) >= 5 for figure in found)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("odwala:full_open", r"no object named 'odwala'.*Did you mean 'odwalla'\?"),
+        ("odwalla", r"'odwalla' needs a state: full_closed, full_open, empty_closed, empty_open"),
+        ("odwalla:ful_open", r"no state 'ful_open'.*Did you mean 'full_open'\?"),
+        ("can:empty_closed", r"'can' has no state 'empty_closed'. Known: full_closed, full_open, empty_open"),
+        ("block:open", r"'block' has no states"),
+        ("", r"no object named ''"),
+    ],
+)
+def test_an_unknown_object_or_state_is_answered_with_what_there_is(name, says):
+    with pytest.raises(UnknownName, match=says):
+        find(name)
+
+
+def test_the_same_seed_is_the_same_bottle_and_another_is_another():
+    spec = find("odwalla:full_open")
+    one, again, other = (instance_of(spec, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    assert one == again
+    assert one.terms != other.terms
+
+
+def test_without_a_generator_it_is_the_catalogues_own_figures():
+    spec = find("toy")
+    instance = instance_of(spec, None)
+    assert (instance.width_m, instance.offset_m, instance.share) == (spec.width_m, 0.0, spec.share)
+    assert dict(spec.terms)["elastic"]["k1_n_m"] == instance.terms[0].k1_n_m
+
+
+def test_instances_spread_as_the_catalogue_says():
+    spec = find("water:empty_open")
+    many = [instance_of(spec, np.random.default_rng(seed)) for seed in range(2000)]
+    stiffness = np.log([i.terms[0].k1_n_m / 1300.0 for i in many])
+    assert np.std(stiffness) == pytest.approx(spec.stiffness_spread, rel=0.06)
+    assert np.mean(stiffness) == pytest.approx(0.0, abs=0.03)
+    assert np.std([i.width_m for i in many]) == pytest.approx(spec.width_spread_m, rel=0.1)
+    assert all(0.0 < i.share <= 1.0 for i in many)
+
+
+@pytest.mark.parametrize("patch", ["line", "face", "point"])
+def test_the_weights_of_the_cells_share_out_the_whole_force(patch):
+    weights = cell_weights(patch, 0.4)
+    assert len(weights) == 15
+    assert math.fsum(weights) == pytest.approx(1.0)
+    rows = [sum(weights[3 * r : 3 * r + 3]) for r in range(5)]
+    if patch == "face":
+        assert max(rows) == pytest.approx(min(rows))
+    else:
+        # Off the middle towards the base by 0.4 of a row: the third row still carries most.
+        assert rows.index(max(rows)) == 2
+
+
+def good():
+    figure = {"value": 1.0, "reason": "because of it"}
+    keys = (
+        "width_m",
+        "width_spread_m",
+        "stiffness_spread",
+        "offset_spread_m",
+        "share",
+        "share_spread",
+        "friction",
+    )
+    table = {key: dict(figure) for key in keys} | {
+        "mass_kg": dict(figure),
+        "summary": "a thing",
+        "patch": "line",
+    }
+    return table | {"terms": [{"type": "loss", "damping_n_s_m": dict(figure)}]}
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda t: t.pop("width_m"), "missing .*width_m"),
+        (lambda t: t.update(colour="red"), "colour: write"),
+        (lambda t: t["width_m"].update(value=-0.01), "negative"),
+        (lambda t: t["width_m"].update(value=math.nan), "no finite number"),
+        (lambda t: t["width_m"].update(value=True), "no finite number"),
+        (lambda t: t["width_m"].update(value=0.0), "'width_m' must be > 0"),
+        (lambda t: t["width_m"].pop("reason"), "write { value = NUMBER, reason = TEXT }"),
+        (lambda t: t.update(patch="round"), "patch"),
+        (lambda t: t["terms"][0].update(type="spring"), "no term 'spring'. Known: elastic"),
+        (lambda t: t["terms"][0].pop("damping_n_s_m"), "missing .*damping_n_s_m"),
+        (lambda t: t["terms"][0].update(tau_s={"value": 1.0, "reason": "none"}), "unknown .*tau_s"),
+    ],
+)
+def test_a_faulty_entry_names_the_object_and_the_key(change, says):
+    table = good()
+    assert scene._spec("thing", table).name == "thing"
+    change(table)
+    with pytest.raises(ConfigError, match=says) as error:
+        scene._spec("thing", table)
+    assert "thing" in str(error.value)
