@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from graspsense_c45.numbers_as_text import java_rounded, short
+from graspsense_c45.numbers_as_text import short, weka_number
 from graspsense_c45.schema import Attribute
 from graspsense_c45.tree import Tree
 
@@ -40,6 +40,6 @@ def _relation(tree: Tree, node: int, slot: int) -> str:
 def _j48_operand(tree: Tree, node: int, slot: int) -> str:
     values = tree.attribute(node).values
     if values is None:
-        return java_rounded(float(tree.tests.threshold[node]), 6)
+        return weka_number(float(tree.tests.threshold[node]))
     one = int(tree.tests.value[node])
     return values[one if one >= 0 else slot]

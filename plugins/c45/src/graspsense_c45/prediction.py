@@ -99,7 +99,8 @@ def _spread(tree: Tree, x: Array, answers: Array) -> NDArray[np.float64]:
 
 
 def _by_completeness(x: Array) -> tuple[Array, Array | None]:
-    if not np.isnan(x.sum()):
+    # The minimum of anything with a NaN in it is NaN.
+    if not np.isnan(x.min(initial=0.0)):
         return np.arange(0), None
     missing = np.isnan(x).any(axis=1)
     return np.flatnonzero(~missing), np.flatnonzero(missing)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from graspsense_c45.arithmetic import TOLERANCE
 from graspsense_c45.branch_words import j48_branch, label_text
-from graspsense_c45.numbers_as_text import java_weight
+from graspsense_c45.numbers_as_text import weka_weight
 from graspsense_c45.tree import Tree
 
 
@@ -34,5 +34,5 @@ def _leaf(tree: Tree, leaf: int, parent: int) -> str:
     weight = float(tree.weight[leaf])
     majority = int(tree.majority[leaf if weight > TOLERANCE else parent])
     errors = weight - float(tree.weights[leaf, majority])
-    wrong = f"/{java_weight(errors)}" if errors > TOLERANCE else ""
-    return f"{label_text(tree, majority)} ({java_weight(weight)}{wrong})"
+    wrong = f"/{weka_weight(errors)}" if errors > TOLERANCE else ""
+    return f"{label_text(tree, majority)} ({weka_weight(weight)}{wrong})"

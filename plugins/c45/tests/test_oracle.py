@@ -1,0 +1,225 @@
+"""J48's own answers, option set by option set; see README.md here for their origin."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from graspsense_c45 import (
+    Attribute,
+    Options,
+    Schema,
+    Table,
+    Tree,
+    class_indices,
+    distributions,
+    fit,
+    hold_out,
+    make_table,
+    read_arff,
+    stratified_folds,
+    to_text,
+)
+
+WEKA = Path(__file__).parent / "weka"
+
+VARIANTS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "unpruned": {"pruning": "none"},
+    "unpruned_nocollapse": {"pruning": "none", "collapse": False},
+    "nocollapse": {"collapse": False},
+    "cf05": {"confidence_factor": 0.05},
+    "cf10": {"confidence_factor": 0.1},
+    "cf50": {"confidence_factor": 0.5},
+    "m1": {"min_objects": 1},
+    "m5": {"min_objects": 5},
+    "m10": {"min_objects": 10},
+    "rep": {"pruning": "reduced_error"},
+    "rep_q7": {"pruning": "reduced_error"},
+    "rep_n10": {"pruning": "reduced_error", "rep_folds": 10},
+    "laplace": {"laplace": True},
+    "noraise": {"subtree_raising": False},
+    "binary": {"binary_splits": True},
+    "nomdl": {"mdl_correction": False},
+    "midpoint": {"actual_split_value": False},
+    "unpruned_nomdl_midpoint": {
+        "pruning": "none",
+        "collapse": False,
+        "mdl_correction": False,
+        "actual_split_value": False,
+    },
+}
+SETS = sorted(path.stem for path in (WEKA / "oracle").glob("*.json"))
+WITH_CV = [name for name in SETS if name != "arff_weather.nominal"]
+
+
+class Asked(NamedTuple):
+    table: Table
+    probe: np.ndarray | None
+    oracle: dict[str, Any]
+
+    def answer(self, variant: str, key: str) -> Any:
+        given = self.oracle["variants"][variant].get(key)
+        while isinstance(given, dict) and "same_as" in given:
+            given = self.oracle["variants"][given["same_as"]].get(key)
+        return given
+
+
+@cache
+def asked(name: str) -> Asked:
+    oracle = json.loads((WEKA / "oracle" / f"{name}.json").read_text())
+    if name.startswith("arff_"):
+        table = read_arff(WEKA / "arff" / f"{name.removeprefix('arff_')}.arff")
+        assert list(table.schema.classes) == oracle["classes"]
+        return Asked(table, None, oracle)
+    if name.startswith("sk_"):
+        from sklearn import datasets
+
+        given = getattr(datasets, f"load_{name.removeprefix('sk_')}")()
+        return Asked(as_table(given.data, given.target, None, oracle["classes"]), None, oracle)
+    return Asked(*read_csv(name, oracle["classes"]), oracle)
+
+
+def as_table(values: Any, labels: Any, weights: Any, classes: Any) -> Table:
+    attributes = tuple(Attribute(f"x{i}") for i in range(np.shape(values)[1]))
+    return make_table(Schema(attributes, tuple(classes)), values, labels, weights)
+
+
+def read_csv(name: str, classes: Any) -> tuple[Table, np.ndarray]:
+    lines = (WEKA / "data" / f"{name}.csv").read_text().splitlines()[1:]
+    cells = [line.split(",") for line in lines]
+    train = [row for row in cells if row[0] == "train"]
+    probe = [row for row in cells if row[0] == "probe"]
+
+    def numbers(rows: list[list[str]]) -> np.ndarray:
+        return np.array([[float(cell.replace("?", "nan")) for cell in row[1:-2]] for row in rows])
+
+    labels = [int(row[-2]) for row in train]
+    weights = [float(row[-1] or 1) for row in train]
+    return as_table(numbers(train), labels, weights, classes), numbers(probe)
+
+
+def assert_same_nodes(ours: dict[str, Any], theirs: dict[str, Any], where: str) -> None:
+    pairs = [(ours, theirs, where)]
+    while pairs:
+        mine, given, place = pairs.pop()
+        assert mine.get("att") == given.get("att"), place
+        assert mine.get("thr") == given.get("thr"), place
+        assert mine["class"] == given["class"], place
+        assert mine["n"] == pytest.approx(given["n"], abs=1e-6), place
+        assert mine["dist"] == pytest.approx(given["dist"], abs=1e-6), place
+        if "att" in given:
+            assert mine["bags"] == pytest.approx(given["bags"], abs=1e-6), place
+            assert len(mine["sons"]) == len(given["sons"]), place
+            sons = zip(mine["sons"], given["sons"], strict=True)
+            pairs += [(m, g, f"{place}.{i}") for i, (m, g) in enumerate(sons)]
+
+
+def assert_same_answers(tree: Tree, question: Asked, variant: str) -> int:
+    compared = 0
+    for part, rows in (("resub", question.table.values), ("probe", question.probe)):
+        predicted = question.answer(variant, f"{part}_pred")
+        if rows is not None and predicted is not None:
+            assert class_indices(tree, rows).tolist() == predicted, (variant, part)
+            compared += 1
+        shares = question.answer(variant, f"{part}_dist")
+        if rows is not None and shares is not None:
+            np.testing.assert_allclose(distributions(tree, rows), shares, rtol=0, atol=1e-9)
+            compared += 1
+    return compared
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_trees_and_answers(name: str) -> None:
+    question = asked(name)
+    assert set(question.oracle["variants"]) == set(VARIANTS)
+    for variant, options in VARIANTS.items():
+        tree = fit(question.table, Options(**options))
+        assert_same_nodes(tree.to_dict(), question.answer(variant, "tree"), f"{name} {variant}")
+        assert assert_same_answers(tree, question, variant) >= 1
+        assert tree.n_nodes == question.answer(variant, "size")
+        assert tree.n_leaves == question.answer(variant, "leaves")
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_text_is_j48s(name: str) -> None:
+    question = asked(name)
+    dumps = [(variant, question.answer(variant, "text")) for variant in VARIANTS]
+    dumps = [(variant, dump) for variant, dump in dumps if dump is not None]
+    assert dumps
+    for variant, dump in dumps:
+        body = dump.split("------------------\n", 1)[1]
+        if isinstance(question.table.schema.classes[0], str):
+            assert to_text(fit(question.table, Options(**VARIANTS[variant]))) == body, variant
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_held_out_rows_are_j48s(name: str) -> None:
+    question = asked(name)
+    assert sorted(hold_out(question.table.labels, 3).tolist()) == sorted(question.oracle["rep_holdout_N3"])
+
+
+def check_cross_validation(name: str, variants: list[str]) -> int:
+    question, compared = asked(name), 0
+    table, folds = question.table, stratified_folds(question.table.labels)
+    for variant in variants:
+        theirs = question.oracle["variants"][variant].get("cv")
+        if theirs is None:
+            continue
+        confusion = np.zeros((len(table.schema.classes),) * 2, dtype=int)
+        predicted, sizes = np.full(len(table.labels), -1), []
+        for train, test in folds:
+            tree = fit(
+                make_table(table.schema, table.values[train], table.labels[train], table.weights[train]),
+                Options(**VARIANTS[variant]),
+            )
+            predicted[test] = distributions(tree, table.values[test]).argmax(axis=1)
+            sizes.append(tree.n_nodes)
+        np.add.at(confusion, (table.labels, predicted), 1)
+        assert confusion.tolist() == theirs["confusion"], (name, variant)
+        assert predicted.tolist() == theirs["pred"], (name, variant)
+        assert sizes == theirs["tree_sizes"], (name, variant)
+        compared += 1
+    return compared
+
+
+@pytest.mark.parametrize("name", WITH_CV)
+def test_folds_are_wekas(name: str) -> None:
+    question = asked(name)
+    folds = stratified_folds(question.table.labels)
+    assert [fold.test.tolist() for fold in folds] == question.oracle["folds"]["test"]
+    if "train_order" in question.oracle["folds"]:
+        assert [fold.train.tolist() for fold in folds] == question.oracle["folds"]["train_order"]
+
+
+@pytest.mark.parametrize("name", ["arff_contact-lenses", "grasp_4c_40", "sk_iris", "ulps", "xor"])
+def test_cross_validation_on_small_sets(name: str) -> None:
+    assert check_cross_validation(name, ["default", "rep"]) >= 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WITH_CV)
+def test_cross_validation(name: str) -> None:
+    assert check_cross_validation(name, list(VARIANTS)) >= 1
+
+
+def test_where_j48_never_ends_ours_does() -> None:
+    # (lo + hi) / 2 overflows there; J48 then sends every row left, again and again.
+    table, probe = read_csv("mag_overflow", range(2 + int(read_labels("mag_overflow").max())))
+    tree = fit(table, Options(pruning="none"))
+    inner = tree.tests.attribute >= 0
+    assert np.isfinite(tree.tests.threshold[inner]).all()
+    for node in np.flatnonzero(inner).tolist():
+        assert all(tree.weight[son] > 0 for son in tree.sons(node))
+    assert len(class_indices(tree, probe)) == len(probe)
+    assert np.abs(table.values).max() > 8e307
+
+
+def read_labels(name: str) -> np.ndarray:
+    lines = (WEKA / "data" / f"{name}.csv").read_text().splitlines()[1:]
+    return np.array([int(line.split(",")[-2]) for line in lines if line.startswith("train")])
