@@ -8,7 +8,9 @@ from typing import Final
 from graspsense.plugin_api import (
     CHANNELS,
     Channel,
+    ClassifierEntry,
     ControllerEntry,
+    DatasetEntry,
     FeatureSetEntry,
     PipelineEntry,
     SensorBackendEntry,
@@ -68,6 +70,34 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
         summary="a recording instead of a gripper; a channel it lacks is NaN",
         channels=tuple(Channel(name, unit) for name, unit in CHANNELS.items()),
         accepts=("effort", "velocity", "position", "force"),
+    )
+
+
+@hookimpl
+def graspsense_classifiers() -> Iterable[ClassifierEntry]:
+    """Return scikit-learn's classifiers; the paper's own, C4.5, is a distribution of its own."""
+    for name, config, summary in (
+        ("svm", "Svm", "support vector machine with a radial kernel (scikit-learn)"),
+        ("mlp", "Mlp", "neural network with one hidden layer (scikit-learn)"),
+        ("forest", "Forest", "random forest (scikit-learn)"),
+        ("knn", "Knn", "nearest neighbours (scikit-learn)"),
+        ("tree", "Tree", "binary decision tree, CART (scikit-learn)"),
+    ):
+        yield ClassifierEntry(
+            name=name,
+            target=f"graspsense.plugins.classifiers.{name}:{config}",
+            config=f"graspsense.plugins.classifiers.{name}:{config}Config",
+            summary=summary,
+        )
+
+
+@hookimpl
+def graspsense_datasets() -> Iterable[DatasetEntry]:
+    """Return the readers of other people's recordings."""
+    yield DatasetEntry(
+        name="icub",
+        target="graspsense.trials.icub_features:read_dataset",
+        summary="iCub Grasp Dataset (Soh, Su and Demiris 2012), as icub:FOLDER",
     )
 
 

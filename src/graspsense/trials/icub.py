@@ -38,6 +38,8 @@ _LINES: Final = (("encoder", 9), ("maximum", 5), *((f"{finger} taxel", 12) for f
 _FULL_TURN_DEG: Final = 360.0
 _FULL_SCALE: Final = 255.0
 
+UNITS: Final = {"t": "frame", "velocity": "m/frame"}
+"""What is not SI in a recording, since there are no time stamps."""
 THUMB_FLEXION: Final = (9, 10)
 FINGER_FLEXION: Final = (11, 12, 13, 14)
 START_GAP_M: Final = 0.08
@@ -79,7 +81,7 @@ def read_recording(name: str) -> Recording:
         name=f"iCub hand, {path.name}",
         readings=relative_readings(grasp),
         rate_hz=1.0,
-        units={"t": "frame", "velocity": "m/frame"},
+        units=UNITS,
         notes=(
             f"{len(grasp)} frames of an iCub hand without time stamps: times are frame numbers, not seconds",
             "metres and newtons are nominal: gap from the encoders, forces from the taxels, "

@@ -1,0 +1,109 @@
+"""Cross validation: each trial is predicted once, by a model that was trained on other folds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.core.novelty import novelty_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.features import FeatureTable
+    from graspsense.core.roles import Classifier
+    from graspsense.evaluation.folds import Folds
+
+
+class Learner(Protocol):
+    """Something that makes a fresh, untrained classifier: a component with its config."""
+
+    def create(self) -> Classifier[Any]:
+        """Return it."""
+
+
+Groups = Sequence["NDArray[np.int64]"]
+"""Trials that are cross-validated apart from each other: all of them, or those of one class."""
+
+
+@frozen(eq=False)
+class Pooled:
+    """The predictions of all folds, one a trial; `unlike` says which the model of its fold would call unknown."""
+
+    predicted: tuple[str, ...]
+    unlike: NDArray[np.bool_]
+    trained_on: float
+    """Mean number of training trials of a fold."""
+
+    def right(self, labels: Sequence[str]) -> list[bool]:
+        """Return for each trial whether its prediction is its label."""
+        return [one == label for one, label in zip(self.predicted, labels, strict=True)]
+
+
+def cross_validate(
+    learner: Learner,
+    table: FeatureTable,
+    labels: Sequence[str],
+    groups: Groups,
+    folds: Sequence[Folds],
+    *,
+    seed: int = 0,
+    share: float = 1.0,
+    progress: Callable[[], None] | None = None,
+) -> Pooled:
+    """Predict every trial of every group by the folds of that group.
+
+    `folds` holds one array a group, of that group's length. The prediction is the label of the largest
+    probability, the first of equals. Where the training trials of a fold have one label, that is the prediction.
+    `share` trains on that part of each fold's training trials, of each label about the same part, at least one
+    of each.
+    """
+    predicted = [""] * len(labels)
+    unlike = np.zeros(len(labels), dtype=np.bool_)
+    sizes: list[int] = []
+    for rows, of in zip(groups, folds, strict=True):
+        for fold in range(int(of.max()) + 1):
+            test, training = rows[of == fold], rows[of != fold]
+            if len(test) == 0:
+                continue
+            if share < 1.0:
+                training = thinned(training, labels, share, seed)
+            known = [labels[i] for i in training]
+            answers = _predict(learner, table, training, known, test, seed)
+            unlike[test] = novelty_of(table.rows(training), known).unlike_rows(table.rows(test))
+            for i, answer in zip(test.tolist(), answers, strict=True):
+                predicted[i] = answer
+            sizes.append(len(training))
+            if progress is not None:
+                progress()
+    return Pooled(tuple(predicted), unlike, float(np.mean(sizes)))
+
+
+def thinned(rows: NDArray[np.int64], labels: Sequence[str], share: float, seed: int) -> NDArray[np.int64]:
+    """Return about this share of the trials of each label, at least one; a larger share holds a smaller one."""
+    rng = np.random.default_rng(seed)
+    of = np.array([labels[i] for i in rows])
+    kept = []
+    for label in np.unique(of):
+        shuffled = rng.permutation(rows[of == label])
+        kept.append(shuffled[: max(1, round(share * len(shuffled)))])
+    return np.sort(np.concatenate(kept))
+
+
+def _predict(
+    learner: Learner,
+    table: FeatureTable,
+    training: NDArray[np.int64],
+    known: Sequence[str],
+    test: NDArray[np.int64],
+    seed: int,
+) -> list[str]:
+    if len(set(known)) == 1:
+        return [known[0]] * len(test)
+    classifier = learner.create()
+    classifier.fit(table.rows(training), known, seed)
+    classes = classifier.classes()
+    return [classes[k] for k in classifier.probabilities(table.rows(test)).argmax(axis=1)]

@@ -1,0 +1,1 @@
+"""Classifiers that come with graspsense: scikit-learn's, behind the common role."""

@@ -1,0 +1,43 @@
+"""Nearest neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from attrs import field, frozen
+from attrs.validators import ge, instance_of
+
+from graspsense.plugin_api import ClassifierConfig
+from graspsense.plugins.classifiers.scikit import Fitted, ScikitClassifier
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@frozen(kw_only=True)
+class KnnConfig(ClassifierConfig):
+    """Settings of the vote."""
+
+    neighbours: int = field(default=5, validator=[instance_of(int), ge(1)])
+    """Training trials that vote; fewer where there are fewer."""
+
+
+class Knn(ScikitClassifier[KnnConfig]):
+    """The nearest training trials vote, distance measured in standard deviations of the training trials."""
+
+    def estimator(self, seed: int, trials: int) -> Any:
+        """Return the vote."""
+        from sklearn.neighbors import KNeighborsClassifier
+
+        return KNeighborsClassifier(n_neighbors=min(self.config.neighbours, trials))
+
+    def reasons(self, fitted: Fitted, row: NDArray[np.float64], label: str) -> Sequence[str]:
+        """Return the votes and how near the nearest was."""
+        distances, rows = fitted.estimator.kneighbors(row)
+        votes = [fitted.labels[i] for i in rows[0].tolist()]
+        return (
+            f"{votes.count(label)} of the {len(votes)} nearest training trials are {label}; the nearest is "
+            f"{distances[0, 0]:.2g} standard deviations away",
+        )

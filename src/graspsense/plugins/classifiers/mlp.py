@@ -1,0 +1,46 @@
+"""Neural network with one hidden layer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from attrs import field, frozen
+from attrs.validators import ge, instance_of
+
+from graspsense.plugin_api import ClassifierConfig
+from graspsense.plugins.classifiers.scikit import Fitted, ScikitClassifier, most_likely
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@frozen(kw_only=True)
+class MlpConfig(ClassifierConfig):
+    """Settings of the network."""
+
+    hidden: int = field(default=20, validator=[instance_of(int), ge(1)])
+    """Neurons of the hidden layer."""
+    weight_decay: float = field(default=0.01, validator=ge(0.0))
+    """L2 penalty on the weights."""
+
+
+class Mlp(ScikitClassifier[MlpConfig]):
+    """One hidden layer, trained by L-BFGS, which suits sets of hundreds of trials."""
+
+    def estimator(self, seed: int, trials: int) -> Any:
+        """Return the network."""
+        from sklearn.neural_network import MLPClassifier
+
+        return MLPClassifier(
+            hidden_layer_sizes=(self.config.hidden,),
+            alpha=self.config.weight_decay,
+            solver="lbfgs",
+            max_iter=500,
+            random_state=seed,
+        )
+
+    def reasons(self, fitted: Fitted, row: NDArray[np.float64], label: str) -> Sequence[str]:
+        """Return the likeliest labels."""
+        return (most_likely(self.shares(fitted, row)[0].tolist(), self.classes(), "outputs of the network"),)

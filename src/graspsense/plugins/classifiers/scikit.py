@@ -1,0 +1,178 @@
+"""What scikit-learn's classifiers have in common here; scikit-learn is imported when one is fitted or loaded.
+
+Missing features are filled with the median of the training trials (0 where no training trial had the feature),
+then every feature is brought to mean 0 and standard deviation 1 over the training trials. A model is kept as its
+training trials, settings and seed, and made again from them when it is loaded: nothing is unpickled, and with the
+same version of scikit-learn it is the same model.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from attrs import frozen
+
+from graspsense.plugin_api import Classifier, ClassifierConfig, Features, FeatureTable, Prediction, in_words
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+ScikitConfigT = TypeVar("ScikitConfigT", bound=ClassifierConfig)
+
+
+@frozen(kw_only=True, eq=False)
+class Fitted:
+    """A fitted estimator, what it was fitted on, and how a trial is made ready for it."""
+
+    estimator: Any
+    table: FeatureTable
+    labels: tuple[str, ...]
+    seed: int
+    fill: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    scale: NDArray[np.float64]
+
+    def ready(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return these trials filled and scaled."""
+        import numpy as np
+
+        filled: NDArray[np.float64] = np.where(np.isnan(values), self.fill, values)
+        return (filled - self.mean) / self.scale
+
+
+class ScikitClassifier(Classifier[ScikitConfigT]):
+    """A classifier of scikit-learn; its subclasses say which."""
+
+    _fitted: Fitted | None = None
+    _made_with = ""
+
+    @abstractmethod
+    def estimator(self, seed: int, trials: int) -> Any:
+        """Return scikit-learn's estimator, unfitted, for this number of training trials."""
+
+    @abstractmethod
+    def reasons(self, fitted: Fitted, row: NDArray[np.float64], label: str) -> Sequence[str]:
+        """Return why this label, for one trial made ready, of shape (1, features)."""
+
+    def shares(self, fitted: Fitted, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the probabilities of trials made ready, columns in the order of the estimator's classes."""
+        import numpy as np
+
+        return np.asarray(fitted.estimator.predict_proba(rows), dtype=np.float64)
+
+    def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
+        """Fill, scale, fit. Raises ValueError where there are fewer than two labels."""
+        import warnings
+
+        import numpy as np
+        from sklearn.exceptions import ConvergenceWarning
+        from threadpoolctl import threadpool_limits
+
+        if len(set(labels)) < 2:
+            raise ValueError(f"all {len(labels)} trials have one label: there is nothing to tell apart")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # numpy's, of a column without any value
+            fill = np.nan_to_num(np.nanmedian(table.values, axis=0), nan=0.0)
+        filled = np.where(np.isnan(table.values), fill, table.values)
+        scale = filled.std(axis=0)
+        # What hardly differs from rounding is constant, and would be blown up to noise.
+        constant = scale <= 1e-12 * np.maximum(np.abs(filled).max(axis=0), np.finfo(np.float64).tiny)
+        fitted = Fitted(
+            estimator=self.estimator(seed, len(labels)),
+            table=table,
+            labels=tuple(labels),
+            seed=seed,
+            fill=fill,
+            mean=filled.mean(axis=0),
+            scale=np.where(constant, 1.0, scale),
+        )
+        # One thread: on tables this small more of them cost time, and sum in another order on another machine.
+        with warnings.catch_warnings(), threadpool_limits(1):
+            # A network that could still improve is what it is; its rate says how good that is.
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            fitted.estimator.fit(fitted.ready(table.values), np.array(labels))
+        self._fitted = fitted
+
+    def classes(self) -> tuple[str, ...]:
+        """Return the labels in the order of the columns of `probabilities`."""
+        return tuple(str(label) for label in self._model().estimator.classes_)
+
+    def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
+        """Return shape (trials, classes)."""
+        fitted = self._model()
+        return self.shares(fitted, fitted.ready(table.columns(fitted.table.names).values))
+
+    def explain(self, features: Features) -> Prediction:
+        """Return the prediction, which missing feature was filled with what, and why this label."""
+        import numpy as np
+
+        fitted = self._model()
+        values = [features[name] for name in fitted.table.names]
+        row = fitted.ready(np.array([values]))
+        shares = self.shares(fitted, row)[0].tolist()
+        label = self.classes()[int(np.argmax(shares))]
+        filled = [
+            f"{name} is missing ({features.reasons.get(name, 'no reason given')}): the median in training, "
+            f"{in_words(float(fill), unit)}, stands for it"
+            for name, unit, value, fill in zip(
+                fitted.table.names, fitted.table.units, values, fitted.fill, strict=True
+            )
+            if math.isnan(value)
+        ]
+        return Prediction(
+            label=label,
+            probabilities=dict(zip(self.classes(), shares, strict=True)),
+            because=(*filled, *self.reasons(fitted, row, label)),
+            warnings=self._version_warnings(),
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the training trials with the seed: what it takes to make the model again."""
+        import sklearn
+
+        fitted = self._model()
+        return {
+            "made_with": self._made_with or f"scikit-learn {sklearn.__version__}",
+            "seed": fitted.seed,
+            "features": [list(one) for one in zip(fitted.table.names, fitted.table.units, strict=True)],
+            "labels": list(fitted.labels),
+            "trials": [
+                [None if math.isnan(value) else value for value in row]
+                for row in fitted.table.values.tolist()
+            ],
+        }
+
+    def from_json(self, model: Mapping[str, Any]) -> None:
+        """Make the model again from its training trials. Raises KeyError, TypeError or ValueError."""
+        import numpy as np
+
+        names, units = zip(*((str(name), str(unit)) for name, unit in model["features"]), strict=True)
+        labels = [str(label) for label in model["labels"]]
+        values = np.array(model["trials"], dtype=np.float64)
+        if values.shape != (len(labels), len(names)) or np.isinf(values).any():
+            raise ValueError("its training trials do not fit its labels and features")
+        self.fit(FeatureTable(names=names, units=units, values=values), labels, int(model["seed"]))
+        self._made_with = str(model["made_with"])
+
+    def _model(self) -> Fitted:
+        if self._fitted is None:
+            raise ValueError("the classifier is neither fitted nor loaded yet")
+        return self._fitted
+
+    def _version_warnings(self) -> tuple[str, ...]:
+        import sklearn
+
+        here = f"scikit-learn {sklearn.__version__}"
+        if self._made_with in ("", here):
+            return ()
+        return (f"this model was made with {self._made_with} and made again with {here}: it may differ",)
+
+
+def most_likely(shares: Sequence[float], classes: Sequence[str], what: str) -> str:
+    """Return the three largest shares in words."""
+    best = sorted(zip(shares, classes, strict=True), key=lambda one: -one[0])[:3]
+    return f"{what}: " + ", ".join(f"{label} {share:.0%}" for share, label in best)

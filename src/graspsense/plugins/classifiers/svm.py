@@ -1,0 +1,49 @@
+"""Support vector machine with a radial kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from attrs import field, frozen
+from attrs.validators import gt
+
+from graspsense.plugin_api import ClassifierConfig
+from graspsense.plugins.classifiers.scikit import Fitted, ScikitClassifier, most_likely
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@frozen(kw_only=True)
+class SvmConfig(ClassifierConfig):
+    """Settings of the machine; the kernel's width is scikit-learn's `scale`."""
+
+    c: float = field(default=10.0, validator=gt(0.0))
+    """What a training trial on the wrong side costs; larger fits closer."""
+
+
+class Svm(ScikitClassifier[SvmConfig]):
+    """Its probabilities are the softmax of its decision values, one against the rest: not calibrated."""
+
+    def estimator(self, seed: int, trials: int) -> Any:
+        """Return the machine."""
+        from sklearn.svm import SVC
+
+        return SVC(C=self.config.c, decision_function_shape="ovr", random_state=seed)
+
+    def shares(self, fitted: Fitted, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the softmax of the decision values."""
+        import numpy as np
+
+        values = np.asarray(fitted.estimator.decision_function(rows), dtype=np.float64)
+        if values.ndim == 1:  # two classes: one value, positive for the second
+            values = np.column_stack((-values, values)) / 2.0
+        powers = np.exp(values - values.max(axis=1, keepdims=True))
+        return np.asarray(powers / powers.sum(axis=1, keepdims=True))
+
+    def reasons(self, fitted: Fitted, row: NDArray[np.float64], label: str) -> Sequence[str]:
+        """Return the nearest labels."""
+        shares = self.shares(fitted, row)[0].tolist()
+        return (most_likely(shares, self.classes(), "softmax of the decision values (not calibrated)"),)

@@ -1,0 +1,54 @@
+"""Scikit-learn's own decision tree (CART)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+from attrs import field, frozen
+from attrs.validators import ge, in_, instance_of
+
+from graspsense.plugin_api import ClassifierConfig, in_words
+from graspsense.plugins.classifiers.scikit import Fitted, ScikitClassifier
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@frozen(kw_only=True)
+class TreeConfig(ClassifierConfig):
+    """Settings of the tree."""
+
+    criterion: Literal["entropy", "gini"] = field(default="entropy", validator=in_(("entropy", "gini")))
+    min_leaf: int = field(default=2, validator=[instance_of(int), ge(1)])
+    """Least number of training trials at a leaf."""
+
+
+class Tree(ScikitClassifier[TreeConfig]):
+    """A binary tree without pruning."""
+
+    def estimator(self, seed: int, trials: int) -> Any:
+        """Return the tree."""
+        from sklearn.tree import DecisionTreeClassifier
+
+        return DecisionTreeClassifier(
+            criterion=self.config.criterion, min_samples_leaf=self.config.min_leaf, random_state=seed
+        )
+
+    def reasons(self, fitted: Fitted, row: NDArray[np.float64], label: str) -> Sequence[str]:
+        """Return the path through the tree, its thresholds in the features' own units."""
+        inner = fitted.estimator.tree_
+        nodes = fitted.estimator.decision_path(row).indices.tolist()
+        sentences = []
+        for node in nodes[:-1]:
+            k = int(inner.feature[node])
+            name, unit = fitted.table.names[k], fitted.table.units[k]
+            value = float(row[0, k] * fitted.scale[k] + fitted.mean[k])
+            threshold = float(inner.threshold[node] * fitted.scale[k] + fitted.mean[k])
+            sign = "<=" if row[0, k] <= inner.threshold[node] else ">"
+            sentences.append(f"{name} = {in_words(value, unit)} {sign} {in_words(threshold, unit)}")
+        share = float(inner.value[nodes[-1]].max() / inner.value[nodes[-1]].sum())
+        trials = int(inner.n_node_samples[nodes[-1]])
+        sentences.append(f"{share:.0%} of the {trials} training trials that came here were {label}")
+        return sentences

@@ -1,0 +1,58 @@
+"""Features from before the contact: a control that no object can be recognised by, unless the data leak.
+
+Everything is from the first half second of the approach, a span that does not depend on how wide the thing is:
+the gap it begins at, and the means of speed, effort and both pad forces. Where a pad feels something in that time
+or shortly after it, the features are missing.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from graspsense.core.contact import CONTACT_FORCE_N
+from graspsense.core.features import Features, missing
+from graspsense.core.signals import APPROACH
+from graspsense.core.trace import Trace
+
+SPAN_S: Final = 0.5
+GUARD_S: Final = 0.1
+"""A cell image can be 41 ms old: what begins to be felt within this time after the span was there in it."""
+
+NAMES: Final = (
+    "gap_at_start",
+    "velocity_before",
+    "effort_before",
+    "force_left_before",
+    "force_right_before",
+)
+_UNITS: Final = ("m", "m/s", "N", "N", "N")
+
+
+def before_contact(trace: Trace) -> Features:
+    """Return the features from before the contact, missing with a reason where it came too soon."""
+    approach = np.flatnonzero(trace.phase == APPROACH)
+    if not len(approach):
+        return _missing("there was no approach")
+    start = trace.t_s[approach[0]]
+    if trace.t_s[approach[-1]] < start + SPAN_S:
+        return _missing(f"the approach took less than {SPAN_S:g} s")
+    felt = np.maximum(trace.force_left_n, trace.force_right_n) >= CONTACT_FORCE_N
+    if bool((felt & (trace.t_s <= start + SPAN_S + GUARD_S)).any()):
+        return _missing(f"a pad felt something in the first {SPAN_S + GUARD_S:g} s of the approach")
+    span = approach[trace.t_s[approach] <= start + SPAN_S]
+    means = [
+        float(column[span].mean())
+        for column in (trace.velocity_m_s, trace.effort_n, trace.force_left_n, trace.force_right_n)
+    ]
+    values = (float(trace.gap_m[span[0]]), *means)
+    lacking = [name for name, value in zip(NAMES, values, strict=True) if math.isnan(value)]
+    reasons = missing(lacking, "the gripper has no such channel")
+    return Features(names=NAMES, values=values, units=_UNITS, reasons=reasons)
+
+
+def _missing(why: str) -> Features:
+    values = (math.nan,) * len(NAMES)
+    return Features(names=NAMES, values=values, units=_UNITS, reasons=missing(NAMES, why))

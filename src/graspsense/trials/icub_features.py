@@ -1,0 +1,145 @@
+"""The iCub Grasp Dataset as labelled trials: `icub:FOLDER`.
+
+Each grasp becomes a trace by `icub.relative_readings`, as the replay backend reads it, all of it in the phase of
+the approach, since no controller of ours was there; the features are drawn from that trace. So they are relative
+to the first frame. The variant `absolute` adds back what the first frame held: contact and rest are the same, and
+`p_first`, `p_steady` and `f_steady` are shifted by the gap and the force of the first frame. What the first frame
+alone tells, before anything is squeezed, is the control from before the contact: all of its 74 numbers as they
+stand in the file. All of this was settled before any recognition rate was looked at.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.features import FeatureTable, table_of
+from graspsense.core.labelled import Control, Labelled
+from graspsense.core.roles import FeatureSet
+from graspsense.core.signals import APPROACH
+from graspsense.core.trace import SI_UNITS, Trace, trace_of
+from graspsense.trials.icub import (
+    DATA_FOLDER,
+    FINGER_FLEXION,
+    FINGERS,
+    FIRST_JOINT,
+    FORCE_N_PER_COUNT,
+    GAP_M_PER_DEG,
+    THUMB_FLEXION,
+    UNITS,
+    IcubGrasp,
+    read_grasp,
+    relative_readings,
+)
+
+UNRELIABLE: Final = "full_coke"
+"""The class whose data the author of the set calls unreliable (its README)."""
+_FILE: Final = re.compile(r"(?P<label>[a-z_]+)_(?P<number>\d+)\.txt")
+_SHIFTED_BY: Final = {"p_first": "gap", "p_steady": "gap", "f_steady": "force"}
+
+
+def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = False) -> Labelled:
+    """Return the grasps in this folder, or in `iCubGraspDataset` in it.
+
+    `unreliable` takes in the class that its author calls so. Raises ConfigError where there are no such files,
+    DataDamaged where one of them is not whole.
+    """
+    paths = _grasps(folder)
+    left_out = [path for path, label, _ in paths if label == UNRELIABLE] if not unreliable else []
+    paths = [one for one in paths if one[0] not in left_out]
+    if not paths:
+        raise ConfigError(f"{folder} holds grasps of {UNRELIABLE} only: --unreliable takes them in")
+    grasps = [read_grasp(path) for path, _, _ in paths]
+    table = table_of([features.extract(_trace(grasp)) for grasp in grasps])
+    notes = [
+        "an iCub hand's data without time stamps: times count frames (delta_t is in frames)",
+        "metres and newtons are nominal, and relative to the first frame (docs/icub.md)",
+    ]
+    if left_out:
+        notes.append(
+            f"{len(left_out)} grasps of {UNRELIABLE} left out: their author calls them unreliable "
+            "(--unreliable takes them in)"
+        )
+    without = int(np.isnan(table.values).all(axis=1).sum())
+    if without:
+        notes.append(f"{without} of {len(grasps)} grasps have no contact of both sides, so no feature at all")
+    variants = {}
+    if set(_SHIFTED_BY) <= set(table.names):
+        what = (
+            "the same features with gap and force of the first frame added back (p_first, p_steady, f_steady)"
+        )
+        variants["absolute"] = Control(table=_absolute(table, grasps), what=what)
+    return Labelled(
+        source=f"icub:{folder}",
+        table=table,
+        labels=tuple(label for _, label, _ in paths),
+        no_instances="every class of this set is one object, so that none can be held out",
+        order=tuple(number for _, _, number in paths),
+        before_contact=Control(table=_first_frame(grasps), what="the first frame alone: its 74 raw numbers"),
+        width=Control(
+            table=table.columns(["p_first"]), what="p_first alone: how far the hand closed to contact"
+        )
+        if "p_first" in table.names
+        else None,
+        no_width="the feature set has no p_first",
+        variants=variants,
+        notes=tuple(notes),
+        provenance={"simulated": False, "frames_not_seconds": True},
+    )
+
+
+def _grasps(folder: str) -> list[tuple[Path, str, int]]:
+    """Return path, label and number of every grasp, by label and number."""
+    given = Path(folder).expanduser()
+    within = given / DATA_FOLDER
+    place = within if within.is_dir() else given
+    if not place.is_dir():
+        raise ConfigError(f"there is no folder {given}: name that of the iCub Grasp Dataset")
+    found = []
+    for path in place.glob("*.txt"):
+        match = _FILE.fullmatch(path.name)
+        if match:
+            found.append((path, match["label"], int(match["number"])))
+    if not found:
+        raise ConfigError(f"{place} holds no file of the iCub Grasp Dataset (CLASS_NUMBER.txt)")
+    return sorted(found, key=lambda one: (one[1], one[2]))
+
+
+def _trace(grasp: IcubGrasp) -> Trace:
+    frames = [reading.frame for reading in relative_readings(grasp)]
+    if not frames:
+        raise DataDamaged("a grasp without frames")
+    n = len(frames)
+    return trace_of(frames, [APPROACH] * n, [0.0] * n, [], {**SI_UNITS, **UNITS})
+
+
+def _absolute(table: FeatureTable, grasps: list[IcubGrasp]) -> FeatureTable:
+    values = table.values.copy()
+    for i, grasp in enumerate(grasps):
+        thumb, finger = (
+            grasp.encoders_deg[0, [joint - FIRST_JOINT for joint in joints]].mean()
+            for joints in (THUMB_FLEXION, FINGER_FLEXION)
+        )
+        pressure = FORCE_N_PER_COUNT * (255.0 - grasp.taxels[0]).sum(axis=1)
+        first = {
+            "gap": -GAP_M_PER_DEG * (thumb + finger) / 2.0,
+            "force": (pressure[0] + pressure[1:].max()) / 2.0,
+        }
+        for name, what in _SHIFTED_BY.items():
+            values[i, table.names.index(name)] += first[what]
+    return FeatureTable(names=table.names, units=table.units, values=values)
+
+
+def _first_frame(grasps: list[IcubGrasp]) -> FeatureTable:
+    joints = [f"joint_{FIRST_JOINT + k}" for k in range(9)]
+    maxima = [f"{finger}_maximum" for finger in FINGERS]
+    taxels = [f"{finger}_{k + 1}" for finger in FINGERS for k in range(12)]
+    values = np.array(
+        [np.concatenate((one.encoders_deg[0], one.maxima[0], one.taxels[0].ravel())) for one in grasps]
+    )
+    names = (*joints, *maxima, *taxels)
+    return FeatureTable(names=names, units=("deg",) * 9 + ("counts",) * 65, values=values)
