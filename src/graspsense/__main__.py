@@ -1,0 +1,5 @@
+"""`python -m graspsense` is `graspsense`."""
+
+from graspsense.cli.main import main
+
+main()

@@ -1,0 +1,191 @@
+"""`graspsense run` as a user meets it: from the shell, with right and with wrong input."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+COMMAND = [sys.executable, "-m", "graspsense"]
+
+
+def graspsense(*arguments, **environment):
+    return subprocess.run(
+        [*COMMAND, *arguments],
+        capture_output=True,
+        text=True,
+        env={**os.environ, **environment},
+        timeout=120,
+        check=False,
+    )
+
+
+def test_without_any_option_it_grasps_a_bottle_and_shows_it_live():
+    done = graspsense("run")
+    assert done.returncode == 0
+    for word in ("approach", "squeeze", "hold", "release"):
+        assert word in done.stderr
+    assert "outcome     steady" in done.stdout
+    for name in ("p_first", "p_steady", "f_steady", "delta_t", "dp_dt", "df_dt"):
+        assert f"\n{name}" in done.stdout
+    assert "simulated" in done.stdout
+    assert "Traceback" not in done.stderr
+
+
+def test_json_has_the_promised_keys_and_says_nothing_else_on_stdout():
+    done = graspsense("run", "--json", "--seed", "7", "--object", "can:empty_open")
+    result = json.loads(done.stdout)
+    assert result["outcome"] == "steady"
+    assert list(result["features"]) == ["p_first", "p_steady", "f_steady", "delta_t", "dp_dt", "df_dt"]
+    assert result["units"]["dp_dt"] == "m/s"
+    assert result["seed"] == 7
+    assert result["components"]["gripper"].startswith("graspsense-sim-gripper/sim ")
+    assert result["seconds_simulated"] > 1.0
+    assert result["seconds_wall"] > 0.0
+    assert {"prediction", "reasons"} <= result.keys()
+    # A 66 mm can, whatever else.
+    assert result["features"]["p_first"] == pytest.approx(0.0655, abs=0.001)
+
+
+def test_the_same_seed_prints_the_same_features():
+    one, again = (json.loads(graspsense("run", "--json", "--seed", "3").stdout) for _ in range(2))
+    assert one["features"] == again["features"]
+
+
+def test_nothing_there_is_an_outcome_with_reasons_and_exit_code_0():
+    done = graspsense("run", "--json", "--object", "none")
+    result = json.loads(done.stdout)
+    assert done.returncode == 0
+    assert result["outcome"] == "nothing there"
+    assert result["features"]["p_first"] is None
+    assert "no pad felt" in result["reasons"]["p_first"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "says"),
+    [
+        (["--gripper", "pr3"], 2, "Did you mean 'pr2'?"),
+        (["--gripper", "pr2"], 3, "looked for"),
+        (["--object", "odwala:full_open"], 2, "Did you mean 'odwalla'?"),
+        (["--object", "odwalla:fool_open"], 2, "Did you mean 'full_open'?"),
+        (["--gripper", "pr2", "--object", "block"], 2, "object"),
+        (["--pipeline", "defolt"], 2, "Did you mean 'default'?"),
+        (["--pipeline", "no_such_file.toml"], 2, "no_such_file.toml"),
+        (["-o", "controller.probing_forse_n=3"], 2, "probing_force_n"),
+        (["-o", "controller.probing_force_n=-3"], 2, "probing_force_n"),
+        (["-o", "controller.probing_force_n=strong"], 2, "probing_force_n"),
+        (["-o", "controller.probing_force_n"], 2, "="),
+        (["--seed", "x"], 2, "seed"),
+        (["--seed", "-1"], 2, "seed"),
+        (["--gripper", "replay", "-o", "gripper.recording=icub:nowhere.txt"], 2, "nowhere.txt"),
+    ],
+)
+def test_a_mistake_says_what_was_found_and_what_to_do(arguments, code, says):
+    done = graspsense("run", *arguments)
+    assert done.returncode == code, done.stderr
+    assert says in done.stderr
+    assert "Traceback" not in done.stderr
+    # The same as JSON, for a program.
+    as_json = graspsense("run", "--json", *arguments)
+    assert as_json.returncode == code
+    assert "Traceback" not in as_json.stderr
+
+
+def test_a_dry_run_opens_nothing_and_says_what_would_be_done():
+    # The PR2 is not there, so anything opened would end with 3.
+    done = graspsense("run", "--gripper", "pr2", "--dry-run")
+    assert done.returncode == 0
+    assert "nothing was opened" in done.stdout
+    assert "controller.probing_force_n = 20.0" in done.stdout
+
+
+def test_a_trial_that_is_kept_runs_again_from_its_own_settings(tmp_path):
+    first = graspsense("run", "--json", "--seed", "5", "--object", "toy", "--save", str(tmp_path / "kept"))
+    assert first.returncode == 0, first.stderr
+    folder = tmp_path / "kept" / "trial-0001"
+    assert {p.name for p in folder.iterdir()} == {"settings.toml", "trial.json", "trace.npz"}
+    again = graspsense("run", "--json", "--pipeline", str(folder / "settings.toml"))
+    assert json.loads(again.stdout)["features"] == json.loads(first.stdout)["features"]
+    with np.load(folder / "trace.npz") as trace:
+        assert trace["gap_m"].shape == trace["t_s"].shape
+        assert trace["pad_left"].shape == (len(trace["pad_t_s"]), 22)
+    graspsense("run", "--save", str(tmp_path / "kept"))
+    assert (tmp_path / "kept" / "trial-0002").is_dir()
+
+
+def test_a_folder_that_cannot_be_written_is_found_out_before_the_grasp(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    done = graspsense("run", "--save", str(tmp_path / "file"))
+    assert done.returncode == 2
+    assert "cannot keep a trial" in done.stderr
+    assert "approach" not in done.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_grasp_with_the_gripper_let_go(number):
+    # 1e5 ticks a second make this grasp long enough to be interrupted; the first row says that it is under way.
+    process = subprocess.Popen(
+        [*COMMAND, "run", "-o", "gripper.rate_hz=100000", "--object", "none"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    began = time.monotonic()
+    while "approach" not in process.stderr.readline():
+        assert time.monotonic() - began < 60.0
+    process.send_signal(number)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 4, err
+    assert "outcome     aborted: interrupted" in out
+    assert "Traceback" not in err
+
+
+HEAVY = ("numpy", "scipy", "sklearn", "numba", "pandas", "matplotlib", "hid", "usb")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "allowed"), [(["--help"], ()), (["plugins", "list"], ()), (["run"], ("numpy",))]
+)
+def test_start_up_imports_nothing_heavy(arguments, allowed):
+    program = (
+        "import sys\nfrom graspsense.cli.main import main\n"
+        f"sys.argv = ['graspsense', *{arguments!r}]\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert eval_list(done.stderr.splitlines()[-1]) == list(allowed)
+
+
+def eval_list(text):
+    return json.loads(text.replace("'", '"'))
+
+
+def test_the_user_who_closes_the_pipe_sees_no_traceback():
+    done = subprocess.run(
+        f"{sys.executable} -m graspsense run --json | head -1",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "Traceback" not in done.stderr
+    assert done.stdout.strip() == "{"
+
+
+def test_as_a_library_it_is_two_lines():
+    program = (
+        "from graspsense import load_pipeline\n"
+        "trial = load_pipeline('default').grasp(object='can:full_open', seed=1)\n"
+        "print(trial.outcome.words, len(trial.trace), trial.features['p_first'])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    outcome, ticks, p_first = done.stdout.split()
+    assert outcome == "steady"
+    assert int(ticks) > 1000
+    assert float(p_first) == pytest.approx(0.066, abs=0.001)
