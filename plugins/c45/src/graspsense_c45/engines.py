@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from importlib.util import find_spec
+from typing import get_args
 
 from graspsense_c45.options import Engine
 
@@ -14,8 +15,10 @@ WORTH_COMPILING = 1_000_000
 def choose_fast(engine: Engine, n_values: int) -> bool:
     """Whether to use the compiled engine.
 
-    Raises ModuleNotFoundError: it is asked for by name and numba is not installed.
+    Raises ModuleNotFoundError: it is asked for by name and numba is not installed; ValueError: there is no such engine.
     """
+    if engine not in get_args(Engine):
+        raise ValueError(f"engine is {engine!r}; allowed: {', '.join(get_args(Engine))}")
     if engine == "fast" and not _is_installed():
         raise ModuleNotFoundError(
             "engine='fast' needs numba, which is not installed; install graspsense-c45[fast] or use engine='numpy'"

@@ -79,6 +79,8 @@ class RowsOfOne:
         )
         for a in self._nominal.tolist():
             offer_values(offers, a, self._value_counts(a), self._sizes, problem)
+        # Not needed any more, and as large as the rows.
+        del self._steps, self._sides, self._inside, self._node
         return offers
 
     def thresholds(self, attribute: Array) -> NDArray[np.float64]:

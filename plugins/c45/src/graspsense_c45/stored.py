@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense_c45.branches import LEAF, Tests
+from graspsense_c45.branches import ALL_VALUES, LEAF, Tests
 from graspsense_c45.schema import Attribute, Schema
 from graspsense_c45.tree import Tree
 
@@ -126,14 +126,18 @@ def _check_node(tree: Tree, node: int) -> None:
     numeric = not np.isnan(tests.threshold[node])
     n_sons = int(tests.n_sons[node])
     if attribute == LEAF:
-        fits = n_sons == 0 and not numeric
+        fits = n_sons == 0 and not numeric and value == ALL_VALUES
     elif not 0 <= attribute < len(tree.schema.attributes):
         fits = False
     else:
         values = tree.schema.attributes[attribute].values
         if values is None:
-            fits = numeric and n_sons == 2
+            fits = bool(np.isfinite(tests.threshold[node])) and n_sons == 2 and value == ALL_VALUES
         else:
-            fits = not numeric and value < len(values) and n_sons == (2 if value >= 0 else len(values))
+            fits = (
+                not numeric
+                and ALL_VALUES <= value < len(values)
+                and n_sons == (2 if value >= 0 else len(values))
+            )
     if not fits:
         raise StoredTreeError(f"damaged stored tree: node {node} does not fit its attribute")

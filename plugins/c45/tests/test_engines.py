@@ -1,0 +1,97 @@
+"""The two engines give the same tree, to the bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from graspsense_c45 import Attribute, Options, Schema, Table, class_indices, fit, make_table
+from graspsense_c45.engines import choose_fast
+
+pytest.importorskip("numba", reason="the extra 'fast' (numba) is not installed: there is one engine only")
+
+OPTIONS: list[dict[str, Any]] = [
+    {},
+    {"pruning": "none"},
+    {"pruning": "none", "collapse": False, "mdl_correction": False, "actual_split_value": False},
+    {"confidence_factor": 0.05},
+    {"confidence_factor": 0.6},
+    {"min_objects": 1},
+    {"min_objects": 7.5},
+    {"subtree_raising": False},
+    {"criterion": "info_gain"},
+    {"criterion": "info_gain", "pruning": "reduced_error", "mdl_correction": False},
+]
+
+
+def grasps(seed: int, n: int, decimals: int | None, weights: str) -> Table:
+    rng = np.random.default_rng(seed)
+    n_classes = int(rng.integers(2, 12))
+    labels = rng.integers(0, n_classes, n)
+    centres = rng.normal(0, 2, (n_classes, 5))
+    values = centres[labels] + rng.uniform(0.5, 4) * rng.normal(0, 1, (n, 5))
+    if decimals is not None:
+        values = np.round(values, decimals)
+    given = {
+        "one": None,
+        "whole": rng.integers(0, 4, n).astype(float),
+        "any": rng.random(n) * 3,
+    }[weights]
+    return make_table(
+        Schema(tuple(Attribute(f"x{i}") for i in range(5)), tuple(range(n_classes))), values, labels, given
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("weights", ["one", "whole", "any"])
+@pytest.mark.parametrize("decimals", [None, 0, 2])
+def test_same_tree_and_predictions(weights: str, decimals: int | None) -> None:
+    sizes = []
+    for seed, options in enumerate(OPTIONS):
+        table = grasps(seed, [40, 300, 1_500][seed % 3], decimals, weights)
+        numpy_tree = fit(table, Options(**options), engine="numpy")
+        fast_tree = fit(table, Options(**options), engine="fast")
+        assert numpy_tree == fast_tree, options
+        predicted = [class_indices(numpy_tree, table.values, engine) for engine in ("numpy", "fast")]
+        assert predicted[0].tolist() == predicted[1].tolist()
+        sizes.append(numpy_tree.n_nodes)
+    assert max(sizes) > 50
+
+
+@pytest.mark.slow
+def test_same_tree_where_branches_are_raised_and_pruned_again() -> None:
+    raised = 0
+    for seed in range(25):
+        table = grasps(seed, 2_000, 1, "one")
+        trees = [fit(table, Options(min_objects=1), engine=engine) for engine in ("numpy", "fast")]
+        assert trees[0] == trees[1]
+        raised += trees[0] != fit(table, Options(min_objects=1, subtree_raising=False), engine="fast")
+    assert raised > 10
+
+
+def oracle_tables() -> list[Path]:
+    return sorted((Path(__file__).parent / "weka" / "data").glob("*.csv"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", oracle_tables(), ids=lambda path: path.stem)
+def test_same_tree_on_the_awkward_sets(path: Path) -> None:
+    lines = [line.split(",") for line in path.read_text().splitlines()[1:] if line.startswith("train")]
+    values = np.array([[float(cell.replace("?", "nan")) for cell in row[1:-2]] for row in lines])
+    labels = np.array([int(row[-2]) for row in lines])
+    weights = np.array([float(row[-1] or 1) for row in lines])
+    schema = Schema(tuple(Attribute(f"x{i}") for i in range(values.shape[1])), tuple(range(labels.max() + 1)))
+    table = make_table(schema, values, labels, weights)
+    for options in OPTIONS:
+        trees = [fit(table, Options(**options), engine=engine) for engine in ("numpy", "fast")]
+        assert trees[0] == trees[1], options
+
+
+def test_auto_compiles_only_what_pays() -> None:
+    assert not choose_fast("numpy", 10**9)
+    assert not choose_fast("auto", 6_000)
+    assert choose_fast("auto", 6_000_000)
+    assert choose_fast("fast", 1)

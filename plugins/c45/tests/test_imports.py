@@ -1,0 +1,48 @@
+"""What importing costs: measured in fresh interpreters."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from graspsense_c45 import Attribute, Schema, fit, make_table, to_json
+
+
+def modules_after(code: str, *arguments: str) -> set[str]:
+    listed = code + "\nimport json, sys\nprint(json.dumps(sorted(m.split('.')[0] for m in sys.modules)))"
+    done = subprocess.run(
+        [sys.executable, "-c", listed, *arguments], capture_output=True, text=True, check=True
+    )
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+def test_importing_the_package_imports_nothing_heavy() -> None:
+    loaded = modules_after("import graspsense_c45; dir(graspsense_c45)")
+    assert "graspsense_c45" in loaded
+    assert not loaded & {"numpy", "sklearn", "numba", "pandas", "matplotlib", "graspsense"}
+
+
+def test_a_stored_tree_predicts_with_numpy_alone() -> None:
+    table = make_table(Schema((Attribute("x"),), ("a", "b")), [[0.0]] * 3 + [[1.0]] * 3, [0] * 3 + [1] * 3)
+    code = (
+        "import sys\nfrom graspsense_c45 import class_indices, explain, fit, from_json, to_text\n"
+        "tree = from_json(sys.argv[1])\n"
+        "assert class_indices(tree, [[0.0], [1.0]]).tolist() == [0, 1]\n"
+        "assert 'x 1 > 0' in str(explain(tree, [1.0])), str(explain(tree, [1.0]))\n"
+        "assert to_text(tree)"
+    )
+    loaded = modules_after(code, to_json(fit(table)))
+    assert "numpy" in loaded
+    assert not loaded & {"sklearn", "scipy", "numba", "pandas", "matplotlib", "graspsense"}
+
+
+def test_every_public_name_loads_and_others_do_not() -> None:
+    import graspsense_c45
+
+    for name in graspsense_c45.__all__:
+        assert getattr(graspsense_c45, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'tree_of_life'"):
+        _ = graspsense_c45.tree_of_life

@@ -1,0 +1,152 @@
+"""The information-gain preset has no answer from J48: here it is compared with a tree grown by brute force.
+
+The brute force follows the rules one row and one cut at a time in plain Python floats, with none of the package's code.
+"""
+
+from __future__ import annotations
+
+from math import log2
+from typing import Any
+
+import numpy as np
+import pytest
+
+from graspsense_c45 import PAPER, Attribute, Options, Schema, Table, fit, make_table
+
+EPSILON = 1e-6
+
+
+def entropy(counts: list[int]) -> float:
+    total = sum(counts)
+    return -sum(c / total * log2(c / total) for c in counts if c)
+
+
+def count(labels: list[int], n_classes: int) -> list[int]:
+    return [labels.count(k) for k in range(n_classes)]
+
+
+def best_cut(
+    pairs: list[tuple[float, int]], n_classes: int, min_objects: int, mdl: bool
+) -> tuple[float, float] | None:
+    """Gain and midpoint of the best cut of one column."""
+    pairs = sorted(pairs)
+    n = len(pairs)
+    least = 0.1 * n / n_classes
+    least = min_objects if least <= min_objects else min(least, 25)
+    whole = entropy(count([k for _, k in pairs], n_classes))
+    best, at, number = 0.0, None, 0
+    for i in range(1, n):
+        if not pairs[i - 1][0] + 1e-5 < pairs[i][0] or i < least - EPSILON or n - i < least - EPSILON:
+            continue
+        number += 1
+        left, right = ([k for _, k in part] for part in (pairs[:i], pairs[i:]))
+        gain = (
+            whole - i / n * entropy(count(left, n_classes)) - (n - i) / n * entropy(count(right, n_classes))
+        )
+        if gain > best + EPSILON:
+            best, at = gain, i
+    if at is None:
+        return None
+    if mdl:
+        best -= log2(number) / n
+    return (best, (pairs[at - 1][0] + pairs[at][0]) / 2) if best >= EPSILON else None
+
+
+def grow(
+    rows: list[tuple[list[float], int]], every: list[list[float]], options: Options, n_classes: int
+) -> dict[str, Any]:
+    labels = [k for _, k in rows]
+    counts = count(labels, n_classes)
+    node: dict[str, Any] = {"dist": counts}
+    if len(rows) < 2 * options.min_objects or max(counts) == len(rows):
+        return node
+    best, chosen = 0.0, None
+    for a in range(len(every[0])):
+        cut = best_cut(
+            [(x[a], k) for x, k in rows], n_classes, int(options.min_objects), options.mdl_correction
+        )
+        if cut is not None and cut[0] > best + EPSILON:
+            best, chosen = cut[0], (a, cut[1])
+    if chosen is None:
+        return node
+    a, middle = chosen
+    threshold = max(x[a] for x in every if x[a] <= middle)
+    sides = [[r for r in rows if (r[0][a] <= threshold) == left] for left in (True, False)]
+    return node | {
+        "att": a,
+        "thr": threshold,
+        "sons": [grow(side, every, options, n_classes) for side in sides],
+    }
+
+
+def prune(node: dict[str, Any], held: list[tuple[list[float], int]]) -> int:
+    """Reduced-error pruning in place; returns the held-out errors of what is left."""
+    label = node["dist"].index(max(node["dist"]))
+    as_leaf = sum(k != label for _, k in held)
+    if "att" not in node:
+        return as_leaf
+    a, threshold = node["att"], node["thr"]
+    as_tree = sum(
+        prune(son, [r for r in held if (r[0][a] <= threshold) == left])
+        for son, left in zip(node["sons"], (True, False), strict=True)
+    )
+    if as_leaf <= as_tree:
+        for key in ("att", "thr", "sons"):
+            del node[key]
+        return as_leaf
+    return as_tree
+
+
+def shape(node: dict[str, Any]) -> dict[str, Any]:
+    kept = {"dist": [int(c) for c in node["dist"]]}
+    if "att" in node:
+        kept |= {"att": node["att"], "thr": node["thr"], "sons": [shape(son) for son in node["sons"]]}
+    return kept
+
+
+def table(seed: int) -> Table:
+    rng = np.random.default_rng(seed)
+    n, n_classes = int(rng.integers(6, 140)), int(rng.integers(2, 5))
+    labels = rng.integers(0, n_classes, n)
+    values = np.round(
+        labels[:, None] * rng.uniform(0, 1.5, 3) + rng.normal(0, 1, (n, 3)), int(rng.integers(0, 4))
+    )
+    schema = Schema(tuple(Attribute(f"x{i}") for i in range(3)), tuple(range(n_classes)))
+    return make_table(schema, values, labels)
+
+
+def as_rows(given: Table, rows: list[int]) -> list[tuple[list[float], int]]:
+    return [(given.values[i].tolist(), int(given.labels[i])) for i in rows]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_tree_is_the_brute_force_one(seed: int) -> None:
+    given = table(seed)
+    mdl = bool(seed % 2)
+    options = Options(
+        criterion="info_gain", pruning="none", collapse=False, mdl_correction=mdl, min_objects=1 + seed % 4
+    )
+    every = given.values.tolist()
+    expected = grow(as_rows(given, list(range(len(every)))), every, options, len(given.schema.classes))
+    assert shape(fit(given, options).to_dict()) == shape(expected)
+
+
+@pytest.mark.parametrize("seed", range(100, 130))
+def test_paper_preset_prunes_on_the_held_out_rows(seed: int) -> None:
+    given = table(seed)
+    n = len(given.labels)
+    held = sorted(np.random.default_rng(seed).choice(n, n // 3, replace=False).tolist())
+    kept = [i for i in range(n) if i not in held]
+    expected = grow(as_rows(given, kept), given.values.tolist(), PAPER, len(given.schema.classes))
+    prune(expected, as_rows(given, held))
+    assert shape(fit(given, PAPER, np.array(held)).to_dict()) == shape(expected)
+
+
+def test_gain_and_ratio_differ_where_c45_says_so() -> None:
+    # x0 cuts one row off a class cleanly (large ratio, small gain); x1 nearly halves the rows (large gain).
+    labels = [0] * 10 + [1] * 10
+    x0 = [0.0] * 18 + [1.0] * 2
+    x1 = [0.0] * 9 + [1.0] + [0.0] * 2 + [1.0] * 8
+    given = make_table(Schema((Attribute("x0"), Attribute("x1")), (0, 1)), np.column_stack((x0, x1)), labels)
+    by_gain = fit(given, Options(criterion="info_gain", pruning="none", mdl_correction=False))
+    assert by_gain.to_dict()["att"] == 1

@@ -1,0 +1,275 @@
+"""Data that trees break on: each with what must come out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from graspsense_c45 import (
+    Attribute,
+    Options,
+    Schema,
+    Table,
+    class_indices,
+    distributions,
+    fit,
+    from_json,
+    make_table,
+    to_json,
+)
+
+GROWN = Options(pruning="none", collapse=False, mdl_correction=False)
+
+
+def table(values: Any, labels: Any, weights: Any = None, n_classes: int | None = None) -> Table:
+    values = np.asarray(values, dtype=float)
+    classes = tuple(range(n_classes or int(max(labels)) + 1))
+    return make_table(
+        Schema(tuple(Attribute(f"x{i}") for i in range(values.shape[1])), classes), values, labels, weights
+    )
+
+
+@pytest.mark.parametrize("scale", [1e300, 1.7e308])
+def test_huge_values_split_cleanly(scale: float) -> None:
+    values = [[-scale], [-scale / 2], [scale / 2], [scale]] * 3
+    tree = fit(table(values, [0, 0, 1, 1] * 3))
+    # The midpoint of the inner pair is 0; the largest value of the data below it is the threshold.
+    assert tree.to_dict()["thr"] == -scale / 2
+    assert class_indices(tree, values).tolist() == [0, 0, 1, 1] * 3
+
+
+def test_midpoint_of_two_huge_values_does_not_overflow() -> None:
+    tree = fit(table([[1.6e308]] * 4 + [[1.7e308]] * 4, [0] * 4 + [1] * 4), Options(actual_split_value=False))
+    assert 1.6e308 <= tree.to_dict()["thr"] < 1.7e308
+    assert tree.n_nodes == 3
+
+
+def test_a_column_below_the_gap_never_splits() -> None:
+    # J48's rule: neighbours must differ by more than 1e-5, whatever the scale.
+    for tiny in (1e-300, 1e-9, 0.99e-5):
+        assert fit(table([[0.0]] * 5 + [[tiny]] * 5, [0] * 5 + [1] * 5), GROWN).n_nodes == 1
+    assert fit(table([[0.0]] * 5 + [[1.1e-5]] * 5, [0] * 5 + [1] * 5), GROWN).n_nodes == 3
+
+
+def test_neighbours_one_ulp_apart() -> None:
+    # Near 1 an ulp is below the gap; near 1e12 it is above, and the midpoint rounds to one of the two.
+    assert fit(table([[1.0]] * 5 + [[np.nextafter(1.0, 2)]] * 5, [0] * 5 + [1] * 5), GROWN).n_nodes == 1
+    for low in (1e12, 1e12 + 2**-13):
+        high = float(np.nextafter(low, 2e12))
+        tree = fit(table([[low]] * 5 + [[high]] * 5, [0] * 5 + [1] * 5), Options(actual_split_value=False))
+        assert tree.to_dict()["thr"] == low
+        assert class_indices(tree, [[low], [high]]).tolist() == [0, 1]
+
+
+def test_ties_go_to_the_first_column_and_the_first_cut() -> None:
+    column = [0.0] * 4 + [1.0] * 4
+    tree = fit(table(np.column_stack((column, column)), [0] * 4 + [1] * 4))
+    assert tree.to_dict()["att"] == 0
+    # Cutting two rows off either end is equally good.
+    tree = fit(table([[0.0], [0.0], [1.0], [1.0], [2.0], [2.0]], [0, 0, 1, 1, 0, 0]), GROWN)
+    assert tree.to_dict()["thr"] == 0.0
+
+
+def test_majority_ties_go_to_the_first_class() -> None:
+    tree = fit(table([[0.0]] * 6, [2, 1, 2, 1, 2, 1]))
+    assert class_indices(tree, [[5.0]]).tolist() == [1]
+    assert distributions(tree, [[5.0]]).tolist() == [[0.0, 0.5, 0.5]]
+
+
+def test_constant_columns_and_duplicates_give_a_leaf() -> None:
+    tree = fit(table([[3.0, 4.0]] * 10, [0, 1] * 5), GROWN)
+    assert tree.n_nodes == 1
+    assert tree.weights.tolist() == [[5.0, 5.0]]
+
+
+def test_one_row_and_one_class() -> None:
+    assert class_indices(fit(table([[1.0]], [0])), [[7.0]]).tolist() == [0]
+    tree = fit(table([[1.0], [2.0], [3.0]], [1, 1, 1], n_classes=3))
+    assert distributions(tree, [[2.0]]).tolist() == [[0.0, 1.0, 0.0]]
+
+
+def test_no_row_and_no_weight_are_refused() -> None:
+    schema = Schema((Attribute("x"),), (0, 1))
+    with pytest.raises(ValueError, match="nothing to learn"):
+        make_table(schema, np.zeros((0, 1)), [])
+    with pytest.raises(ValueError, match="weight 0"):
+        make_table(schema, [[1.0], [2.0]], [0, 1], [0.0, 0.0])
+    with pytest.raises(ValueError, match="not negative"):
+        make_table(schema, [[1.0], [2.0]], [0, 1], [1.0, -1.0])
+
+
+def test_rows_of_weight_zero_do_not_vote() -> None:
+    values = [[0.0]] * 4 + [[1.0]] * 4 + [[0.0]] * 3
+    weights = [1.0] * 8 + [0.0] * 3
+    tree = fit(table(values, [0] * 4 + [1] * 4 + [1] * 3, weights))
+    assert tree.weights.tolist() == [[4.0, 4.0], [4.0, 0.0], [0.0, 4.0]]
+
+
+def test_whole_weights_are_repeated_rows() -> None:
+    rng = np.random.default_rng(0)
+    labels = rng.integers(0, 3, 60)
+    values = labels[:, None] + rng.normal(0, 0.8, (60, 2))
+    weights = rng.integers(1, 4, 60)
+    # With the least minimum, since J48 asks for twice that many rows, and counts them unweighted.
+    options = Options(min_objects=1)
+    weighted = fit(table(values, labels, weights), options)
+    repeated = fit(table(np.repeat(values, weights, axis=0), np.repeat(labels, weights)), options)
+    assert weighted == repeated
+    assert weighted.n_nodes > 1
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf])
+def test_infinite_values_are_refused(value: float) -> None:
+    with pytest.raises(ValueError, match=r"infinite value .* row 1, column x0"):
+        table([[1.0], [value], [2.0]], [0, 1, 0])
+    tree = fit(table([[0.0], [1.0]] * 4, [0, 1] * 4))
+    with pytest.raises(ValueError, match="infinite"):
+        class_indices(tree, [[value]])
+
+
+def test_a_column_that_is_all_missing_is_left_alone() -> None:
+    values = np.column_stack((np.full(8, np.nan), [0.0] * 4 + [1.0] * 4))
+    tree = fit(table(values, [0] * 4 + [1] * 4))
+    assert tree.to_dict()["att"] == 1
+    assert fit(table(np.full((6, 1), np.nan), [0, 1] * 3)).n_nodes == 1
+
+
+def test_missing_values_are_shared_out_by_weight() -> None:
+    # 6 known rows go left, 3 right; the 10th row, which knows nothing, goes 2/3 left and 1/3 right.
+    values = [[0.0]] * 6 + [[1.0]] * 3 + [[np.nan]]
+    tree = fit(table(values, [0] * 6 + [1] * 3 + [0]), GROWN)
+    assert tree.weights[1:].ravel().tolist() == pytest.approx([6 + 2 / 3, 0.0, 1 / 3, 3.0], abs=1e-9)
+    # Predicting shares by the training weight of the branches.
+    left, right = 20 / 3, 10 / 3
+    expected = [left / 10 + right / 10 * (1 / 3) / right, 3.0 / 10]
+    assert distributions(tree, [[np.nan]])[0].tolist() == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_value_no_row_took_answers_with_the_parents_distribution() -> None:
+    schema = Schema((Attribute("colour", values=("red", "green", "blue")),), (0, 1))
+    tree = fit(make_table(schema, [[0.0]] * 4 + [[1.0]] * 3, [0] * 4 + [1] * 3), GROWN)
+    assert tree.n_nodes == 4
+    assert distributions(tree, [[2.0]])[0].tolist() == pytest.approx([4 / 7, 3 / 7])
+
+
+def test_many_values_stay_out_of_the_average_but_may_be_chosen() -> None:
+    # A nominal column with a value for every pair of rows: at 0.3 n values or more it does not raise the average gain.
+    values = np.column_stack((np.repeat(np.arange(10.0), 2), [0.0] * 9 + [1.0] * 11))
+    schema = Schema((Attribute("id", values=tuple("abcdefghij")), Attribute("x")), (0, 1))
+    tree = fit(make_table(schema, values, [0] * 10 + [1] * 10), GROWN)
+    assert tree.to_dict()["att"] == 1
+
+
+def test_a_nominal_column_must_hold_indices() -> None:
+    schema = Schema((Attribute("colour", values=("red", "green")),), (0, 1))
+    for wrong in (2.0, -1.0, 0.5):
+        with pytest.raises(ValueError, match="colour"):
+            make_table(schema, [[0.0], [wrong]], [0, 1])
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> Table:
+    n = draw(st.integers(1, 40))
+    n_columns = draw(st.integers(1, 3))
+    cells = st.one_of(st.integers(-3, 3).map(float), st.just(float("nan")), st.floats(-1e300, 1e300))
+    values = draw(st.lists(st.lists(cells, min_size=n_columns, max_size=n_columns), min_size=n, max_size=n))
+    labels = draw(st.lists(st.integers(0, 3), min_size=n, max_size=n))
+    weights = draw(
+        st.one_of(st.none(), st.lists(st.integers(1, 12).map(lambda w: w / 4), min_size=n, max_size=n))
+    )
+    return table(values, labels, weights, n_classes=4)
+
+
+@settings(max_examples=30, deadline=None)
+@given(tables(), st.randoms(use_true_random=False))
+def test_the_order_of_the_rows_does_not_matter(given_table: Table, random: Any) -> None:
+    order = list(range(len(given_table.labels)))
+    random.shuffle(order)
+    shuffled = Table(
+        given_table.schema, given_table.values[order], given_table.labels[order], given_table.weights[order]
+    )
+    assert fit(given_table) == fit(shuffled)
+
+
+@settings(max_examples=30, deadline=None)
+@given(tables())
+def test_weights_add_up_and_json_is_exact(given_table: Table) -> None:
+    tree = fit(given_table, Options(min_objects=1))
+    assert tree.weight[0] == pytest.approx(given_table.weights.sum(), rel=1e-12)
+    for node in range(tree.n_nodes):
+        sons = list(tree.sons(node))
+        if sons:
+            np.testing.assert_allclose(tree.weights[sons].sum(axis=0), tree.weights[node], atol=1e-6)
+    assert from_json(to_json(tree)) == tree
+    np.testing.assert_allclose(distributions(tree, given_table.values).sum(axis=1), 1.0, atol=1e-6)
+
+
+def test_the_order_of_the_columns_matters_in_ties_only() -> None:
+    rng = np.random.default_rng(5)
+    labels = rng.integers(0, 3, 200)
+    values = labels[:, None] * [0.5, 0.9, 1.3] + rng.normal(0, 1, (200, 3))
+    options = Options(min_objects=8)
+    straight = fit(table(values, labels), options).to_dict()
+    turned = fit(table(values[:, ::-1], labels), options).to_dict()
+    pairs = [(straight, turned)]
+    compared = 0
+    while pairs:
+        one, other = pairs.pop()
+        assert one["dist"] == other["dist"]
+        if "att" in one:
+            assert (one["att"], one["thr"]) == (2 - other["att"], other["thr"])
+            pairs += list(zip(one["sons"], other["sons"], strict=True))
+            compared += 1
+    assert compared >= 3
+
+
+def test_the_order_of_the_rows_decides_what_is_held_out() -> None:
+    # Reduced-error pruning holds rows out by their place, as J48 does.
+    rng = np.random.default_rng(2)
+    labels = rng.integers(0, 2, 90)
+    values = labels[:, None] + rng.normal(0, 1.5, (90, 2))
+    trees = [
+        fit(table(values[order], labels[order]), Options(pruning="reduced_error"))
+        for order in (np.arange(90), rng.permutation(90))
+    ]
+    assert trees[0] != trees[1]
+    assert trees[0].weight[0] == 60.0
+
+
+def test_held_out_rows_need_reduced_error_pruning() -> None:
+    with pytest.raises(ValueError, match="reduced_error"):
+        fit(table([[0.0], [1.0]], [0, 1]), Options(), np.array([0]))
+    with pytest.raises(ValueError, match="all rows are held out"):
+        fit(table([[0.0], [1.0]], [0, 1]), Options(pruning="reduced_error"), np.array([0, 1]))
+    with pytest.raises(ValueError, match="cannot be cut into 3 folds"):
+        fit(table([[0.0], [1.0]], [0, 1]), Options(pruning="reduced_error"))
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("criterion", "gini"),
+        ("pruning", "x"),
+        ("confidence_factor", 0.0),
+        ("min_objects", 0),
+        ("rep_folds", 1),
+    ],
+)
+def test_options_out_of_range_are_refused(option: str, value: Any) -> None:
+    with pytest.raises(ValueError, match=option):
+        Options(**{option: value})
+
+
+def test_a_deep_tree_is_no_trouble() -> None:
+    # Classes that alternate along one column: a chain of cuts, hundreds of levels deep.
+    n = 1_500
+    labels = (np.arange(n) // 2) % 2
+    options = Options(pruning="none", collapse=False, mdl_correction=False, min_objects=1)
+    values = np.arange(n, dtype=float)[:, None] ** 1.0
+    tree = fit(table(values, labels), options)
+    assert tree.n_nodes > 100
+    assert from_json(to_json(tree)) == tree
