@@ -109,7 +109,8 @@ def sense(
     if now != ticks:
         ticks = now
         before = gap
-        gap, _ = gap_and_rate(params.link, ticks / PR2_ENCODER_TICKS)
+        # Within a tick the transmission is straight to a tenth of a picometre.
+        gap = plant.gap_m - plant.rate_m_rev * (plant.revolutions - ticks / PR2_ENCODER_TICKS)
         moved = gap - before
     velocity += dt_s / (VELOCITY_FILTER_S + dt_s) * (moved / dt_s - velocity)
 
