@@ -89,3 +89,28 @@ def test_whatever_is_asked_nothing_leaves_over_a_limit_or_not_a_number(kind, val
     if command.kind == VELOCITY:
         assert abs(command.value) <= 0.2
     assert state.acted in (0, 1)
+
+
+def test_touching_with_exactly_the_contact_force_counts_as_felt():
+    for touch in ({"left": 0.625}, {"right": 0.625}):
+        assert guard(REAL, FRESH, frame(**touch), Command(EFFORT, 80.0, inf, inf))[1].contact_seen == 1
+
+
+def test_having_felt_something_is_remembered_even_when_the_command_was_left_alone():
+    _, state = guard(REAL, FRESH, frame(right=0.7), Command(EFFORT, 5.0, inf, inf))
+    assert state.contact_seen == 1
+
+
+def test_a_limit_of_nothing_is_a_limit_and_no_mistake():
+    command, state = guard(LIMITS, FRESH, frame(), Command(EFFORT, 5.0, 0.0, 0.0))
+    assert (command.value, state.stopped) == (0.0, 0)
+
+
+def test_a_small_effort_past_the_speed_limit_is_taken_away_like_a_large_one():
+    assert guard(LIMITS, FRESH, frame(-0.3), Command(EFFORT, 0.05, inf, inf))[0].value == 0.0
+    assert guard(LIMITS, FRESH, frame(0.3), Command(EFFORT, -0.05, inf, inf))[0].value == 0.0
+
+
+def test_an_effort_within_its_limits_is_handed_on_as_it_is():
+    asked = Command(EFFORT, 20.0, inf, inf)
+    assert guard(LIMITS, FRESH, frame(), asked)[0] is asked

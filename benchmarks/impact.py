@@ -1,0 +1,82 @@
+"""How hard each controller hits: the block over all phases of the pads' clock, and two hundred eggs. Simulated.
+
+    python benchmarks/impact.py [--json]
+
+True peak force on a pad, which only the simulator knows. The block is grasped at 23 N from 41 openings, 10 um apart,
+which moves the contact through the 41 ms of the pads' clock; the eggs at 20 N, a seed each.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+from datetime import date
+from importlib.metadata import version
+
+import numpy as np
+from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.setting import set_scene
+
+from graspsense.plugin_api import create
+
+PHASES, EGGS = 41, 200
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--json", action="store_true")
+    as_json = parser.parse_args().json
+    result = {
+        "date": date.today().isoformat(),
+        "machine": f"{platform.machine()}, {platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        "graspsense-sim-gripper": version("graspsense-sim-gripper"),
+        **block(),
+        **eggs(),
+    }
+    if as_json:
+        print(json.dumps(result, indent=2))
+        return
+    for key, value in result.items():
+        print(f"{key:<28}{value if not isinstance(value, float) else round(value, 2)}")
+
+
+def block() -> dict[str, float]:
+    peak: dict[str, list[float]] = {"hybrid": [], "force": []}
+    for name, found in peak.items():
+        controller = create("controller", name, probing_force_n=23.0)
+        for k in range(PHASES):
+            config = SimConfig(spread=False, open_gap_m=0.086 + k * 1e-5)
+            found.append(run_many(config, controller, ["block"], [0], compiled=True)[0].body.peak_n)
+    return {
+        "block_hybrid_least_n": min(peak["hybrid"]),
+        "block_hybrid_most_n": max(peak["hybrid"]),
+        "block_force_least_n": min(peak["force"]),
+        "block_force_most_n": max(peak["force"]),
+        "block_ratio_worst": min(peak["force"]) / max(peak["hybrid"]),
+    }
+
+
+def eggs() -> dict[str, float]:
+    crush = np.array(
+        [set_scene(SimConfig(), "egg", s).plant.thing.terms[0].crush_force_n for s in range(EGGS)]
+    )
+    result: dict[str, float] = {"eggs": EGGS, "egg_weakest_n": float(crush.min())}
+    for name in ("hybrid", "force"):
+        controller = create("controller", name, probing_force_n=20.0)
+        done = run_many(SimConfig(), controller, ["egg"] * EGGS, range(EGGS))
+        peaks = np.array([one.body.peak_n for one in done])
+        broken = sum(one.body.squeezed.states[0].broken for one in done)
+        result[f"egg_{name}_broken"] = broken
+        result[f"egg_{name}_peak_most_n"] = float(peaks.max())
+        if name == "hybrid":
+            result["egg_hybrid_margin_least_n"] = float((crush - peaks).min())
+    return result
+
+
+if __name__ == "__main__":
+    main()
