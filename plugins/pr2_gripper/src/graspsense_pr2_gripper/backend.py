@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Final, final
 
 from attrs import asdict, evolve
@@ -30,6 +31,7 @@ from graspsense_pr2_gripper.protocol import (
     RELEASE_KIND,
     Identity,
     OutputReport,
+    ProtocolError,
     encode_output,
     limit,
     micro,
@@ -38,6 +40,7 @@ from graspsense_pr2_gripper.protocol import (
 OPENING_N: Final = -20.0
 """The authors' recordings show +17 and +20 N, opening, between squeezes."""
 TARE_IMAGES: Final = 6
+RELEASE_REPORT: Final = OutputReport(0, RELEASE_KIND, 0, 0, 0)
 UNHEARD_S: Final = 0.1
 """A command that is not echoed for this long does not arrive: the device counts as lost."""
 TEST_NUMBER: Final = (0x1209, 0x0001)
@@ -48,7 +51,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
     """Reads and commands one gripper over the transport that the settings name."""
 
     _opened: Opened | None = None
-    _report: Mapping[str, float | int | str | bool] = {}
+    _report: dict[str, float | int | str | bool] | None = None
     _lost_serial = ""
     _sent = _echo = _heard_us = 0
 
@@ -74,11 +77,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
     def read(self, timeout_s: float) -> Reading | None:
         """Return the newest frame with the last whole cell image. Raises DeviceLost."""
         link = self._open().link
-        try:
-            arrival = link.next(timeout_s)
-        except DeviceLost:
-            self._lost_serial = self._open().identity.serial
-            raise
+        arrival = link.next(timeout_s)
         if arrival is None:
             return None
         report = arrival.report
@@ -101,18 +100,18 @@ class Pr2Backend(SensorBackend[Pr2Config]):
 
         Anything but an effort that is a number lets go.
         """
-        opened = self._open()
-        if command.kind == EFFORT and command.value == command.value:
+        numbers = RELEASE_REPORT
+        if command.kind == EFFORT:
             most = self._effort_limit_n
-            self._send(
-                opened,
-                EFFORT_KIND,
-                micro(min(max(command.value, -most), most)),
-                limit(min(command.effort_limit_n, most)),
-                limit(command.speed_limit_m_s),
-            )
-        else:
-            self._send(opened, RELEASE_KIND, 0, 0, 0)
+            with suppress(ProtocolError):
+                numbers = OutputReport(
+                    0,
+                    EFFORT_KIND,
+                    micro(min(max(command.value, -most), most)),
+                    limit(min(command.effort_limit_n, most)),
+                    limit(command.speed_limit_m_s),
+                )
+        self._send(self._open(), numbers)
 
     def tare(self, images: Sequence[Pads]) -> None:
         """Set the zero of the pads. Raises TareRefused."""
@@ -124,17 +123,21 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         opened, self._opened = self._opened, None
         if opened is None:
             return
-        try:
-            if self._sent:
-                self._send(opened, RELEASE_KIND, 0, 0, 0)
-        except DeviceLost:
+        with suppress(DeviceLost):
+            if self._sent and not opened.link.gone:
+                self._send(opened, RELEASE_REPORT)
+        if opened.link.gone:
             self._lost_serial = opened.identity.serial
         clean = opened.link.close()
         self._report = self._counted(opened, clean)
+        if opened.emulation is not None:
+            self._report["let_go_after_s"] = opened.emulation.wire.firmware.run_on()
 
     def report(self) -> Mapping[str, float | int | str | bool]:
         """Return what was counted on the wire, until now or until it was closed."""
-        return self._report if self._opened is None else self._counted(self._opened, True)
+        if self._opened is not None:
+            return self._counted(self._opened, True)
+        return self._report or {}
 
     def _described(self, opened: Opened) -> DeviceInfo:
         config, identity, emulation = self.config, opened.identity, opened.emulation
@@ -145,7 +148,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             stored_zero(found["tare"]) if "tare" in found else None,
             stored_tables(found["load-cell"]) if "load-cell" in found else None,
         )
-        self._effort_limit_n = identity.effort_limit_un * 1e-6
+        self._effort_limit_n = identity.effort_limit_un / 1e6
         self._sent = self._echo = 0
         self._heard_us = 0
         notes = [f"calibration {kind} of {one.made} is in use" for kind, one in found.items()]
@@ -163,7 +166,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             clock="virtual" if isinstance(opened.link, LockStepLink) else "device",
             rate_hz=identity.report_rate_hz,
             effort_limit_n=self._effort_limit_n,
-            speed_limit_m_s=identity.speed_limit_um_s * 1e-6,
+            speed_limit_m_s=identity.speed_limit_um_s / 1e6,
             opening=Command(EFFORT, OPENING_N, math.inf, math.inf),
             relaxed=Command(EFFORT, 0.0, math.inf, math.inf),
             tare_images=TARE_IMAGES,
@@ -171,14 +174,9 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             notes=tuple(notes),
         )
 
-    def _send(
-        self, opened: Opened, kind: int, effort_un: int, effort_limit_un: int, speed_limit_um_s: int
-    ) -> None:
+    def _send(self, opened: Opened, command: OutputReport) -> None:
         self._sent += 1
-        counter = self._sent & 0xFFFF
-        opened.link.send(
-            encode_output(OutputReport(counter, kind, effort_un, effort_limit_un, speed_limit_um_s))
-        )
+        opened.link.send(encode_output(command._replace(counter=self._sent & 0xFFFF)))
 
     def _counted(self, opened: Opened, clean: bool) -> dict[str, float | int | str | bool]:
         link, emulation = opened.link, opened.emulation
@@ -189,9 +187,10 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             skipped=link.skipped,
             bad_cells=self._measure.bad_cells,
             commands_sent=self._sent,
-            clock_offset_s=link.clock.offset_s,
             closed_cleanly=clean,
         )
+        if link.clock.offset_s == link.clock.offset_s:
+            counted["clock_offset_s"] = link.clock.offset_s
         return counted
 
     def _open(self) -> Opened:

@@ -18,6 +18,7 @@ class Wire:
         self.firmware = firmware
         self.unplugged = False
         self._faults = faults
+        self._behaves = faults == FaultConfig()
         self._chance = random.Random(seed)
         self._late: list[tuple[int, int, bytes]] = []
         self._held: deque[bytes] = deque()
@@ -28,6 +29,8 @@ class Wire:
         """Let a period pass; return the reports that reach the host in it."""
         faults, chance = self._faults, self._chance
         report = self.firmware.step()
+        if self._behaves:
+            return [] if self.unplugged else [report]
         now_us = self.firmware.time_us
         self._steps += 1
         if now_us >= faults.unplug_at_s * 1e6:

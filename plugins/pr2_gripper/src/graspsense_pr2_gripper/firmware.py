@@ -67,6 +67,7 @@ class Firmware:
         self._result = NO_COMMAND
         self._velocity_um_s = 0.0
         self._ticks = 0
+        _, self._rate_m_rev = gap_and_rate(self._link, 0.0)
         self._velocity_mtick_s = 0
         self._body_image = 0
         self._image = 0
@@ -74,6 +75,18 @@ class Firmware:
         self._slice = 0
         self._gone_out = True
         self._cells = [0] * IMAGE_CELLS
+
+    def run_on(self) -> float:
+        """Let time pass without a host until the motor is let go; return how long that took in seconds.
+
+        The watchdog makes that short. Raises RuntimeError where it did not.
+        """
+        began = self.time_us
+        while self.effort_un:
+            if self.time_us - began > 2 * self._watchdog_us:
+                raise RuntimeError("the emulated firmware's watchdog did not let go")
+            self.step()
+        return (self.time_us - began) / 1e6
 
     @property
     def time_us(self) -> int:
@@ -147,7 +160,7 @@ class Firmware:
             effort < 0 and -closing_um_s > self._speed_limit_um_s
         ):
             return 0.0
-        return effort * 1e-6
+        return effort / 1e6
 
     def _measure(self, frame: Frame) -> None:
         if not (math.isfinite(frame.gap_m) and math.isfinite(frame.velocity_m_s)):
@@ -155,9 +168,11 @@ class Firmware:
             return
         self._status &= ~ENCODER_FAULT
         ticks_rev = self.identity.encoder_ticks_rev
-        self._ticks = round(revolutions_at(self._link, frame.gap_m) * ticks_rev)
-        _, rate = gap_and_rate(self._link, self._ticks / ticks_rev)
-        self._velocity_mtick_s = _clamped(frame.velocity_m_s / rate * ticks_rev * 1e3)
+        ticks = round(revolutions_at(self._link, frame.gap_m) * ticks_rev)
+        if ticks != self._ticks:
+            self._ticks = ticks
+            _, self._rate_m_rev = gap_and_rate(self._link, ticks / ticks_rev)
+        self._velocity_mtick_s = _clamped(frame.velocity_m_s / self._rate_m_rev * ticks_rev * 1e3)
         self._velocity_um_s = frame.velocity_m_s * 1e6
 
     def _latch(self, pads: Pads, now_us: int) -> None:

@@ -46,6 +46,8 @@ class Link(ABC):
         """Reports that were too old to be acted on."""
         self.skipped = 0
         """Reports that a newer one replaced before the driver asked."""
+        self.gone = ""
+        """Why the device is gone; empty while it is there."""
 
     @abstractmethod
     def next(self, timeout_s: float) -> Arrival | None:
@@ -60,7 +62,8 @@ class Link(ABC):
         try:
             self.transport.write(report)
         except TransportGone as gone:
-            raise DeviceLost(_lost(gone)) from gone
+            self.gone = _lost(gone)
+            raise DeviceLost(self.gone) from gone
 
 
 @final
@@ -84,7 +87,8 @@ class LockStepLink(Link):
                 if newest is not None:
                     return Arrival(newest, self.stream.image, time.monotonic())
         except (TransportGone, Restarted) as gone:
-            raise DeviceLost(_lost(gone)) from gone
+            self.gone = _lost(gone)
+            raise DeviceLost(self.gone) from gone
         return None
 
     def close(self) -> bool:
@@ -101,7 +105,6 @@ class ThreadedLink(Link):
         super().__init__(transport)
         self._arrived = threading.Condition()
         self._newest: Arrival | None = None
-        self._gone = ""
         self._stop = threading.Event()
         self._closed = False
         self._reader = threading.Thread(target=self._run, name="PR2 reader", daemon=True)
@@ -112,8 +115,8 @@ class ThreadedLink(Link):
         give_up = time.monotonic() + timeout_s
         with self._arrived:
             while self._newest is None:
-                if self._gone:
-                    raise DeviceLost(self._gone)
+                if self.gone:
+                    raise DeviceLost(self.gone)
                 left = give_up - time.monotonic()
                 if left <= 0.0:
                     return None
@@ -157,7 +160,7 @@ class ThreadedLink(Link):
                     self._arrived.notify()
         except (TransportGone, Restarted) as gone:
             with self._arrived:
-                self._gone = _lost(gone)
+                self.gone = _lost(gone)
                 self._arrived.notify()
 
 

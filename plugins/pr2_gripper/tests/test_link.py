@@ -1,0 +1,157 @@
+"""The reader thread: nothing old is acted on, a loss is told at once, and closing is bounded."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from typing import Any
+
+import pytest
+
+from graspsense.plugin_api import DeviceLost
+from graspsense_pr2_gripper import link as links
+from graspsense_pr2_gripper.clock import WINDOW_S, DeviceClock
+from graspsense_pr2_gripper.link import ThreadedLink
+from graspsense_pr2_gripper.protocol import InputReport, encode_input
+from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
+
+
+def report(sequence: int, time_us: int) -> bytes:
+    return encode_input(InputReport(sequence, time_us, 0, 0, 0, 0, 0, (), 0, 0, (0, 0, 0, 0), 0, 0))
+
+
+class Fed(Transport):
+    """A wire that hands over what the test puts in, when it puts it in."""
+
+    def __init__(self) -> None:
+        self.reports: queue.Queue[bytes | Exception] = queue.Queue()
+        self.closed = threading.Event()
+        self.stuck_in_read = self.stuck_in_close = False
+        self.freed = threading.Event()
+
+    def read(self, timeout_s: float) -> bytes:
+        if self.stuck_in_read:
+            self.freed.wait()
+        try:
+            got = self.reports.get(timeout=timeout_s)
+        except queue.Empty:
+            return b""
+        if isinstance(got, Exception):
+            raise got
+        return got
+
+    def write(self, report: bytes) -> None:
+        raise NotImplementedError
+
+    def feature(self, report_id: int) -> bytes:
+        raise NotImplementedError
+
+    def close(self) -> None:
+        if self.stuck_in_close:
+            self.freed.wait()
+        self.closed.set()
+
+
+def drained(link: ThreadedLink, wire: Fed, count: int) -> None:
+    """Wait until the reader has taken `count` reports, however long that takes here."""
+    while link.stream.counts.reports < count:
+        time.sleep(0.001)
+
+
+def test_oldest_reports_of_a_full_buffer_are_not_acted_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """hidraw keeps the oldest 64 and loses the newer: after a stall of 300 ms the first are 300 ms old."""
+    host = [100.0]
+    monkeypatch.setattr(links.time, "monotonic", lambda: host[0])
+    clock = DeviceClock()
+    assert clock.age_s(1.000, 100.000) == 0.0
+    host[0] = 100.3
+    ages = [clock.age_s(1.001 + 0.001 * i, host[0]) for i in range(64)]
+    assert ages[0] == pytest.approx(0.299)
+    assert min(ages) > links.OLDEST_S, "the whole buffer is stale"
+    assert clock.age_s(1.3005, 100.3005) < 0.001
+
+
+def test_reader_counts_what_was_too_old_and_hands_on_the_fresh_one() -> None:
+    wire = Fed()
+    link = ThreadedLink(wire)
+    try:
+        now_us = 10_000_000
+        wire.reports.put(report(1, now_us))
+        assert link.next(10.0) is not None
+        for i in range(64):
+            wire.reports.put(report(2 + i, now_us - 300_000 + 1000 * i))
+        drained(link, wire, 65)
+        wire.reports.put(report(400, now_us + 3_600_000_000))  # fresher than all: a shorter delay than ever
+        arrival = link.next(10.0)
+        assert arrival is not None
+        assert arrival.report.sequence == 400
+        assert link.discarded == 64
+    finally:
+        link.close()
+
+
+def test_newest_report_replaces_the_one_nobody_asked_for() -> None:
+    wire = Fed()
+    link = ThreadedLink(wire)
+    try:
+        for i in range(5):
+            wire.reports.put(report(i, 1000 * i + 3_600_000_000 * i))
+        drained(link, wire, 5)
+        wire.reports.put(report(5, 3_600_000_000 * 9))
+        drained(link, wire, 6)
+        arrival = link.next(10.0)
+        while arrival is not None and arrival.report.sequence < 5:
+            arrival = link.next(10.0)
+        assert arrival is not None
+        assert arrival.report.sequence == 5
+        assert link.skipped >= 4
+        assert link.next(0.001) is None
+    finally:
+        link.close()
+
+
+def test_loss_is_told_with_its_reason() -> None:
+    wire = Fed()
+    link = ThreadedLink(wire)
+    wire.reports.put(TransportGone("read error"))
+    with pytest.raises(DeviceLost, match=r"read error.*graspsense devices"):
+        link.next(10.0)
+    assert link.close()
+    assert wire.closed.is_set()
+
+
+def test_closing_twice_is_closing_once() -> None:
+    wire = Fed()
+    link = ThreadedLink(wire)
+    assert link.close()
+    wire.closed.clear()
+    assert link.close()
+    assert not wire.closed.is_set()
+
+
+@pytest.mark.parametrize("where", ["stuck_in_read", "stuck_in_close"])
+def test_closing_is_bounded_where_the_library_hangs(monkeypatch: pytest.MonkeyPatch, where: str) -> None:
+    """pyusb's close was seen to hang for more than 8 s on a device that answers nothing."""
+    monkeypatch.setattr(links, "JOIN_S", 0.3)
+    wire = Fed()
+    setattr(wire, where, True)
+    link = ThreadedLink(wire)
+    assert link.close() is False
+    assert not wire.closed.is_set(), "never closed under a read"
+    wire.freed.set()
+    if where == "stuck_in_close":
+        assert wire.closed.wait(10.0)
+    for thread in threading.enumerate():
+        if thread.name.startswith("PR2"):
+            thread.join(10.0)
+
+
+def test_offset_follows_a_drifting_clock_and_forgets_a_lucky_one() -> None:
+    """A device clock 100 parts in a million fast drifts from the first offset; two windows bound the error."""
+    clock = DeviceClock()
+    ages: list[Any] = []
+    for i in range(40_000):
+        host_s = i * 1e-3
+        ages.append(clock.age_s(host_s * (1 - 100e-6), host_s))
+    assert max(ages) <= 2 * WINDOW_S * 100e-6 + 1e-6

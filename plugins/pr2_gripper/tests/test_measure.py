@@ -1,0 +1,166 @@
+"""From counts to metres and newtons, with values that follow from the published figures."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from graspsense.plugin_api import PR2_LINKAGES, LoadTable, Pads, TareRefused, gap_and_rate, revolutions_at
+from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.measure import BAD_CELL, BEYOND_TABLE, Measure
+from graspsense_pr2_gripper.protocol import LEFT_ABSENT, InputReport
+from graspsense_pr2_gripper.stream import Image
+
+TIP = tuple(3000.0 + i for i in range(22))
+
+
+def report(ticks: int = 0, velocity_mtick_s: int = 0, status: int = 0, time_us: int = 0) -> InputReport:
+    return InputReport(0, time_us, ticks, velocity_mtick_s, 0, status, 0, (), 1, 0, (0, 0, 0, 0), 0, 0)
+
+
+def image(counter: int, left: dict[int, int] | None = None, right: dict[int, int] | None = None) -> Image:
+    """An image with these counts over the zero of `TIP` on these cells."""
+    cells = [int(TIP[i]) + over.get(i, 0) for over in (left or {}, right or {}) for i in range(22)]
+    return Image(counter, 1000 * counter, tuple(cells))
+
+
+def raw(base: Image, at: int, value: int) -> Image:
+    return base._replace(cells=(*base.cells[:at], value, *base.cells[at + 1 :]))
+
+
+def tared(identity: Any, config: Pr2Config | None = None, **more: Any) -> Measure:
+    measure = Measure(identity, config or Pr2Config(), more.get("stored"), more.get("tables"))
+    pads = [Pads(0.041 * i, i, TIP, TIP) for i in range(1, 7)]
+    measure.tare(pads)
+    return measure
+
+
+@pytest.mark.parametrize("transmission", sorted(PR2_LINKAGES))
+def test_gap_of_every_encoder_tick_comes_back_to_a_nanometre(transmission: str, device_identity: Any) -> None:
+    """Over the stroke 0 to 90 mm: ticks to metres by the driver, metres to ticks by the inverse."""
+    measure = Measure(device_identity(transmission=transmission), Pr2Config(), None, None)
+    link = PR2_LINKAGES[transmission]
+    first, last = (math.ceil(revolutions_at(link, gap) * 1200) for gap in (0.0, 0.09))
+    gaps = []
+    for ticks in range(first, last, 97):
+        gap = measure.reading(report(ticks), None).frame.gap_m
+        gaps.append(gap)
+        back = measure.reading(report(round(revolutions_at(link, gap) * 1200)), None).frame.gap_m
+        assert abs(back - gap) < 1e-9
+        assert abs(gap_and_rate(link, revolutions_at(link, gap))[0] - gap) < 1e-9
+    assert gaps[0] == pytest.approx(0.0, abs=1e-6)
+    assert gaps[-1] == pytest.approx(0.09, abs=1e-4)
+    assert gaps == sorted(gaps)
+
+
+def test_velocity_is_the_motors_times_the_linkages_ratio(device_identity: Any) -> None:
+    """pr2 linkage at 50 mm: 0.3975 mm a revolution; one revolution a second is 1200 ticks."""
+    measure = Measure(device_identity(), Pr2Config(), None, None)
+    ticks = round(revolutions_at(PR2_LINKAGES["pr2"], 0.050) * 1200)
+    frame = measure.reading(report(ticks, velocity_mtick_s=-1_200_000), None).frame
+    assert frame.velocity_m_s == pytest.approx(-0.3975e-3, rel=2e-4)
+
+
+def test_newtons_per_region(device_identity: Any) -> None:
+    """1600 counts/N on the pad, 400 on the sides, 600 on the other edge cells (fingertip_geometry.py)."""
+    measure = tared(device_identity())
+    frame = measure.reading(
+        report(), image(9, left={7: 800, 21: 800, 1: 200}, right={14: 3200, 3: 600})
+    ).frame
+    assert frame.force_left_n == pytest.approx(1.0)
+    assert frame.force_right_n == pytest.approx(2.0)
+    assert frame.edge_left_n == pytest.approx(0.5)
+    assert frame.edge_right_n == pytest.approx(1.0)
+    assert frame.status == 0
+
+
+def test_counts_per_newton_are_the_devices_own(device_identity: Any) -> None:
+    measure = tared(device_identity(pad_counts_per_n=800, side_counts_per_n=100, edge_counts_per_n=200))
+    frame = measure.reading(report(), image(9, left={10: 800, 6: 100}, right={5: 100})).frame
+    assert (frame.force_left_n, frame.edge_left_n, frame.edge_right_n) == pytest.approx((1.0, 1.0, 0.5))
+
+
+@pytest.mark.parametrize("dead", [0x0000, 0xFFFF])
+def test_cell_that_does_not_answer_adds_no_force_and_is_flagged(dead: int, device_identity: Any) -> None:
+    measure = tared(device_identity())
+    frame = measure.reading(report(), raw(image(9, left={7: 1600}), 12, dead)).frame
+    assert frame.force_left_n == pytest.approx(1.0)
+    assert frame.status == BAD_CELL
+    assert measure.bad_cells == 1
+
+
+def test_whole_tip_that_does_not_answer_has_no_force(device_identity: Any) -> None:
+    measure = tared(device_identity())
+    dead = Image(9, 0, (0,) * 22 + tuple(int(c) for c in TIP))
+    frame = measure.reading(report(), dead).frame
+    assert math.isnan(frame.force_left_n)
+    assert frame.force_right_n == pytest.approx(0.0)
+
+
+def test_board_that_misses_a_fingertip_gives_it_no_force(device_identity: Any) -> None:
+    frame = tared(device_identity()).reading(report(status=LEFT_ABSENT), image(9)).frame
+    assert math.isnan(frame.force_left_n)
+    swapped = tared(device_identity(), Pr2Config(swap_fingers=True))
+    frame = swapped.reading(report(status=LEFT_ABSENT), image(9)).frame
+    assert math.isnan(frame.force_right_n)
+    assert not math.isnan(frame.force_left_n)
+
+
+def test_fingers_can_be_swapped(device_identity: Any) -> None:
+    measure = tared(device_identity(), Pr2Config(swap_fingers=True))
+    frame = measure.reading(report(), image(9, left={7: 1600})).frame
+    assert (frame.force_left_n, frame.force_right_n) == pytest.approx((0.0, 1.0))
+
+
+def test_mirroring_swaps_the_z_sides_of_one_tip(device_identity: Any) -> None:
+    """Left column i is cells 7+i+3k, the mirrored one 9-i+3k; side 1 and 6, corner 2 and 5, tip 3 and 4."""
+    measure = Measure(device_identity(), Pr2Config(mirror_left=True), None, None)
+    cells = tuple(range(100, 144))
+    pads = measure.reading(report(), Image(1, 0, cells)).pads
+    assert pads.left[:7] == (100, 106, 105, 104, 103, 102, 101)
+    for k in range(5):
+        assert pads.left[7 + 3 * k : 10 + 3 * k] == (109 + 3 * k, 108 + 3 * k, 107 + 3 * k)
+    assert pads.right == cells[22:]
+
+
+def test_load_table_gives_newtons_of_the_load_cell_and_says_where_it_ends(device_identity: Any) -> None:
+    table = LoadTable((0.0, 2.0, 4.0), (0.0, 3.0, 5.0))
+    measure = tared(device_identity(), tables=(table, table))
+    inside = measure.reading(report(), image(9, left={7: 4800}, right={7: 1600})).frame
+    assert (inside.force_left_n, inside.force_right_n, inside.status) == pytest.approx((4.0, 1.5, 0))
+    beyond = measure.reading(report(), image(10, left={7: 8000})).frame
+    assert beyond.force_left_n == pytest.approx(6.0)
+    assert beyond.status == BEYOND_TABLE
+
+
+def test_steady_load_is_refused_against_the_stored_tare(device_identity: Any) -> None:
+    measure = Measure(device_identity(), Pr2Config(), (TIP, TIP), None)
+    loaded = tuple(c + 160.0 if i >= 7 else c for i, c in enumerate(TIP))  # 15 cells x 160 = 1.5 N
+    with pytest.raises(TareRefused, match=r"right pad is \+1.50 N off its stored tare"):
+        measure.tare([Pads(0.0, 1, TIP, loaded)])
+
+
+def test_without_a_stored_tare_an_improbable_zero_is_refused(device_identity: Any) -> None:
+    heavy = (4700.0,) * 22
+    with pytest.raises(TareRefused, match="4700 counts a cell"):
+        Measure(device_identity(), Pr2Config(), None, None).tare([Pads(0.0, 1, TIP, heavy)])
+    Measure(device_identity(), Pr2Config(), (heavy, heavy), None).tare([Pads(0.0, 1, heavy, heavy)])
+
+
+def test_cell_dead_during_the_tare_stays_out_when_it_comes_back(device_identity: Any) -> None:
+    measure = Measure(device_identity(), Pr2Config(), None, None)
+    dead = (*TIP[:9], 0.0, *TIP[10:])
+    measure.tare([Pads(0.0, i, dead, TIP) for i in (1, 2)])
+    frame = measure.reading(report(), image(9, left={7: 1600})).frame
+    assert frame.force_left_n == pytest.approx(1.0)
+    assert frame.status == BAD_CELL
+
+
+def test_time_begins_with_the_first_report(device_identity: Any) -> None:
+    measure = Measure(device_identity(), Pr2Config(), None, None)
+    first = measure.reading(report(time_us=7_000_000), None).frame
+    third = measure.reading(report(time_us=7_003_000), None).frame
+    assert (first.t_s, first.dt_s) == (0.0, 0.001)
+    assert (third.t_s, third.dt_s) == (0.003, 0.003)

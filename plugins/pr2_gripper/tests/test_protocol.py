@@ -1,0 +1,307 @@
+"""The codec and the document that defines it: bytes to numbers and back, and nothing wrong let through."""
+
+from __future__ import annotations
+
+import math
+import random
+import re
+import struct
+from pathlib import Path
+from typing import Any
+from zlib import crc32
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense_pr2_gripper import protocol
+from graspsense_pr2_gripper.protocol import (
+    Identity,
+    InputReport,
+    OutputReport,
+    ProtocolError,
+    axes,
+    decode_identity,
+    decode_input,
+    decode_output,
+    encode_identity,
+    encode_input,
+    encode_output,
+    limit,
+    micro,
+)
+
+DOCUMENT = Path(__file__).parents[3] / "specs" / "pr2_hid.md"
+U8, U16, U32 = st.integers(0, 0xFF), st.integers(0, 0xFFFF), st.integers(0, 0xFFFFFFFF)
+I32, U64 = st.integers(-(2**31), 2**31 - 1), st.integers(0, 2**64 - 1)
+
+INPUTS = st.builds(
+    InputReport,
+    sequence=U32,
+    time_us=U64,
+    encoder_ticks=I32,
+    velocity_mtick_s=I32,
+    effort_un=I32,
+    status=U16,
+    echo=U16,
+    samples=st.lists(U32, max_size=4).map(tuple),
+    image=U16,
+    slice=st.integers(0, 10),
+    cells=st.tuples(U16, U16, U16, U16),
+    command_result=st.integers(0, 3),
+    image_age_us=U16,
+)
+OUTPUTS = st.builds(
+    OutputReport,
+    counter=U16,
+    kind=st.integers(0, 1),
+    effort_un=I32,
+    effort_limit_un=U32,
+    speed_limit_um_s=U32,
+)
+
+
+def tables() -> dict[str, list[tuple[int, str, str]]]:
+    """The document's layouts: heading to (offset, type, field)."""
+    found: dict[str, list[tuple[int, str, str]]] = {}
+    heading = ""
+    for line in DOCUMENT.read_text().splitlines():
+        if line.startswith("## "):
+            heading = line[3:]
+        row = re.match(r"\| (\d+) \| ([ui]\d+)(\[\d+\])? \| (\w+) \|", line)
+        if row:
+            found.setdefault(heading, []).append((int(row[1]), row[2] + (row[3] or ""), row[4]))
+    return found
+
+
+def width(kind: str) -> int:
+    size, _, count = kind.partition("[")
+    return int(size[1:]) // 8 * int(count.rstrip("]") or 1)
+
+
+TABLES = tables()
+LAYOUTS = {
+    "Report 1, input: one each millisecond": protocol.INPUT_LAYOUT,
+    "Report 2, output: a command": protocol.OUTPUT_LAYOUT,
+    "Report 3, feature: who the device is": protocol.FEATURE_LAYOUT,
+}
+
+
+@pytest.mark.parametrize("heading", LAYOUTS)
+def test_document_has_no_gap_and_ends_with_the_crc_at_64_bytes(heading: str) -> None:
+    at = 0
+    for offset, kind, _ in TABLES[heading]:
+        assert offset == at
+        at += width(kind)
+    assert TABLES[heading][0][2] == "report_id"
+    assert TABLES[heading][-1][1:] == ("u32", "crc")
+    assert at == protocol.REPORT_SIZE
+
+
+@pytest.mark.parametrize("heading", LAYOUTS)
+def test_codec_has_the_documents_types_in_the_documents_order(heading: str) -> None:
+    codes = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i32": "i"}
+    expected = ""
+    for _, kind, field in TABLES[heading][:-1]:
+        size, _, count = kind.partition("[")
+        repeated = int(count.rstrip("]") or 1)
+        text = field in ("magic", "serial", "reserved")
+        expected += f"{repeated}s" if text else codes[size] * repeated
+    written = re.sub(r"(\d+)([BHIQi])", lambda m: m[2] * int(m[1]), LAYOUTS[heading].format.lstrip("<"))
+    assert written == expected
+
+
+def value_at(data: bytes, heading: str, field: str) -> Any:
+    offset, kind, _ = next(row for row in TABLES[heading] if row[2] == field)
+    size, _, count = kind.partition("[")
+    code = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i32": "i"}[size]
+    values = struct.unpack_from(f"<{int(count.rstrip(']') or 1)}{code}", data, offset)
+    return values if count else values[0]
+
+
+@given(INPUTS)
+def test_input_fields_lie_where_the_document_says(report: InputReport) -> None:
+    data, heading = encode_input(report), "Report 1, input: one each millisecond"
+    for field in InputReport._fields:
+        if field == "samples":
+            assert value_at(data, heading, "sample_count") == len(report.samples)
+            assert value_at(data, heading, "samples")[: len(report.samples)] == report.samples
+        else:
+            assert value_at(data, heading, field) == getattr(report, field)
+    assert value_at(data, heading, "crc") == crc32(data[:60])
+    assert decode_input(data) == report
+
+
+@given(OUTPUTS)
+def test_output_fields_lie_where_the_document_says(report: OutputReport) -> None:
+    data, heading = encode_output(report), "Report 2, output: a command"
+    for field in OutputReport._fields:
+        assert value_at(data, heading, field) == getattr(report, field)
+    assert value_at(data, heading, "crc") == crc32(data[:60])
+    assert decode_output(data) == report
+
+
+def test_feature_fields_lie_where_the_document_says(device_identity: Any) -> None:
+    identity = device_identity()
+    data, heading = encode_identity(identity), "Report 3, feature: who the device is"
+    assert bytes(value_at(data, heading, "magic")) == b"GSPR"
+    assert value_at(data, heading, "protocol") == 1
+    assert value_at(data, heading, "firmware") == (1, 2, 3)
+    assert bytes(value_at(data, heading, "serial")) == b"L7".ljust(16, b"\0")
+    assert value_at(data, heading, "transmission") == 0
+    for field in identity._fields[3:]:
+        assert value_at(data, heading, field) == getattr(identity, field)
+    assert decode_identity(data) == identity
+
+
+@pytest.mark.parametrize("name", ["pr2", "pr2_2009", "pr2_paper"])
+def test_document_numbers_the_transmissions_as_the_codec_does(name: str, device_identity: Any) -> None:
+    number = protocol.TRANSMISSIONS.index(name)
+    assert f"{number} {name}" in DOCUMENT.read_text()
+    assert decode_identity(encode_identity(device_identity(transmission=name))).transmission == name
+
+
+def test_document_numbers_bits_results_and_kinds_as_the_codec_does() -> None:
+    text = DOCUMENT.read_text()
+    bits = re.search(r"\| status bit .*?\n\n", text, re.S)
+    results = re.search(r"\| command result .*?\n\n", text, re.S)
+    assert bits
+    assert results
+    found = {name: 1 << int(bit) for bit, name in re.findall(r"\| (\d+) \| (\w+) \|", bits[0])}
+    assert found == {name: getattr(protocol, name.upper()) for name in found}
+    assert len(found) == 6
+    numbers = {name: int(n) for n, name in re.findall(r"\| (\d) \| (\w+) \|", results[0])}
+    assert numbers == {
+        "none": protocol.NO_COMMAND,
+        "accepted": protocol.ACCEPTED,
+        "clamped": protocol.CLAMPED,
+        "refused": protocol.REFUSED,
+    }
+    assert "0 let go, 1 effort" in text
+    assert (protocol.RELEASE_KIND, protocol.EFFORT_KIND) == (0, 1)
+
+
+def test_documents_report_descriptor_is_the_codecs_and_declares_63_byte_reports() -> None:
+    block = DOCUMENT.read_text().split("## Report descriptor")[1]
+    descriptor = bytes.fromhex("".join(re.findall(r"\b[0-9A-F]{2}\b", block)))
+    assert descriptor == protocol.REPORT_DESCRIPTOR
+    # Items are a prefix byte (size in its two lowest bits) and their data; 0x94 is the report count, 0x84 the id.
+    items, at = [], 0
+    while at < len(descriptor):
+        size = (0, 1, 2, 4)[descriptor[at] & 3]
+        items.append((descriptor[at] & 0xFC, int.from_bytes(descriptor[at + 1 : at + 1 + size], "little")))
+        at += 1 + size
+    assert [data for tag, data in items if tag == 0x84] == [1, 2, 3]
+    assert [data for tag, data in items if tag == 0x94] == [63, 63, 63]
+    assert items[0] == (0x04, 0xFF00)
+
+
+def test_an_image_goes_out_well_within_its_41_ms() -> None:
+    assert protocol.SLICES * protocol.SLICE_CELLS == 44
+    assert protocol.SLICES <= 41 // 3, "so that each slice goes out three times"
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 3000.0])
+def test_what_no_report_can_hold_is_refused_before_it_is_sent(value: float) -> None:
+    with pytest.raises(ProtocolError):
+        micro(value)
+
+
+def test_limits_are_rounded_down_and_infinity_is_the_devices_own() -> None:
+    assert limit(math.inf) == limit(1e9) == protocol.OWN_LIMIT
+    assert limit(0.0109999999) == 10_999
+    for wrong in (math.nan, -1.0):
+        with pytest.raises(ProtocolError):
+            limit(wrong)
+
+
+def test_accelerometer_words_hold_three_signed_axes() -> None:
+    assert axes(0) == (0, 0, 0)
+    assert axes(511 | (1024 - 512) << 10 | (1024 - 1) << 20) == (511, -512, -1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "what"),
+    [
+        ({"serial": ""}, "serial"),
+        ({"serial": "x" * 17}, "serial"),
+        ({"serial": "é"}, "serial"),
+        ({"transmission": "worm"}, "transmission"),
+        ({"report_rate_hz": 0}, "report_rate_hz"),
+        ({"encoder_ticks_rev": 0}, "encoder_ticks_rev"),
+        ({"pad_counts_per_n": 0}, "pad_counts_per_n"),
+    ],
+)
+def test_identity_that_means_nothing_is_refused(
+    changes: dict[str, Any], what: str, device_identity: Any
+) -> None:
+    with pytest.raises(ProtocolError, match=what):
+        encode_identity(device_identity(**changes))
+
+
+def test_another_protocol_says_which(device_identity: Any) -> None:
+    body = bytearray(encode_identity(device_identity())[:60])
+    body[5] = 2
+    with pytest.raises(ProtocolError, match="protocol version 2, this driver version 1"):
+        decode_identity(bytes(body) + struct.pack("<I", crc32(body)))
+    body[1:5] = b"ABCD"
+    with pytest.raises(ProtocolError, match="no gripper of ours"):
+        decode_identity(bytes(body) + struct.pack("<I", crc32(body)))
+
+
+def mutated(chance: random.Random, good: bytes) -> bytes:
+    kind = chance.randrange(6)
+    if kind == 0:
+        return chance.randbytes(chance.randrange(130))
+    if kind == 1:
+        return chance.randbytes(64)
+    data = bytearray(good)
+    if kind == 2:
+        for _ in range(chance.randrange(1, 9)):
+            data[chance.randrange(64)] = chance.randrange(256)
+    elif kind == 3:
+        data[chance.randrange(64)] ^= 1 << chance.randrange(8)
+    elif kind == 4:
+        return bytes(data[: chance.randrange(65)]) + chance.randbytes(chance.randrange(3))
+    else:
+        # Right CRC over nonsense: only the ranges are left to object.
+        first = chance.randrange(1, 60)
+        data[first:60] = chance.randbytes(60 - first)
+        return bytes(data[:60]) + struct.pack("<I", crc32(data[:60]))
+    return bytes(data)
+
+
+def attack(count: int, seed: int, identity: Identity) -> tuple[int, int]:
+    """Decode `count` random and mutated reports; return how many were accepted and how many were refused."""
+    chance = random.Random(seed)
+    accepted = refused = 0
+    good = {
+        decode_input: encode_input(InputReport(7, 8, 9, 10, 11, 0, 1, (5,), 3, 2, (1, 2, 3, 4), 1, 6)),
+        decode_output: encode_output(OutputReport(3, 1, -20_000_000, 100, 200)),
+        decode_identity: encode_identity(identity),
+    }
+    decoders = list(good)
+    for _ in range(count):
+        decode = decoders[chance.randrange(3)]
+        data = mutated(chance, good[decode])
+        try:
+            decode(data)
+        except ProtocolError:
+            refused += 1
+            continue
+        accepted += 1
+        assert len(data) == 64
+        assert crc32(data[:60]) == int.from_bytes(data[60:], "little")
+    return accepted, refused
+
+
+def test_twenty_thousand_random_and_mutated_reports(device_identity: Any) -> None:
+    accepted, refused = attack(20_000, 7, device_identity())
+    assert accepted > 100, "else nothing with a right CRC was tried"
+    assert refused > 10_000
+
+
+@pytest.mark.slow
+def test_one_million_random_and_mutated_reports(device_identity: Any) -> None:
+    accepted, refused = attack(1_000_000, 8, device_identity())
+    assert accepted + refused == 1_000_000

@@ -1,0 +1,143 @@
+"""Reports as they come: what is lost, late, repeated or damaged is counted, and images come together all the same."""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense_pr2_gripper.protocol import InputReport, encode_input
+from graspsense_pr2_gripper.stream import RESTARTED, Restarted, Stream
+
+IMAGE = tuple(range(3000, 3044))
+
+
+def report(sequence: int, *, image: int = 1, slice: int = 0, cells: Any = None, age_us: int = 0) -> bytes:
+    part = cells if cells is not None else IMAGE[4 * slice : 4 * slice + 4]
+    return encode_input(
+        InputReport(sequence & 0xFFFFFFFF, 1000 * sequence, 0, 0, 0, 0, 0, (), image, slice, part, 1, age_us)
+    )
+
+
+def reports(first: int, count: int, image: int = 1) -> list[bytes]:
+    """A board's stream: the image's slices over and over."""
+    return [report(first + i, image=image, slice=i % 11, age_us=1000 * i) for i in range(count)]
+
+
+def test_image_is_whole_after_eleven_reports_and_bears_the_time_it_was_taken() -> None:
+    stream = Stream()
+    for data in reports(100, 10):
+        stream.take(data)
+    assert stream.image is None
+    stream.take(reports(100, 11)[10])
+    assert stream.image == (1, 100_000, IMAGE)
+
+
+def test_lost_report_delays_an_image_by_one_round_and_no_more() -> None:
+    stream = Stream()
+    sent = reports(0, 41)
+    del sent[4]
+    whole_after = next(i for i, data in enumerate(sent, 1) if stream.take(data) and stream.image)
+    assert whole_after == 15  # slice 4 comes again as report 15
+    assert stream.counts.lost == 1
+    assert stream.image == (1, 0, IMAGE)
+
+
+def test_image_that_never_came_whole_is_counted_and_not_made_up() -> None:
+    stream = Stream()
+    for data in [*reports(0, 41, image=1), *reports(41, 5, image=2), *reports(46, 41, image=4)]:
+        stream.take(data)
+    assert stream.image is not None
+    assert stream.image.counter == 2, "images are numbered as they come whole"
+    assert stream.counts.images == 2
+    assert stream.counts.images_lost == 2, "number 2 was cut short, number 3 never came"
+
+
+def test_counters_wrap() -> None:
+    stream = Stream()
+    first = 2**32 - 20
+    sent = [
+        *(report(first + i, image=65535, slice=i % 11) for i in range(20)),
+        *(report(i, image=1, slice=i % 11) for i in range(11)),
+    ]
+    assert all(stream.take(data) for data in sent)
+    assert (stream.counts.lost, stream.counts.images, stream.counts.images_lost) == (0, 2, 0)
+
+
+def test_late_report_is_not_handed_on_but_its_cells_count() -> None:
+    stream = Stream()
+    sent = reports(0, 11)
+    sent[4], sent[5] = sent[5], sent[4]
+    handed_on = [stream.take(data) is not None for data in sent]
+    assert handed_on == [True] * 5 + [False] + [True] * 5
+    assert (stream.counts.lost, stream.counts.out_of_order) == (0, 1)
+    assert stream.image is not None
+
+
+def test_repeated_and_damaged_reports_change_nothing() -> None:
+    stream = Stream()
+    good = reports(0, 3)
+    damaged = bytearray(good[1])
+    damaged[14] ^= 4
+    taken = [
+        stream.take(data) is not None
+        for data in (good[0], good[0], bytes(damaged), good[1], good[0], good[2])
+    ]
+    assert taken == [True, False, False, True, False, True]
+    counts = stream.counts
+    assert (counts.reports, counts.repeated, counts.corrupt, counts.lost) == (3, 2, 1, 0)
+
+
+def test_device_that_begins_anew_is_noticed() -> None:
+    stream = Stream()
+    stream.take(report(5000))
+    for i in range(RESTARTED - 1):
+        assert stream.take(report(i)) is None
+    with pytest.raises(Restarted, match="from number 5000 to 31"):
+        stream.take(report(RESTARTED - 1))
+
+
+@given(
+    st.integers(0, 2**32 - 1),
+    st.lists(st.sampled_from(["pass", "drop", "repeat", "swap", "damage"]), min_size=1, max_size=80),
+    st.randoms(use_true_random=False),
+)
+def test_what_is_counted_adds_up(first: int, fates: list[str], chance: random.Random) -> None:
+    """The first and last report pass, so that both ends are known; then every report is accounted for."""
+    stream = Stream()
+    arriving: list[bytes] = [report(first)]
+    held: list[bytes] = []
+    expected = {"drop": 0, "repeat": 0, "swap": 0, "damage": 0}
+    for i, fate in enumerate(fates, 1):
+        data = report(first + i)
+        if fate == "swap" and not held:
+            held.append(data)
+            expected["swap"] += 1
+            continue
+        if fate == "drop":
+            expected["drop"] += 1
+            continue
+        if fate == "damage":
+            broken = bytearray(data)
+            broken[chance.randrange(64)] ^= 1 << chance.randrange(8)
+            data = bytes(broken)
+            expected["damage"] += 1
+        elif fate == "repeat":
+            arriving.append(data)
+            expected["repeat"] += 1
+        arriving.append(data)
+        if fate == "pass" and held:
+            arriving.append(held.pop())
+    arriving += [report(first + len(fates) + 1), *held]
+    handed_on = [stream.take(data) for data in arriving]
+    counts = stream.counts
+    sequences = [(one.sequence - first) & 0xFFFFFFFF for one in handed_on if one]
+    assert sequences == sorted(set(sequences))
+    assert counts.lost == expected["drop"] + expected["damage"]
+    assert counts.corrupt == expected["damage"]
+    assert counts.repeated == expected["repeat"]
+    assert counts.out_of_order == expected["swap"]
+    assert counts.reports + counts.out_of_order + counts.lost == len(fates) + 2
