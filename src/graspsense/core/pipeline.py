@@ -10,6 +10,7 @@ from attrs import frozen
 from graspsense.core.config import Flag, Settings, resolve
 from graspsense.core.model import model_for
 from graspsense.core.plugins import Plugins, installed
+from graspsense.core.roles import DeviceInfo
 from graspsense.core.runner import Sink, run_grasp
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
 from graspsense.core.wiring import check
@@ -70,6 +71,7 @@ def grasp_with(
     labels: Mapping[str, str] | None = None,
     sinks: Iterable[Sink] = (),
     on_event: Callable[[GraspEvent], None] | None = None,
+    on_open: Callable[[DeviceInfo], None] | None = None,
 ) -> Trial:
     """Do one grasp with these settings: build the components, run, draw features, predict, tell the observers."""
     # The model comes first: a missing one must not be found out after the grasp.
@@ -89,7 +91,7 @@ def grasp_with(
             on_event(event)
 
     plugins.run_starting(run)
-    grasp = run_grasp(backend, controller, settings.run, sinks=sinks, on_event=tell)
+    grasp = run_grasp(backend, controller, settings.run, sinks=sinks, on_event=tell, on_open=on_open)
     features = feature_set.extract(grasp.trace)
     prediction = None if model is None else model.predict(features, settings, grasp.device)
     trial = Trial(

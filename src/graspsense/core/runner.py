@@ -108,14 +108,18 @@ def run_grasp(
     *,
     sinks: Iterable[Sink] = (),
     on_event: Callable[[GraspEvent], None] | None = None,
+    on_open: Callable[[DeviceInfo], None] | None = None,
 ) -> Grasp:
     """Drive one grasp and return it, whatever its outcome.
 
+    `on_open` is told which gripper was opened, before it is commanded anything; what it raises ends the run.
     Raises NoDevice where the gripper cannot be opened. All that goes wrong later is an outcome.
     """
     began = time.perf_counter()
     try:
         info = backend.open(run.seed)
+        if on_open is not None:
+            on_open(info)
         grasp = _Grasp(backend, controller, run, info, tuple(sinks), on_event)
         outcome, reason = grasp.drive()
     finally:
