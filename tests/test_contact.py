@@ -16,6 +16,7 @@ from graspsense.core.contact import (
 def test_contact_needs_both_pads_at_or_over_the_threshold():
     # Equation 1 as the text means it: one finger first is no contact, exactly tau_1 is.
     assert both_touch(0.625, 0.7, 0.625)
+    assert both_touch(0.7, 0.625, 0.625)
     assert not both_touch(5.0, 0.6249, 0.625)
     assert not both_touch(0.0, 5.0, 0.625)
     assert not both_touch(float("nan"), 5.0, 0.625)

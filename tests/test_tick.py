@@ -1,0 +1,127 @@
+"""One tick as a pure function: the phases a grasp goes through, and when."""
+
+from math import inf
+
+import pytest
+
+from graspsense.core.binding import bind
+from graspsense.core.guard import GuardParams
+from graspsense.core.signals import (
+    APPROACH,
+    EFFORT,
+    HOLD,
+    RUNNING,
+    SQUEEZE,
+    STEADY,
+    Command,
+    Frame,
+    Pads,
+    Phase,
+)
+from graspsense.core.tick import Schedule, TickParams, first_state, tick
+from graspsense.plugins.controllers.velocity import VelocityState
+
+OPENING = Command(EFFORT, -20.0, inf, inf)
+RELAXED = Command(EFFORT, 0.0, inf, inf)
+CLOSING = Command(EFFORT, 9.0, inf, inf)
+LIMITS = GuardParams(100.0, 0.2, inf, inf, 0.625)
+
+
+def law_that_ends_at(t_end, outcome=STEADY):
+    """A law that approaches, squeezes from 1 s on, and ends with `outcome` at `t_end`."""
+
+    def step(params, state, frame, pads):
+        phase, ended = (SQUEEZE if frame.t_s >= 1.0 else APPROACH), RUNNING
+        if frame.t_s >= t_end:
+            phase, ended = HOLD, outcome
+        return CLOSING, VelocityState(phase, ended, None, 0.0)
+
+    return step
+
+
+def walk(step, gap_of, ticks, opens=1, tare_images=3, hold_s=0.25, timeout_s=5.0, images_every=41):
+    """Run `ticks` ticks of 1 ms; return (t, phase, command value) of each and the last state."""
+    params = TickParams(Schedule(opens, OPENING, RELAXED, tare_images, hold_s, timeout_s), LIMITS, ())
+    state = first_state(VelocityState(APPROACH, RUNNING, None, 0.0))
+    bound, seen = bind(tick, step=step), []
+    for k in range(ticks):
+        t = k * 0.001
+        frame = Frame(t, 0.001, gap_of(t), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+        command, state = bound(params, state, frame, Pads(t, 1 + k // images_every, (), ()))
+        seen.append((t, state.phase, command.value))
+        if state.done:
+            break
+    return seen, state
+
+
+def first_of(seen, phase):
+    return next(t for t, p, _ in seen if p == phase)
+
+
+def test_opened_means_slower_than_1_mm_s_for_a_tenth_of_a_second():
+    # Opens at 2 mm/s until 0.3 s, then creeps at 0.5 mm/s: that counts as open.
+    def gap(t):
+        return 0.05 + 0.002 * min(t, 0.3) + 0.0005 * max(t - 0.3, 0.0)
+
+    seen, _ = walk(law_that_ends_at(9.0), gap, 600)
+    assert first_of(seen, Phase.TARING) == pytest.approx(0.4, abs=0.06)
+    assert all(value == -20.0 for t, p, value in seen if p == Phase.OPENING)
+
+
+def test_fingers_that_go_on_opening_faster_than_that_are_not_open():
+    seen, state = walk(law_that_ends_at(9.0), lambda t: 0.02 + 0.0015 * t, 600)
+    assert state.phase == Phase.OPENING
+    assert {p for _, p, _ in seen} == {Phase.OPENING}
+
+
+def test_opening_ends_at_its_time_out_whatever_the_fingers_do():
+    seen, _ = walk(law_that_ends_at(9.0), lambda t: 0.02 + 0.02 * t, 1200, timeout_s=1.0)
+    assert first_of(seen, Phase.TARING) == pytest.approx(1.0, abs=0.0011)
+
+
+def test_the_taring_waits_for_its_images_relaxed():
+    seen, _ = walk(law_that_ends_at(9.0), lambda t: 0.086, 400)
+    taring, approach = first_of(seen, Phase.TARING), first_of(seen, Phase.APPROACH)
+    assert taring == pytest.approx(0.1, abs=0.0011)
+    # Three images from the one that was there: at 123, 164, 205 ms.
+    assert approach == pytest.approx(0.205, abs=0.0011)
+    # The tick that finds the fingers open still opens them; from then on they are relaxed.
+    values = [value for _, p, value in seen if p == Phase.TARING]
+    assert values[0] == -20.0
+    assert set(values[1:]) == {0.0}
+
+
+def test_no_images_wanted_no_waiting():
+    seen, _ = walk(law_that_ends_at(9.0), lambda t: 0.086, 400, tare_images=0)
+    assert first_of(seen, Phase.APPROACH) - first_of(seen, Phase.TARING) == pytest.approx(0.001)
+
+
+def test_a_steady_grasp_is_held_then_released_then_done():
+    seen, state = walk(law_that_ends_at(1.5), lambda t: 0.086 if t < 1.0 else 0.05, 5000)
+    assert first_of(seen, Phase.HOLD) == pytest.approx(1.5)
+    assert first_of(seen, Phase.RELEASE) == pytest.approx(1.75, abs=0.0021)
+    assert state.done == 1
+    # Released is: still for a tenth of a second.
+    assert seen[-1][0] == pytest.approx(1.85, abs=0.004)
+    assert seen[-1][2] == -20.0
+
+
+def test_any_other_ending_is_released_at_once():
+    seen, _ = walk(law_that_ends_at(1.5, outcome=STEADY + 3), lambda t: 0.05, 5000)
+    assert first_of(seen, Phase.RELEASE) == pytest.approx(1.5)
+
+
+def test_a_recording_has_no_opening_and_no_release():
+    seen, state = walk(law_that_ends_at(1.5), lambda t: 0.05, 5000, opens=0)
+    assert seen[0][1] == Phase.APPROACH
+    assert state.done == 1
+    assert seen[-1][0] == pytest.approx(1.75, abs=0.0021)
+    assert {p for _, p, _ in seen} == {Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD}
+
+
+def test_without_a_controller_it_says_so():
+    params = TickParams(Schedule(0, OPENING, RELAXED, 0, 0.0, 1.0), LIMITS, ())
+    state = first_state(VelocityState(APPROACH, RUNNING, None, 0.0))
+    frame = Frame(0.0, 0.001, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+    with pytest.raises(TypeError, match="no controller"):
+        tick(params, state, frame, Pads(0.0, 0, (), ()))
