@@ -85,6 +85,11 @@ def asked(name: str) -> Asked:
     return Asked(*read_csv(name, oracle["classes"]), oracle)
 
 
+@cache
+def fitted(name: str, variant: str) -> Tree:
+    return fit(asked(name).table, Options(**VARIANTS[variant]))
+
+
 def as_table(values: Any, labels: Any, weights: Any, classes: Any) -> Table:
     attributes = tuple(Attribute(f"x{i}") for i in range(np.shape(values)[1]))
     return make_table(Schema(attributes, tuple(classes)), values, labels, weights)
@@ -138,8 +143,8 @@ def assert_same_answers(tree: Tree, question: Asked, variant: str) -> int:
 def test_trees_and_answers(name: str) -> None:
     question = asked(name)
     assert set(question.oracle["variants"]) == set(VARIANTS)
-    for variant, options in VARIANTS.items():
-        tree = fit(question.table, Options(**options))
+    for variant in VARIANTS:
+        tree = fitted(name, variant)
         assert_same_nodes(tree.to_dict(), question.answer(variant, "tree"), f"{name} {variant}")
         assert assert_same_answers(tree, question, variant) >= 1
         assert tree.n_nodes == question.answer(variant, "size")
@@ -155,7 +160,7 @@ def test_text_is_j48s(name: str) -> None:
     for variant, dump in dumps:
         body = dump.split("------------------\n", 1)[1]
         if isinstance(question.table.schema.classes[0], str):
-            assert to_text(fit(question.table, Options(**VARIANTS[variant]))) == body, variant
+            assert to_text(fitted(name, variant)) == body, variant
 
 
 @pytest.mark.parametrize("name", SETS)

@@ -72,7 +72,7 @@ class Laws(NamedTuple):
 class Intervals(NamedTuple):
     """Rows by leaf, and for every node the interval of them that is its own."""
 
-    rows: NDArray[np.int32]
+    rows: NDArray[np.uint32]
     start: NDArray[np.int64]
     end: NDArray[np.int64]
 
@@ -85,7 +85,8 @@ def takes(problem: Problem) -> bool:
 def grow(problem: Problem) -> tuple[Branches, Intervals]:
     """The unpruned tree (thresholds are midpoints) and where its rows are."""
     n_rows, n_attributes = problem.values.shape
-    order = np.empty((n_attributes, n_rows), dtype=np.int32)
+    # Unsigned, so that no index is checked for counting from the end.
+    order = np.empty((n_attributes, n_rows), dtype=np.uint32)
     values = np.empty((n_attributes, n_rows))
     for a in range(n_attributes):
         column = np.ascontiguousarray(problem.values[:, a])
@@ -104,7 +105,7 @@ def grow(problem: Problem) -> tuple[Branches, Intervals]:
         problem.unit,
     )
     attribute, threshold, first_son, counts, start, end = _grow(
-        order, values, problem.labels.astype(np.int32), problem.weights, terms, laws
+        order, values, _small_labels(problem), problem.weights, terms, laws
     )
     n_nodes = len(attribute)
     branches = Branches(
@@ -134,7 +135,7 @@ def prune_pessimistic(branches: Branches, problem: Problem, intervals: Intervals
     estimate = (confidence, bits, problem.weight_bits, problem.weight_margin)
     tree = (branches.attribute, branches.threshold, branches.first_son, branches.counts)
     rows = (intervals.rows, intervals.start, intervals.end)
-    data = (np.ascontiguousarray(problem.values), problem.labels.astype(np.int32), problem.weights)
+    data = (np.ascontiguousarray(problem.values), _small_labels(problem), problem.weights)
     _prune(tree, rows, data, estimate, limit, problem.options.subtree_raising)
     branches.n_sons[branches.attribute == LEAF] = 0
 
@@ -142,6 +143,10 @@ def prune_pessimistic(branches: Branches, problem: Problem, intervals: Intervals
 def reach(tests: Tests, values: NDArray[np.float64]) -> NDArray[np.int64]:
     """The leaf each row comes to from the root; a tree of numeric tests, no value that is tested may be missing."""
     return np.asarray(_reach(tests.attribute, tests.threshold, tests.first_son, np.ascontiguousarray(values)))
+
+
+def _small_labels(problem: Problem) -> Array:
+    return problem.labels.astype(np.min_scalar_type(problem.n_classes))
 
 
 @_compile
@@ -163,6 +168,89 @@ def _majority(counts: Array, margin: Number) -> Number:
 
 
 @_compile
+def _scan_ones(
+    columns: Any,
+    begin: Number,
+    stop: Number,
+    counts: Array,
+    running: Array,
+    terms: Array,
+    steps: Array,
+    least: Number,
+    tolerance: Number,
+    zero: Number,
+) -> Any:
+    """The best cut of an attribute at a node where every row weighs 1: numerator, place (-1: none), left, cuts."""
+    rows, values, labels = columns
+    total = stop - begin
+    # The numerator but for the sides' terms: L(T), and what the rows passed so far changed.
+    inside = terms[total]
+    best, cut_left, n_cuts = np.int64(0), np.int64(0), 0
+    cut: Number = np.int64(-1)
+    for i in range(begin, stop - 1):
+        k = labels[rows[i]]
+        had = running[k]
+        running[k] = had + 1
+        inside += steps[had] - steps[counts[k] - had - 1]
+        left = i + 1 - begin
+        right = total - left
+        if left < least or right < least or not values[i] + criteria.GAP < values[i + 1]:
+            continue
+        n_cuts += 1
+        numerator = inside - terms[left] - terms[right]
+        if numerator - best > tolerance and numerator >= zero:
+            best, cut, cut_left = numerator, i, left
+    return best, cut, cut_left, n_cuts
+
+
+@_compile
+def _scan_weights(
+    columns: Any,
+    begin: Number,
+    stop: Number,
+    counts: Array,
+    running: Array,
+    weights: Array,
+    laws: Laws,
+    least: Number,
+    tolerance: Number,
+    zero: Number,
+) -> Any:
+    """As ``_scan_ones``, for rows of any weight."""
+    rows, values, labels = columns
+    total = counts.sum()
+    inside = _term(total, laws.weight_bits, laws.term_bits)
+    best, cut_left, n_cuts = np.int64(0), np.int64(0), 0
+    cut: Number = np.int64(-1)
+    left = np.int64(0)
+    for i in range(begin, stop - 1):
+        row = rows[i]
+        k, w = labels[row], weights[row]
+        had = running[k]
+        rest = counts[k] - had
+        running[k] = had + w
+        left += w
+        right = total - left
+        inside += (
+            _term(had + w, laws.weight_bits, laws.term_bits)
+            - _term(had, laws.weight_bits, laws.term_bits)
+            + _term(rest - w, laws.weight_bits, laws.term_bits)
+            - _term(rest, laws.weight_bits, laws.term_bits)
+        )
+        if left < least or right < least or not values[i] + criteria.GAP < values[i + 1]:
+            continue
+        n_cuts += 1
+        numerator = (
+            inside
+            - _term(left, laws.weight_bits, laws.term_bits)
+            - _term(right, laws.weight_bits, laws.term_bits)
+        )
+        if numerator - best > tolerance and numerator >= zero:
+            best, cut, cut_left = numerator, i, left
+    return best, cut, cut_left, n_cuts
+
+
+@_compile
 def _grow(order: Array, values: Array, labels: Array, weights: Array, terms: Array, laws: Laws) -> Any:
     n_attributes, n_rows = order.shape
     n_classes = laws.n_classes
@@ -178,12 +266,13 @@ def _grow(order: Array, values: Array, labels: Array, weights: Array, terms: Arr
     end[0] = n_rows
     n_nodes = 1
     goes_left = np.zeros(n_rows, dtype=np.bool_)
-    spare_rows = np.empty(n_rows, dtype=np.int32)
+    spare_rows = np.empty(n_rows, dtype=np.uint32)
     spare_values = np.empty(n_rows)
     running = np.zeros(n_classes, dtype=np.int64)
     gains = np.zeros(n_attributes)
     ratios = np.zeros(n_attributes)
     usable = np.zeros(n_attributes, dtype=np.bool_)
+    steps = np.diff(terms)
     cuts = np.zeros(n_attributes, dtype=np.int64)
     stack = [np.int64(0)]
     while len(stack) > 0:
@@ -200,67 +289,32 @@ def _grow(order: Array, values: Array, labels: Array, weights: Array, terms: Arr
         least = np.int64(criteria.least_units(least_weight, laws.weight_bits))
         tolerance = np.int64(criteria.gain_tolerance(weight, laws.term_bits))
         zero = np.int64(criteria.least_numerator(weight, weight, laws.term_bits))
-        whole = terms[total] if laws.unit else _term(total, laws.weight_bits, laws.term_bits)
         enough = criteria.has_enough_rows(stop - begin, least_weight)
         for a in range(n_attributes):
             usable[a] = False
             if not enough:
                 continue
             running[:] = 0
-            left = np.int64(0)
-            # The numerator but for the sides' terms: L(T), and what the rows passed so far changed.
-            inside = whole
-            best = np.int64(0)
-            n_cuts = 0
-            cut: Number = np.int64(-1)
-            cut_left = np.int64(0)
-            for i in range(begin, stop - 1):
-                row = order[a, i]
-                k = labels[row]
-                had = running[k]
-                rest = counts[node, k] - had
-                if laws.unit:
-                    inside += terms[had + 1] - terms[had] - (terms[rest] - terms[rest - 1])
-                    running[k] = had + 1
-                    left += 1
-                else:
-                    w = weights[row]
-                    inside += (
-                        _term(had + w, laws.weight_bits, laws.term_bits)
-                        - _term(had, laws.weight_bits, laws.term_bits)
-                        + _term(rest - w, laws.weight_bits, laws.term_bits)
-                        - _term(rest, laws.weight_bits, laws.term_bits)
-                    )
-                    running[k] = had + w
-                    left += w
-                right = total - left
-                if left < least or right < least or not values[a, i] + criteria.GAP < values[a, i + 1]:
-                    continue
-                n_cuts += 1
-                if laws.unit:
-                    numerator = inside - terms[left] - terms[right]
-                else:
-                    numerator = (
-                        inside
-                        - _term(left, laws.weight_bits, laws.term_bits)
-                        - _term(right, laws.weight_bits, laws.term_bits)
-                    )
-                if numerator - best > tolerance and numerator >= zero:
-                    best, cut, cut_left = numerator, i, left
+            columns = (order[a], values[a], labels)
+            if laws.unit:
+                best, cut, cut_left, n_cuts = _scan_ones(
+                    columns, begin, stop, counts[node], running, terms, steps, least, tolerance, zero
+                )
+            else:
+                best, cut, cut_left, n_cuts = _scan_weights(
+                    columns, begin, stop, counts[node], running, weights, laws, least, tolerance, zero
+                )
             if cut < 0:
                 continue
             gain = criteria.gain(math.ldexp(float(best), -laws.term_bits), weight, weight)
             if laws.mdl_correction:
                 mantissa, exponent = math.frexp(float(n_cuts))
                 gain = gain - criteria.mdl_cost(arithmetic.ln_of_parts(mantissa, exponent), weight)
-            if laws.unit:
-                split = whole - terms[cut_left] - terms[total - cut_left]
-            else:
-                split = (
-                    whole
-                    - _term(cut_left, laws.weight_bits, laws.term_bits)
-                    - _term(total - cut_left, laws.weight_bits, laws.term_bits)
-                )
+            split = (
+                _term(total, laws.weight_bits, laws.term_bits)
+                - _term(cut_left, laws.weight_bits, laws.term_bits)
+                - _term(total - cut_left, laws.weight_bits, laws.term_bits)
+            )
             usable[a] = gain >= TOLERANCE
             gains[a] = gain
             ratios[a] = criteria.gain_ratio(gain, math.ldexp(float(split), -laws.term_bits), weight)
