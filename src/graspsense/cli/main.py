@@ -23,6 +23,10 @@ TRACEBACK_VARIABLE: Final = "GRASPSENSE_TRACEBACK"
 
 COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "run": ("graspsense.cli.run:run", "Grasp once, live in the terminal."),
+    "train": ("graspsense.cli.train:train", "Make a model from labelled trials."),
+    "predict": ("graspsense.cli.predict:predict", "Ask a model what trials are of."),
+    "evaluate": ("graspsense.cli.evaluate:evaluate", "Measure an honest recognition rate."),
+    "calibrate": ("graspsense.cli.calibrate:calibrate", "Keep a gripper's zero, load table and friction."),
     "config": ("graspsense.cli.config:config", "Show or check the settings of a pipeline."),
     "plugins": ("graspsense.cli.plugins:plugins", "Show what is installed and whether it works."),
     "devices": ("graspsense.cli.devices:devices", "Look for grippers that are plugged in."),

@@ -98,8 +98,8 @@ class Labelled:
             )
         return self.rows(np.flatnonzero(of))
 
-    def aimed(self, target: Target) -> Labelled:
-        """Return the trials labelled with their class, their state, or both. Raises ConfigError."""
+    def aimed(self, target: str) -> Labelled:
+        """Return the trials with labels by one of `TARGETS`. Raises ConfigError where labels have no state."""
         if target == "both":
             return self
         if target == "class":

@@ -25,8 +25,6 @@ from graspsense.core.firstparty import MODELS
 from graspsense.core.novelty import Novelty, novelty_from, novelty_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from graspsense.core.config import Settings
     from graspsense.core.labelled import Labelled
     from graspsense.core.plugins import Component, Plugins
@@ -90,7 +88,7 @@ class Model:
         warnings = tuple(self._warnings(settings, device))
         probabilities: Mapping[str, float] = {}
         because: tuple[str, ...]
-        misfit = self._misfit(features)
+        misfit = self.misfit(features)
         if misfit:
             because = (misfit,)
         else:
@@ -110,21 +108,8 @@ class Model:
             model=self.in_a_line,
         )
 
-    def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
-        """Return shape (trials, classes), in the order of the classifier's classes. Raises ConfigError."""
-        return self.classifier.probabilities(self._table(table))
-
-    def unlike(self, table: FeatureTable) -> NDArray[np.bool_]:
-        """Return for each trial whether it is unlike everything trained on. Raises ConfigError."""
-        return self.novelty.unlike_rows(self._table(table))
-
-    def _table(self, table: FeatureTable) -> FeatureTable:
-        misfit = self._misfit(table)
-        if misfit:
-            raise ConfigError(misfit)
-        return table.columns(self.names)
-
-    def _misfit(self, given: Features | FeatureTable) -> str:
+    def misfit(self, given: Features | FeatureTable) -> str:
+        """Return why the model cannot be asked about these features, or an empty string where it can."""
         lacking = [name for name in self.names if name not in given.names]
         if lacking:
             return (

@@ -20,8 +20,8 @@ from graspsense.evaluation.folds import commonest, in_order, instance_held_out, 
 from graspsense.evaluation.intervals import Difference, Rate, difference
 
 if TYPE_CHECKING:
-    from graspsense.evaluation.folds import Folds
     from graspsense.core.features import FeatureTable
+    from graspsense.evaluation.folds import Folds
 
 INSTANCE_HELD_OUT: Final = "instance_held_out"
 SHARES: Final = (0.1, 0.2, 0.4, 0.7, 1.0)

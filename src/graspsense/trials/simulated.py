@@ -34,6 +34,8 @@ CONTAINERS: Final[Mapping[str, tuple[str, ...]]] = {
 
 THINGS_PER_SEED: Final = 1000
 TRIALS_PER_SEED: Final = 1_000_000
+BATCH: Final = 1000
+"""Grasps asked for at once: large enough that a backend may compile them, and at most some 400 MB of traces."""
 
 Progress = Callable[[int, int], None]
 
@@ -48,7 +50,7 @@ def simulated(
     *,
     objects: Sequence[str] = (),
     instances: int = 12,
-    trials: int = 4,
+    trials: int = 5,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Labelled:
@@ -81,6 +83,8 @@ def simulated(
 
     backend, controller = settings.gripper.create(), settings.controller.create()
     feature_set = settings.features.create()
+    if progress is not None:
+        progress(0, len(scenes))
     rows: list[Features] = []
     before: list[Features] = []
     for trace in _traces(backend, controller, settings, scenes, seeds):
@@ -138,16 +142,11 @@ def _traces(
     scenes: Sequence[str],
     seeds: Sequence[int],
 ) -> Iterable[Trace]:
-    """Yield one trace a scene; a batch holds the scenes of one kind, so that not all traces are held at once."""
+    """Yield one trace a scene."""
     if isinstance(backend, BatchBackend):
-        kinds = [scene.partition(":")[0].partition("#")[0] for scene in scenes]
-        start = 0
-        while start < len(scenes):
-            end = start
-            while end < len(scenes) and kinds[end] == kinds[start]:
-                end += 1
+        for start in range(0, len(scenes), BATCH):
+            end = start + BATCH
             yield from backend.run_many(controller, scenes[start:end], seeds[start:end])
-            start = end
         return
     for scene, seed in zip(scenes, seeds, strict=True):
         one = settings.gripper.component.create(evolve(settings.gripper.config, object=scene))

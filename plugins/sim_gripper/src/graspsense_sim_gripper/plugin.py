@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.plugin_api import Channel, SensorBackendEntry, hookimpl
+from graspsense.plugin_api import Channel, ModelEntry, SensorBackendEntry, hookimpl
 
 GRASPSENSE_API = (1, 0)
 
@@ -30,4 +30,14 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
             Channel("pads", "counts", PAD_RATE_HZ),
         ),
         accepts=("effort",),
+    )
+
+
+@hookimpl
+def graspsense_models() -> Iterable[ModelEntry]:
+    """Return the model that tells the paper's containers and their states apart."""
+    yield ModelEntry(
+        name="default",
+        resource="graspsense_sim_gripper:models/default.json",
+        summary="C4.5 on simulated grasps of the paper's containers, at 20 N and 10 mm/s",
     )

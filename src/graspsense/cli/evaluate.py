@@ -1,0 +1,117 @@
+"""`graspsense evaluate`: a recognition rate, with everything that is needed to judge it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from graspsense.cli.output import echo_json, echo_table, talk
+from graspsense.cli.sources import SOURCES, classifier_option, learner_of, source_options, trials_of
+
+if TYPE_CHECKING:
+    from graspsense.evaluation.evaluate import Evaluation, Judged
+
+
+@click.command(
+    short_help="Measure an honest recognition rate.",
+    help=f"""Cross-validate a classifier on SOURCE; print its rate with the controls beside it.
+
+    The headline holds whole instances out where instances are labelled, else it is the paper's: stratified ten
+    folds, predictions pooled. docs/evaluation.md defines every number.
+
+    {SOURCES}""",
+)
+@click.argument("source")
+@click.option(
+    "--target",
+    type=click.Choice(["both", "class", "state"]),
+    default="both",
+    show_default=True,
+    help="Labels as they are; what is before the colon; or what is behind it, in each class apart.",
+)
+@click.option("--folds", type=int, default=10, show_default=True, help="Number of folds.")
+@click.option("--png", metavar="FILE", help="Draw the confusion matrix, too.")
+@click.option("--keep", metavar="FILE", help="Keep the trials' features as a CSV, too.")
+@classifier_option
+@source_options
+@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+def evaluate(
+    source: str,
+    target: str,
+    folds: int,
+    png: str | None,
+    keep: str | None,
+    classifier: str | None,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """Measure and print."""
+    from graspsense.cli.progress import Progress
+    from graspsense.core.strict import plain
+    from graspsense.evaluation.evaluate import evaluate as judge
+
+    learner = learner_of(source, classifier, given)
+    with Progress() as progress:
+        labelled = trials_of(source, progress, given)
+        if keep:
+            from graspsense.trials.features_csv import write_labelled
+
+            write_labelled(Path(keep), labelled)
+        found = judge(
+            learner,
+            labelled,
+            classifier=f"{learner.component.qualified} {learner.component.version}",
+            target=target,  # type: ignore[arg-type]
+            folds=folds,
+            seed=given["seed"],
+            settings={key: value for key, value in plain(learner.config).items() if key != "model"},
+            progress=progress,
+        )
+    if png:
+        from graspsense.report.confusion import confusion_png
+
+        confusion_png(found.confusion, f"{found.source}\n{found.protocol}: {found.headline.words}", Path(png))
+        talk(f"drawn in {png}")
+    if as_json:
+        echo_json(found.as_json())
+    else:
+        _print(found)
+
+
+def _print(found: Evaluation) -> None:
+    from graspsense.report.confusion import confusion_text
+
+    what = {"both": "labels as they are", "class": "classes", "state": "states, each class apart"}[
+        found.target
+    ]
+    click.echo(f"{found.classifier} on {found.source}: {found.headline.n} trials, {what}")
+    click.echo(
+        f"features: {', '.join(f'{name} [{unit}]' if unit else name for name, unit in found.features)}"
+    )
+    click.echo(f"\nrate        {found.headline.words}   {found.protocol}\n")
+    rows = [_row(name, one) for name, one in found.protocols.items()]
+    rows += [_row(name, one) for name, one in found.controls.items() if name not in found.protocols]
+    echo_table(("PROTOCOL OR CONTROL", "RATE", "95 %", "DIFFERENCE", "WHAT"), rows)
+    click.echo("\nconfusion (rows are the truth)")
+    for line in confusion_text(found.confusion):
+        click.echo(f"  {line}")
+    if len(found.by_class) > 1 and found.target != "class":
+        click.echo("\nby class")
+        for name, rate in found.by_class.items():
+            click.echo(f"  {name:<20}{rate.words}")
+    click.echo("\nlearning curve")
+    for point in found.learning_curve:
+        click.echo(f"  {point.trained_on:8.1f} trials  {point.rate.words}")
+    click.echo(f"\nwould be called unknown: {found.unlike.words}")
+    for note in found.notes:
+        click.echo(f"note: {note}")
+
+
+def _row(name: str, one: Judged) -> tuple[str, str, str, str, str]:
+    if one.rate is None:
+        return name, "-", "", "", f"{one.what}: {one.reason}"
+    low, high = one.rate.interval
+    against = f"{one.of} less this: {one.difference.words}" if one.difference else ""
+    return name, f"{one.rate.rate:.3f}", f"{low:.3f} to {high:.3f}", against, one.what

@@ -1,0 +1,107 @@
+"""`graspsense predict`: what a model says of trials."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from graspsense.cli.output import echo_json, echo_table, talk
+from graspsense.cli.sources import SOURCES, is_csv, source_options, trials_of
+
+if TYPE_CHECKING:
+    from graspsense.core.features import FeatureTable, Prediction
+
+
+@click.command(
+    short_help="Ask a model what trials are of.",
+    help=f"""Ask MODEL what the trials of SOURCE are of: a label, how sure, and why.
+
+    MODEL is a .json file that `graspsense train` wrote, or the name of one that a plugin offers (default). Where
+    the trials have labels, the rate is printed, too: an honest one if the model never saw these things. A CSV
+    needs no --label here.
+
+    {SOURCES}""",
+)
+@click.argument("model")
+@click.argument("source")
+@source_options
+@click.option("--json", "as_json", is_flag=True, help="Print every prediction with its reasons as JSON.")
+def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
+    """Predict and print."""
+    from graspsense.cli.progress import Progress
+    from graspsense.core.model import load_model
+    from graspsense.core.plugins import installed
+    from graspsense.evaluation.evaluate import rate_as_json
+    from graspsense.evaluation.intervals import Rate
+
+    asked = load_model(model, installed())
+    labels: tuple[str, ...] | None = None
+    notes: tuple[str, ...] = ()
+    table: FeatureTable
+    if is_csv(source) and not given["label"]:
+        from graspsense.trials.features_csv import read_table
+
+        table = read_table(Path(source), asked.names)
+    else:
+        with Progress() as progress:
+            labelled = trials_of(
+                source, progress, {**given, "features": given["features"] or ",".join(asked.names)}
+            )
+        table, notes = labelled.table, labelled.notes
+        labels = labelled.aimed(asked.target).labels
+    misfit = asked.misfit(table)
+    if misfit:
+        from graspsense.core.errors import ConfigError
+
+        raise ConfigError(misfit)
+    predictions = [asked.predict(table.row(i)) for i in range(len(table))]
+    rate = None
+    if labels is not None:
+        rate = Rate(
+            sum(one.label == label for one, label in zip(predictions, labels, strict=True)), len(labels)
+        )
+    warnings = list(dict.fromkeys(warning for one in predictions for warning in one.warnings))
+    if as_json:
+        echo_json(
+            {
+                "model": asked.in_a_line,
+                "n": len(predictions),
+                "predictions": [
+                    _as_json(one, None if labels is None else labels[i]) for i, one in enumerate(predictions)
+                ],
+                "rate": None if rate is None else rate_as_json(rate),
+                "unknown": sum(not _known(one) for one in predictions),
+                "warnings": warnings,
+                "notes": list(notes),
+            }
+        )
+        return
+    for text in (*warnings, *notes):
+        talk(f"note: {text}")
+    click.echo(asked.in_a_line)
+    header = ("TRIAL", "ANSWER", "SURE", *(("TRUTH",) if labels else ()), "BECAUSE")
+    rows = []
+    for i, one in enumerate(predictions):
+        sure = f"{one.probabilities.get(one.label, 0.0):.0%}" if _known(one) else ""
+        truth = (labels[i],) if labels else ()
+        rows.append((str(i + 1), one.label, sure, *truth, "; ".join(one.because)))
+    echo_table(header, rows)
+    if rate is not None:
+        click.echo(f"\nrate        {rate.words}   (an answer of unknown counts as wrong)")
+
+
+def _known(prediction: Prediction) -> bool:
+    from graspsense.core.features import UNKNOWN
+
+    return prediction.label != UNKNOWN
+
+
+def _as_json(prediction: Prediction, truth: str | None) -> dict[str, Any]:
+    found = {
+        "label": prediction.label,
+        "probabilities": dict(prediction.probabilities),
+        "because": list(prediction.because),
+    }
+    return found if truth is None else {**found, "truth": truth}

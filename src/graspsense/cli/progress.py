@@ -1,0 +1,47 @@
+"""How far something is, on stderr, once it has taken two seconds."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import Final
+
+import click
+
+FIRST_S: Final = 2.0
+AGAIN_S: Final = 0.2
+AGAIN_IN_A_LOG_S: Final = 10.0
+"""Where stderr is no terminal every report is a line of its own, so there are fewer."""
+BAR: Final = 24
+
+
+class Progress:
+    """Reports what is being done and how much of it; leaves nothing behind on a terminal."""
+
+    def __init__(self) -> None:
+        self._terminal = sys.stderr.isatty()
+        self._next = time.monotonic() + FIRST_S
+        self._shown = False
+
+    def __call__(self, what: str, done: int, total: int) -> None:
+        """Report that `done` of `total` parts of `what` are done."""
+        now = time.monotonic()
+        if now < self._next:
+            return
+        self._next = now + (AGAIN_S if self._terminal else AGAIN_IN_A_LOG_S)
+        if self._terminal:
+            bar = "█" * round(BAR * done / max(total, 1))
+            click.echo(f"\r\033[K{bar:<{BAR}} {done} of {total}  {what}", err=True, nl=False)
+            self._shown = True
+        else:
+            click.echo(f"{what}: {done} of {total}", err=True)
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None
+    ) -> None:
+        if self._shown:
+            click.echo("\r\033[K", err=True, nl=False)

@@ -1,0 +1,107 @@
+"""`graspsense train`: a model from labelled trials."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from graspsense.cli.output import echo_json, talk
+from graspsense.cli.sources import (
+    SOURCES,
+    classifier_option,
+    command_line,
+    learner_of,
+    source_options,
+    trials_of,
+)
+
+
+@click.command(
+    short_help="Make a model from labelled trials.",
+    help=f"""Train a classifier on all trials of SOURCE and write the model.
+
+    The model is a JSON file that runs no code: use it with -o classifier.model=FILE. How good it is says
+    `graspsense evaluate` with the same arguments: a rate on the trials that it was trained on would say nothing.
+
+    {SOURCES}""",
+)
+@click.argument("source")
+@click.option("--out", metavar="FILE", required=True, help="Where the model goes, a .json file.")
+@click.option("--keep", metavar="FILE", help="Keep the trials' features as a CSV, too.")
+@click.option(
+    "--target",
+    type=click.Choice(["both", "class", "state"]),
+    default="both",
+    show_default=True,
+    help="What it learns to name; state needs --only CLASS.",
+)
+@classifier_option
+@source_options
+@click.option("--json", "as_json", is_flag=True, help="Print what was made as JSON.")
+def train(
+    source: str,
+    out: str,
+    keep: str | None,
+    target: str,
+    classifier: str | None,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """Train, write, and say what was made of what."""
+    from graspsense.cli.progress import Progress
+    from graspsense.core.errors import ConfigError
+    from graspsense.core.labelled import class_of
+    from graspsense.core.model import train as trained
+    from graspsense.core.model import write_model
+
+    path = Path(out)
+    if path.suffix != ".json":
+        raise ConfigError(f"--out {out}: a model's file ends in .json")
+    learner = learner_of(source, classifier, given)
+    with Progress() as progress:
+        labelled = trials_of(source, progress, given)
+    if target == "state" and len({class_of(label) for label in labelled.labels}) > 1:
+        raise ConfigError(
+            "a model of states is one of a single class: name it with --only, one of "
+            + ", ".join(sorted({class_of(label) for label in labelled.labels}))
+        )
+    labelled = labelled.aimed(target)
+    if len(labelled.classes) < 2:
+        raise ConfigError(
+            f"every trial of {source} has the label {labelled.labels[0]!r}: nothing to tell apart"
+        )
+    model = trained(
+        learner.component,
+        learner.config,
+        labelled,
+        name=path.stem,
+        seed=given["seed"],
+        target=target,
+        provenance={"command": command_line(("keep", "as_json"))},
+    )
+    write_model(path, model)
+    if keep:
+        from graspsense.trials.features_csv import write_labelled
+
+        write_labelled(Path(keep), labelled)
+    for note in labelled.notes:
+        talk(f"note: {note}")
+    if as_json:
+        echo_json(
+            {
+                "model": out,
+                "classifier": model.component,
+                "target": target,
+                "features": list(model.names),
+                "labels": list(model.classifier.classes()),
+                "trials": len(labelled),
+                "provenance": dict(model.provenance),
+            }
+        )
+        return
+    click.echo(f"{out}: {model.in_a_line}")
+    click.echo(f"labels      {', '.join(model.classifier.classes())}")
+    how_good = command_line(("out", "keep", "as_json"), "evaluate")
+    click.echo(f"how good    {how_good}")

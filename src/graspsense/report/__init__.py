@@ -1,0 +1,1 @@
+"""Figures and pages: the one owner of what is drawn."""

@@ -1,0 +1,60 @@
+"""The confusion matrix, for the terminal and as a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from graspsense.core.errors import ConfigError, PluginUnavailable
+
+if TYPE_CHECKING:
+    from graspsense.evaluation.confusion import Confusion
+
+MATPLOTLIB_HINT = 'a picture needs matplotlib: pip install "graspsense[plot]", or pip install matplotlib'
+
+
+def confusion_text(confusion: Confusion) -> list[str]:
+    """Return the matrix in lines: rows are the truth, columns the answers, which letters stand for."""
+    letters = [_letter(k) for k in range(len(confusion.labels))]
+    width = max(len(str(n)) for row in confusion.counts for n in row)
+    width = max(width, max(map(len, letters)))
+    lines = [" ".join(letter.rjust(width) for letter in letters) + "   <- answered"]
+    for letter, label, row in zip(letters, confusion.labels, confusion.counts, strict=True):
+        cells = " ".join((str(n) if n else ".").rjust(width) for n in row)
+        lines.append(f"{cells}   {letter} = {label}")
+    return lines
+
+
+def confusion_png(confusion: Confusion, title: str, path: Path) -> None:
+    """Draw the matrix. Raises PluginUnavailable without matplotlib, ConfigError for a path that cannot be written."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
+    n = len(confusion.labels)
+    side = 2.6 + 0.42 * n
+    figure = Figure(figsize=(side, side), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes: Any = figure.add_subplot()
+    totals = [max(sum(row), 1) for row in confusion.counts]
+    shares = [[count / total for count in row] for row, total in zip(confusion.counts, totals, strict=True)]
+    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0)
+    for i, row in enumerate(confusion.counts):
+        for j, count in enumerate(row):
+            if count:
+                colour = "white" if shares[i][j] > 0.5 else "black"
+                axes.text(j, i, str(count), ha="center", va="center", color=colour, fontsize=8)
+    axes.set_xticks(range(n), confusion.labels, rotation=90, fontsize=8)
+    axes.set_yticks(range(n), confusion.labels, fontsize=8)
+    axes.set_xlabel("answered")
+    axes.set_ylabel("true")
+    axes.set_title(title, fontsize=9)
+    try:
+        figure.savefig(path, format="png")
+    except OSError as error:
+        raise ConfigError(f"the picture cannot be written to {path}: {error.strerror}") from error
+
+
+def _letter(k: int) -> str:
+    return (chr(ord("a") + k // 26 - 1) if k >= 26 else "") + chr(ord("a") + k % 26)
