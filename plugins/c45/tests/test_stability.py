@@ -74,6 +74,13 @@ def test_ties_go_to_the_first_column_and_the_first_cut() -> None:
     assert tree.to_dict()["thr"] == 0.0
 
 
+def test_of_two_zeros_the_first_in_the_rows_is_the_threshold() -> None:
+    # As J48; it is the one thing about a threshold that the order of the rows decides.
+    for first, second in ((0.0, -0.0), (-0.0, 0.0)):
+        tree = fit(table([[first], [second]] * 3 + [[1.0]] * 6, [0] * 6 + [1] * 6))
+        assert np.signbit(tree.to_dict()["thr"]) == np.signbit(first)
+
+
 def test_majority_ties_go_to_the_first_class() -> None:
     tree = fit(table([[0.0]] * 6, [2, 1, 2, 1, 2, 1]))
     assert class_indices(tree, [[5.0]]).tolist() == [1]
@@ -175,7 +182,9 @@ def test_a_nominal_column_must_hold_indices() -> None:
 def tables(draw: st.DrawFn) -> Table:
     n = draw(st.integers(1, 40))
     n_columns = draw(st.integers(1, 3))
-    cells = st.one_of(st.integers(-3, 3).map(float), st.just(float("nan")), st.floats(-1e300, 1e300))
+    cells = st.one_of(
+        st.integers(-3, 3).map(float), st.just(float("nan")), st.floats(-1e300, 1e300).map(lambda x: x + 0.0)
+    )
     values = draw(st.lists(st.lists(cells, min_size=n_columns, max_size=n_columns), min_size=n, max_size=n))
     labels = draw(st.lists(st.integers(0, 3), min_size=n, max_size=n))
     weights = draw(

@@ -81,6 +81,8 @@ def _take_actual_values(branches: Branches, values: NDArray[np.float64]) -> None
         if nodes.size:
             # NaN sorts to the end, behind every threshold.
             column = np.sort(values[:, a])
-            branches.threshold[nodes] = column[
-                np.searchsorted(column, branches.threshold[nodes], side="right") - 1
-            ]
+            actual = column[np.searchsorted(column, branches.threshold[nodes], side="right") - 1]
+            if not actual.all():
+                # Of 0.0 and -0.0, which are equal, J48 has the one that comes first in the rows.
+                actual[actual == 0.0] = values[np.argmax(values[:, a] == 0.0), a]
+            branches.threshold[nodes] = actual

@@ -9,7 +9,10 @@ from graspsense_c45.tree import Tree
 
 
 def to_text(tree: Tree) -> str:
-    """J48's dump below its title: a line a branch, leaves with (weight/errors), then how many leaves and nodes."""
+    """J48's dump below its title: a line a branch, leaves with (weight/errors), then how many leaves and nodes.
+
+    (With -B J48 prints thresholds with all their digits; here they have six decimals at most, as without.)
+    """
     lines = [f": {_leaf(tree, 0, 0)}"] if tree.is_leaf(0) else ["", *_branches(tree)]
     lines += ["", f"Number of Leaves  : \t{tree.n_leaves}", "", f"Size of the tree : \t{tree.n_nodes}", ""]
     return "\n".join(lines)
