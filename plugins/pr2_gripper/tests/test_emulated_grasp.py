@@ -17,7 +17,8 @@ from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.protocol import EFFORT_KIND, ProtocolError, decode_output
 
-EMULATED = ("gripper.type=pr2", "gripper.transport=emulated")
+BARE = "classifier.type=none"
+EMULATED = ("gripper.type=pr2", "gripper.transport=emulated", BARE)
 
 
 NEAR: dict[str, Any] = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
@@ -38,7 +39,7 @@ def test_grasp_through_the_driver_is_the_direct_one(thing: str, seed: int) -> No
     An encoder tick is 0.3 to 0.4 um of the gap, over which both may differ at any instant; a count is 1/1600 N on one
     pad. What the last bits of a velocity may move is an instant by two ticks of 1 ms.
     """
-    direct = load_pipeline(options=["gripper.pad_delay_s=0.01"]).grasp(object=thing, seed=seed)
+    direct = load_pipeline(options=["gripper.pad_delay_s=0.01", BARE]).grasp(object=thing, seed=seed)
     driven = load_pipeline(options=EMULATED).grasp(object=thing, seed=seed)
     assert driven.outcome == direct.outcome
     assert driven.outcome == (Outcome.NOTHING_THERE if thing == "none" else Outcome.STEADY)

@@ -137,8 +137,8 @@ def test_load_table_gives_newtons_of_the_load_cell_and_says_where_it_ends(device
 
 def test_steady_load_is_refused_against_the_stored_tare(device_identity: Any) -> None:
     measure = Measure(device_identity(), Pr2Config(), (TIP, TIP), None)
-    loaded = tuple(c + 160.0 if i >= 7 else c for i, c in enumerate(TIP))  # 15 cells x 160 = 1.5 N
-    with pytest.raises(TareRefused, match=r"right pad is \+1.50 N off its stored tare"):
+    loaded = tuple(c + 400.0 if i >= 7 else c for i, c in enumerate(TIP))  # 15 cells x 400 = 3.75 N
+    with pytest.raises(TareRefused, match=r"right pad is \+3.75 N off its stored tare"):
         measure.tare([Pads(0.0, 1, TIP, loaded)])
 
 

@@ -150,7 +150,7 @@ def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) 
         if misfits:
             raise ConfigError(
                 f"{path} does not fit this device: {'; '.join(misfits)}. There are two choices:\n"
-                f"  calibrate this device:  graspsense calibrate {kind} (it replaces the file with --replace)\n"
+                f"  calibrate this device:  graspsense calibrate {kind} --replace\n"
                 "  run without:            -o gripper.calibration=none"
             )
         found[kind] = calibration

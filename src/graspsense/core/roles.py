@@ -38,7 +38,8 @@ class DeviceInfo:
     On a `virtual` clock, apply-then-read advances one tick and nothing waits; on a `device` clock a read waits
     for the next frame. `opening` is the command that opens the fingers and `relaxed` the one that lets go; a
     recording has no opening (None). `tare_images` is how many unloaded cell images the tare needs (0: none).
-    `calibration` names each stored calibration in use and the hash of its content.
+    `calibration` names each stored calibration in use and the hash of its content; `numbers` are what the device's
+    raw numbers mean (counts per newton, transmission): a stored calibration holds for these alone.
     `units` names units that are not SI, as of a recording: `{"t": "frame"}`. `frames_due` is the number of
     frames a recording holds, None where there is no end to them.
     """
@@ -54,6 +55,7 @@ class DeviceInfo:
     relaxed: Command
     tare_images: int = 0
     calibration: Mapping[str, str] = field(factory=dict)
+    numbers: Mapping[str, float | str] = field(factory=dict)
     units: Mapping[str, str] = field(factory=dict)
     notes: tuple[str, ...] = ()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import Any, Final, final
+from typing import Final, final
 
 from attrs import asdict, evolve
 
@@ -67,12 +67,13 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         if self._lost_serial and config.transport != "emulated":
             config, wait_s = evolve(config, serial=self._lost_serial), config.reconnect_s
         opened = open_board(config, seed, wait_s)
-        self._opened = opened
         try:
-            return self._described(opened)
+            info = self._described(opened)
         except BaseException:
-            self.close()
+            opened.link.close()
             raise
+        self._opened = opened
+        return info
 
     def read(self, timeout_s: float) -> Reading | None:
         """Return the newest frame with the last whole cell image. Raises DeviceLost."""
@@ -170,6 +171,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             opening=Command(EFFORT, OPENING_N, math.inf, math.inf),
             relaxed=Command(EFFORT, 0.0, math.inf, math.inf),
             tare_images=TARE_IMAGES,
+            numbers=device_numbers(identity),
             calibration={kind: one.sha256 for kind, one in found.items()},
             notes=tuple(notes),
         )
@@ -199,7 +201,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         return self._opened
 
 
-def device_numbers(identity: Identity) -> dict[str, Any]:
+def device_numbers(identity: Identity) -> dict[str, float | str]:
     """Return what a calibration of this device depends on, besides its serial."""
     return {
         "transmission": identity.transmission,

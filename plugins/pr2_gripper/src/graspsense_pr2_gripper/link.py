@@ -133,10 +133,7 @@ class ThreadedLink(Link):
         self._reader.join(JOIN_S)
         if self._reader.is_alive():
             return False
-        closer = threading.Thread(target=self.transport.close, name="PR2 closer", daemon=True)
-        closer.start()
-        closer.join(JOIN_S)
-        return not closer.is_alive()
+        return close_within(self.transport, JOIN_S)
 
     def _run(self) -> None:
         stream, clock = self.stream, self.clock
@@ -162,6 +159,14 @@ class ThreadedLink(Link):
             with self._arrived:
                 self.gone = _lost(gone)
                 self._arrived.notify()
+
+
+def close_within(transport: Transport, time_s: float) -> bool:
+    """Close a device in a thread that is left behind where it hangs; return whether it closed in time."""
+    closer = threading.Thread(target=transport.close, name="PR2 closer", daemon=True)
+    closer.start()
+    closer.join(time_s)
+    return not closer.is_alive()
 
 
 def _lost(why: Exception) -> str:

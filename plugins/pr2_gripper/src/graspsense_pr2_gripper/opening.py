@@ -12,7 +12,7 @@ from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.discovery import search
 from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.firmware import Firmware
-from graspsense_pr2_gripper.link import Link, LockStepLink, ThreadedLink
+from graspsense_pr2_gripper.link import JOIN_S, Link, LockStepLink, ThreadedLink, close_within
 from graspsense_pr2_gripper.protocol import FEATURE_ID, Identity, ProtocolError, decode_identity
 from graspsense_pr2_gripper.transports.emulated import LockStepTransport, PacedTransport
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
@@ -58,7 +58,7 @@ def open_board(config: Pr2Config, seed: int, wait_s: float) -> Opened:
                 f"its feature report says serial {identity.serial!r}, asked for is {config.serial!r}"
             )
     except (ProtocolError, TransportGone) as error:
-        transport.close()
+        close_within(transport, JOIN_S)
         raise NoDevice(
             f"a device {config.vendor_id:04x}:{config.product_id:04x} is there, but is no PR2 gripper to this driver: "
             f"{error}\n  try: other numbers with -o gripper.vendor_id and gripper.product_id, or -o gripper.serial"

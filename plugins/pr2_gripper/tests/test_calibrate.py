@@ -1,0 +1,144 @@
+"""`graspsense calibrate` and what its files do to a run: kept by serial, hashed, and refused where they do not fit."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from graspsense.cli.main import main
+from graspsense.core.calibration import load_of, load_table
+from graspsense.core.calibration_files import read_calibration
+from graspsense.core.errors import ConfigError, DataDamaged
+
+GRIPPER = ("--gripper", "pr2", "-o", "gripper.transport=emulated", "--object", "can:empty_open", "--seed", "1",
+           "-o", "gripper.body_config.open_gap_m=0.075", "-o", "classifier.type=none")  # fmt: skip
+
+
+@pytest.fixture
+def shell(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
+    """Run `graspsense`, with calibrations below this test's own folder; return exit code, JSON, stderr."""
+
+    def call(command: str, *arguments: str) -> tuple[int, Any, str]:
+        with pytest.raises(SystemExit) as ended:
+            main([*command.split(), *GRIPPER, "-o", f"gripper.calibration={tmp_path}", "--json", *arguments])
+        out, err = capsys.readouterr()
+        return ended.value.code or 0, json.loads(out), err  # type: ignore[return-value]
+
+    return call
+
+
+def test_stored_tare_has_its_time_and_its_hash_stands_in_the_trial(shell: Any, tmp_path: Path) -> None:
+    code, tare, _ = shell("calibrate tare", "--images", "12")
+    assert code == 0
+    stored = read_calibration(tmp_path / "EMULATED" / "tare.json")
+    assert stored.made == tare["made"]
+    assert stored.made.endswith("+00:00")
+    assert stored.data["images"] == 12
+    assert stored.device["pad_counts_per_n"] == 1600
+    code, trial, _ = shell("run")
+    assert (code, trial["outcome"]) == (0, "steady")
+    assert trial["device"]["calibration"] == {"tare": stored.sha256}
+
+
+def test_calibration_of_another_linkage_is_an_error_with_two_choices(shell: Any, tmp_path: Path) -> None:
+    shell("calibrate tare")
+    other = ("-o", "gripper.transmission=pr2_paper")
+    code, _, err = shell("run", *other)
+    assert code == 2
+    assert "transmission was 'pr2' and is 'pr2_paper'" in err
+    assert "graspsense calibrate tare --replace" in err
+    assert "-o gripper.calibration=none" in err
+    # Both choices work.
+    code, _, _ = shell("calibrate tare", "--replace", *other)
+    assert code == 0
+    code, trial, _ = shell("run", *other)
+    assert trial["outcome"] == "steady"
+    _, trial, _ = shell("run", "-o", "gripper.calibration=none")
+    assert trial["device"]["calibration"] == {}
+
+
+def test_file_of_another_serial_is_refused(shell: Any, tmp_path: Path) -> None:
+    shell("calibrate tare", "-o", 'gripper.serial="R2"')
+    (tmp_path / "EMULATED").mkdir()
+    (tmp_path / "R2" / "tare.json").rename(tmp_path / "EMULATED" / "tare.json")
+    code, _, err = shell("run")
+    assert code == 2
+    assert "serial was 'R2' and is 'EMULATED'" in err
+
+
+def test_changed_file_is_damaged(shell: Any, tmp_path: Path) -> None:
+    shell("calibrate tare")
+    path = tmp_path / "EMULATED" / "tare.json"
+    content = json.loads(path.read_text())
+    content["data"]["left"][8] += 1.0
+    path.write_text(json.dumps(content))
+    code, _, err = shell("run")
+    assert code == 5
+    assert "was changed after it was written" in err
+
+
+def test_load_cell_table_changes_the_forces_and_flags_its_end(shell: Any, tmp_path: Path) -> None:
+    readings = tmp_path / "readings.csv"
+    readings.write_text("side,pad_counts,load_n\n" + "".join(
+        f"{side},{counts},{2.0 * counts / 1600.0}\n" for side in ("left", "right") for counts in (1600, 8000)
+    ))  # fmt: skip
+    _, plain, _ = shell("run")
+    code, _, _ = shell("calibrate load-cell", str(readings))
+    assert code == 0
+    _, doubled, _ = shell(
+        "run", "-o", "controller.contact_force_n=1.25", "-o", "features.contact_force_n=1.25"
+    )
+    assert doubled["features"]["f_steady"] == pytest.approx(2.0 * plain["features"]["f_steady"], rel=0.02)
+    assert "load-cell" in doubled["device"]["calibration"]
+
+
+def test_unreadable_readings_name_their_line(shell: Any, tmp_path: Path) -> None:
+    readings = tmp_path / "readings.csv"
+    readings.write_text("side,pad_counts,load_n\nleft,1600,1\nmiddle,1600,1\n")
+    code, _, err = shell("calibrate load-cell", str(readings))
+    assert code == 5
+    assert "readings.csv:3" in err
+
+
+def test_friction_comes_out_near_the_models_own(shell: Any) -> None:
+    """Breakaway in the model is 8 N or its sliding friction, 7 N with a spread of 0.4 N, if that is more."""
+    code, friction, _ = shell("calibrate friction", "--gaps", "2", "--narrowest", "0.07")
+    assert code == 0
+    for effort in (*friction["data"]["closing_n"], *friction["data"]["opening_n"]):
+        assert 8.0 <= effort <= 8.5
+
+
+def test_gripper_without_calibrations_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["calibrate", "tare"])
+    assert ended.value.code == 2
+    assert "keeps no calibrations" in capsys.readouterr().err
+
+
+def test_load_table_rises_and_goes_on_beyond_its_end() -> None:
+    table = load_table([(1.0, 1.5), (2.0, 3.5), (2.0, 2.5), (4.0, 4.0), (5.0, 3.8)])
+    assert table.load_n == pytest.approx((0.0, 1.5, 3.0, 3.9, 3.9)), "a mean of 2, and a fall pooled"
+    assert load_of(table, 0.5) == (0.75, True)
+    assert load_of(table, 3.0) == (pytest.approx(3.45), True)
+    assert load_of(table, 6.0) == (pytest.approx(3.9), False)
+    values = [load_of(table, 0.01 * i)[0] for i in range(-100, 700)]
+    assert values == sorted(values)
+
+
+@pytest.mark.parametrize(
+    "readings", [[], [(1.0, 1.0)], [(1.0, 1.0), (float("nan"), 2.0)], [(-1.0, 1.0), (2.0, 2.0)]]
+)
+def test_table_that_means_nothing_is_refused(readings: list[tuple[float, float]]) -> None:
+    with pytest.raises(ConfigError):
+        load_table(readings)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": "graspsense-calibration", "version": 2}', "\0"])
+def test_what_is_no_calibration_is_damaged(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "tare.json"
+    path.write_text(text)
+    with pytest.raises(DataDamaged, match=r"tare\.json"):
+        read_calibration(path)

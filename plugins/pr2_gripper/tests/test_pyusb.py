@@ -1,0 +1,243 @@
+"""The driver over pyusb, with the real pyusb in front of functions that stand for libusb's.
+
+They behave as libusb was seen to on a Linux kernel with pyusb 1.3: see the table "What each library really does" in
+docs/pr2.md.
+"""
+
+from __future__ import annotations
+
+import array
+import errno
+import threading
+from collections import deque
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import usb.backend
+import usb.backend.libusb1
+import usb.core
+
+from graspsense.plugin_api import EFFORT, Command, DeviceLost, NoDevice, PluginUnavailable
+from graspsense_pr2_gripper.backend import Pr2Backend
+from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.faults import Wire
+
+SERIAL_STRING = 3
+
+
+class Libusb(usb.backend.IBackend):  # type: ignore[misc]
+    """One board on a USB port. `usbhid` has claimed it, as the kernel does with every HID device."""
+
+    def __init__(self, wire: Wire, serial: str = "L7") -> None:
+        self.wire, self.serial = wire, serial
+        self.plugged, self.stalled, self.naks = True, False, False
+        self.driver_active, self.claimed, self.resets, self.reattached = True, False, 0, False
+        self.reports: deque[bytes] = deque()
+        self.changed = threading.Condition()
+
+    def tick(self) -> None:
+        with self.changed:
+            self.reports.clear()  # nothing is queued between transfers: only the fresh one
+            self.reports.extend(self.wire.step())
+            self.changed.notify_all()
+
+    def _there(self) -> None:
+        if not self.plugged:
+            raise usb.core.USBError("No such device (it may have been disconnected)", -4, errno.ENODEV)
+
+    def enumerate_devices(self) -> Any:
+        return iter(["port"] if self.plugged else [])
+
+    def get_device_descriptor(self, dev: Any) -> Any:
+        return SimpleNamespace(
+            bLength=18, bDescriptorType=1, bcdUSB=0x200, bDeviceClass=0, bDeviceSubClass=0, bDeviceProtocol=0,
+            bMaxPacketSize0=64, idVendor=0x1209, idProduct=1, bcdDevice=0x100, iManufacturer=1, iProduct=2,
+            iSerialNumber=SERIAL_STRING, bNumConfigurations=1, address=5, bus=1, port_number=1,
+            port_numbers=(1,), speed=2,
+        )  # fmt: skip
+
+    def get_configuration_descriptor(self, dev: Any, config: int) -> Any:
+        return SimpleNamespace(
+            bLength=9, bDescriptorType=2, wTotalLength=41, bNumInterfaces=1, bConfigurationValue=1,
+            iConfiguration=0, bmAttributes=0x80, bMaxPower=50, extra_descriptors=[],
+        )  # fmt: skip
+
+    def get_interface_descriptor(self, dev: Any, intf: int, alt: int, config: int) -> Any:
+        if intf or alt:
+            raise IndexError
+        return SimpleNamespace(
+            bLength=9, bDescriptorType=4, bInterfaceNumber=0, bAlternateSetting=0, bNumEndpoints=2,
+            bInterfaceClass=3, bInterfaceSubClass=0, bInterfaceProtocol=0, iInterface=0, extra_descriptors=[],
+        )  # fmt: skip
+
+    def get_endpoint_descriptor(self, dev: Any, ep: int, intf: int, alt: int, config: int) -> Any:
+        return SimpleNamespace(
+            bLength=7, bDescriptorType=5, bEndpointAddress=(0x83, 0x04)[ep], bmAttributes=3, wMaxPacketSize=64,
+            bInterval=1, bRefresh=0, bSynchAddress=0, extra_descriptors=[],
+        )  # fmt: skip
+
+    def open_device(self, dev: Any) -> Any:
+        self._there()
+        return "handle"
+
+    def close_device(self, handle: Any) -> None:
+        pass
+
+    def get_configuration(self, handle: Any) -> int:
+        return 1
+
+    def set_configuration(self, handle: Any, value: int) -> None:
+        raise AssertionError("setting the configuration of a device in use disturbs its other users")
+
+    def reset_device(self, handle: Any) -> None:
+        self.resets += 1
+
+    def is_kernel_driver_active(self, handle: Any, intf: int) -> bool:
+        self._there()
+        return self.driver_active
+
+    def detach_kernel_driver(self, handle: Any, intf: int) -> None:
+        self.driver_active = False
+
+    def attach_kernel_driver(self, handle: Any, intf: int) -> None:
+        self._there()
+        self.driver_active = self.reattached = True
+
+    def claim_interface(self, handle: Any, intf: int) -> None:
+        if self.driver_active:
+            raise usb.core.USBError("Resource busy", -6, errno.EBUSY)
+        self.claimed = True
+
+    def release_interface(self, handle: Any, intf: int) -> None:
+        self._there()
+        self.claimed = False
+
+    def clear_halt(self, handle: Any, ep: int) -> None:
+        self._there()
+        self.stalled = False
+
+    def intr_read(self, handle: Any, ep: int, intf: int, buff: Any, timeout: int) -> int:
+        assert ep == 0x83, "the descriptors' own endpoint"
+        assert timeout > 0
+        with self.changed:
+            self.changed.wait_for(lambda: self.reports or not self.plugged or self.stalled, timeout / 1e3)
+            self._there()
+            if self.stalled:
+                raise usb.core.USBError("Pipe error", -9, errno.EPIPE)
+            if not self.reports:
+                raise usb.core.USBTimeoutError("Operation timed out", -7, errno.ETIMEDOUT)
+            report = self.reports.popleft()
+        buff[: len(report)] = array.array("B", report)
+        return len(report)
+
+    def intr_write(self, handle: Any, ep: int, intf: int, data: Any, timeout: int) -> int:
+        assert ep == 0x04
+        self._there()
+        if self.naks:
+            raise usb.core.USBTimeoutError("Operation timed out", -7, errno.ETIMEDOUT)
+        with self.changed:
+            self.wire.output(data.tobytes())
+        return len(data)
+
+    def ctrl_transfer(
+        self, handle: Any, kind: int, request: int, value: int, index: int, data: Any, timeout: int
+    ) -> int:
+        self._there()
+        if (kind, request) == (0xA1, 1) and value == 0x0303:
+            answer = self.wire.firmware.feature()
+        elif (kind, request) == (0x80, 6) and value >> 8 == 3:
+            raw = b"\x09\x04" if value & 255 == 0 else self.serial.encode("utf-16le")
+            answer = bytes([2 + len(raw), 3]) + raw
+        else:
+            raise usb.core.USBError("Pipe error", -9, errno.EPIPE)
+        data[: len(answer)] = array.array("B", answer)
+        return len(answer)
+
+
+@pytest.fixture
+def port(monkeypatch: pytest.MonkeyPatch, board: Any) -> Libusb:
+    backend = Libusb(board())
+    monkeypatch.setattr(usb.backend.libusb1, "get_backend", lambda *a, **k: backend)
+    return backend
+
+
+@pytest.fixture
+def opened(port: Libusb) -> Any:
+    backend = Pr2Backend(Pr2Config(transport="pyusb"))
+    backend.open(0)
+    yield backend
+    backend.close()
+
+
+def following(backend: Pr2Backend, port: Libusb) -> Any:
+    """Tick until the reader, which may be between two transfers, has caught one."""
+    while True:
+        port.tick()
+        reading = backend.read(0.01)
+        if reading is not None:
+            return reading
+
+
+def test_device_is_taken_from_the_kernel_and_given_back(port: Libusb) -> None:
+    backend = Pr2Backend(Pr2Config(transport="pyusb", serial="L7"))
+    info = backend.open(0)
+    assert (info.serial, info.clock) == ("L7", "device")
+    assert port.claimed
+    assert not port.driver_active
+    backend.close()
+    assert not port.claimed
+    assert port.reattached
+    assert port.resets == 0, "a reset enumerates the device anew"
+
+
+def test_frames_come_and_commands_arrive(opened: Pr2Backend, port: Libusb) -> None:
+    assert following(opened, port).frame.gap_m == pytest.approx(0.086, abs=1e-6)
+    opened.apply(Command(EFFORT, 7.0, float("inf"), float("inf")))
+    assert following(opened, port).frame.effort_n == 7.0
+
+
+def test_idle_timeout_is_no_loss(opened: Pr2Backend, port: Libusb) -> None:
+    assert opened.read(0.12) is None
+    assert following(opened, port) is not None
+
+
+def test_pulled_cable_ends_a_read_and_closing_survives_it(opened: Pr2Backend, port: Libusb) -> None:
+    """attach_kernel_driver raises errno 19 after an unplug."""
+    following(opened, port)
+    with port.changed:
+        port.plugged = False
+        port.changed.notify_all()
+    with pytest.raises(DeviceLost, match="No such device"):
+        opened.read(10.0)
+    opened.close()
+    assert opened.report()["closed_cleanly"] is True
+
+
+def test_stalled_endpoint_is_cleared(opened: Pr2Backend, port: Libusb) -> None:
+    following(opened, port)
+    with port.changed:
+        port.stalled = True
+        port.changed.notify_all()
+    assert following(opened, port) is not None
+    assert not port.stalled
+
+
+def test_device_that_takes_no_command_in_time_is_lost(opened: Pr2Backend, port: Libusb) -> None:
+    following(opened, port)
+    port.naks = True
+    with pytest.raises(DeviceLost, match="timed out"):
+        opened.apply(Command(EFFORT, 7.0, float("inf"), float("inf")))
+
+
+def test_another_serial_is_another_device(port: Libusb) -> None:
+    with pytest.raises(NoDevice, match="with serial number 'R2' with libusb"):
+        Pr2Backend(Pr2Config(transport="pyusb", serial="R2")).open(0)
+
+
+def test_missing_libusb_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("libusb1", "libusb0", "openusb"):
+        module = __import__(f"usb.backend.{name}", fromlist=["get_backend"])
+        monkeypatch.setattr(module, "get_backend", lambda *a, **k: None)
+    with pytest.raises(PluginUnavailable, match=r"apt install libusb-1\.0-0"):
+        Pr2Backend(Pr2Config(transport="pyusb")).open(0)

@@ -1,0 +1,193 @@
+"""`graspsense calibrate`: files by device serial that hold a gripper's zero, its load table and its friction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+from graspsense.cli.options import pipeline_options, settings_of
+from graspsense.cli.output import echo_json, echo_table, talk
+
+if TYPE_CHECKING:
+    from graspsense.core.calibrating import Rig
+    from graspsense.core.calibration_files import Calibration
+    from graspsense.core.roles import DeviceInfo
+
+
+class _Bench(NamedTuple):
+    """A gripper opened without any calibration, the way to drive it, and where its calibrations are kept."""
+
+    backend: Any
+    info: DeviceInfo
+    rig: Rig
+    folder: str
+    stored: Mapping[str, Calibration]
+    first_effort_n: float
+
+
+def _options(command: Callable[..., Any]) -> Callable[..., Any]:
+    command = click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")(command)
+    command = click.option(
+        "--replace",
+        is_flag=True,
+        help="Replace what is stored, whatever it says, instead of comparing with it.",
+    )(command)
+    return pipeline_options(command)
+
+
+@click.group()
+def calibrate() -> None:
+    """Calibrate a gripper; what is found is kept under its serial number.
+
+    The gripper must be empty. Files are kept below the folder gripper.calibration, or the user's own.
+    """
+
+
+@calibrate.command()
+@click.option(
+    "--images", type=click.IntRange(2, 1000), default=24, show_default=True, help="Cell images to average."
+)
+@_options
+def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
+    """Store the zero of the pads: the mean of cell images with the fingers open and nothing touching."""
+    from graspsense.core import calibration
+    from graspsense.core.calibrating import unloaded_images
+    from graspsense.core.calibration_files import stored_zero
+
+    with _bench(asked, replace) as bench:
+        stored = stored_zero(bench.stored["tare"]) if "tare" in bench.stored else None
+        counts_per_n = float(bench.info.numbers.get("pad_counts_per_n", calibration.PAD_COUNTS_PER_N))
+        taken = unloaded_images(bench.rig, images, timeout_s=10.0 + images)
+        left, right = calibration.tare(taken, stored, counts_per_n)
+        if stored is None and not replace:
+            bench.backend.tare(taken)
+        data = {"left": list(left), "right": list(right), "images": len(taken)}
+        _store(bench, "tare", data, as_json)
+
+
+@calibrate.command("load-cell")
+@click.argument("readings", type=click.Path(exists=True, dir_okay=False))
+@_options
+def load_cell(readings: str, replace: bool, as_json: bool, **asked: Any) -> None:
+    """Store a table from the pads' force to a load cell's, made of READINGS.
+
+    READINGS is a CSV file with the columns side (left or right), pad_counts (sum of the 15 pad cells over their tare)
+    and load_n (what the load cell said).
+    """
+    with _bench(asked, replace) as bench:
+        from graspsense.core.calibration import PAD_COUNTS_PER_N
+
+        counts_per_n = float(bench.info.numbers.get("pad_counts_per_n", PAD_COUNTS_PER_N))
+        data = _tables(readings, counts_per_n)
+        _store(bench, "load-cell", data, as_json)
+
+
+@calibrate.command()
+@click.option("--gaps", type=click.IntRange(2, 90), default=5, show_default=True, help="At how many gaps.")
+@click.option("--narrowest", "narrowest_m", type=click.FloatRange(0.002, 0.08), default=0.01, show_default=True,
+              help="The narrowest gap, in m.")  # fmt: skip
+@_options
+def friction(gaps: int, narrowest_m: float, replace: bool, as_json: bool, **asked: Any) -> None:
+    """Store the effort at which the fingers begin to move, closing and opening, over the stroke."""
+    from graspsense.core.calibrating import breakaways, unloaded_images
+
+    with _bench(asked, replace) as bench:
+        if bench.info.tare_images:
+            bench.backend.tare(unloaded_images(bench.rig, bench.info.tare_images, timeout_s=10.0))
+        widest_m = bench.rig.open().frame.gap_m * 0.95
+        step_m = (widest_m - narrowest_m) / (gaps - 1)
+        found = breakaways(bench.rig, [narrowest_m + i * step_m for i in range(gaps)], bench.first_effort_n)
+        data = {
+            "gap_m": [one.gap_m for one in found],
+            "closing_n": [one.closing_n for one in found],
+            "opening_n": [one.opening_n for one in found],
+        }
+        _store(bench, "friction", data, as_json)
+        if not as_json:
+            rows = [(f"{a * 1e3:.1f}", f"{b:.2f}", f"{c:.2f}") for a, b, c in found]
+            echo_table(("GAP mm", "CLOSING N", "OPENING N"), rows)
+
+
+@contextmanager
+def _bench(asked: Mapping[str, Any], replace: bool) -> Iterator[_Bench]:
+    """Open the gripper that the options ask for, uncalibrated, and let go of it whatever happens.
+
+    Unless they are to be replaced, the stored calibrations must fit it.
+    """
+    import attrs
+
+    from graspsense.core.calibrating import Rig
+    from graspsense.core.calibration_files import UNCALIBRATED, calibrations_of
+    from graspsense.core.errors import ConfigError
+
+    settings = settings_of(**asked)
+    component, config = settings.gripper.component, settings.gripper.config
+    folder = getattr(config, "calibration", None)
+    if folder is None:
+        raise ConfigError(
+            f"gripper {component.qualified} keeps no calibrations: choose a device, as in --gripper pr2"
+        )
+    if folder == UNCALIBRATED:
+        raise ConfigError("gripper.calibration is none, so there is no folder to keep a calibration in")
+    backend = component.create(attrs.evolve(config, calibration=UNCALIBRATED))
+    try:
+        info = backend.open(settings.run.seed)
+        rig = Rig(backend, info, settings.run)
+        stored = {} if replace else calibrations_of(folder, info.serial, info.numbers)
+        yield _Bench(backend, info, rig, folder, stored, settings.run.first_effort_n)
+    finally:
+        backend.close()
+
+
+def _store(bench: _Bench, kind: str, data: Mapping[str, Any], as_json: bool) -> None:
+    from datetime import UTC, datetime
+
+    from graspsense.core.calibration_files import Calibration, calibration_path, write_calibration
+
+    made = Calibration(
+        kind=kind,
+        serial=bench.info.serial,
+        device=dict(bench.info.numbers),
+        made=datetime.now(UTC).isoformat(timespec="seconds"),
+        data=data,
+    )
+    path = calibration_path(bench.folder, bench.info.serial, kind)
+    written = write_calibration(path, made)
+    if as_json:
+        echo_json({"file": str(path), "kind": kind, "serial": written.serial, "made": written.made,
+                   "sha256": written.sha256, "data": dict(written.data)})  # fmt: skip
+    else:
+        talk(f"{kind} of {written.serial} kept in {path}")
+    for note in bench.info.notes:
+        talk(f"note: {note}")
+
+
+def _tables(path: str, counts_per_n: float) -> dict[str, Any]:
+    import csv
+
+    from graspsense.core.calibration import load_table
+    from graspsense.core.errors import DataDamaged
+
+    readings: dict[str, list[tuple[float, float]]] = {"left": [], "right": []}
+    with open(path, newline="", encoding="utf-8-sig") as file:
+        rows = csv.DictReader(file)
+        missing = {"side", "pad_counts", "load_n"} - set(rows.fieldnames or ())
+        if missing:
+            raise DataDamaged(f"{path} lacks the columns {', '.join(sorted(missing))}")
+        for row in rows:
+            try:
+                side, pad_n, load_n = (
+                    row["side"],
+                    float(row["pad_counts"]) / counts_per_n,
+                    float(row["load_n"]),
+                )
+                readings[side].append((pad_n, load_n))
+            except (KeyError, TypeError, ValueError):
+                raise DataDamaged(
+                    f"{path}:{rows.line_num}: expected side left or right and two numbers, found {row}"
+                ) from None
+    tables = {side: load_table(pairs) for side, pairs in readings.items()}
+    return {side: {"pad_n": list(one.pad_n), "load_n": list(one.load_n)} for side, one in tables.items()}
