@@ -7,8 +7,9 @@ import subprocess
 import sys
 import time
 
-import numpy as np
 import pytest
+
+from graspsense.trials.store import Store
 
 COMMAND = [sys.executable, "-m", "graspsense"]
 
@@ -103,18 +104,29 @@ def test_a_dry_run_opens_nothing_and_says_what_would_be_done():
     assert "controller.probing_force_n = 20.0" in done.stdout
 
 
-def test_a_trial_that_is_kept_runs_again_from_its_own_settings(tmp_path):
-    first = graspsense("run", "--json", "--seed", "5", "--object", "toy", "--save", str(tmp_path / "kept"))
+def test_a_trial_that_is_kept_runs_again_from_its_recording_and_from_its_settings(tmp_path):
+    store = tmp_path / "kept"
+    first = graspsense(
+        "run", "--json", "--seed", "5", "--object", "toy", "--save", str(store), "--label", "toy#1"
+    )
     assert first.returncode == 0, first.stderr
-    folder = tmp_path / "kept" / "trial-0001"
-    assert {p.name for p in folder.iterdir()} == {"settings.toml", "trial.json", "trace.npz"}
-    again = graspsense("run", "--json", "--pipeline", str(folder / "settings.toml"))
-    assert json.loads(again.stdout)["features"] == json.loads(first.stdout)["features"]
-    with np.load(folder / "trace.npz") as trace:
-        assert trace["gap_m"].shape == trace["t_s"].shape
-        assert trace["pad_left"].shape == (len(trace["pad_t_s"]), 22)
-    graspsense("run", "--save", str(tmp_path / "kept"))
-    assert (tmp_path / "kept" / "trial-0002").is_dir()
+    kept = json.loads(first.stdout)
+    assert kept["kept"]["trial"] == 1
+    assert kept["kept"]["recorder"]["dropped"] == 0
+    assert kept["kept"]["recorder"]["ticks"] == kept["counts"]["ticks"]
+    again = graspsense("run", "--json", "--gripper", "replay", "-o", f"gripper.recording=store:{store}#1")
+    assert json.loads(again.stdout)["features"] == kept["features"]
+    settings = tmp_path / "settings.toml"
+    with Store.read(store) as opened:
+        settings.write_text(opened.trial(1).settings)
+    again = graspsense("run", "--json", "--pipeline", str(settings))
+    assert json.loads(again.stdout)["features"] == kept["features"]
+    graspsense("run", "--save", str(store))
+    with Store.read(store) as opened:
+        assert [(one.id, one.label, one.instance) for one in opened.page()] == [
+            (2, None, None),
+            (1, "toy", "toy#1"),
+        ]
 
 
 def test_a_folder_that_cannot_be_written_is_found_out_before_the_grasp(tmp_path):

@@ -11,19 +11,23 @@ from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json, talk
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import FrameType
 
     from graspsense.core.config import Settings
+    from graspsense.core.runner import Sink
     from graspsense.core.signals import Command, Frame, Pads
     from graspsense.core.trial import Trial
 
 EXIT_ABORTED: Final = 4
+EXIT_NOT_KEPT: Final = 2
 BAR: Final = 24
 
 
 @click.command(short_help="Grasp once, live in the terminal.")
 @pipeline_options
-@click.option("--save", metavar="DIR", help="Keep the trial in a new folder below DIR.")
+@click.option("--save", metavar="DIR", help="Keep the trial in the store DIR, with its recording.")
+@click.option("--label", metavar="CLASS:STATE", help="With --save: what it was, as in can:full_open#2.")
 @click.option("--dry-run", is_flag=True, help="Say what would be done; open nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
 def run(
@@ -33,6 +37,7 @@ def run(
     options: tuple[str, ...],
     seed: int | None,
     save: str | None,
+    label: str | None,
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -52,31 +57,52 @@ def run(
     if dry_run:
         _say_what_would_be_done(settings, as_json)
         return
-    folder = None
-    if save is not None:
-        from graspsense.trials.folder import new_trial_folder
-
-        folder = new_trial_folder(save)
-
+    if label is not None and save is None:
+        raise click.UsageError("--label goes with a trial that is kept: add --save DIR")
     sinks = () if as_json else (LiveRows(),)
+    kept: dict[str, Any] | None = None
     previous = signal.signal(signal.SIGTERM, _interrupt)
     try:
-        trial = grasp_with(settings, installed(), sinks=sinks)
+        if save is None:
+            trial = grasp_with(settings, installed(), sinks=sinks)
+        else:
+            trial, kept = _kept(save, label, settings, sinks)
     finally:
         signal.signal(signal.SIGTERM, previous)
 
-    if folder is not None:
-        from graspsense.core.config import to_toml
-        from graspsense.trials.folder import keep
-
-        keep(folder, trial, to_toml(settings))
-        talk(f"kept in {folder}")
     if as_json:
-        echo_json(trial_as_json(trial))
+        echo_json(trial_as_json(trial) if kept is None else {**trial_as_json(trial), "kept": kept})
     else:
         _print(trial)
+    if kept is not None and kept["problem"]:
+        talk(f"graspsense: {kept['problem']}")
+        raise click.exceptions.Exit(EXIT_NOT_KEPT)
     if trial.outcome in (Outcome.ABORTED, Outcome.DEVICE_LOST):
         raise click.exceptions.Exit(EXIT_ABORTED)
+
+
+def _kept(
+    save: str, label: str | None, settings: Settings, sinks: Sequence[Sink]
+) -> tuple[Trial, dict[str, Any]]:
+    """Grasp and keep the trial; return it with what is printed of its keeping."""
+    from graspsense.core.plugins import installed
+    from graspsense.trials.keeping import kept_grasp
+    from graspsense.trials.labels import labels_of
+    from graspsense.trials.store import Store
+
+    labels = {} if label is None else labels_of(label)
+    with Store.open(save) as store:
+        grasp = kept_grasp(store, settings, installed(), labels=labels, origin="run", sinks=sinks)
+    if grasp.number is not None:
+        talk(f"kept as trial {grasp.number} in {save}")
+        if grasp.counts["dropped"]:
+            talk(f"warning: the recorder could not follow: {grasp.counts['dropped']} messages are missing")
+    return grasp.trial, {
+        "store": save,
+        "trial": grasp.number,
+        "recorder": dict(grasp.counts),
+        "problem": grasp.problem,
+    }
 
 
 class LiveRows:

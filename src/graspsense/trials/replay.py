@@ -15,14 +15,39 @@ from graspsense.core.signals import EFFORT, Command, Pads
 from graspsense.trials.icub import read_recording
 from graspsense.trials.recording import Recording
 
-KINDS: Final[Mapping[str, Callable[[str], Recording]]] = {"icub": read_recording}
+
+def _mcap(name: str) -> Recording:
+    from graspsense.trials.recorded import read_recorded
+
+    return read_recorded(name).recording()
+
+
+def _stored(name: str) -> Recording:
+    from graspsense.trials.stored import stored_recording
+
+    return stored_recording(name)
+
+
+KINDS: Final[Mapping[str, Callable[[str], Recording]]] = {
+    "icub": read_recording,
+    "mcap": _mcap,
+    "store": _stored,
+}
 """What can stand before the colon of a recording's name, and the reader of that kind."""
 
 
+def kind_and_name(recording: str) -> tuple[str, str]:
+    """Return what stands before and behind the colon; a file that ends in `.mcap` needs no kind."""
+    kind, colon, name = recording.partition(":")
+    if recording.endswith(".mcap") and kind not in KINDS:
+        return "mcap", recording
+    return (kind, name) if colon else ("", recording)
+
+
 def _known_kind(_config: object, _attribute: Attribute[str], value: str) -> None:
-    kind, colon, name = value.partition(":")
+    kind, name = kind_and_name(value)
     known = ", ".join(f"{k}:" for k in KINDS)
-    if not colon:
+    if not kind:
         raise ValueError(
             f"{value!r} does not say what kind of recording it is: write {known} before the file"
         )
@@ -34,7 +59,10 @@ def _known_kind(_config: object, _attribute: Attribute[str], value: str) -> None
 
 @frozen
 class ReplayConfig:
-    """Which recording: `KIND:FILE` with a kind of `KINDS`, as in `icub:FOLDER/full_vitamin_water_1.txt`."""
+    """Which recording: `KIND:FILE` with a kind of `KINDS`, as in `icub:FOLDER/full_vitamin_water_1.txt`.
+
+    `store:DIR#NUMBER` is a trial of a store; a `FILE.mcap` of ours needs no kind.
+    """
 
     recording: str = field(validator=[instance_of(str), _known_kind])
 
@@ -51,7 +79,7 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
 
         Raises ConfigError where there is no such file, DataDamaged where it is not what it claims to be.
         """
-        kind, _, name = self.config.recording.partition(":")
+        kind, name = kind_and_name(self.config.recording)
         recording = KINDS[kind](name)
         self._recording, self._next = recording, 0
         return DeviceInfo(

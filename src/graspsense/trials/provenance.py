@@ -1,0 +1,116 @@
+"""What made a trial, besides its settings: versions, the commit of the code, the machine, the gripper."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import platform
+import subprocess
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from graspsense import __version__
+
+if TYPE_CHECKING:
+    from graspsense.core.config import Settings
+
+GIT_S: Final = 2.0
+_WITH: Final = ("numpy", "scikit-learn", "mcap")
+
+
+def provenance(settings: Settings) -> dict[str, Any]:
+    """Return the config's hash, component and library versions, the commit, and the machine."""
+    return {
+        "config_sha256": config_sha256(settings.values),
+        "components": dict(settings.components),
+        "seed": settings.run.seed,
+        **_of_this_process(),
+    }
+
+
+def config_sha256(values: Mapping[str, Any]) -> str:
+    """Return the hash of resolved settings: the same settings, the same hash."""
+    return hashlib.sha256(json_text(values).encode()).hexdigest()
+
+
+PER_GRASP: Final = (("gripper", "object"), ("gripper", "recording"), ("run", "seed"))
+"""Settings that differ from grasp to grasp of one and the same experiment."""
+
+
+def recipe(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return settings without those of `PER_GRASP`, and without keys that are not set."""
+    return {
+        table: {
+            key: value for key, value in keys.items() if value is not None and (table, key) not in PER_GRASP
+        }
+        for table, keys in values.items()
+    }
+
+
+def json_text(value: Any) -> str:
+    """Return JSON in its one canonical form; NaN becomes null, infinities `"inf"` and `"-inf"`."""
+    return json.dumps(
+        _finite(value), sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
+    )
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    if isinstance(value, Mapping):
+        return {str(key): _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return value
+
+
+@cache
+def _of_this_process() -> Mapping[str, Any]:
+    code, work = _commit(Path(__file__).parent), _commit(Path.cwd())
+    return {
+        "graspsense": __version__,
+        "python": platform.python_version(),
+        "libraries": {name: _version(name) for name in _WITH},
+        "host": platform.node(),
+        "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+        "git": {"graspsense": code, "here": work},
+    }
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def _commit(folder: Path) -> dict[str, Any] | None:
+    """Return commit and dirty flag of the checkout this folder is in; None where it is in none."""
+    commit = _git(folder, "rev-parse", "HEAD")
+    if commit is None:
+        return None
+    # Files that git ignores or does not know are not the code that ran.
+    changed = _git(folder, "status", "--porcelain", "--untracked-files=no")
+    return {"commit": commit, "dirty": None if changed is None else bool(changed)}
+
+
+def _git(folder: Path, *arguments: str) -> str | None:
+    # A checkout's own settings may name programs to run; these are the ones that status would.
+    command = ["git", "-c", "core.fsmonitor=false", "-c", "core.hooksPath=/dev/null", "-C", str(folder)]
+    try:
+        done = subprocess.run(
+            [*command, *arguments],
+            capture_output=True,
+            text=True,
+            timeout=GIT_S,
+            env={**os.environ, "GIT_OPTIONAL_LOCKS": "0", "LC_ALL": "C"},
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
