@@ -23,6 +23,10 @@ TRACEBACK_VARIABLE: Final = "GRASPSENSE_TRACEBACK"
 
 COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "run": ("graspsense.cli.run:run", "Grasp once, live in the terminal."),
+    "collect": ("graspsense.cli.collect:collect", "Collect labelled trials with an operator."),
+    "replay": ("graspsense.cli.replay:replay", "Put a recording through a pipeline."),
+    "recover": ("graspsense.cli.recover:recover", "Save what a killed program left."),
+    "verify": ("graspsense.cli.verify:verify", "Check every hash and file of a store."),
     "train": ("graspsense.cli.train:train", "Make a model from labelled trials."),
     "predict": ("graspsense.cli.predict:predict", "Ask a model what trials are of."),
     "evaluate": ("graspsense.cli.evaluate:evaluate", "Measure an honest recognition rate."),

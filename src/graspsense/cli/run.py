@@ -73,7 +73,7 @@ def run(
     if as_json:
         echo_json(trial_as_json(trial) if kept is None else {**trial_as_json(trial), "kept": kept})
     else:
-        _print(trial)
+        print_trial(trial)
     if kept is not None and kept["problem"]:
         talk(f"graspsense: {kept['problem']}")
         raise click.exceptions.Exit(EXIT_NOT_KEPT)
@@ -151,7 +151,8 @@ def _interrupt(signum: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-def _print(trial: Trial) -> None:
+def print_trial(trial: Trial) -> None:
+    """Print outcome, features, prediction and what has to be said of them."""
     click.echo()
     reason = f": {trial.reason}" if trial.reason else ""
     click.echo(f"outcome     {trial.outcome.words}{reason}")

@@ -43,12 +43,13 @@ PER_GRASP: Final = (("gripper", "object"), ("gripper", "recording"), ("run", "se
 
 
 def recipe(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return settings without those of `PER_GRASP`, and without keys that are not set."""
+    """Return the settings that decide what is felt: without `PER_GRASP`, the classifier, and keys that are not set."""
     return {
         table: {
             key: value for key, value in keys.items() if value is not None and (table, key) not in PER_GRASP
         }
         for table, keys in values.items()
+        if table != "classifier"
     }
 
 

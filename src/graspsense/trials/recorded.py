@@ -6,6 +6,7 @@ A file is somebody else's until it was read: lengths are bounded, checksums are 
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -73,6 +74,8 @@ class RecordedGrasp:
     whole: bool
     damage: str = ""
     lost: int = 0
+    base_ns: int | None = None
+    """Wall clock at time 0 of the gripper's clock, None where there is no message."""
     device: Mapping[str, Any] = field(factory=dict)
 
     def __len__(self) -> int:
@@ -170,6 +173,7 @@ class _Reading:
         self.pads_before: list[int] = []
         self.metadata: dict[str, dict[str, str]] = {}
         self.lost = 0
+        self.base_ns: int | None = None
         self.ended = self.started = False
 
     def take(self, record: McapRecord) -> str:
@@ -222,6 +226,7 @@ class _Reading:
                 whole=self.ended and not damage and not self.lost,
                 damage=damage,
                 lost=self.lost,
+                base_ns=self.base_ns,
                 device=device,
             )
             _check_device(device)
@@ -251,7 +256,10 @@ class _Reading:
             self.next_number[topic] = (record.sequence + 1) & 0xFFFFFFFF
             if topic == PADS_TOPIC:
                 self.pads_before.append(len(self.bodies[TICK_TOPIC]))
-            self.bodies[topic].append(record.data[4:])
+            if self.base_ns is None:
+                (t_s,) = struct.unpack_from("<d", record.data, len(CDR_HEADER))
+                self.base_ns = record.log_time - round(t_s * 1e9)
+            self.bodies[topic].append(record.data[len(CDR_HEADER) :])
 
     def _rows(self, topic: str) -> NDArray[np.void]:
         dtype = _TICK_ROW if topic == TICK_TOPIC else _PADS_ROW

@@ -37,10 +37,11 @@ class Written:
 class RecordingFile:
     """Writes one recording. Times are those of the gripper's clock, laid on the wall clock at the first of them.
 
+    `base_ns` is the wall clock at time 0 of the gripper's, where that is known already.
     Raises OSError from every method where the disk does not take it, FileExistsError where it is there.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, base_ns: int | None = None) -> None:
         self.path, self.part = path, path.with_name(path.name + PART)
         if path.exists():
             raise FileExistsError(17, "there is such a recording already", str(path))
@@ -59,7 +60,7 @@ class RecordingFile:
             schema = self._mcap.register_schema(name, "ros2msg", definition)
             self._channels[topic] = self._mcap.register_channel(topic, "cdr", schema)
         self._counts = dict.fromkeys(SCHEMAS, 0)
-        self._base_ns: int | None = None
+        self._base_ns = base_ns
         self._chunk_log_ns = self._chunk_wall_ns = 0
         self._open_chunk = False
 

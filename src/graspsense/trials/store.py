@@ -251,10 +251,15 @@ class Store:
                 "sha256": row_sha256(sets, trial, detail),
             }
             names = ", ".join(f'"{name}"' for name in row)
-            cursor = connection.execute(
-                f"INSERT INTO trial ({names}) VALUES ({', '.join('?' * len(row))})", tuple(row.values())
-            )
-            number = int(cursor.lastrowid or 0)
+            inserted = connection.execute(
+                f"INSERT INTO trial ({names}) VALUES ({', '.join('?' * len(row))}) "
+                "ON CONFLICT (recording) DO NOTHING RETURNING id",
+                tuple(row.values()),
+            ).fetchone()
+            if inserted is None:  # `recover` found the recording before its row was written, and wrote it
+                known = connection.execute("SELECT id FROM trial WHERE recording = ?", (recording.name,))
+                return int(known.fetchone()[0])
+            number = int(inserted[0])
             connection.execute(
                 f"INSERT INTO detail (trial, {', '.join(detail)}) VALUES (?{', ?' * len(detail)})",
                 (number, *detail.values()),

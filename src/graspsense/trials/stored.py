@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import tomllib
+
+from graspsense.core.config import NONE
 from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.layers import Layer
+from graspsense.trials.content import beginning_in
 from graspsense.trials.recorded import RecordedGrasp, read_recorded
 from graspsense.trials.recording import Recording
 from graspsense.trials.store import Store
@@ -30,3 +35,18 @@ def stored_grasp(name: str) -> RecordedGrasp:
 def stored_recording(name: str) -> Recording:
     """Return the same as what a gripper can replay."""
     return stored_grasp(name).recording()
+
+
+def own_settings(kind: str, name: str) -> Layer:
+    """Return the settings that a recording of ours was made with, but for its gripper, as a layer.
+
+    `kind` is `store` or `mcap`, as in `replay`. Raises ConfigError, DataDamaged.
+    """
+    grasp = stored_grasp(name) if kind == "store" else read_recorded(name)
+    settings = beginning_in(grasp.metadata, str(grasp.path)).settings
+    try:
+        values = tomllib.loads(settings)
+    except (ValueError, RecursionError) as error:
+        raise DataDamaged(f"the settings in {grasp.path} are no TOML: {error}") from error
+    values = {"classifier": {"type": NONE}, **values}
+    return Layer.of({k: v for k, v in values.items() if k != "gripper"}, f"the recording {grasp.path.name}")

@@ -1,0 +1,111 @@
+"""`graspsense collect`: labelled trials, one after the other, with an operator."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from typing import TYPE_CHECKING
+
+import click
+
+from graspsense.cli.options import pipeline_options, settings_of
+from graspsense.cli.output import echo_json, talk
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+    from graspsense.core.config import Settings
+
+
+@click.command(short_help="Collect labelled trials with an operator.")
+@click.option(
+    "--labels",
+    required=True,
+    metavar="NAMES",
+    help="What there is, with commas: can:full_open,can:empty_open; #2 names the second can.",
+)
+@click.option("--each", type=int, default=10, show_default=True, help="Trials of each label.")
+@click.option("--save", metavar="DIR", default="trials", show_default=True, help="The store to keep them in.")
+@click.option("--operator", metavar="NAME", help="Who does it; kept with every trial.")
+@click.option("--changed", is_flag=True, help="Go on with another gripper or other settings than before.")
+@pipeline_options
+@click.option("--json", "as_json", is_flag=True, help="At the end, print what was collected as JSON.")
+def collect(
+    labels: str,
+    each: int,
+    save: str,
+    operator: str | None,
+    changed: bool,
+    pipeline: str | None,
+    gripper: str | None,
+    object_name: str | None,
+    options: tuple[str, ...],
+    seed: int | None,
+    as_json: bool,
+) -> None:
+    """Prompt for the next object, grasp it, keep the trial; Enter grasps, u undoes, r takes again, q stops.
+
+    Things come in rounds, so that no class is recorded in one go. It can be stopped or killed at any time and goes
+    on where it was. A simulated gripper finds what the label says. Answers can come from a file or a pipe.
+    """
+    from graspsense.core.plugins import installed
+    from graspsense.core.wiring import check
+    from graspsense.trials.collecting import Collection, Wanted
+    from graspsense.trials.recover import recover_store
+    from graspsense.trials.store import Store
+
+    wanted = Wanted(
+        words=tuple(one.strip() for one in labels.split(",") if one.strip()),
+        each=each,
+        seed=seed or 0,
+        labels={"operator": operator} if operator else {},
+    )
+    first = settings_of(pipeline, gripper, object_name, options, seed)
+    check(first)
+    finds = first.values["gripper"].get("object") is not None
+
+    def settings_for(word: str, number: int) -> Settings:
+        return settings_of(pipeline, gripper, word if finds else object_name, options, number)
+
+    with Store.open(save) as store:
+        for one in recover_store(store):
+            number = f" as trial {one.trial}" if one.trial is not None else ""
+            talk(f"{one.file.name}: {one.what}{number}{f' ({one.why})' if one.why else ''}")
+        collection = Collection(
+            store=store,
+            wanted=wanted,
+            plugins=installed(),
+            settings_for=settings_for,
+            ask=_ask,
+            say=talk,
+            changed=changed,
+        )
+
+        def stop(signum: int, frame: FrameType | None) -> None:
+            del signum, frame
+            collection.stopping = True
+            raise KeyboardInterrupt
+
+        previous = signal.signal(signal.SIGTERM, stop)
+        try:
+            collection.run()
+        finally:
+            signal.signal(signal.SIGTERM, previous)
+        counts = collection.counts()
+    done = all(n >= each for n in counts.values())
+    if as_json:
+        echo_json(
+            {"store": save, "trials": collection.kept, "counts": counts, "each": each, "complete": done}
+        )
+    else:
+        for word, n in counts.items():
+            click.echo(f"{word:<24}{n:>4} of {each}")
+
+
+def _ask(question: str) -> str | None:
+    """Ask on the terminal, or take the next line of what stands in for it; None at its end."""
+    click.echo(question, err=True, nl=False)
+    line = sys.stdin.readline()
+    if not sys.stdin.isatty():
+        click.echo(line.rstrip("\n"), err=True)
+    return line.strip().lower() if line else None

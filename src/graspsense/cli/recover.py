@@ -1,0 +1,43 @@
+"""`graspsense recover`: save what a killed program left."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from graspsense.cli.output import echo_json
+
+EXIT_DAMAGED = 5
+
+
+@click.command(short_help="Save what a killed program left.")
+@click.argument("source", metavar="DIR|FILE")
+@click.option("--out", metavar="FILE", help="With a FILE: where to write the recovered recording.")
+@click.option("--json", "as_json", is_flag=True, help="Print what became of each file as JSON.")
+def recover(source: str, out: str | None, as_json: bool) -> None:
+    """Give cut recordings an end and a row in the store DIR, or write what can be read of one FILE into a new one.
+
+    Nothing is deleted: a cut recording stays as .cut. Exit code 5 means that something could not be saved.
+    """
+    from graspsense.trials.recover import recover_file, recover_store
+    from graspsense.trials.store import Store
+
+    if Path(source).is_dir():
+        if out is not None:
+            raise click.UsageError("--out is for a FILE; in a store everything has its place")
+        with Store.open(source) as store:
+            found = recover_store(store)
+    else:
+        found = [recover_file(source, out)]
+    if as_json:
+        echo_json({"files": [one.as_json() for one in found]})
+    else:
+        for one in found:
+            where = f" as trial {one.trial}" if one.trial is not None else f" in {one.recording}"
+            why = f": {one.why}" if one.why else ""
+            click.echo(f"{one.file.name}: {one.what}{where if one.recording else ''}, {one.ticks} ticks{why}")
+        if not found:
+            click.echo("nothing to recover")
+    if any(one.what == "failed" for one in found):
+        raise click.exceptions.Exit(EXIT_DAMAGED)

@@ -1,0 +1,64 @@
+"""`graspsense replay`: a recording through a pipeline."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from graspsense.cli.output import echo_json
+
+if TYPE_CHECKING:
+    from graspsense.core.config import Settings
+
+
+@click.command(short_help="Put a recording through a pipeline.")
+@click.argument("recording", metavar="FILE.mcap|DIR#NUMBER|KIND:NAME")
+@click.option(
+    "--pipeline", metavar="NAME|FILE", help="Another pipeline.  [for our own: the one it was recorded with]"
+)
+@click.option(
+    "-o",
+    "options",
+    metavar="TABLE.KEY=VALUE",
+    multiple=True,
+    help="A key of the pipeline, as in -o features.pads=left. May be given again.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
+def replay(recording: str, pipeline: str | None, options: tuple[str, ...], as_json: bool) -> None:
+    """Draw features from a recording, and predict, as if the gripper felt it now; nothing moves.
+
+    FILE.mcap is a recording of ours, DIR#NUMBER a trial of a store, KIND:NAME what another reader reads, as in
+    icub:FOLDER/full_vitamin_water_1.txt.
+    """
+    from graspsense.cli.run import print_trial
+    from graspsense.core.pipeline import grasp_with
+    from graspsense.core.plugins import installed
+    from graspsense.core.trial import trial_as_json
+    from graspsense.core.wiring import check
+
+    settings = _settings(recording, pipeline, options)
+    check(settings)
+    trial = grasp_with(settings, installed())
+    if as_json:
+        echo_json(trial_as_json(trial))
+    else:
+        print_trial(trial)
+
+
+def _settings(recording: str, pipeline: str | None, options: tuple[str, ...]) -> Settings:
+    from graspsense.core.config import Flag, resolve
+    from graspsense.trials.replay import KINDS, kind_and_name
+    from graspsense.trials.stored import own_settings
+
+    kind, name = kind_and_name(recording)
+    if kind not in KINDS and "#" in recording:
+        kind, name = "store", recording
+    own: Any = None
+    if pipeline is None and kind in ("store", "mcap"):
+        own = own_settings(kind, name)
+    flags = (
+        Flag("--gripper", "gripper.type", "replay"),
+        Flag("RECORDING", "gripper.recording", f"{kind}:{name}" if kind in KINDS else recording),
+    )
+    return resolve(pipeline or "default", experiment=own, options=options, flags=flags)

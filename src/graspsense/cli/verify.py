@@ -1,0 +1,38 @@
+"""`graspsense verify`: whether what was kept is there and is what it was."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from graspsense.cli.output import echo_json
+
+EXIT_DAMAGED = 5
+
+
+@click.command(short_help="Check every hash and file of a store.")
+@click.argument("source", metavar="DIR|FILE")
+@click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON.")
+def verify(source: str, as_json: bool) -> None:
+    """Check the store DIR with all its recordings, or one recording FILE. Exit code 5 means damage."""
+    from graspsense.cli.progress import Progress
+    from graspsense.trials.verify import verify_file, verify_store
+
+    if Path(source).is_dir():
+        with Progress() as progress:
+            found = verify_store(source, lambda done, total: progress("checking", done, total))
+    else:
+        found = verify_file(source)
+    if as_json:
+        echo_json(found.as_json())
+    else:
+        for problem in found.problems:
+            click.echo(f"damaged     {problem}")
+        for one in found.unfinished:
+            click.echo(f"unfinished  {one}")
+        click.echo(f"{found.trials} trials, {found.recordings} recordings, {len(found.problems)} damaged")
+        if found.unfinished:
+            click.echo("graspsense recover saves what is unfinished")
+    if found.problems:
+        raise click.exceptions.Exit(EXIT_DAMAGED)

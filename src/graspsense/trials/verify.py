@@ -1,0 +1,99 @@
+"""Whether everything that was kept is there and is what it was: every hash, every file."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from attrs import frozen
+
+from graspsense.core.errors import DataDamaged, GraspsenseError
+from graspsense.trials.recorded import read_recorded
+from graspsense.trials.recording_file import PART
+from graspsense.trials.recover import CUT
+from graspsense.trials.store import Store, integrity, stored_rows
+
+Progress = Callable[[int, int], None]
+
+
+@frozen(kw_only=True)
+class Verified:
+    """What was checked, what is wrong with it, and what only wants `recover`."""
+
+    trials: int
+    recordings: int
+    problems: tuple[str, ...]
+    unfinished: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it as JSON values."""
+        return {
+            "whole": not self.problems,
+            "trials": self.trials,
+            "recordings": self.recordings,
+            "problems": list(self.problems),
+            "unfinished": list(self.unfinished),
+        }
+
+
+def verify_store(folder: str | Path, progress: Progress | None = None) -> Verified:
+    """Check a store: SQLite's own checks, the hash of every row, the hash of every recording.
+
+    Raises ConfigError where there is none, DataDamaged where it cannot be read at all.
+    """
+    with Store.read(folder) as store:
+        problems = [f"the database: {one}" for one in integrity(store)]
+        rows = list(stored_rows(store))
+        names = set()
+        for done, (number, name, sha256, size, stored, found) in enumerate(rows):
+            if progress is not None:
+                progress(done, len(rows))
+            if stored != found:
+                problems.append(f"trial {number}: its row was changed after it was written")
+            try:
+                path = store.recording_of(str(name))
+            except DataDamaged as error:
+                problems.append(f"trial {number}: {error}")
+                continue
+            names.add(path.name)
+            wrong = _wrong_with(path, str(sha256), size)
+            if wrong:
+                problems.append(f"trial {number}: {wrong}")
+        unfinished = []
+        for path in sorted(store.recordings.iterdir() if store.recordings.is_dir() else ()):
+            if path.name.endswith(PART):
+                unfinished.append(f"{path.name} was never finished")
+            elif path.suffix == ".mcap" and path.name not in names:
+                unfinished.append(f"{path.name} has no row")
+            elif not path.name.endswith((".mcap", CUT)):
+                unfinished.append(f"{path.name} is no recording of the store")
+    return Verified(
+        trials=len(rows), recordings=len(names), problems=tuple(problems), unfinished=tuple(unfinished)
+    )
+
+
+def verify_file(path: str | Path) -> Verified:
+    """Check a recording: its checksums, its end, that no message is missing. Raises ConfigError, DataDamaged."""
+    read_recorded(path)
+    return Verified(trials=0, recordings=1, problems=(), unfinished=())
+
+
+def _wrong_with(path: Path, sha256: str, size: int) -> str:
+    try:
+        with path.open("rb") as file:
+            if hashlib.file_digest(file, "sha256").hexdigest() == sha256:
+                return ""
+        found = path.stat().st_size
+    except FileNotFoundError:
+        return f"its recording {path.name} is gone"
+    except OSError as error:
+        return f"its recording {path.name} cannot be read: {error.strerror}"
+    if found != size:
+        return f"its recording {path.name} has {found} bytes and had {size}"
+    try:
+        read_recorded(path)
+    except GraspsenseError as error:
+        return str(error)
+    return f"its recording {path.name} was changed after it was written"
