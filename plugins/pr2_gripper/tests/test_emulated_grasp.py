@@ -11,7 +11,7 @@ import pytest
 
 from graspsense import load_pipeline
 from graspsense.core.runner import Grasp, run_grasp
-from graspsense.plugin_api import ConfigError, Outcome, Phase, RunConfig, create
+from graspsense.plugin_api import ConfigError, GraspEvent, Outcome, Phase, RunConfig, create
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
 from graspsense_pr2_gripper.faults import Wire
@@ -166,19 +166,35 @@ PHASE_TIMES = {Phase.OPENING: 0.05, Phase.TARING: 0.2, Phase.APPROACH: 1.0, Phas
 
 
 @pytest.mark.parametrize("phase", [pytest.param(p, id=p.name.lower()) for p in PHASE_TIMES])
-@pytest.mark.parametrize("pace", ["lock-step", pytest.param("device", marks=pytest.mark.slow)])
-def test_cable_pulled_in_every_phase(phase: Phase, pace: Any) -> None:
+def test_cable_pulled_in_every_phase(phase: Phase) -> None:
     at_s = PHASE_TIMES[phase]
-    config = Pr2Config(transport="emulated", pace=pace, faults=FaultConfig(unplug_at_s=at_s), **NEAR)
-    ended = grasp(config)
+    ended = grasp(Pr2Config(transport="emulated", faults=FaultConfig(unplug_at_s=at_s), **NEAR))
     assert ended.outcome == Outcome.DEVICE_LOST
     assert "cable" in ended.reason
     assert ended.events[-1].phase == phase
     assert ended.report["let_go_after_s"] <= 0.1
     if phase >= Phase.APPROACH:
         assert ended.trace.phase[-1] == phase
-    if phase >= Phase.APPROACH and pace == "lock-step":
         assert ended.trace.t_s[-1] == pytest.approx(at_s - 0.001), "the trace holds the last frame there was"
+
+
+@pytest.mark.parametrize("phase", [pytest.param(p, id=p.name.lower()) for p in PHASE_TIMES])
+@pytest.mark.parametrize("pace", ["lock-step", pytest.param("device", marks=pytest.mark.slow)])
+def test_cable_pulled_between_a_frame_and_its_command(phase: Phase, pace: Any) -> None:
+    """At the instant a phase begins: its frame was read, its command finds nobody."""
+    backend = Pr2Backend(Pr2Config(transport="emulated", pace=pace, **NEAR))
+
+    def pull(event: GraspEvent) -> None:
+        if event.phase == phase:
+            backend._open().emulation.wire.unplugged = True  # type: ignore[union-attr]
+
+    ended = run_grasp(backend, create("controller", "hybrid"), RunConfig(seed=1), on_event=pull)
+    assert ended.outcome == Outcome.DEVICE_LOST
+    assert ended.events[-1].phase == phase
+    assert ended.report["let_go_after_s"] <= 0.1
+    if phase > Phase.APPROACH:
+        assert ended.trace.phase[-1] == phase
+        assert ended.trace.t_s[-1] == ended.events[-1].t_s
 
 
 def test_short_stall_is_survived_and_counted_as_late() -> None:

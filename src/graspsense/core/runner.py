@@ -1,8 +1,8 @@
 """The runner owns time: it opens the gripper, drives one grasp tick by tick, and leaves the gripper safe.
 
 Open the fingers, tare, close under the controller, hold, open again; each tick it reads, steps, guards, applies
-and hands the tick to the sinks. On every way out (done, error, Ctrl-C, lost device) the fingers are told to open,
-then to relax, and the gripper is closed.
+and hands the tick to the sinks. On every way out (done, error, Ctrl-C) the fingers are told to open, then
+to relax; a lost gripper is told to relax. Then the gripper is closed.
 """
 
 from __future__ import annotations
@@ -122,8 +122,15 @@ def run_grasp(
             on_open(info)
         grasp = _Grasp(backend, controller, run, info, tuple(sinks), on_event)
         outcome, reason = grasp.drive()
-    finally:
+    except BaseException:
         backend.close()
+        raise
+    try:
+        backend.close()
+    except Exception as error:
+        # The trace must outlive a backend that fails at the very end.
+        reason = f"the gripper could not be closed: {_in_words(error)} ({reason or outcome.words})"
+        outcome = Outcome.ABORTED
     frames = grasp.recorder.frames
     return Grasp(
         trace=grasp.recorder.trace(),
@@ -136,6 +143,10 @@ def run_grasp(
         seconds_simulated=grasp.seconds() if info.clock == "virtual" else None,
         seconds_wall=time.perf_counter() - began,
     )
+
+
+def _in_words(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"
 
 
 class _Grasp:
@@ -177,10 +188,10 @@ class _Grasp:
             ending = Outcome.ABORTED, "interrupted"
         except Exception as error:
             # A controller or sink of anybody's may fail; the gripper must be let go and the trace kept.
-            ending = Outcome.ABORTED, f"{type(error).__name__}: {error}"
+            ending = Outcome.ABORTED, _in_words(error)
         finally:
-            if not lost and not self.state.done:
-                self._let_go()
+            # Of a lost gripper it is not known whether it still hears, so it is told to relax all the same.
+            self._let_go(opens=not lost and not self.state.done)
         if ending is None:
             ending = self._ended_by_itself()
         if self.state.law.outcome != RUNNING and ending[0] in (Outcome.DEVICE_LOST, Outcome.ABORTED):
@@ -230,10 +241,15 @@ class _Grasp:
             if state.guard is not watcher:
                 self._guard_event(frame, watcher, state.guard)
                 watcher = state.guard
-            apply(command)
             # The frame that ended the taring still has the old zero.
-            if phase >= APPROACH and stepped:
-                record(frame, pads, phase, command)
+            recorded = phase >= APPROACH and stepped
+            try:
+                apply(command)
+            finally:
+                # Also where the gripper is lost at this very moment: the frame was felt.
+                if recorded:
+                    record(frame, pads, phase, command)
+            if recorded:
                 for sink in sinks:
                     sink.take(frame, pads, phase, command)
             if state.done or watcher.stopped:
@@ -251,11 +267,14 @@ class _Grasp:
         if self.on_event is not None:
             self.on_event(event)
 
-    def _let_go(self) -> None:
-        """Open the fingers for as long as that takes, then relax. Nothing that fails here may stop the rest."""
+    def _let_go(self, opens: bool) -> None:
+        """Open the fingers for as long as that takes, then relax. Nothing that fails here may stop the rest.
+
+        With `opens` false (they are open, or no frame would tell) only relax.
+        """
         info, run = self.info, self.run
         try:
-            if info.opening is not None and self.state.phase >= APPROACH and self.last is not None:
+            if opens and info.opening is not None and self.state.phase >= APPROACH and self.last is not None:
                 still, began_s = Stillness(self.last.t_s, self.last.gap_m), self.last.t_s
                 give_up = time.perf_counter() + run.opening_timeout_s
                 fresh = GuardState(1, 0, 0)

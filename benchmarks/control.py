@@ -1,0 +1,170 @@
+"""One control tick of the PR2 driver, and how late the host wakes up for a report. No hardware.
+
+    python benchmarks/control.py [--grasps N] [--seconds S] [--json]
+
+The tick is what the runner does from the moment a report's bytes are in the process to the moment the command's are
+handed to the wire: decode, count, convert, the hybrid controller's step, the guard, encode. The reports are those of
+an emulated grasp, recorded first and played back, so that neither the emulated board nor the simulator is in the
+figure. The wake-up is measured apart, against a board that runs by the clock in a thread of the same process: how
+long after the report with the shortest delay, in device time, a report was in the driver's hands.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import platform
+import time
+from collections.abc import Sequence
+from datetime import date
+from importlib.metadata import version
+from typing import Any
+
+from graspsense.core.runner import RunConfig, run_grasp
+from graspsense.plugin_api import create
+from graspsense_pr2_gripper import backend as driver
+from graspsense_pr2_gripper import opening
+from graspsense_pr2_gripper.backend import Pr2Backend
+from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.faults import Wire
+from graspsense_pr2_gripper.link import LockStepLink
+from graspsense_pr2_gripper.protocol import decode_identity
+from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
+
+SCHEDULERS = {os.SCHED_FIFO: "real-time (fifo)", os.SCHED_RR: "real-time (round robin)"}
+EMULATED = Pr2Config(transport="emulated", calibration="none")
+
+
+class Recorded(Wire):
+    """A wire that keeps what the board sent."""
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self.sent: list[bytes] = []
+        recordings.append(self)
+
+    def step(self) -> list[bytes]:
+        reports = super().step()
+        self.sent += reports
+        return reports
+
+
+recordings: list[Recorded] = []
+
+
+class Playback(Transport):
+    """Hands over recorded reports, and notes when it did and when a command came back."""
+
+    def __init__(self, reports: Sequence[bytes], feature: bytes) -> None:
+        self._reports, self._feature, self._next = reports, feature, 0
+        self._read_ns = 0
+        self.ticks_ns: list[int] = []
+
+    def read(self, timeout_s: float) -> bytes:
+        if timeout_s == 0.0:  # nothing else waits
+            return b""
+        if self._next == len(self._reports):
+            raise TransportGone("the recording is over")
+        self._next += 1
+        data = self._reports[self._next - 1]
+        self._read_ns = time.perf_counter_ns()
+        return data
+
+    def write(self, report: bytes) -> None:
+        if self._read_ns:
+            self.ticks_ns.append(time.perf_counter_ns() - self._read_ns)
+            self._read_ns = 0
+
+    def feature(self, report_id: int) -> bytes:
+        return self._feature
+
+    def close(self) -> None:
+        pass
+
+
+def ticks_us(grasps: int) -> list[float]:
+    controller = create("controller", "hybrid")
+    opening.Wire = Recorded  # type: ignore[misc]
+    run_grasp(Pr2Backend(EMULATED), controller, RunConfig())
+    opening.Wire = Wire  # type: ignore[misc]
+    sent = recordings[0].sent
+    feature = recordings[0].firmware.feature()
+    identity = decode_identity(feature)
+    found: list[float] = []
+    for _ in range(grasps):
+        wire = Playback(sent, feature)
+        link = LockStepLink(wire, 1.0 / identity.report_rate_hz)
+        driver.open_board = lambda *_, link=link: opening.Opened(link, identity, None)  # type: ignore[assignment]
+        grasp = run_grasp(Pr2Backend(EMULATED), controller, RunConfig())
+        assert grasp.outcome.words == "steady", grasp.reason
+        found += [ns / 1e3 for ns in wire.ticks_ns]
+    driver.open_board = opening.open_board
+    return found
+
+
+def wake_ups_us(seconds: float) -> list[float]:
+    paced = Pr2Config(transport="emulated", pace="device", object="none", calibration="none")
+    board = opening.open_board(paced, 0, 0.0)
+    taken: list[tuple[float, float]] = []
+    try:
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            arrival = board.link.next(0.1)
+            if arrival is not None:
+                taken.append((arrival.report.time_us * 1e-6, time.monotonic()))
+    finally:
+        board.link.close()
+    offset_s = min(host_s - device_s for device_s, host_s in taken)
+    return [(host_s - device_s - offset_s) * 1e6 for device_s, host_s in taken]
+
+
+def distribution(name: str, values: Sequence[float]) -> dict[str, Any]:
+    ordered = sorted(values)
+
+    def at(share: float) -> float:
+        return round(ordered[min(math.ceil(share * len(ordered)), len(ordered)) - 1], 1)
+
+    histogram: dict[str, int] = {}
+    for value in ordered:
+        below = 1 << max(math.ceil(value), 1).bit_length()
+        histogram[f"below {below}"] = histogram.get(f"below {below}", 0) + 1
+    return {
+        f"{name}_count": len(ordered),
+        f"{name}_p50_us": at(0.5),
+        f"{name}_p90_us": at(0.9),
+        f"{name}_p99_us": at(0.99),
+        f"{name}_p999_us": at(0.999),
+        f"{name}_max_us": at(1.0),
+        f"{name}_histogram_us": histogram,
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--grasps", type=int, default=5, help="how often the grasp is played back")
+    parser.add_argument("--seconds", type=float, default=5.0, help="how long the wake-ups are watched")
+    parser.add_argument("--json", action="store_true")
+    asked = parser.parse_args()
+    result = {
+        "date": date.today().isoformat(),
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}",
+        "load_average": round(os.getloadavg()[0], 2),
+        "scheduler": SCHEDULERS.get(os.sched_getscheduler(0), "other"),
+        "python": platform.python_version(),
+        "graspsense-pr2-gripper": version("graspsense-pr2-gripper"),
+        **distribution("tick", ticks_us(asked.grasps)),
+        **distribution("wake_up", wake_ups_us(asked.seconds)),
+    }
+    if asked.json:
+        print(json.dumps(result, indent=2))
+        return
+    for key, value in result.items():
+        print(f"{key:<28}{value}")
+
+
+if __name__ == "__main__":
+    main()
