@@ -21,7 +21,8 @@ from graspsense.core.errors import DeviceLost, NoDevice
 from graspsense.core.plugins import IsolatedPlugins
 from graspsense.plugin_api import hookimpl
 
-REPLAY = ["--gripper", "replay", "-o", "gripper.recording=icub:some/file.txt"]
+REPLAY = ["--gripper", "replay", "-o", "gripper.recording=icub:some/file.txt", "-o", "classifier.type=none"]
+"""What is here without any other distribution; the default pipeline's classifier is not."""
 
 
 class Ran:
@@ -125,7 +126,8 @@ def test_version_is_that_of_the_distribution():
         (
             ["plugins", "show", "replai"],
             "graspsense: no plugin or component named 'replai'. "
-            "Known: chitta, force, graspsense, hybrid, replay, velocity. Did you mean 'replay'?\n",
+            "Known: chitta, force, forest, graspsense, hybrid, knn, mlp, replay, svm, tree, velocity. "
+            "Did you mean 'replay'?\n",
         ),
     ],
 )
@@ -363,7 +365,7 @@ class TestConfig:
         site.install("lab-deaf", plugin)
         monkeypatch.setattr(loader, "_current", site.discover())
 
-        ran = run("config", "validate", "--gripper", "deaf", "--json")
+        ran = run("config", "validate", "--gripper", "deaf", "-o", "classifier.type=none", "--json")
 
         assert ran.code == 2
         assert ran.json["error"]["kind"] == "WiringError"
@@ -430,7 +432,7 @@ class TestCompletion:
         ("words", "offered"),
         [
             ("graspsense ", list(COMMANDS)),
-            ("graspsense p", ["plugins"]),
+            ("graspsense p", ["predict", "plugins"]),
             ("graspsense config ", ["show", "validate"]),
             ("graspsense config show --g", ["--gripper"]),
         ],

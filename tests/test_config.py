@@ -219,7 +219,7 @@ def test_extends_lays_a_file_over_another_with_paths_from_its_own_folder(plugins
 
 
 def test_a_file_extends_a_named_pipeline(plugins, write):
-    top = write('extends = "default"\n[gripper]\ntype = "hand"\nport = "a"\n')
+    top = write('extends = "default"\n[gripper]\ntype = "hand"\nport = "a"\n[classifier]\ntype = "none"\n')
 
     settings = resolve(top)
 
@@ -314,7 +314,8 @@ class TestClassifier:
 
     def test_a_table_without_a_type_is_an_error(self, plugins, write):
         assert complaint(write(BASE + "[classifier]\nforce_n = 3\n")) == (
-            "lab.toml:11: classifier.type is not given: name a classifier. Known: guess"
+            "lab.toml:11: classifier.type is not given: name a classifier. "
+            "Known: forest, guess, knn, mlp, svm, tree"
         )
 
 

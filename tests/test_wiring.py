@@ -63,6 +63,7 @@ def misfit(site):
                 Flag("--gripper", "gripper.type", gripper),
                 Flag("--controller", "controller.type", controller),
                 Flag("--features", "features.type", features),
+                Flag("--classifier", "classifier.type", "none"),
             ]
             try:
                 check(resolve(flags=flags))

@@ -216,9 +216,10 @@ def train(
 
 def write_model(path: Path, model: Model) -> None:
     """Write a model's file, whole or not at all. Raises OSError."""
-    text = json.dumps(model.as_json(), indent=1, ensure_ascii=False, allow_nan=False)
+    # A line a key: readable, and much shorter than a line a number.
+    lines = (f"{json.dumps(key)}: {_json(value)}" for key, value in model.as_json().items())
     part = path.with_name(path.name + ".part")
-    part.write_text(text + "\n", encoding="utf-8")
+    part.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
     os.replace(part, path)
 
 
@@ -313,6 +314,10 @@ def _content(name: str, text: bytes) -> dict[str, Any]:
         if not isinstance(content.get(key), kind):
             raise DataDamaged(f"model {name!r} is damaged: {key!r} is missing or no {kind.__name__}")
     return cast("dict[str, Any]", content)
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 def _digest(content: Mapping[str, Any]) -> str:

@@ -6,7 +6,7 @@ Light to import: the tree itself is imported when one is grown or asked.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import field, frozen
@@ -20,7 +20,6 @@ from graspsense.plugin_api import (
     FeatureTable,
     Prediction,
     hookimpl,
-    in_words,
 )
 
 if TYPE_CHECKING:
@@ -110,92 +109,37 @@ class C45(Classifier[C45Config]):
 
     def explain(self, features: Features) -> Prediction:
         """Return the prediction with the path through the tree."""
-        import numpy as np
-
-        from graspsense_c45.prediction import class_indices, distributions
+        from graspsense_c45.path import explain
+        from graspsense_c45.prediction import distributions
 
         tree = self._fitted()
-        row = np.array([[features[one.name] for one in tree.schema.attributes]])
-        shares = distributions(tree, row)[0].tolist()
-        label = self.classes()[int(class_indices(tree, row)[0])]
+        row = [features[one.name] for one in tree.schema.attributes]
+        path = explain(tree, row)
+        shares = distributions(tree, [row], "numpy")[0].tolist()
+        missing = [
+            f"{one.name} is missing: {features.reasons.get(one.name, 'no reason given')}"
+            for one, value in zip(tree.schema.attributes, row, strict=True)
+            if math.isnan(value)
+        ]
         return Prediction(
-            label=label,
+            label=str(path.label),
             probabilities=dict(zip(self.classes(), shares, strict=True)),
-            because=tuple(_path(tree, features)),
+            because=(*missing, *path.steps, f"{path.support:g} training trials came to this leaf"),
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Return the tree's nodes, breadth first: what each tests, and the training weight of each class."""
-        tree = self._fitted()
-        tests = tree.tests
-        return {
-            "classes": list(tree.schema.classes),
-            "attributes": [[one.name, one.unit] for one in tree.schema.attributes],
-            "laplace": tree.laplace,
-            "attribute": tests.attribute.tolist(),
-            "threshold": [None if math.isnan(one) else one for one in tests.threshold.tolist()],
-            "weights": [{str(k): w for k, w in enumerate(row) if w} for row in tree.weights.tolist()],
-        }
+        """Return the tree as `graspsense_c45.stored` writes it."""
+        from graspsense_c45.stored import to_document
+
+        return to_document(self._fitted())
 
     def from_json(self, model: Mapping[str, Any]) -> None:
-        """Become the tree that `to_json` gave. Raises KeyError, TypeError or ValueError where it is none."""
-        import numpy as np
+        """Become the tree that `to_json` gave. Raises ValueError where it is none."""
+        from graspsense_c45.stored import from_document
 
-        from graspsense_c45.branches import ALL_VALUES, LEAF, Tests
-        from graspsense_c45.schema import Attribute, Schema
-        from graspsense_c45.tree import Tree
-
-        schema = Schema(
-            tuple(Attribute(str(name), str(unit)) for name, unit in model["attributes"]),
-            tuple(str(one) for one in model["classes"]),
-        )
-        attribute = np.array(model["attribute"], dtype=np.int32)
-        threshold = np.array(
-            [math.nan if one is None else float(one) for one in model["threshold"]], dtype=np.float64
-        )
-        weights = np.zeros((len(attribute), len(schema.classes)))
-        for i, row in enumerate(model["weights"]):
-            for k, weight in row.items():
-                weights[i, int(k)] = float(weight)
-        inner = attribute != LEAF
-        n_sons = np.where(inner, 2, 0).astype(np.int32)
-        first_son = np.where(inner, 1 + np.cumsum(n_sons) - n_sons, 0).astype(np.int32)
-        if (
-            len(attribute) != 1 + int(n_sons.sum())
-            or len(threshold) != len(attribute)
-            or len(model["weights"]) != len(attribute)
-            or attribute.min() < LEAF
-            or attribute.max() >= len(schema.attributes)
-            or bool(np.isnan(threshold[inner]).any())
-            # A node's sons come behind it: without that a walk down the tree would not end.
-            or bool((first_son[inner] <= np.flatnonzero(inner)).any())
-        ):
-            raise ValueError("its nodes do not make a tree")
-        value = np.full(len(attribute), ALL_VALUES, dtype=np.int32)
-        tests = Tests(attribute, threshold, value, first_son, n_sons)
-        self._tree = Tree(schema, tests, weights, bool(model["laplace"]))
+        self._tree = from_document(dict(model))
 
     def _fitted(self) -> Tree:
         if self._tree is None:
             raise ValueError("the tree is neither fitted nor loaded yet")
         return self._tree
-
-
-def _path(tree: Tree, features: Features) -> Iterator[str]:
-    """Yield one sentence a test on the way down, and one on the leaf; where a feature is missing, the heavier way."""
-    node = 0
-    while not tree.is_leaf(node):
-        one = tree.attribute(node)
-        at_most, above = tree.sons(node)
-        value, threshold = features[one.name], float(tree.tests.threshold[node])
-        if math.isnan(value):
-            why = features.reasons.get(one.name, "missing")
-            node = at_most if tree.weight[at_most] >= tree.weight[above] else above
-            yield f"{one.name} is missing ({why}): both ways counted, the likelier one followed here"
-            continue
-        sign = "<=" if value <= threshold else ">"
-        yield f"{one.name} = {in_words(value, one.unit)} {sign} {in_words(threshold, one.unit)}"
-        node = at_most if value <= threshold else above
-    majority = int(tree.majority[node])
-    right, total = float(tree.weights[node, majority]), float(tree.weight[node])
-    yield f"{right:g} of the {total:g} training trials that came here were {tree.schema.classes[majority]}"
