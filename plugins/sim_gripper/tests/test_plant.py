@@ -213,6 +213,17 @@ def test_the_stops_hold_at_both_ends():
     assert (opened.gap_m, opened.speed_rev_s) == (pytest.approx(0.086, abs=1e-9), 0.0)
 
 
+@pytest.mark.parametrize("mass_share", [1e-2, 1e-4, 1e-6])
+def test_no_moving_mass_is_too_light_for_the_stops(mass_share):
+    numbers = drive()._replace(inertia=drive().inertia * mass_share)
+    params, move = PlantParams(numbers, thing(width=-1.0), 1), plant_of([])
+    for effort in (100.0, -100.0):
+        state = at(0.04, ())
+        for _ in range(200):
+            state = move(params, state, effort, TICK)
+            assert -1e-9 <= state.gap_m <= 0.086 + 1e-9
+
+
 def test_a_stuck_gripper_does_not_creep_over_a_long_hold():
     params = PlantParams(drive(), thing(Elastic(2000.0, 0.0), Maxwell(250.0, 0.4)), 1)
     state = run(params, at(0.0501, (NoState(), MaxwellState(0.0))), 23.0, 3.0, (elastic, maxwell))

@@ -234,10 +234,10 @@ def _piece(
         speed1 = speed + 0.5 * used * (kick + kick1)
         if speed1 * direction < 0.0:
             speed1 = 0.0
-    if revolutions1 >= drive.open_rev and speed1 > 0.0:
+    if revolutions1 >= drive.open_rev and speed1 >= 0.0:
         revolutions1, speed1 = drive.open_rev, 0.0
         gap1, rate1 = gap_and_rate(drive.link, revolutions1)
-    elif revolutions1 <= drive.closed_rev and speed1 < 0.0:
+    elif revolutions1 <= drive.closed_rev and speed1 <= 0.0:
         revolutions1, speed1 = drive.closed_rev, 0.0
         gap1, rate1 = gap_and_rate(drive.link, revolutions1)
     return PlantState(revolutions1, speed1, gap1, rate1, left, right, offset, touched, squeezed, peak), used
