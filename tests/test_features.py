@@ -100,6 +100,16 @@ def test_the_release_is_no_part_of_the_squeeze():
     assert missing == set(NAMES) - {"p_first"}
 
 
+def test_a_contact_that_ends_the_grasp_at_once_is_named_as_that():
+    # Too wide: both pads are felt in the very tick that turns to release.
+    trace = made_trace(
+        [(0.06, 0.0, 0.0)] * 5 + [(0.06, 9.0, 9.0)], phases=[Phase.APPROACH] * 5 + [Phase.RELEASE]
+    )
+    missing, reasons = missing_of(trace)
+    assert missing == set(NAMES)
+    assert "only when the grasp had ended" in reasons["p_first"]
+
+
 def test_a_gap_that_drops_out_after_contact_is_not_rest():
     rows = [(0.06, 9.0, 9.0)] * 10 + [(math.nan, 9.0, 9.0)] * 500
     missing, _ = missing_of(made_trace(rows))

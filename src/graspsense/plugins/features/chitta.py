@@ -121,7 +121,7 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
     def _first(self, trace: Trace) -> int | None:
         tau_1 = self.config.contact_force_n
         touch = (trace.force_left_n >= tau_1) & (trace.force_right_n >= tau_1)
-        touch &= (trace.phase >= APPROACH) & (trace.phase <= HOLD) & (trace.gap_m == trace.gap_m)
+        touch &= _closing(trace) & (trace.gap_m == trace.gap_m)
         return int(touch.argmax()) if touch.any() else None
 
     def _rest(self, trace: Trace, first: int) -> tuple[int, int] | None:
@@ -146,9 +146,18 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         if len(trace) == 0:
             return "the trace is empty"
         tau_1 = self.config.contact_force_n
-        left, right = bool((trace.force_left_n >= tau_1).any()), bool((trace.force_right_n >= tau_1).any())
-        if left and right:
+        left, right = trace.force_left_n >= tau_1, trace.force_right_n >= tau_1
+        closing = _closing(trace)
+        if bool((left & right & ~closing).any()):
+            return f"the pads felt {tau_1:g} N at the same time only when the grasp had ended"
+        felt = [side for side, on in (("left", left), ("right", right)) if bool((on & closing).any())]
+        if len(felt) == 2:
             return f"the pads never felt {tau_1:g} N at the same time"
-        if left or right:
-            return f"only the {'left' if left else 'right'} pad felt {tau_1:g} N"
+        if felt:
+            return f"only the {felt[0]} pad felt {tau_1:g} N"
         return f"no pad felt {tau_1:g} N"
+
+
+def _closing(trace: Trace) -> NDArray[np.bool_]:
+    """Return which ticks belong to the grasp itself: from the approach to the end of the hold."""
+    return (trace.phase >= APPROACH) & (trace.phase <= HOLD)
