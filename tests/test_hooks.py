@@ -213,13 +213,14 @@ def test_hook_graspsense_run_finished():
     assert module.outcomes == ["never steady"]
 
 
-def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog):
+@pytest.mark.parametrize("failure", [RuntimeError("no room on the disk"), SystemExit("no room on the disk")])
+def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, failure):
     class Raising:
         GRASPSENSE_API = (1, 0)
 
         @hookimpl
         def graspsense_grasp_event(self, event):
-            raise RuntimeError("no room on the disk")
+            raise failure
 
     seen = example("graspsense_grasp_event")
     plugins = IsolatedPlugins()
@@ -233,7 +234,8 @@ def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog):
 
     assert seen.events == ["both pads touch", "both pads touch"]
     assert [one.getMessage() for one in caplog.records] == [
-        f"{name} 0.1 failed in graspsense_grasp_event and is passed over: RuntimeError: no room on the disk"
+        f"{name} 0.1 failed in graspsense_grasp_event and is passed over: "
+        f"{type(failure).__name__}: no room on the disk"
         for name in ("lab-first", "lab-last")
     ]
 

@@ -470,7 +470,7 @@ class Plugins:
     def _isolated(self, status: PluginStatus, hook: str) -> Iterator[None]:
         try:
             yield
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             key = (f"{status.distribution}:{status.entry_point}", hook)
             if key not in self._warned:
                 self._warned.add(key)
