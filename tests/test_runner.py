@@ -42,8 +42,9 @@ def test_a_grasp_from_opening_to_release():
     # Three whole images, all of them taken after the taring began.
     assert [len(images) for images in gripper.tares] == [3]
     assert gripper.tares[0][0].t_s > 0.1
-    # Opened first and last; the probing force in between.
-    assert gripper.commands[0].value == gripper.commands[-1].value == -20.0
+    # Opened first and last, then relaxed; the probing force in between.
+    assert gripper.commands[0].value == -20.0
+    assert let_go(gripper)
     assert 20.0 in {c.value for c in gripper.commands}
 
 
@@ -83,6 +84,8 @@ def test_a_silent_device_is_lost_too(silent_from):
     grasp = run_grasp(gripper, HYBRID, RUN)
     assert grasp.outcome is Outcome.DEVICE_LOST
     assert "no frame from scripted for 100 ms" in grasp.reason
+    # It may still hear what it is told, though nothing comes back.
+    assert gripper.commands[-1].value == 0.0
     assert gripper.closed == 1
 
 
@@ -199,6 +202,18 @@ def test_a_gripper_that_is_not_there_is_an_error_not_an_outcome():
     with pytest.raises(NoDevice):
         run_grasp(gripper, HYBRID, RUN)
     assert gripper.closed == 1
+
+
+def test_a_gripper_that_cannot_be_closed_leaves_the_trace_and_says_so():
+    class Stubborn(Scripted):
+        def close(self):
+            super().close()
+            raise OSError("Input/output error")
+
+    grasp = run_grasp(Stubborn(squeezing, bottle), HYBRID, RUN)
+    assert grasp.outcome is Outcome.ABORTED
+    assert "could not be closed: OSError: Input/output error (steady)" in grasp.reason
+    assert Phase.HOLD in phases_of(grasp)
 
 
 def recorded(length):

@@ -40,8 +40,8 @@ class DeviceInfo:
     recording has no opening (None). `tare_images` is how many unloaded cell images the tare needs (0: none).
     `calibration` names each stored calibration in use and the hash of its content; `numbers` are what the device's
     raw numbers mean (counts per newton, transmission): a stored calibration holds for these alone.
-    `units` names units that are not SI, as of a recording: `{"t": "frame"}`. `frames_due` is the number of
-    frames a recording holds, None where there is no end to them.
+    `units` names units that are not SI, as of a recording: `{"t": "frame"}`. `notes` are
+    sentences that whoever reads the result has to know.
     """
 
     name: str
