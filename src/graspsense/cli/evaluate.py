@@ -90,7 +90,10 @@ def _print(found: Evaluation) -> None:
     click.echo(
         f"features: {', '.join(f'{name} [{unit}]' if unit else name for name, unit in found.features)}"
     )
-    click.echo(f"\nrate        {found.headline.words}   {found.protocol}\n")
+    click.echo(f"\nrate        {found.headline.words}   {found.protocol}")
+    for warning in found.warnings:
+        click.echo(f"WARNING     {warning}")
+    click.echo()
     rows = [_row(name, one) for name, one in found.protocols.items()]
     rows += [_row(name, one) for name, one in found.controls.items() if name not in found.protocols]
     echo_table(("PROTOCOL OR CONTROL", "RATE", "95 %", "DIFFERENCE", "WHAT"), rows)

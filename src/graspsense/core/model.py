@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import platform
 from collections import Counter
@@ -99,7 +100,9 @@ class Model:
             if strange is None:
                 return evolve(prediction, warnings=warnings, model=self.in_a_line)
             probabilities = prediction.probabilities
-            because = (strange, f"its nearest answer would be {prediction.label}")
+            because = (strange,)
+            if not all(math.isnan(value) for value in chosen.values):
+                because = (strange, f"taken for a known thing, it would be {prediction.label}")
         return Prediction(
             label=UNKNOWN,
             probabilities=probabilities,

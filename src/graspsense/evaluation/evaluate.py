@@ -82,6 +82,8 @@ class Evaluation:
     unlike: Rate
     """Held-out trials that the model of their fold would call unknown; here they are counted by their label."""
     learning_curve: tuple[CurvePoint, ...]
+    warnings: tuple[str, ...]
+    """What in the controls speaks against taking the headline for the object's."""
     notes: tuple[str, ...]
     folds: int
     seed: int
@@ -109,6 +111,7 @@ class Evaluation:
             "learning_curve": [
                 {"trained_on": one.trained_on, **rate_as_json(one.rate)} for one in self.learning_curve
             ],
+            "warnings": list(self.warnings),
             "notes": list(self.notes),
         }
 
@@ -155,6 +158,7 @@ class _Judge:
         self.learner, self.classifier, self.target = learner, classifier, target
         self.k, self.seed, self.settings, self.progress = folds, seed, settings, progress
         self.notes = list(labelled.notes)
+        self.warnings: list[str] = []
         self.labelled = self._chosen(labelled)
         self.labels = self.labelled.labels
         self.groups: Groups = self._groups()
@@ -175,12 +179,20 @@ class _Judge:
         head = plain if held is None else held
         head_folds = dealt if held_folds is None else held_folds
 
-        def beside(name: str, control: Control | None, reason: str, default: str) -> Judged:
+        majority_right, majority = self._majority(head, protocol)
+
+        def beside(name: str, control: Control | None, reason: str = "", default: str = "") -> Judged:
             """Judge other features by the same folds."""
             if control is None:
                 return Judged(default, reason=reason or "these trials have no such features")
             found = self._pooled(name, control.table, head_folds)
-            against = difference(head.right(self.labels), found.right(self.labels))
+            right = found.right(self.labels)
+            against = difference(head.right(self.labels), right)
+            if name == "before_contact" and difference(right, majority_right).interval[0] > 0.0:
+                self.warnings.append(
+                    f"before any contact {self._rate(found).rate:.3f} are right already ({control.what}; the "
+                    f"commonest label alone: {np.mean(majority_right):.3f}): the recording tells the labels apart"
+                )
             return Judged(control.what, self._rate(found), difference=against, of=protocol)
 
         controls = {
@@ -193,9 +205,10 @@ class _Judge:
             "width_only": beside("width_only", labelled.width, labelled.no_width, "p_first alone"),
             INSTANCE_HELD_OUT: protocols[INSTANCE_HELD_OUT],
             "recording_order": self._in_order(plain, plain_name),
-            "majority_class": self._majority(head, protocol),
+            "majority_class": majority,
         }
-        controls.update((name, beside(name, one, "", "")) for name, one in labelled.variants.items())
+        controls.update((name, beside(name, one)) for name, one in labelled.variants.items())
+        self._warn_of_leaks(controls)
         return Evaluation(
             source=labelled.source,
             classifier=self.classifier,
@@ -209,6 +222,7 @@ class _Judge:
             by_class=self._by_class(head),
             unlike=Rate(int(head.unlike.sum()), len(self.labels)),
             learning_curve=self._curve(head_folds, head),
+            warnings=tuple(self.warnings),
             notes=tuple(self.notes),
             folds=self.k,
             seed=self.seed,
@@ -307,7 +321,16 @@ class _Judge:
         against = difference(plain.right(self.labels), blocks.right(self.labels))
         return Judged(what, self._rate(blocks), difference=against, of=plain_name)
 
-    def _majority(self, head: Pooled, protocol: str) -> Judged:
+    def _warn_of_leaks(self, controls: Mapping[str, Judged]) -> None:
+        for name, why in (
+            (INSTANCE_HELD_OUT, "part of the stratified rate is the very things' that were trained on"),
+            ("recording_order", "part of the stratified rate is the moment's of the recording"),
+        ):
+            one = controls[name].difference
+            if one is not None and one.interval[0] > 0.0:
+                self.warnings.append(f"{name} is lower by {one.words}: {why}")
+
+    def _majority(self, head: Pooled, protocol: str) -> tuple[list[bool], Judged]:
         right = np.zeros(len(self.labels), dtype=np.bool_)
         for rows in self.groups:
             most = commonest([self.labels[i] for i in rows])
@@ -316,7 +339,8 @@ class _Judge:
         if len(self.groups) > 1:
             what += " (of each class, the commonest state)"
         against = difference(head.right(self.labels), right.tolist())
-        return Judged(what, Rate(int(right.sum()), len(right)), difference=against, of=protocol)
+        judged = Judged(what, Rate(int(right.sum()), len(right)), difference=against, of=protocol)
+        return right.tolist(), judged
 
     def _by_class(self, head: Pooled) -> dict[str, Rate]:
         right: dict[str, list[bool]] = {}
