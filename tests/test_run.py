@@ -201,3 +201,15 @@ def test_as_a_library_it_is_two_lines():
     assert outcome == "steady"
     assert int(ticks) > 1000
     assert float(p_first) == pytest.approx(0.066, abs=0.001)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
+@pytest.mark.parametrize("arguments", [["run", "--json"], ["config", "show"]])
+def test_a_full_disk_under_stdout_is_told_without_a_traceback(arguments):
+    with open("/dev/full", "wb") as full:
+        ran = subprocess.run(
+            [sys.executable, "-m", "graspsense", *arguments], stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert ran.returncode == 2
+    assert ran.stderr.splitlines()[-1] == "graspsense: No space left on device"
+    assert "Traceback" not in ran.stderr

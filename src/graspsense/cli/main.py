@@ -136,8 +136,7 @@ def _exit_code(arguments: list[str]) -> int:
         click.echo("interrupted", err=True)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        # Whoever read us has gone; the interpreter's last flush must not complain of it either.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _give_up_stdout()  # whoever read us has gone
         return EXIT_BROKEN_PIPE
     except Exception as error:
         return _report(error, as_json="--json" in arguments)
@@ -167,5 +166,16 @@ def _report(error: Exception, as_json: bool) -> int:
     if as_json:
         from graspsense.cli.output import echo_json
 
-        echo_json({"error": {"kind": type(error).__name__, "message": message, "exit_code": code}})
+        try:
+            echo_json({"error": {"kind": type(error).__name__, "message": message, "exit_code": code}})
+        except OSError:  # it may be what the error is about
+            _give_up_stdout()
+    elif isinstance(error, OSError):
+        _give_up_stdout()
     return code
+
+
+def _give_up_stdout() -> None:
+    """Send what is still to be flushed nowhere: the interpreter's last flush would complain of it."""
+    if sys.stdout is not None:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
