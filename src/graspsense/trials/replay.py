@@ -28,9 +28,16 @@ def _stored(name: str) -> Recording:
     return stored_recording(name)
 
 
+def _bag(name: str) -> Recording:
+    from graspsense.trials.rosbag import read_bag
+
+    return read_bag(name)
+
+
 KINDS: Final[Mapping[str, Callable[[str], Recording]]] = {
     "icub": read_recording,
     "mcap": _mcap,
+    "rosbag": _bag,
     "store": _stored,
 }
 """What can stand before the colon of a recording's name, and the reader of that kind."""

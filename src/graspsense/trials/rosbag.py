@@ -1,0 +1,246 @@
+"""Recorded PR2 data: ROS 1 and ROS 2 bags as recordings of one gripper.
+
+Read are, for the left (`l`) or right (`r`) gripper:
+
+| topic | type | for |
+|---|---|---|
+| `/pressure/{l,r}_gripper_motor` | pr2_msgs/PressureState (2009: ethercat_hardware/PressureState) | cell images |
+| `/joint_states` | sensor_msgs/JointState | gap, its rate, effort |
+| `/{l,r}_gripper_controller/state` | pr2_controllers_msgs/JointControllerState | the same, without joint states |
+| `/pr2_gripper_controller/state` | pr2_msgs/GripperControllerState (2009) | the same, without either |
+
+Cells are 16 bits unsigned that the driver put into signed fields, so values above 32767 come as negative ones; the
+two tips are called l_finger_tip and r_finger_tip, in 2009 data0 and data1. Messages without a header, or with a
+stamp of zero, are at the time at which they were recorded (pr2_ethercat_drivers, pr2_common, and personalrobots-pkg
+of September 2009). ROS counts an effort that opens as positive; here one that squeezes is.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from graspsense.core.calibration import Cells, edge_force, masked, pad_force, tare, zero_of
+from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable, TareRefused
+from graspsense.core.roles import Reading
+from graspsense.core.signals import CELLS, NO_PADS, Frame, Pads
+from graspsense.trials.recording import Recording
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
+
+SIDES: Final = {"l": "left", "r": "right"}
+TIP_FIELDS: Final = (("l_finger_tip", "r_finger_tip"), ("data0", "data1"))
+"""Names of the two tips' fields, now and in 2009."""
+TARE_IMAGES: Final = 6
+PRESSURE: Final = "/pressure/{}_gripper_motor"
+JOINT_STATES: Final = "/joint_states"
+CONTROLLER_STATE: Final = "/{}_gripper_controller/state"
+STATE_2009: Final = "/pr2_gripper_controller/state"
+
+DEFINITIONS: Final[Mapping[str, str]] = {
+    "pr2_msgs/msg/PressureState": "std_msgs/Header header\nint16[] l_finger_tip\nint16[] r_finger_tip\n",
+    "pr2_controllers_msgs/msg/JointControllerState": (
+        "std_msgs/Header header\nfloat64 set_point\nfloat64 process_value\nfloat64 process_value_dot\nfloat64 error\n"
+        "float64 time_step\nfloat64 command\nfloat64 p\nfloat64 i\nfloat64 d\nfloat64 i_clamp\n"
+    ),
+}
+"""The messages that are not ROS's own, for a bag without definitions; one with them is read by its own."""
+
+_NAN: Final = float("nan")
+
+
+class _Motion(NamedTuple):
+    t_ns: int
+    gap_m: float
+    velocity_m_s: float
+    effort_n: float
+
+
+class _Image(NamedTuple):
+    t_ns: int
+    left: Cells
+    right: Cells
+
+
+def read_bag(name: str) -> Recording:
+    """Return the recording in a bag: `FILE`, or `FILE#l` and `FILE#r` where it holds both grippers.
+
+    The zero of the pads is the mean of the first images. Raises ConfigError where there is no such file or it must be
+    said which gripper is meant, DataDamaged where it is no bag or lacks what a grasp needs, PluginUnavailable
+    without rosbags.
+    """
+    file, _, side = name.partition("#")
+    path = Path(file)
+    if not path.exists():
+        raise ConfigError(f"there is no bag {file!r}: name a .bag file, or the folder of a ROS 2 bag")
+    if side not in ("", *SIDES):
+        raise ConfigError(f"{name!r}: behind # comes l or r, for the left or the right gripper")
+    images: list[_Image] = []
+    motions: list[_Motion] = []
+    with _bag(path) as reader:
+        topics = frozenset(reader.topics)
+        side = _side(path, side, topics)
+        pressure, source = PRESSURE.format(side), _source(path, side, topics)
+        for topic, t_ns, message in _messages(path, reader, (pressure, source)):
+            if topic == pressure:
+                image = _image(path, t_ns, message)
+                # A message may repeat the image before: the board's clock is not in it.
+                if not images or image[1:] != images[-1][1:]:
+                    images.append(image)
+            else:
+                motions += _motion(t_ns, message, f"{side}_gripper_joint")
+    if len(motions) < 2 or not images:
+        raise DataDamaged(
+            f"{path} holds {len(motions)} positions of the {SIDES[side]} gripper on {source} and {len(images)} cell "
+            f"images on {pressure}: a grasp needs both"
+        )
+    motions.sort()
+    images.sort(key=lambda one: one.t_ns)
+    duration_s = (motions[-1].t_ns - motions[0].t_ns) * 1e-9
+    if duration_s <= 0.0:
+        raise DataDamaged(f"{path}: all positions on {source} have the same time")
+    notes = [f"recorded on a PR2, {SIDES[side]} gripper: gap from {source}, cells from {pressure}"]
+    return Recording(
+        name=f"{path.name}, {SIDES[side]} gripper",
+        readings=tuple(_readings(motions, images, notes)),
+        rate_hz=(len(motions) - 1) / duration_s,
+        notes=tuple(notes),
+    )
+
+
+@contextmanager
+def _bag(path: Path) -> Iterator[AnyReader]:
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    except ImportError as error:
+        raise PluginUnavailable(
+            f'reading ROS bags needs rosbags: {error}\n  try: pip install "graspsense[ros]"'
+        ) from error
+
+    # Not every ROS 2 bag carries the definitions of its messages.
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for name, definition in DEFINITIONS.items():
+        store.register(get_types_from_msg(definition, name))
+    try:
+        reader = AnyReader([path], default_typestore=store)
+        reader.open()
+    except Exception as error:  # rosbags meets damage with whatever it stumbles over
+        raise DataDamaged(f"{path} cannot be read as a ROS bag: {error}") from error
+    try:
+        yield reader
+    finally:
+        reader.close()
+
+
+def _messages(path: Path, reader: AnyReader, topics: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
+    """Yield topic, time and message: the time of its header where that has one, else of its recording."""
+    connections = [one for one in reader.connections if one.topic in topics]
+    try:
+        for connection, recorded_ns, raw in reader.messages(connections=connections):
+            message = reader.deserialize(raw, connection.msgtype)
+            stamp = getattr(getattr(message, "header", None), "stamp", None)
+            stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec if stamp is not None else 0
+            yield connection.topic, stamp_ns or recorded_ns, message
+    except DataDamaged:
+        raise
+    except Exception as error:  # as above
+        raise DataDamaged(f"{path} is damaged: {type(error).__name__}: {error}") from error
+
+
+def _side(path: Path, side: str, topics: Collection[str]) -> str:
+    there = [one for one in SIDES if PRESSURE.format(one) in topics]
+    if side in there:
+        return side
+    if not there:
+        wanted = " or ".join(PRESSURE.format(one) for one in SIDES)
+        raise DataDamaged(
+            f"{path} has no fingertips: no topic {wanted}. It has: {', '.join(sorted(topics)) or 'none'}"
+        )
+    if side:
+        raise ConfigError(f"{path} has no {SIDES[side]} gripper: no topic {PRESSURE.format(side)}")
+    if len(there) > 1:
+        raise ConfigError(
+            f"{path} holds both grippers: write {path}#l for the left or {path}#r for the right one"
+        )
+    return there[0]
+
+
+def _source(path: Path, side: str, topics: Collection[str]) -> str:
+    wanted = (JOINT_STATES, CONTROLLER_STATE.format(side), STATE_2009)
+    for topic in wanted:
+        if topic in topics:
+            return topic
+    raise DataDamaged(f"{path} does not say how far the gripper is open: no topic {', '.join(wanted)}")
+
+
+def _image(path: Path, t_ns: int, message: Any) -> _Image:
+    for left, right in TIP_FIELDS:
+        if hasattr(message, left) and hasattr(message, right):
+            tips = [
+                tuple(float(int(cell) & 0xFFFF) for cell in getattr(message, name)) for name in (left, right)
+            ]
+            if any(len(tip) != CELLS for tip in tips):
+                raise DataDamaged(
+                    f"{path}: a pressure message has {len(tips[0])} and {len(tips[1])} cells, not {CELLS}"
+                )
+            return _Image(t_ns, *tips)
+    names = ", ".join(" and ".join(pair) for pair in TIP_FIELDS)
+    raise DataDamaged(f"{path}: a pressure message has neither of the pairs of fields {names}")
+
+
+def _motion(t_ns: int, message: Any, joint: str) -> list[_Motion]:
+    """Return what a message says of this joint: one motion, or none where it is of other joints."""
+    if hasattr(message, "process_value"):
+        return [_Motion(t_ns, message.process_value, message.process_value_dot, -message.command)]
+    if hasattr(message, "joint_position"):
+        if message.joint_name not in ("", joint):
+            return []
+        return [_Motion(t_ns, message.joint_position, message.joint_velocity, -message.joint_applied_effort)]
+    if joint not in message.name:
+        return []
+    i = list(message.name).index(joint)
+    velocity, effort = ([*column, *[_NAN] * (i + 1)][i] for column in (message.velocity, message.effort))
+    return [_Motion(t_ns, float(message.position[i]), float(velocity), -float(effort))]
+
+
+def _readings(motions: Sequence[_Motion], images: Sequence[_Image], notes: list[str]) -> Iterator[Reading]:
+    began_ns = motions[0].t_ns
+    pads = [Pads((one.t_ns - began_ns) * 1e-9, i, one.left, one.right) for i, one in enumerate(images, 1)]
+    first = pads[:TARE_IMAGES]
+    try:
+        zero = tare(first)
+    except TareRefused as refused:
+        zero = zero_of([one.left for one in first]), zero_of([one.right for one in first])
+        notes.append(
+            f"the zero of the pads is doubtful, as the first {len(first)} images cannot tare them: {refused}"
+        )
+    times = [one.t_ns for one in images]
+    before: _Motion | None = None
+    for motion in motions:
+        n = bisect_right(times, motion.t_ns)
+        dt_s = (motion.t_ns - before.t_ns) * 1e-9 if before else 0.0
+        velocity = motion.velocity_m_s
+        if velocity != velocity and before is not None and dt_s > 0.0:
+            velocity = (motion.gap_m - before.gap_m) / dt_s
+        seen = pads[n - 1] if n else NO_PADS
+        forces = _forces(seen.left, zero[0]), _forces(seen.right, zero[1])
+        (left, edge_left), (right, edge_right) = forces
+        yield Reading(
+            Frame(
+                (motion.t_ns - began_ns) * 1e-9, dt_s, motion.gap_m, velocity, motion.effort_n, left, right,
+                edge_left, edge_right, 0,
+            ),
+            seen,
+        )  # fmt: skip
+        before = motion
+
+
+def _forces(cells: Cells, zero: Cells) -> tuple[float, float]:
+    """Return pad and edge force of a tip; NaN where none of its cells answers."""
+    kept, bad = masked(cells, zero)
+    return (_NAN, _NAN) if bad == CELLS else (pad_force(kept, zero), edge_force(kept, zero))

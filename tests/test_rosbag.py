@@ -1,0 +1,265 @@
+"""ROS bags of a PR2 as recordings, on bags written here with the messages' own definitions."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+rosbags = pytest.importorskip("rosbags", reason="rosbags is the extra `ros`")
+
+from rosbags.rosbag1 import Writer as Writer1  # noqa: E402
+from rosbags.rosbag2 import Writer as Writer2  # noqa: E402
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: E402
+
+from graspsense import load_pipeline  # noqa: E402
+from graspsense.core.errors import ConfigError, DataDamaged  # noqa: E402
+from graspsense.trials.rosbag import read_bag  # noqa: E402
+
+PRESSURE_NOW = (
+    "pr2_msgs/msg/PressureState",
+    "std_msgs/Header header\nint16[] l_finger_tip\nint16[] r_finger_tip\n",
+)
+PRESSURE_2009 = (
+    "ethercat_hardware/msg/PressureState", "std_msgs/Header header\nint16[] data0\nint16[] data1\n",
+)  # fmt: skip
+STATE_2009 = (
+    "pr2_msgs/msg/GripperControllerState",
+    "float64 joint_commanded_effort\nfloat64 joint_applied_effort\nstring joint_name\n"
+    "float64 joint_position\nfloat64 joint_velocity\n",
+)
+CONTROLLER_STATE = (
+    "pr2_controllers_msgs/msg/JointControllerState",
+    "std_msgs/Header header\nfloat64 set_point\nfloat64 process_value\nfloat64 process_value_dot\nfloat64 error\n"
+    "float64 time_step\nfloat64 command\nfloat64 p\nfloat64 i\nfloat64 d\nfloat64 i_clamp\n",
+)
+BEGAN_S = 1_252_000_000.0
+"""Some time in September 2009."""
+
+ZERO = 32_700
+"""Unloaded counts near the sign bit, so that a load wraps the signed field."""
+
+
+class Bag:
+    """A bag being written, of either kind: `add(topic, (type, definition), t_s, **fields)`."""
+
+    def __init__(self, path: Path, ros: int, definitions: bool = True) -> None:
+        self.ros, self.definitions = ros, definitions
+        self.store = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.ROS2_HUMBLE)
+        self.writer: Any = Writer1(path) if ros == 1 else Writer2(path, version=9 if definitions else 8)
+        self.writer.open()
+        self.connections: dict[str, Any] = {}
+        self.sequence = 0
+
+    def add(self, topic: str, kind: tuple[str, str] | str, t_s: float, **fields: Any) -> None:
+        name = kind if isinstance(kind, str) else kind[0]
+        if not isinstance(kind, str) and name not in self.store.fielddefs:
+            self.store.register(get_types_from_msg(kind[1], name))
+        if topic not in self.connections:
+            self.connections[topic] = self.writer.add_connection(topic, name, typestore=self.store)
+        message = self.store.types[name](**fields)
+        encode = self.store.serialize_ros1 if self.ros == 1 else self.store.serialize_cdr
+        self.writer.write(self.connections[topic], round(t_s * 1e9), encode(message, name))
+
+    def header(self, t_s: float) -> Any:
+        stamp = self.store.types["builtin_interfaces/msg/Time"](int(t_s), round((t_s - int(t_s)) * 1e9))
+        kind = self.store.types["std_msgs/msg/Header"]
+        self.sequence += 1
+        return kind(self.sequence, stamp, "") if self.ros == 1 else kind(stamp, "")
+
+    def close(self) -> None:
+        self.writer.close()
+
+
+def signed(cells: Any) -> Any:
+    """16 bits unsigned in a signed field, as the PR2's driver published them."""
+    return np.asarray(cells, dtype=np.int64).astype(np.uint16).view(np.int16)
+
+
+@pytest.fixture(scope="module")
+def grasp() -> Any:
+    """A simulated grasp of a bottle: its trace is what the bags below hold."""
+    options = ["classifier.type=none", "gripper.open_gap_m=0.07"]
+    return load_pipeline(options=options).grasp(object="odwalla:full_closed", seed=1)
+
+
+def pressure(bag: Bag, t_s: float, left: Any, right: Any, kind: tuple[str, str], side: str = "r") -> None:
+    names = ("data0", "data1") if kind is PRESSURE_2009 else ("l_finger_tip", "r_finger_tip")
+    fields = dict(zip(names, (signed(left), signed(right)), strict=True))
+    bag.add(f"/pressure/{side}_gripper_motor", kind, t_s + 0.002, header=bag.header(t_s), **fields)
+
+
+def write(
+    path: Path, grasp: Any, *, ros: int, source: str, kind: tuple[str, str], definitions: bool = True
+) -> None:
+    """Write the grasp at the PR2's rates: motion at 100 Hz, images as they came and each twice."""
+    trace, bag = grasp.trace, Bag(path, ros, definitions)
+    shift = ZERO - 3300
+    for t, left, right in zip(trace.pad_t_s, trace.pad_left, trace.pad_right, strict=True):
+        pressure(bag, BEGAN_S + t, left + shift, right + shift, kind)
+        pressure(bag, BEGAN_S + t + 0.02, left + shift, right + shift, kind)
+    for i in range(0, len(trace), 10):
+        t_s, gap, velocity = BEGAN_S + trace.t_s[i], trace.gap_m[i], trace.velocity_m_s[i]
+        effort = -trace.effort_n[i]  # ROS: positive opens
+        if source == "/joint_states":
+            kind_ = "sensor_msgs/msg/JointState"
+            fields = {"name": ["head_pan_joint", "r_gripper_joint"], "position": np.array([9.0, gap]),
+                      "velocity": np.array([9.0, velocity]), "effort": np.array([9.0, effort])}  # fmt: skip
+            bag.add(source, kind_, t_s + 0.001, header=bag.header(t_s), **fields)
+        elif source == "/r_gripper_controller/state":
+            rest = dict.fromkeys(("set_point", "error", "time_step", "p", "i", "d", "i_clamp"), 0.0)
+            bag.add(source, CONTROLLER_STATE, t_s + 0.001, header=bag.header(t_s), process_value=gap,
+                    process_value_dot=velocity, command=effort, **rest)  # fmt: skip
+        else:
+            bag.add(source, STATE_2009, t_s, joint_commanded_effort=0.0, joint_applied_effort=effort,
+                    joint_name="r_gripper_joint", joint_position=gap, joint_velocity=velocity)  # fmt: skip
+    bag.close()
+
+
+CASES = {
+    "ros1": {"ros": 1, "source": "/joint_states", "kind": PRESSURE_NOW},
+    "ros1-2009": {"ros": 1, "source": "/pr2_gripper_controller/state", "kind": PRESSURE_2009},
+    "ros1-controller": {"ros": 1, "source": "/r_gripper_controller/state", "kind": PRESSURE_NOW},
+    "ros2": {"ros": 2, "source": "/joint_states", "kind": PRESSURE_NOW},
+    "ros2-without-definitions": {
+        "ros": 2,
+        "source": "/r_gripper_controller/state",
+        "kind": PRESSURE_NOW,
+        "definitions": False,
+    },
+    "ros2-2009": {"ros": 2, "source": "/pr2_gripper_controller/state", "kind": PRESSURE_2009},
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bag_is_the_grasp_that_was_written(case: str, grasp: Any, tmp_path: Path) -> None:
+    path = tmp_path / ("grasp.bag" if "ros1" in case else "grasp")
+    write(path, grasp, **CASES[case])  # type: ignore[arg-type]
+    recording = read_bag(str(path))
+    trace = grasp.trace
+    frames = [one.frame for one in recording.readings]
+    assert recording.rate_hz == pytest.approx(100.0, rel=0.01)
+    np.testing.assert_allclose([f.t_s for f in frames], trace.t_s[::10] - trace.t_s[0], atol=1e-6)
+    np.testing.assert_allclose([f.gap_m for f in frames], trace.gap_m[::10])
+    np.testing.assert_allclose([f.velocity_m_s for f in frames], trace.velocity_m_s[::10])
+    np.testing.assert_allclose([f.effort_n for f in frames], trace.effort_n[::10])
+    pads = recording.readings[-1].pads
+    images = int(np.sum(trace.pad_t_s <= trace.t_s[::10][-1]))
+    assert pads.counter == images, "an image that is repeated counts once"
+    np.testing.assert_array_equal(pads.left, trace.pad_left[images - 1] + ZERO - 3300)
+    # Zero and images differ from the run's by the noise of 15 counts a cell: sqrt(15) * 15 / 1600 N and a few.
+    peak = max(f.force_left_n for f in frames)
+    assert peak == pytest.approx(float(np.max(trace.force_left_n)), abs=0.15)
+    assert max(max(one.pads.left) for one in recording.readings) > 2**15, "the load crosses the sign bit"
+
+
+def test_bag_replays_to_the_features_of_the_grasp(grasp: Any, tmp_path: Path) -> None:
+    path = tmp_path / "grasp.bag"
+    write(path, grasp, ros=1, source="/joint_states", kind=PRESSURE_NOW)
+    options = ["gripper.type=replay", f'gripper.recording="rosbag:{path}"', "classifier.type=none",
+               "features.rest_speed_m_s=2e-4"]  # fmt: skip
+    replayed = load_pipeline(options=options).grasp()
+    assert replayed.outcome == grasp.outcome
+    p_first, p_steady, f_steady = grasp.features.values[:3]
+    assert replayed.features.values[0] == pytest.approx(
+        p_first, abs=3e-4
+    )  # 10 ms at 10 mm/s, and an image later
+    assert replayed.features.values[1] == pytest.approx(p_steady, abs=1e-4)
+    assert replayed.features.values[2] == pytest.approx(f_steady, abs=0.1)
+
+
+def test_loads_beyond_the_sign_bit_do_not_wrap(tmp_path: Path) -> None:
+    bag = Bag(tmp_path / "a.bag", 1)
+    for i in range(12):
+        load = 0 if i < 6 else 100 * i
+        # Cell 0 tells one image from the next, as noise does on the robot.
+        cells = [ZERO + (load if cell >= 7 else i if cell == 0 else 0) for cell in range(22)]
+        pressure(bag, BEGAN_S + 0.041 * i, cells, cells, PRESSURE_NOW)
+        t_s = BEGAN_S + 0.041 * i
+        bag.add("/r_gripper_controller/state", CONTROLLER_STATE, t_s, header=bag.header(t_s),
+                set_point=0.0, process_value=0.05, process_value_dot=0.0, error=0.0, time_step=0.0, command=-20.0,
+                p=0.0, i=0.0, d=0.0, i_clamp=0.0)  # fmt: skip
+    bag.close()
+    frames = [one.frame for one in read_bag(str(tmp_path / "a.bag")).readings]
+    assert [f.force_left_n for f in frames] == pytest.approx(
+        [0.0] * 6 + [15 * 100 * i / 1600 for i in range(6, 12)]
+    )
+    assert {f.effort_n for f in frames} == {20.0}
+
+
+def motion(bag: Bag, t_s: float, gap_m: float = 0.05, side: str = "r") -> None:
+    bag.add("/pr2_gripper_controller/state", STATE_2009, t_s, joint_commanded_effort=0.0, joint_applied_effort=0.0,
+            joint_name=f"{side}_gripper_joint", joint_position=gap_m, joint_velocity=0.0)  # fmt: skip
+
+
+def test_fingertip_that_reads_zero_throughout_is_absent(tmp_path: Path) -> None:
+    bag = Bag(tmp_path / "a.bag", 1)
+    for i in range(8):
+        cells = [3000 + i] * 22
+        pressure(bag, BEGAN_S + 0.041 * i, [0] * 22, cells, PRESSURE_NOW)
+        motion(bag, BEGAN_S + 0.041 * i)
+    bag.close()
+    recording = read_bag(str(tmp_path / "a.bag"))
+    assert all(math.isnan(one.frame.force_left_n) for one in recording.readings)
+    assert not any(math.isnan(one.frame.force_right_n) for one in recording.readings)
+    assert any("left fingertip" in note for note in recording.notes)
+
+
+def test_bag_of_both_grippers_must_be_told_which(tmp_path: Path) -> None:
+    bag = Bag(tmp_path / "a.bag", 1)
+    for i in range(8):
+        for side, level in (("l", 3000), ("r", 3500)):
+            pressure(bag, BEGAN_S + 0.041 * i, [level + i] * 22, [level] * 22, PRESSURE_NOW, side)
+            motion(bag, BEGAN_S + 0.041 * i, 0.05 if side == "l" else 0.07, side)
+    bag.close()
+    path = str(tmp_path / "a.bag")
+    with pytest.raises(ConfigError, match="#l for the left"):
+        read_bag(path)
+    assert {one.frame.gap_m for one in read_bag(path + "#l").readings} == {0.05}
+    assert read_bag(path + "#r").readings[-1].pads.left[0] == 3507
+    with pytest.raises(ConfigError, match="comes l or r"):
+        read_bag(path + "#x")
+
+
+def test_what_is_no_bag_is_told_apart(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no bag"):
+        read_bag(str(tmp_path / "missing.bag"))
+    text = tmp_path / "text.bag"
+    text.write_text("this is no bag\n")
+    with pytest.raises(DataDamaged, match="cannot be read as a ROS bag"):
+        read_bag(str(text))
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    with pytest.raises(DataDamaged, match="cannot be read as a ROS bag"):
+        read_bag(str(empty))
+
+
+def test_bag_that_is_cut_short_or_changed_raises_nothing_but_our_own(grasp: Any, tmp_path: Path) -> None:
+    whole = tmp_path / "whole.bag"
+    write(whole, grasp, ros=1, source="/joint_states", kind=PRESSURE_NOW)
+    data = whole.read_bytes()
+    chance = np.random.default_rng(5)
+    damaged = 0
+    for i in range(60):
+        broken = bytearray(data[: int(chance.integers(len(data)))] if i % 2 else data)
+        if not i % 2:
+            for at in chance.integers(len(broken), size=40):
+                broken[at] = int(chance.integers(256))
+        path = tmp_path / f"{i}.bag"
+        path.write_bytes(bytes(broken))
+        try:
+            read_bag(str(path))
+        except (DataDamaged, ConfigError):
+            damaged += 1
+    assert damaged >= 30, "at least those that are cut short"
+
+
+def test_bag_without_fingertips_says_what_it_has(tmp_path: Path) -> None:
+    bag = Bag(tmp_path / "a.bag", 1)
+    motion(bag, BEGAN_S)
+    bag.close()
+    with pytest.raises(DataDamaged, match=r"no fingertips.*It has: /pr2_gripper_controller/state"):
+        read_bag(str(tmp_path / "a.bag"))
