@@ -141,6 +141,7 @@ def device_metadata(device: DeviceInfo) -> dict[str, str]:
                 "clock": device.clock,
                 "rate_hz": device.rate_hz,
                 "calibration": dict(device.calibration),
+                "numbers": dict(device.numbers),
                 "units": dict(device.units),
                 "notes": list(device.notes),
             }

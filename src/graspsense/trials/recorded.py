@@ -45,6 +45,7 @@ LARGEST_RECORD: Final = 1 << 26
 
 _DAMAGE: Final = (
     McapError,
+    struct.error,
     ValueError,
     KeyError,
     TypeError,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import secrets
 import shutil
@@ -131,6 +132,8 @@ class Store:
             raise NotKept(
                 f"cannot keep a trial below {folder}: {error.strerror}. Name a folder to write in"
             ) from error
+        if not all(os.access(one, os.W_OK) for one in (folder, folder / RECORDINGS)):
+            raise NotKept(f"cannot keep a trial below {folder}: it is read-only. Name a folder to write in")
         new = _header(folder)
         with _told(folder):
             connection = sqlite3.connect(folder / FILE, timeout=BUSY_S, isolation_level=None)

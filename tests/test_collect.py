@@ -1,0 +1,192 @@
+"""`graspsense collect` with an operator whose answers are written down."""
+
+import io
+import json
+import subprocess
+import sys
+from collections import Counter
+
+import pytest
+
+from graspsense.cli.main import main
+from graspsense.core.errors import ConfigError
+from graspsense.trials.collecting import Collection, Wanted
+from graspsense.trials.store import Store
+
+PLAIN = ["-o", "classifier.type=none"]
+
+
+class Done:
+    def __init__(self, returncode, out, err):
+        self.returncode, self.stdout, self.stderr = returncode, out, err
+
+
+@pytest.fixture
+def graspsense(capsys, monkeypatch):
+    """Return a function that runs the command line with answers on what stands in for a terminal."""
+
+    def graspsense(*arguments, answers=""):
+        monkeypatch.setattr(sys, "stdin", io.StringIO(answers))
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        return Done(ended.value.code, *capsys.readouterr())
+
+    return graspsense
+
+
+@pytest.fixture
+def collect(graspsense):
+    def collect(folder, answers, labels="can:full_open,block", each=2, more=()):
+        command = ["collect", "--labels", labels, "--each", str(each), "--save", str(folder), *PLAIN, *more]
+        return graspsense(*command, "--json", answers=answers)
+
+    return collect
+
+
+def trials_in(folder):
+    with Store.read(folder) as store:
+        return [(one.id, one.label, one.set_aside) for one in reversed(store.page(set_aside=None))]
+
+
+def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(collect, tmp_path):
+    done = collect(tmp_path / "t", "\nu\n\n\n?\nr\n\n\n")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["counts"] == {"can:full_open": 2, "block": 2}
+    assert result["complete"]
+    kept = trials_in(tmp_path / "t")
+    assert [number for number, _, _ in kept] == result["trials"] == [1, 2, 3, 4, 5, 6]
+    assert kept[0][2] == "undone by the operator"
+    assert [why for _, _, why in kept].count("taken again") == 1
+    assert Counter(label for _, label, why in kept if why is None) == {"can:full_open": 2, "block": 2}
+    assert "Enter: grasp it" in done.stderr
+    assert "next: block  (1 of 2)" in done.stderr
+
+
+def test_classes_come_in_rounds_so_that_none_is_recorded_in_one_go(collect, tmp_path):
+    collect(tmp_path / "t", "\n" * 9, labels="block,toy,can:full_open", each=3)
+    labels = [label for _, label, _ in trials_in(tmp_path / "t")]
+    for k in (0, 3, 6):
+        assert sorted(labels[k : k + 3]) == ["block", "can:full_open", "toy"]
+
+
+def test_it_goes_on_where_it_was_with_new_draws(collect, tmp_path):
+    first = json.loads(collect(tmp_path / "t", "\n\nq\n").stdout)
+    assert not first["complete"]
+    second = json.loads(collect(tmp_path / "t", "\n\n\n\n").stdout)
+    assert second["trials"] == [3, 4]
+    assert second["complete"]
+    with Store.read(tmp_path / "t") as store:
+        values = [store.trial(number).values for number in (1, 2, 3, 4)]
+        seeds = [store.trial(number).provenance["seed"] for number in (1, 2, 3, 4)]
+    assert len(set(values)) == 4
+    assert seeds == [0, 1, 2, 3]
+
+
+def test_other_settings_are_refused_unless_told(collect, tmp_path):
+    collect(tmp_path / "t", "\n")
+    other = ["-o", "controller.probing_force_n=12"]
+    done = collect(tmp_path / "t", "\n", more=other)
+    assert done.returncode == 2
+    assert "controller.probing_force_n was 20.0 and is 12.0" in done.stderr
+    assert "--changed" in done.stderr
+    assert len(trials_in(tmp_path / "t")) == 1
+    done = collect(tmp_path / "t", "\nq\n", more=[*other, "--changed"])
+    assert done.returncode == 0
+    assert len(trials_in(tmp_path / "t")) == 2
+
+
+def test_another_classifier_is_no_other_setting(collect, graspsense, tmp_path):
+    collect(tmp_path / "t", "\n")
+    command = ["collect", "--labels", "block,can:full_open", "--save", str(tmp_path / "t"), "-o"]
+    done = graspsense(*command, "classifier.type=knn", answers="q\n")
+    assert done.returncode == 0, done.stderr
+
+
+def test_another_gripper_is_refused_before_it_moves(tmp_path):
+    from grippers import Scripted, bottle, squeezing
+
+    from graspsense.core.config import resolve
+    from graspsense.core.plugins import installed
+
+    plugins = installed()
+
+    class Serial(Scripted):
+        serial = "A"
+        commanded = 0
+
+        def open(self, seed):
+            from attrs import evolve
+
+            return evolve(super().open(seed), serial=type(self).serial)
+
+        def apply(self, command):
+            type(self).commanded += 1
+            super().apply(command)
+
+    def settings_for(word, seed):
+        from attrs import evolve
+
+        settings = resolve("default", plugins=plugins, options=["classifier.type=none", f"run.seed={seed}"])
+
+        class Choice(type(settings.gripper)):
+            def create(self):
+                return Serial(squeezing, bottle)
+
+        return evolve(settings, gripper=Choice(settings.gripper.component, settings.gripper.config))
+
+    said = []
+    answers = iter(["", "", "q"])
+    with Store.open(tmp_path / "t") as store:
+        collection = Collection(
+            store=store,
+            wanted=Wanted(words=("jar:full",), each=5),
+            plugins=plugins,
+            settings_for=settings_for,
+            ask=lambda question: next(answers),
+            say=said.append,
+        )
+        collection.run()
+        assert collection.counts() == {"jar:full": 2}
+        Serial.serial, Serial.commanded = "B", 0
+        answers = iter([""])
+        with pytest.raises(ConfigError, match="serial was 'A' and is 'B'"):
+            collection.run()
+        assert Serial.commanded == 0
+        assert collection.counts() == {"jar:full": 2}
+        assert list(store.recordings.glob("*.part")) == []
+        collection.changed = True
+        answers = iter(["", "q"])
+        collection.run()
+        assert collection.counts() == {"jar:full": 3}
+
+
+def test_it_takes_its_answers_from_a_pipe(tmp_path):
+    command = [sys.executable, "-m", "graspsense", "collect", "--labels", "block", "--each", "1", *PLAIN]
+    done = subprocess.run(
+        command, input="\n", capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "next: block  (1 of 1)" in done.stderr
+    assert done.stdout.split() == ["block", "1", "of", "1"]
+    assert trials_in(tmp_path / "trials") == [(1, "block", None)]
+
+
+def test_a_label_that_the_simulator_does_not_know_is_told(collect, tmp_path):
+    done = collect(tmp_path / "t", "\n", labels="jar:full")
+    assert done.returncode == 2
+    assert "jar" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("labels", "says"), [("", "nothing to collect"), ("block,block", "named twice"), ("a b", "is no label")]
+)
+def test_labels_that_make_no_sense_are_told(collect, tmp_path, labels, says):
+    done = collect(tmp_path / "t", "", labels=labels)
+    assert done.returncode == 2
+    assert says in done.stderr
+
+
+def test_nothing_there_counts_since_it_is_an_answer_of_the_gripper(collect, tmp_path):
+    done = collect(tmp_path / "t", "\n", labels="none", each=1)
+    assert json.loads(done.stdout)["counts"] == {"none": 1}

@@ -1,0 +1,216 @@
+"""Recordings, read without us: by the `mcap` package with the ROS 2 decoder that knows nothing of graspsense."""
+
+import hashlib
+import json
+import math
+import os
+import signal
+import struct
+import subprocess
+import sys
+import time
+from itertools import pairwise
+
+import pytest
+from kept import beginning, command, ending, frame, pads, write_recording
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from graspsense import load_pipeline
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.trials.recorded import read_recorded
+from graspsense.trials.recorder import NotKept, Recorder
+from graspsense.trials.recording_file import RecordingFile
+
+OPTIONS = ["classifier.type=none", "gripper.object=can:full_open"]
+
+
+def decoded(path):
+    """Return topic to its messages in order, as somebody else's reader gives them."""
+    found = {}
+    with path.open("rb") as file:
+        for _, channel, message, value in make_reader(
+            file, validate_crcs=True, decoder_factories=[DecoderFactory()]
+        ).iter_decoded_messages(log_time_order=False):
+            found.setdefault(channel.topic, []).append((message, value))
+    return found
+
+
+def same(a, b):
+    return a == b or (math.isnan(a) and math.isnan(b))
+
+
+def test_a_grasp_is_recorded_tick_by_tick_as_another_reader_sees_it(tmp_path):
+    recorder = Recorder(tmp_path / "g.mcap")
+    trial = load_pipeline("default", options=OPTIONS).grasp(sinks=[recorder])
+    recorded = recorder.finish()
+    found = decoded(tmp_path / "g.mcap")
+    ticks = [value for _, value in found["/grasp/tick"]]
+    assert len(ticks) == len(trial.trace) == recorded.ticks
+    for name in (
+        "t_s",
+        "gap_m",
+        "velocity_m_s",
+        "effort_n",
+        "force_left_n",
+        "force_right_n",
+        "phase",
+        "command",
+    ):
+        column = getattr(trial.trace, name).tolist()
+        assert all(same(getattr(tick, name), value) for tick, value in zip(ticks, column, strict=True)), name
+    images = [value for _, value in found["/grasp/pads"]]
+    assert [image.t_s for image in images] == trial.trace.pad_t_s.tolist()
+    assert [image.right_21 for image in images] == trial.trace.pad_right[:, 21].tolist()
+    assert recorded.sha256 == hashlib.sha256((tmp_path / "g.mcap").read_bytes()).hexdigest()
+    assert (recorded.dropped, recorded.size) == (0, (tmp_path / "g.mcap").stat().st_size)
+
+
+def test_times_are_the_gripper_s_on_the_wall_clock_and_a_chunk_closes_every_50_ms(tmp_path):
+    before = time.time_ns()
+    write_recording(tmp_path / "g.mcap", ticks=400)
+    messages = [message for message, _ in decoded(tmp_path / "g.mcap")["/grasp/tick"]]
+    assert before - 1e9 < messages[0].log_time < time.time_ns()
+    steps = {b.log_time - a.log_time for a, b in pairwise(messages)}
+    assert max(abs(step - 1_000_000) for step in steps) <= 2
+    with (tmp_path / "g.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+    spans = [one.message_end_time - one.message_start_time for one in summary.chunk_indexes]
+    assert len(spans) >= 8
+    assert max(spans) <= 51_000_000
+    assert summary.statistics.message_count == 400 + 10
+
+
+def test_fields_are_scalars_and_the_schema_tells_the_bytes(tmp_path):
+    """The layout by hand, from the schema's text alone: 4 bytes of header, then 8 bytes a field."""
+    write_recording(tmp_path / "g.mcap", ticks=3)
+    with (tmp_path / "g.mcap").open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages(topics=["/grasp/tick"]):
+            assert (channel.message_encoding, schema.encoding) == ("cdr", "ros2msg")
+            lines = [line.split() for line in schema.data.decode().splitlines()]
+            code = "<4x" + "".join({"float64": "d", "int64": "q"}[kind] for kind, _ in lines)
+            values = dict(zip((name for _, name in lines), struct.unpack(code, message.data), strict=True))
+            expected = frame(message.sequence)
+            assert all(same(values[name], getattr(expected, name)) for name in expected._fields)
+            assert values["command"] == command(message.sequence).value
+            assert values["command_effort_limit_n"] == math.inf
+
+
+def test_our_reader_gives_each_tick_with_the_image_it_had(tmp_path):
+    write_recording(tmp_path / "g.mcap", ticks=120, end=ending())
+    readings = read_recorded(tmp_path / "g.mcap").readings()
+    assert repr([one.frame for one in readings]) == repr([frame(k) for k in range(120)])
+    assert [one.pads for one in readings] == [pads(k) for k in range(120)]
+
+
+def test_a_recording_that_is_being_written_has_another_name(tmp_path):
+    file = write_recording(tmp_path / "g.mcap", finish=False)
+    assert [one.name for one in tmp_path.iterdir()] == ["g.mcap.part"]
+    with pytest.raises(ConfigError, match="was never finished: graspsense recover"):
+        read_recorded(tmp_path / "g.mcap")
+    file.finish()
+    assert [one.name for one in tmp_path.iterdir()] == ["g.mcap"]
+
+
+def test_a_recording_is_never_written_over_another(tmp_path):
+    write_recording(tmp_path / "g.mcap")
+    content = (tmp_path / "g.mcap").read_bytes()
+    with pytest.raises(FileExistsError):
+        RecordingFile(tmp_path / "g.mcap")
+    recorder = Recorder(tmp_path / "g.mcap")
+    recorder.take(frame(0), pads(0), 3, command(0))
+    with pytest.raises(NotKept, match="such a recording already"):
+        recorder.finish()
+    assert (tmp_path / "g.mcap").read_bytes() == content
+
+
+def test_a_writer_that_does_not_follow_holds_nobody_up_and_loses_nothing(tmp_path):
+    """Its process is stopped, so that the pipe fills; every message is kept and written once it goes on."""
+    recorder = Recorder(tmp_path / "g.mcap")
+    recorder.metadata("graspsense", beginning().as_metadata())
+    pid = recorder._process.pid
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        for k in range(20_000):
+            recorder.take(frame(k), pads(k), 3, command(k))
+    finally:
+        os.kill(pid, signal.SIGCONT)
+    recorded = recorder.finish()
+    assert recorded.ticks == 20_000
+    assert recorded.deferred > 1000
+    assert recorded.most_waiting > 1000
+    assert recorded.dropped == 0
+    grasp = read_recorded(tmp_path / "g.mcap")
+    assert grasp.ticks["t_s"].tolist() == [frame(k).t_s for k in range(20_000)]
+
+
+def test_a_writer_that_has_died_does_not_stop_the_grasp(tmp_path):
+    recorder = Recorder(tmp_path / "g.mcap")
+    recorder._process.kill()
+    recorder._process.wait()
+    trial = load_pipeline("default", options=OPTIONS).grasp(sinks=[recorder])
+    assert trial.outcome.words == "steady"
+    with pytest.raises(NotKept, match="its process has died"):
+        recorder.finish()
+
+
+def test_a_grasp_that_ends_without_a_word_leaves_what_was_felt(tmp_path):
+    felt, nothing = Recorder(tmp_path / "felt.mcap"), Recorder(tmp_path / "nothing.mcap")
+    for k in range(10):
+        felt.take(frame(k), pads(k), 3, command(k))
+    felt.leave()
+    nothing.leave()
+    assert [one.name for one in tmp_path.iterdir()] == ["felt.mcap.part"]
+    assert len(read_recorded(tmp_path / "felt.mcap.part", salvage=True)) == 10
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda data: b"", "EndOfFile"),
+        (lambda data: b"t,gap\n0,1\n", "not a valid MCAP file|unpack"),
+        (lambda data: data[:-200], "damaged"),
+        (lambda data: data[: len(data) // 2], "damaged"),
+        (lambda data: data + b"more", "behind its end"),
+        (lambda data: data[:1500] + bytes(8) + data[1508:], "damaged"),
+    ],
+)
+def test_a_damaged_recording_is_told_and_not_used(tmp_path, spoil, says):
+    path = tmp_path / "g.mcap"
+    write_recording(path, ticks=300, end=ending())
+    path.write_bytes(spoil(path.read_bytes()))
+    with pytest.raises(DataDamaged, match=says) as told:
+        read_recorded(path)
+    assert str(path) in str(told.value)
+
+
+def test_a_recording_of_a_newer_layout_is_refused(tmp_path):
+    file = RecordingFile(tmp_path / "g.mcap")
+    file.metadata("graspsense", {**beginning().as_metadata(), "version": "2"})
+    file.finish()
+    with pytest.raises(DataDamaged, match="version '2'; this graspsense reads version 1"):
+        read_recorded(tmp_path / "g.mcap")
+
+
+def test_somebody_else_s_mcap_is_no_recording_of_ours(tmp_path):
+    from mcap.writer import Writer
+
+    with (tmp_path / "g.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel("/imu", "json", 0)
+        writer.add_message(channel, 0, json.dumps({"x": 1}).encode(), 0)
+        writer.finish()
+    with pytest.raises(DataDamaged, match="it is no recording of graspsense"):
+        read_recorded(tmp_path / "g.mcap")
+
+
+def test_the_writer_s_process_is_light_and_starts_in_any_folder(tmp_path):
+    """A file mcap.py where the user stands is not imported; numpy is not needed to write."""
+    (tmp_path / "mcap.py").write_text("raise SystemExit('imported the wrong one')")
+    program = (
+        "import sys; sys.argv = ['x']; import graspsense.trials.recording_process; "
+        "print([m for m in ('numpy', 'scipy', 'sklearn', 'sqlite3') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, cwd=tmp_path)
+    assert (done.stdout, done.stderr) == ("[]\n", "")

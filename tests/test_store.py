@@ -1,0 +1,380 @@
+"""The store: what is kept is there, beside other programs, and a store that is not ours or newer is left alone."""
+
+import json
+import os
+import shutil
+import sqlite3
+import subprocess
+import sys
+import threading
+
+import pytest
+from kept import beginning, ending, keep, write_recording
+
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.trials import schema
+from graspsense.trials.labels import labels_of
+from graspsense.trials.recorder import NotKept
+from graspsense.trials.recover import facts_of
+from graspsense.trials.store import Store
+from graspsense.trials.verify import verify_store
+
+
+@pytest.fixture
+def store(tmp_path):
+    with Store.open(tmp_path / "trials") as store:
+        yield store
+
+
+def test_a_trial_comes_back_as_it_was_kept(store):
+    number = keep(store, "can:full_open", "can#2", values=(0.066, None))
+    with Store.read(store.folder) as reader:
+        kept = reader.trial(number)
+    assert kept.features == (("p_first", "m"), ("f_steady", "N"))
+    assert kept.values == (0.066, None)
+    assert (kept.listed.label, kept.listed.instance, kept.listed.outcome) == (
+        "can:full_open",
+        "can#2",
+        "steady",
+    )
+    assert kept.labels == {"label": "can:full_open", "instance": "can#2"}
+    assert kept.listed.simulated
+    assert kept.provenance["seed"] == 3
+    assert kept.device["serial"] == kept.listed.device == "S1"
+    assert kept.recipe["controller"] == {"type": "graspsense/hybrid", "probing_force_n": 20.0}
+    assert "object" not in kept.recipe["gripper"]
+    assert kept.recording.is_file()
+
+
+def test_numbers_are_kept_to_the_last_bit(store):
+    values = (0.1 + 0.2, 5e-324)
+    assert store.trial(keep(store, values=values)).values == values
+
+
+def test_a_page_holds_the_newest_that_fit_newest_first(store):
+    for k in range(7):
+        keep(store, "can:full_open" if k % 2 else "can:empty_open", outcome="slipped" if k == 4 else "steady")
+    assert [one.id for one in store.page(limit=3)] == [7, 6, 5]
+    assert [one.id for one in store.page(limit=3, before=5)] == [4, 3, 2]
+    assert [one.id for one in store.page(label="can:empty_open")] == [7, 5, 3, 1]
+    assert [one.id for one in store.page(outcome="slipped")] == [5]
+    assert store.page(since="2027-01-01") == []
+
+
+def test_what_is_set_aside_stays_but_does_not_count(store):
+    first, second = keep(store), keep(store)
+    store.set_aside(first, "undone")
+    assert [one.id for one in store.page()] == [second]
+    assert [(one.id, one.set_aside) for one in store.page(set_aside=True)] == [(first, "undone")]
+    assert store.counts() == {("can:full_open", None): 1}
+    assert verify_store(store.folder).problems == ()
+
+
+def test_only_whole_grasps_that_ended_by_themselves_count(store):
+    for outcome in ("steady", "aborted", "device lost", "nothing there"):
+        keep(store, outcome=outcome)
+    start, end = beginning(), ending()
+    path = store.new_recording(start.made_at)
+    write_recording(path, 5, start, end)
+    store.add(start, end, {}, facts_of(path, 5, 1), whole=False)
+    assert store.counts() == {("can:full_open", None): 2}
+
+
+def test_a_number_that_is_not_there_says_which_are(store):
+    with pytest.raises(ConfigError, match="it has none yet"):
+        store.trial(1)
+    keep(store)
+    with pytest.raises(ConfigError, match="has no trial 5: its trials are 1 to 1"):
+        store.set_aside(5, "why")
+
+
+def test_readers_read_beside_a_writer_in_another_process(store):
+    """A reader sees what was committed, while a transaction is open and after it."""
+    keep(store)
+    program = (
+        "import sys; from graspsense.trials.store import Store\n"
+        "with Store.read(sys.argv[1]) as store: print(len(store.page()))"
+    )
+    with store._transaction() as connection:
+        connection.execute("UPDATE trial SET set_aside = 'pending'")
+        done = subprocess.run(
+            [sys.executable, "-c", program, str(store.folder)], capture_output=True, text=True, timeout=60
+        )
+    assert (done.stdout.strip(), done.stderr) == ("1", "")
+
+
+def test_writers_wait_for_one_another(store):
+    def write():
+        with Store.open(store.folder) as mine:
+            for _ in range(10):
+                keep(mine, ticks=3)
+
+    threads = [threading.Thread(target=write) for _ in range(4)]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    assert sorted(one.id for one in store.page(limit=100)) == list(range(1, 41))
+
+
+def test_a_recording_gets_one_row_whoever_writes_it(store):
+    start, end = beginning(), ending()
+    path = store.new_recording(start.made_at)
+    write_recording(path, 5, start, end)
+    facts = facts_of(path, 5, 1)
+    assert store.add(start, end, {}, facts) == store.add(start, end, {}, facts) == 1
+    assert len(store.page()) == 1
+
+
+def bytes_in(folder):
+    return {one.name: one.read_bytes() for one in folder.iterdir() if one.is_file()}
+
+
+def test_a_newer_store_is_refused_and_not_a_byte_of_it_changes(store):
+    keep(store)
+    store.close()
+    path = store.folder / "store.sqlite"
+    connection = sqlite3.connect(path)
+    connection.execute(f"PRAGMA user_version = {schema.NEWEST + 1}")
+    connection.execute("ALTER TABLE trial ADD COLUMN mood TEXT")
+    connection.commit()
+    connection.close()
+    before = bytes_in(store.folder)
+    for opened in (Store.open, Store.read):
+        with pytest.raises(ConfigError, match=f"version {schema.NEWEST + 1}.*Update graspsense") as told:
+            opened(store.folder)
+        assert told.value.exit_code == 2
+    assert bytes_in(store.folder) == before
+
+
+def test_a_newer_version_that_only_the_log_knows_is_refused(store):
+    """Another program has just migrated it and is still open: the main file has the old number."""
+    store.close()
+    writer = sqlite3.connect(store.folder / "store.sqlite")
+    writer.execute("PRAGMA wal_autocheckpoint = 0")
+    writer.execute(f"PRAGMA user_version = {schema.NEWEST + 1}")
+    writer.commit()
+    for opened in (Store.open, Store.read):
+        with pytest.raises(ConfigError, match="Update graspsense"):
+            opened(store.folder)
+    writer.close()
+
+
+def test_an_older_store_is_brought_up_to_date_with_all_that_is_in_it(tmp_path, monkeypatch):
+    older = schema.VERSIONS
+    with Store.open(tmp_path / "trials") as store:
+        keep(store)
+    newer = (*older, ("ALTER TABLE trial ADD COLUMN mood TEXT", "CREATE INDEX by_mood ON trial (mood)"))
+    monkeypatch.setattr(schema, "VERSIONS", newer)
+    schema.expected.cache_clear()
+    monkeypatch.setattr(schema, "NEWEST", len(newer))
+    monkeypatch.setattr("graspsense.trials.store.NEWEST", len(newer))
+    with Store.read(tmp_path / "trials") as store:
+        assert store.trial(1).values == (0.066, 5.5)
+        assert store.query("SELECT mood FROM trial") == [(None,)]
+        assert store.query("PRAGMA user_version") == [(len(newer),)]
+    schema.expected.cache_clear()
+
+
+def test_a_migration_that_fails_leaves_the_store_as_it_was(tmp_path, monkeypatch):
+    with Store.open(tmp_path / "trials") as store:
+        keep(store)
+    newer = (*schema.VERSIONS, ("ALTER TABLE trial ADD COLUMN mood TEXT", "CREATE TABLE trial (id)"))
+    connection = sqlite3.connect(tmp_path / "trials" / "store.sqlite", isolation_level=None)
+    before = schema.found(connection)
+    monkeypatch.setattr(schema, "VERSIONS", newer)
+    monkeypatch.setattr(schema, "NEWEST", len(newer))
+    with pytest.raises(sqlite3.OperationalError, match="already exists"):
+        schema.migrate(connection, len(newer) - 1)
+    assert schema.found(connection) == before
+    assert connection.execute("PRAGMA user_version").fetchone() == (len(newer) - 1,)
+    connection.close()
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "CREATE TRIGGER t AFTER INSERT ON trial BEGIN DELETE FROM detail; END",
+        "CREATE VIEW v AS SELECT load_extension('x')",
+        "DROP TABLE detail",
+        "CREATE TABLE more (id)",
+    ],
+)
+def test_a_store_that_holds_more_or_less_than_ours_do_is_refused(store, statement):
+    """A trigger would run at the next trial; nothing that a store brings along is run."""
+    store.close()
+    connection = sqlite3.connect(store.folder / "store.sqlite")
+    connection.execute(statement)
+    connection.commit()
+    connection.close()
+    for opened in (Store.open, Store.read):
+        with pytest.raises(DataDamaged, match="its tables are not those of version"):
+            opened(store.folder)
+
+
+@pytest.mark.parametrize("content", [b"", b"a table of trials", b"SQLite format 3\0" + bytes(200)])
+def test_what_is_no_store_is_told_and_left_alone(store, content):
+    keep(store)
+    store.close()
+    path = store.folder / "store.sqlite"
+    path.write_bytes(content)
+    for opened in (Store.open, Store.read):
+        with pytest.raises(DataDamaged, match=r"recover|no store of graspsense"):
+            opened(store.folder)
+    assert path.read_bytes() == content
+
+
+def test_somebody_else_s_sqlite_file_is_left_alone(tmp_path):
+    connection = sqlite3.connect(tmp_path / "store.sqlite")
+    connection.execute("CREATE TABLE trial (id)")
+    connection.commit()
+    connection.close()
+    before = (tmp_path / "store.sqlite").read_bytes()
+    with pytest.raises(DataDamaged, match="is no store of graspsense"):
+        Store.open(tmp_path)
+    assert (tmp_path / "store.sqlite").read_bytes() == before
+
+
+def test_reading_makes_no_store(tmp_path):
+    with pytest.raises(ConfigError, match="there is no store in"):
+        Store.read(tmp_path / "nowhere")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["../../etc/passwd", "a/b.mcap", "x.txt", ".hidden.mcap", ""])
+def test_a_row_cannot_name_a_file_outside_of_the_store(store, name):
+    number = keep(store)
+    store._connection.execute("UPDATE trial SET recording = ? WHERE id = ?", (name, number))
+    with pytest.raises(DataDamaged, match="is no name of a recording"):
+        store.trial(number)
+    assert any("is no name of a recording" in one for one in verify_store(store.folder).problems)
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("label", "can:empty_open"),
+        ("outcome", "slipped"),
+        ('"values"', "[0.067,5.5]"),
+        ("made_at", "2020-01-01"),
+    ],
+)
+def test_a_row_that_was_changed_is_found_by_its_hash(store, column, value):
+    keep(store)
+    number = keep(store)
+    store._connection.execute(f"UPDATE trial SET {column} = ? WHERE id = ?", (value, number))
+    (problem,) = verify_store(store.folder).problems
+    assert problem == f"trial {number}: its row was changed after it was written"
+
+
+def test_verify_finds_what_became_of_recordings(store):
+    paths = [store.trial(keep(store)).recording for _ in range(4)]
+    paths[0].unlink()
+    paths[1].write_bytes(paths[1].read_bytes()[:-50])
+    data = paths[2].read_bytes()
+    paths[2].write_bytes(data[:2000] + b"\0\0\0\0" + data[2004:])
+    write_recording(store.recordings / "loose.mcap", 5, beginning(), ending())
+    found = verify_store(store.folder)
+    assert [one.partition(":")[0] for one in found.problems] == ["trial 1", "trial 2", "trial 3"]
+    assert "is gone" in found.problems[0]
+    assert "bytes and had" in found.problems[1]
+    assert "damaged" in found.problems[2]
+    assert found.unfinished == ("loose.mcap has no row",)
+
+
+needs_mounts = pytest.mark.skipif(
+    os.geteuid() != 0 or not sys.platform.startswith("linux") or shutil.which("mount") is None,
+    reason="needs root on Linux, to mount a small or a read-only disk",
+)
+
+
+@pytest.fixture
+def mounted(tmp_path):
+    """Return a function that mounts a small disk and remounts it; skips where this machine does not allow it."""
+    places = []
+
+    def mount(options, remount=False):
+        place = tmp_path / "disk"
+        place.mkdir(exist_ok=True)
+        command = [
+            "mount",
+            *(["-o", f"remount,{options}"] if remount else ["-t", "tmpfs", "-o", options, "none"]),
+        ]
+        done = subprocess.run([*command, str(place)], capture_output=True, text=True, check=False)
+        if done.returncode:
+            pytest.skip(f"mounting is not allowed here: {done.stderr.strip()}")
+        if not remount:
+            places.append(place)
+        return place
+
+    yield mount
+    for place in places:
+        subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+@needs_mounts
+@pytest.mark.parametrize("log", [False, True], ids=["closed", "with a log"])
+def test_a_store_on_a_read_only_disk_is_read_and_not_written(mounted, log):
+    disk = mounted("size=20m")
+    store = Store.open(disk)
+    keep(store)
+    if log:  # as if the program that wrote it had been killed: the last trial is in the log alone
+        saved = {one.name: one.read_bytes() for one in disk.iterdir() if one.is_file()}
+        store.close()
+        for name, data in saved.items():
+            (disk / name).write_bytes(data)
+        (disk / "store.sqlite-shm").unlink()
+    else:
+        store.close()
+    mounted("ro", remount=True)
+    with Store.read(disk) as reader:
+        assert reader.trial(1).values == (0.066, 5.5)
+    assert verify_store(disk).problems == ()
+    with pytest.raises(NotKept, match="read-only"):
+        Store.open(disk)
+
+
+@needs_mounts
+def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
+    disk = mounted("size=1500k")
+    with Store.open(disk) as store:
+        kept = 0
+        with pytest.raises((NotKept, OSError)) as told:  # noqa: PT012 - how many fit is the disk's business
+            while True:
+                keep(store, ticks=400)
+                kept += 1
+        assert "full" in str(told.value) or "No space" in str(told.value)
+        assert kept >= 1
+    found = verify_store(disk)
+    assert (found.trials, found.problems) == (kept, ())
+
+
+@pytest.mark.parametrize(
+    ("word", "labels"),
+    [
+        ("can:full_open#2", {"label": "can:full_open", "instance": "can#2"}),
+        ("can:full_open", {"label": "can:full_open"}),
+        ("ball", {"label": "ball"}),
+    ],
+)
+def test_a_word_says_class_state_and_thing(word, labels):
+    assert labels_of(word) == labels
+
+
+@pytest.mark.parametrize("word", ["", "a b", "can:", "can:full:open", "unknown", "unknown:x", "#2"])
+def test_a_word_that_is_no_label_is_refused(word):
+    with pytest.raises(ConfigError, match="is no label"):
+        labels_of(word)
+
+
+def test_the_file_is_readable_without_us(store):
+    """With nothing but SQLite: labels, outcomes, and features as JSON that SQLite's own functions read."""
+    keep(store)
+    with sqlite3.connect(store.folder / "store.sqlite") as connection:
+        rows = connection.execute(
+            """SELECT label, outcome, json_extract("values", '$[0]') FROM trial"""
+        ).fetchall()
+        (names,) = connection.execute("SELECT features FROM feature_set ORDER BY id LIMIT 1").fetchone()
+    connection.close()
+    assert rows == [("can:full_open", "steady", 0.066)]
+    assert json.loads(names)[0] == ["p_first", "m"]
