@@ -1,0 +1,184 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.features import FeatureTable
+from graspsense.core.labelled import Labelled
+from graspsense.trials.features_csv import read_labelled, read_table, write_labelled
+
+GOOD = "what,p_first [m],f_steady\n" + "".join(
+    f"{'ab'[i % 2]},{0.05 + 0.001 * (i % 3)},{6 + i % 2}\n" for i in range(8)
+)
+
+
+@pytest.fixture
+def csv(tmp_path):
+    def write(content, name="trials.csv"):
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return write
+
+
+def test_names_units_labels_and_the_width(csv):
+    found = read_labelled(csv(GOOD), "what")
+
+    assert found.table.names == ("p_first", "f_steady")
+    assert found.table.units == ("m", "")
+    assert found.labels == ("a", "b") * 4
+    assert found.width is not None
+    assert found.instances is None
+    assert found.no_instances == "no column names the instance (--instance COLUMN)"
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize("prefix", ["", "\ufeff"])
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_separators_byte_order_marks_and_line_ends(csv, separator, prefix, ending):
+    text = prefix + GOOD.replace(",", separator).replace("\n", ending)
+
+    assert (
+        read_labelled(csv(text), "what").table.values.tolist()
+        == read_labelled(csv(GOOD), "what").table.values.tolist()
+    )
+
+
+@pytest.mark.parametrize("gap", ["", "nan", "NaN", "NA", "?", "null", " "])
+def test_what_counts_as_missing(csv, gap):
+    found = read_labelled(csv(GOOD.replace("a,0.05,6", f"a,{gap},6", 1)), "what")
+
+    assert math.isnan(found.table.values[0, 0])
+    assert any(note.endswith("of all values are missing") for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("content", "error", "said"),
+    [
+        ("", DataDamaged, "is empty: it needs a header line"),
+        ("\n\n  \n", DataDamaged, "is empty"),
+        ("what,p_first\n", DataDamaged, "has a header and no trial"),
+        (
+            GOOD.replace("what", "class"),
+            ConfigError,
+            "has no column 'what' (the label). Its columns: class, p_first",
+        ),
+        (
+            GOOD.replace("a,0.05,6", "a,0.05", 1),
+            DataDamaged,
+            "line 2: 2 values where the header names 3 columns",
+        ),
+        (
+            GOOD.replace("a,0.05,6", "a,wide,6", 1),
+            DataDamaged,
+            "line 2: p_first is 'wide', which is no number",
+        ),
+        (
+            GOOD.replace("a,0.05,6", 'a,"0,05",6', 1),
+            DataDamaged,
+            "which is no number (write a decimal point)",
+        ),
+        (GOOD.replace("a,0.05,6", "a,5_0,6", 1), DataDamaged, "line 2: p_first is '5_0', which is no number"),
+        (GOOD.replace("a,0.05,6", "a,inf,6", 1), DataDamaged, "line 2: p_first is infinite"),
+        (GOOD.replace("a,0.05,6", ",0.05,6", 1), DataDamaged, "line 2: what (the label) is empty"),
+        (GOOD.replace("a,0.05,6", 'a,"0.05,6', 1), DataDamaged, "line "),
+        (GOOD.replace("f_steady", "p_first"), DataDamaged, "two columns are named 'p_first'"),
+        (GOOD.replace("f_steady", ""), DataDamaged, "column 3 has no name"),
+        (GOOD.replace("a,", "unknown,"), ConfigError, "'unknown' is no label"),
+        (GOOD.encode("utf-16"), DataDamaged, "is UTF-16: save it as UTF-8"),
+        (
+            GOOD.replace("b,", "flaschenöffner,").encode("latin-1"),
+            DataDamaged,
+            "line 3: byte 0xf6 is not UTF-8",
+        ),
+        (b"PK\x03\x04\x00\x00what,p", DataDamaged, "holds zero bytes: it is no text"),
+        ("what,p\na,\nb,\n" * 1, DataDamaged, "no feature has a single value: p"),
+        ("what,name\na,x\na,y\nb,z\n", ConfigError, "has no column of numbers besides what"),
+    ],
+)
+def test_what_cannot_be_read_says_where_and_why(csv, content, error, said):
+    with pytest.raises(error) as raised:
+        read_labelled(csv(content), "what")
+
+    assert said in str(raised.value)
+
+
+def test_a_column_of_numbers_is_no_label(csv):
+    with pytest.raises(ConfigError, match="that is no label"):
+        read_labelled(csv("what,p\n" + "".join(f"{i * 1.1},{i % 2}\n" for i in range(9))), "what")
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_labelled(tmp_path / "nothing.csv", "what")
+
+
+def test_counters_and_texts_are_no_features_unless_asked_for(csv):
+    lines = [f"{'ab'[i % 2]},{i},{100.5 + i * i},{i % 3},x{i}" for i in range(8)]
+    path = csv("what,trial,time,p,comment\n" + "\n".join(lines) + "\n")
+
+    found = read_labelled(path, "what")
+    assert found.table.names == ("p",)
+    assert any("trial, time (--features takes them in)" in note for note in found.notes)
+    assert any("hold no numbers: comment" in note for note in found.notes)
+    assert read_labelled(path, "what", features=["trial", "p"]).table.names == ("trial", "p")
+
+
+def test_constant_and_empty_columns_are_noted(csv):
+    lines = [f"{'ab'[i % 2]},{i % 3},7,," for i in range(8)]
+    found = read_labelled(
+        csv("what,p,same,empty,\n".replace(",\n", ",void\n") + "\n".join(lines) + "\n"), "what"
+    )
+
+    assert "constant, so that they tell nothing apart: same" in found.notes
+    assert "without a single value: empty, void" in found.notes
+
+
+def test_labels_that_differ_in_case_only_are_noted(csv):
+    found = read_labelled(csv(GOOD.replace("a,0.05,6", "A,0.05,6", 1)), "what")
+
+    assert any("differ in case only" in note for note in found.notes)
+
+
+def test_instances_order_and_what_is_known_before_the_contact(csv):
+    lines = [f"{'ab'[i % 2]},thing{i % 4},{100 - i},{i % 3},{i % 5}" for i in range(12)]
+    path = csv("what,thing,when,start,p\n" + "\n".join(lines) + "\n")
+    found = read_labelled(path, "what", instance="thing", order="when", before=["start"])
+
+    assert found.instances == ("thing0", "thing1", "thing2", "thing3") * 3
+    assert found.order == tuple(range(11, -1, -1))
+    assert found.before_contact is not None
+    assert found.before_contact.table.names == ("start",)
+    with pytest.raises(ConfigError, match="'when' is no feature here"):
+        read_labelled(path, "what", order="when", features=["when", "p"])
+
+
+CELLS = st.one_of(st.floats(allow_nan=False, allow_infinity=False), st.just(math.nan))
+
+
+@given(st.lists(st.tuples(CELLS, st.floats(-1e9, 1e9)), min_size=4, max_size=20))
+def test_what_is_written_reads_back_to_the_bit(tmp_path_factory, rows):
+    path = tmp_path_factory.mktemp("kept") / "kept.csv"
+    values = np.array(rows)
+    labels = tuple("xy"[i % 2] for i in range(len(rows)))
+    things = tuple(f"thing, {i % 3}" for i in range(len(rows)))
+    table = FeatureTable(names=("p_first", "force"), units=("m", ""), values=values)
+
+    write_labelled(path, Labelled(source="here", table=table, labels=labels, instances=things))
+    again = read_labelled(path, "label", instance="instance", features=["p_first", "force"])
+
+    assert again.table.values.tobytes() == np.where(np.isnan(values), np.nan, values).tobytes()
+    assert (again.labels, again.instances, again.table.units) == (labels, things, ("m", ""))
+
+
+def test_a_table_without_labels(csv):
+    found = read_table(csv(GOOD), ["f_steady", "p_first"])
+
+    assert found.names == ("f_steady", "p_first")
+    assert found.values[0].tolist() == [6.0, 0.05]

@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.evaluation.intervals import Rate, difference, wilson
+
+
+@pytest.mark.parametrize(
+    ("correct", "n", "low", "high"),
+    [
+        # Rates of Chitta, Piccoli and Sturm (ICRA 2010) with their 95 % Wilson intervals, worked out apart from us.
+        (215, 229, 0.900, 0.963),
+        (67, 96, 0.600, 0.781),
+        (80, 96, 0.746, 0.895),
+        (91, 96, 0.884, 0.978),
+        (24, 41, 0.434, 0.722),
+        (31, 42, 0.589, 0.847),
+        (26, 80, 0.232, 0.434),
+        (95, 149, 0.558, 0.710),
+        (207, 275, 0.698, 0.800),
+    ],
+)
+def test_wilson_on_published_rates(correct, n, low, high):
+    assert wilson(correct, n) == (pytest.approx(low, abs=5e-4), pytest.approx(high, abs=5e-4))
+
+
+@given(st.integers(1, 500), st.data())
+def test_wilson_lies_in_the_unit_and_holds_the_rate(n, data):
+    correct = data.draw(st.integers(0, n))
+    low, high = wilson(correct, n)
+
+    assert 0.0 <= low <= correct / n <= high <= 1.0
+    assert low < high
+    assert wilson(n - correct, n) == (pytest.approx(1 - high), pytest.approx(1 - low))
+
+
+@pytest.mark.parametrize(("correct", "n"), [(1, 0), (-1, 3), (4, 3)])
+def test_what_is_no_rate_is_refused(correct, n):
+    with pytest.raises(ValueError, match="is no rate"):
+        Rate(correct, n)
+
+
+@given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=1, max_size=60))
+def test_a_difference_turns_its_sign_with_its_sides(pairs):
+    first, second = [a for a, _ in pairs], [b for _, b in pairs]
+    one, other = difference(first, second), difference(second, first)
+
+    assert one.value == pytest.approx((sum(first) - sum(second)) / len(pairs))
+    assert one.interval[0] <= one.value <= one.interval[1]
+    assert other.value == pytest.approx(-one.value)
+    assert other.interval == (pytest.approx(-one.interval[1]), pytest.approx(-one.interval[0]))
+
+
+def test_equal_judgements_differ_by_nothing():
+    found = difference([True, False] * 20, [True, False] * 20)
+
+    assert found.value == 0.0
+    assert found.interval[0] < 0.0 < found.interval[1]
+
+
+def test_the_interval_of_a_difference_covers_the_true_one_nineteen_times_in_twenty():
+    rng = np.random.default_rng(0)
+    both, only_first, only_second = 0.55, 0.20, 0.08
+    covered, runs = 0, 2000
+    for _ in range(runs):
+        u = rng.random(100)
+        first = u < both + only_first
+        second = (u < both) | ((u >= both + only_first) & (u < both + only_first + only_second))
+        low, high = difference(first.tolist(), second.tolist()).interval
+        covered += low <= only_first - only_second <= high
+
+    assert 0.93 < covered / runs < 0.98
+
+
+def test_of_two_lengths_there_is_no_difference():
+    with pytest.raises(ValueError, match="must judge the same ones"):
+        difference([True], [True, False])

@@ -1,0 +1,96 @@
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from graspsense.core.features import Features, FeatureTable
+from graspsense.core.novelty import REACH, novelty_from, novelty_of
+
+NAMES, UNITS = ("p_first", "delta_t"), ("m", "s")
+
+
+def table(rows):
+    return FeatureTable(names=NAMES, units=UNITS, values=np.array(rows, dtype=np.float64))
+
+
+def features(*values):
+    reasons = {name: "the recording ended" for name, v in zip(NAMES, values, strict=True) if math.isnan(v)}
+    return Features(names=NAMES, values=values, units=UNITS, reasons=reasons)
+
+
+# Within classes p_first has the standard deviation 1 mm and delta_t 0.1 s.
+ROWS = [[0.057, 0.2], [0.059, 0.4], [0.065, 0.5], [0.067, 0.7]]
+SPAN = novelty_of(table(ROWS), ["bottle", "bottle", "can", "can"])
+
+
+def test_the_spread_is_the_one_within_classes():
+    assert SPAN.spread == pytest.approx([math.sqrt(2) * 1e-3, math.sqrt(2) * 0.1])
+
+
+def test_what_was_trained_on_is_known():
+    assert not SPAN.unlike_rows(table(ROWS)).any()
+    assert all(SPAN.unlike(features(*row)) is None for row in ROWS)
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_the_edge_of_the_known_is_three_spreads_outside_a_class(share):
+    beyond = 0.067 + share * REACH * SPAN.spread[0]
+
+    assert (SPAN.unlike(features(beyond, 0.6)) is not None) is (share > 1.0)
+    assert SPAN.unlike_rows(table([[beyond, 0.6]])).tolist() == [share > 1.0]
+
+
+def test_the_reason_names_the_feature_the_value_and_the_nearest_class_in_units():
+    assert SPAN.unlike(features(0.030, 0.3)) == (
+        "p_first = 30 mm is unlike everything trained on: the nearest, bottle, has 57 mm to 59 mm"
+    )
+
+
+def test_like_one_class_in_one_feature_and_another_in_the_other_is_unknown():
+    wide = novelty_of(
+        table([[0.0570, 0.2], [0.0571, 0.21], [0.067, 0.9], [0.0671, 0.91]]), ["a", "a", "b", "b"]
+    )
+
+    assert wide.unlike(features(0.057, 0.9)) is not None
+
+
+def test_a_missing_feature_is_not_judged_and_no_feature_at_all_is_unknown():
+    assert SPAN.unlike(features(0.058, math.nan)) is None
+    assert SPAN.unlike(features(0.030, math.nan)) is not None
+    assert SPAN.unlike(features(math.nan, math.nan)) == "no feature is defined: the recording ended"
+    assert SPAN.unlike_rows(table([[math.nan, math.nan]])).tolist() == [True]
+
+
+def test_trials_without_any_feature_are_known_where_a_class_has_such():
+    span = novelty_of(table([*ROWS, [math.nan, math.nan]]), ["bottle", "bottle", "can", "can", "nothing"])
+
+    assert span.unlike(features(math.nan, math.nan)) is None
+    # The class without any range must not take in everything.
+    assert span.unlike(features(0.030, 0.3)) is not None
+
+
+def test_a_feature_that_was_constant_allows_rounding_only():
+    span = novelty_of(table([[0.05, 0.2], [0.05, 0.3], [0.05, 0.4]]), ["a", "a", "b"])
+
+    assert span.unlike(features(0.05 * (1 + 1e-12), 0.3)) is None
+    assert span.unlike(features(0.0501, 0.3)) is not None
+
+
+def test_one_trial_a_class_is_judged_by_what_differs_between_classes():
+    span = novelty_of(table([[0.05, 0.2], [0.06, 0.3]]), ["a", "b"])
+
+    assert span.unlike(features(0.055, 0.25)) is None
+    assert span.unlike(features(0.155, 0.25)) is not None
+
+
+def test_it_comes_back_from_json_the_same():
+    span = novelty_of(table([*ROWS, [0.07, math.nan]]), ["bottle", "bottle", "can", "can", "jar"])
+    kept = json.loads(json.dumps(span.to_json(), allow_nan=False))
+    again = novelty_from(NAMES, UNITS, kept)
+
+    for name in ("lowest", "highest", "spread"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(span, name))
+    assert (again.classes, again.featureless) == (span.classes, span.featureless)
