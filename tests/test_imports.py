@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "graspsense"
 
 MAY_KNOW = {
+    "__main__": {"cli"},
     "core": {"core"},
     "plugins": {"plugin_api", "plugins"},
     "trials": {"core", "trials"},
