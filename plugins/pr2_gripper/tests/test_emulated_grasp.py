@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from graspsense import load_pipeline
+from graspsense.core.rehearsal import rehearse
 from graspsense.core.runner import Grasp, run_grasp
 from graspsense.plugin_api import ConfigError, GraspEvent, Outcome, Phase, RunConfig, create
 from graspsense_pr2_gripper.backend import Pr2Backend
@@ -283,3 +284,26 @@ def test_driver_sends_no_effort_that_is_no_number(monkeypatch: pytest.MonkeyPatc
         backend.close()
     with pytest.raises(ProtocolError):
         decode_output(bytes(64))
+
+
+def test_dry_run_shows_a_first_close_that_is_slow_and_weak(monkeypatch: pytest.MonkeyPatch) -> None:
+    """12 N and 15 mm/s until a contact has been seen (run.first_effort_n, run.first_speed_m_s), 20 N after it."""
+    looked: list[object] = []
+    monkeypatch.setattr("graspsense_pr2_gripper.opening.search", looked.append)
+    rehearsal = rehearse(Pr2Backend(Pr2Config()), create("controller", "hybrid"), RunConfig())
+    assert looked == [], "nothing is opened, nor looked for"
+    assert rehearsal is not None
+    assert rehearsal.outcome == "steady"
+    phases = {one.phase: one for one in rehearsal.phases}
+    assert list(phases) == ["opening", "taring", "approach", "squeeze", "hold", "release"]
+    assert (phases["opening"].least_n, phases["opening"].most_n) == (-12.0, -12.0)
+    assert (phases["taring"].least_n, phases["taring"].most_n) == (0.0, 0.0)
+    assert phases["approach"].most_n == 12.0
+    assert phases["approach"].limited > 0
+    assert phases["approach"].fastest_m_s < 0.015
+    assert (phases["squeeze"].least_n, phases["squeeze"].most_n) == (20.0, 20.0)
+    assert phases["release"].least_n == -20.0
+
+
+def test_dry_run_of_a_gripper_without_a_stand_in_says_nothing_of_commands() -> None:
+    assert rehearse(create("sensor-backend", "sim"), create("controller", "hybrid"), RunConfig()) is None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from graspsense.cli.options import pipeline_options, settings_of
-from graspsense.cli.output import echo_json, talk
+from graspsense.cli.output import echo_json, echo_table, talk
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -187,11 +187,21 @@ def _shown(value: float, unit: str, reason: str) -> str:
 
 
 def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
+    from graspsense.core.errors import GraspsenseError
+    from graspsense.core.rehearsal import rehearse
+
+    why_not = "this gripper has no stand-in in software"
+    try:
+        rehearsal = rehearse(settings.gripper.create(), settings.controller.create(), settings.run)
+    except GraspsenseError as error:
+        rehearsal, why_not = None, str(error)
     if as_json:
         plan: dict[str, Any] = {
             "dry_run": True,
             "components": dict(settings.components),
             "settings": settings.values,
+            "rehearsed_on": rehearsal.device if rehearsal else None,
+            "commands": [one._asdict() for one in rehearsal.phases] if rehearsal else None,
         }
         echo_json(plan)
         return
@@ -202,4 +212,19 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
         for key, value in values.items():
             if key != "type":
                 click.echo(f"    {table}.{key} = {value}")
+    if rehearsal is None:
+        click.echo(f"commands: not rehearsed, {why_not}")
+    else:
+        click.echo(f"would command, as rehearsed on {rehearsal.device} ({rehearsal.outcome}):")
+        rows = [
+            (
+                one.phase,
+                f"{one.seconds:.2f} s",
+                f"{one.least_n:+.1f} to {one.most_n:+.1f} N",
+                f"{one.fastest_m_s * 1e3:.0f} mm/s",
+                f"{one.limited} limited" if one.limited else "",
+            )
+            for one in rehearsal.phases
+        ]
+        echo_table(("PHASE", "FOR", "EFFORT (+ squeezes)", "FASTEST", "BY THE GUARD"), rows)
     click.echo("nothing was opened")

@@ -101,6 +101,13 @@ class SensorBackend(ABC, Generic[ConfigT]):
         """Return what the backend counted, or knows beyond its frames (a simulator knows the true force)."""
         return {}
 
+    def stand_in(self) -> SensorBackend[Any] | None:
+        """Return a gripper in software that takes the same commands, for a dry run; None where there is none.
+
+        It says that its clock is a `device`'s where that of the real one is, so that the same limits hold.
+        """
+        return None
+
 
 class BatchBackend(SensorBackend[ConfigT]):
     """A backend that can do many grasps at once."""

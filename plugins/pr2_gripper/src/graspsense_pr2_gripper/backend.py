@@ -43,6 +43,7 @@ TARE_IMAGES: Final = 6
 RELEASE_REPORT: Final = OutputReport(0, RELEASE_KIND, 0, 0, 0)
 UNHEARD_S: Final = 0.1
 """A command that is not echoed for this long does not arrive: the device counts as lost."""
+UNCALIBRATED: Final = "none"
 TEST_NUMBER: Final = (0x1209, 0x0001)
 
 
@@ -53,6 +54,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
     _opened: Opened | None = None
     _report: dict[str, float | int | str | bool] | None = None
     _lost_serial = ""
+    _stands_in = False
     _sent = _echo = _heard_us = 0
 
     def open(self, seed: int) -> DeviceInfo:
@@ -140,6 +142,13 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             return self._counted(self._opened, True)
         return self._report or {}
 
+    def stand_in(self) -> Pr2Backend:
+        """Return an emulated gripper with the limits that hold for a real one at its first use."""
+        emulated = evolve(self.config, transport="emulated", pace="lock-step", calibration=UNCALIBRATED)
+        backend = Pr2Backend(emulated)
+        backend._stands_in = self.config.transport != "emulated" or self.config.pace == "device"
+        return backend
+
     def _described(self, opened: Opened) -> DeviceInfo:
         config, identity, emulation = self.config, opened.identity, opened.emulation
         found = calibrations_of(config.calibration, identity.serial, device_numbers(identity))
@@ -164,7 +173,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             name="PR2 gripper" if emulation is None else f"emulated PR2 gripper over {config.body}",
             serial=identity.serial,
             firmware=".".join(map(str, identity.firmware)),
-            clock="virtual" if isinstance(opened.link, LockStepLink) else "device",
+            clock="virtual" if isinstance(opened.link, LockStepLink) and not self._stands_in else "device",
             rate_hz=identity.report_rate_hz,
             effort_limit_n=self._effort_limit_n,
             speed_limit_m_s=identity.speed_limit_um_s / 1e6,
