@@ -43,7 +43,7 @@ class Tests:
         nodes = roots
         while nodes.size:
             found.append(nodes)
-            nodes = self.sons(self.inner(nodes))
+            nodes = self.sons(nodes)
         return found
 
     def slot(self, nodes: Array, tested: Array) -> Array:

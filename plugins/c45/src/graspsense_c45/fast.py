@@ -187,17 +187,17 @@ def _scan_ones(
     inside = terms[total]
     best, cut_left, n_cuts = np.int64(0), np.int64(0), 0
     cut: Number = np.int64(-1)
-    for i in range(begin, stop - 1):
+    # Every row weighs 1: there is no cut in the last rows that one side needs.
+    for i in range(begin, stop - least):
         k = labels[rows[i]]
         had = running[k]
         running[k] = had + 1
         inside += steps[had] - steps[counts[k] - had - 1]
         left = i + 1 - begin
-        right = total - left
-        if left < least or right < least or not values[i] + criteria.GAP < values[i + 1]:
+        if left < least or not values[i] + criteria.GAP < values[i + 1]:
             continue
         n_cuts += 1
-        numerator = inside - terms[left] - terms[right]
+        numerator = inside - terms[left] - terms[total - left]
         if numerator - best > tolerance and numerator >= zero:
             best, cut, cut_left = numerator, i, left
     return best, cut, cut_left, n_cuts
@@ -405,15 +405,15 @@ def _partition(
     spare_values: Array,
 ) -> None:
     """Move the rows that go left to the front, both parts keeping their order."""
+    # Written to both places and counted in one: what a row does is hard to foresee, and a branch would often guess wrong.
     at, kept = begin, 0
     for i in range(begin, stop):
         row, value = rows[i], values[i]
-        if goes_left[row]:
-            rows[at], values[at] = row, value
-            at += 1
-        else:
-            spare_rows[kept], spare_values[kept] = row, value
-            kept += 1
+        left = np.int64(goes_left[row])
+        rows[at], values[at] = row, value
+        spare_rows[kept], spare_values[kept] = row, value
+        at += left
+        kept += 1 - left
     rows[at:stop] = spare_rows[:kept]
     values[at:stop] = spare_values[:kept]
 
