@@ -16,7 +16,9 @@ from graspsense_sim_gripper import kernel
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.terms import Elastic, Loss, NoState, elastic, loss
+from graspsense_sim_gripper.terms.elastic import Elastic, elastic
+from graspsense_sim_gripper.terms.loss import Loss, loss
+from graspsense_sim_gripper.terms.term import NoState
 
 numba = pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
 
@@ -163,7 +165,8 @@ def _scaled(x):
 PROGRAM = """
     import sys
     from graspsense_sim_gripper import kernel
-    from graspsense_sim_gripper.terms import Elastic, NoState, Rigid, RigidState, elastic
+    from graspsense_sim_gripper.terms.elastic import Elastic
+    from graspsense_sim_gripper.terms.term import NoState
     from graspsense.plugin_api import bind
 
     def soft(p, s, d0, d1, h):

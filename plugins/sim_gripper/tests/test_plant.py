@@ -10,7 +10,10 @@ from hypothesis import strategies as st
 from graspsense.plugin_api import PR2_LINKAGES, gap_and_rate, revolutions_at
 from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.plant import Drive, PlantParams, PlantState, Squeezed, Thing
-from graspsense_sim_gripper.terms import Elastic, Loss, Maxwell, MaxwellState, NoState, elastic, loss, maxwell
+from graspsense_sim_gripper.terms.elastic import Elastic, elastic
+from graspsense_sim_gripper.terms.loss import Loss, loss
+from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
+from graspsense_sim_gripper.terms.term import NoState
 
 LINK = PR2_LINKAGES["pr2"]
 TICK = 1e-3
@@ -37,9 +40,8 @@ def thing(*terms, width=0.05, table=0.0, skins=inf):
 def at(gap, states=(), offset=0.0, speed_m_s=0.0, link=LINK):
     revolutions = revolutions_at(link, gap)
     gap, rate = gap_and_rate(link, revolutions)
-    return PlantState(
-        revolutions, speed_m_s / rate, gap, rate, 0.0, 0.0, offset, 0, Squeezed(0.0, 0.0, 0.0, states), 0.0
-    )
+    fresh = Squeezed(0.0, 0.0, 0.0, states, 0.0, 0.0)
+    return PlantState(revolutions, speed_m_s / rate, gap, rate, 0.0, 0.0, offset, 0, fresh, 0.0, 0.0, fresh)
 
 
 SPRING = (Elastic(2000.0, 0.0),)
@@ -70,7 +72,7 @@ def test_a_loaded_gripper_is_stuck_by_as_much_as_its_load_adds():
     # At 10 N on the pads breakaway is 8 + 0.5 * 10 = 13 N to either side of the balance.
     params = PlantParams(drive(), thing(*SPRING), 1)
     loaded = at(0.045, (NoState(),))._replace(
-        left_n=10.0, right_n=10.0, touched=1, squeezed=Squeezed(0.005, 10.0, 2000.0, (NoState(),))
+        left_n=10.0, right_n=10.0, touched=1, squeezed=Squeezed(0.005, 10.0, 2000.0, (NoState(),), 0.0, 0.0)
     )
     for effort, moves in ((22.9, False), (23.1, True), (-2.9, False), (-3.1, True)):
         after = run(params, loaded, effort, 0.2)

@@ -18,9 +18,11 @@ from graspsense.plugin_api import (
     tare,
 )
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.sensing import felt_again, sense
-from graspsense_sim_gripper.setting import CELL_OFFSET, device_info, laws_of, set_scene
+from graspsense_sim_gripper.setting import CELL_OFFSET, device_info, set_scene
+from graspsense_sim_gripper.terms.registry import laws_of
 
 
 class SimBackend(BatchBackend[SimConfig]):
@@ -39,6 +41,8 @@ class SimBackend(BatchBackend[SimConfig]):
         self._images: list[tuple[list[float], list[float]]] = []
         self._pads = NO_PADS
         self._effort_n: float | None = None
+        # Compression and force at each tick since the first contact, where they are to be explained.
+        self._pressed: list[tuple[float, float]] = []
         return device_info(self.config)
 
     def read(self, timeout_s: float) -> Reading:
@@ -51,6 +55,10 @@ class SimBackend(BatchBackend[SimConfig]):
         else:
             self._body = self._move(setting.plant, self._body, effort, dt)
             self._ticks += 1
+            if self.config.explain and self._body.touched == 1:
+                # Of an object that is held fast the half that is pressed harder.
+                half = max(self._body.squeezed, self._body.right, key=lambda one: one.force_n)
+                self._pressed.append((half.compression_m, half.force_n))
         images = self._images
         if self._sensor.images >= len(images):
             self._draw()
@@ -87,13 +95,21 @@ class SimBackend(BatchBackend[SimConfig]):
     def close(self) -> None:
         """Nothing to let go of."""
 
-    def report(self) -> Mapping[str, float | int | str | bool]:
-        """Return what only the model knows: the true peak force on the pads, and whether something broke."""
-        return {
+    def report(self) -> Mapping[str, Any]:
+        """Return what only the model knows: the true peak force on the pads, and whether something broke.
+
+        With `explain` in the settings, also how much each term of the object did, under `model`.
+        """
+        report: dict[str, Any] = {
             "simulated": True,
             "true_peak_force_n": self._body.peak_n,
             "broken": any(getattr(state, "broken", 0) == 1 for state in self._body.squeezed.states),
         }
+        if self.config.explain:
+            setting = self._setting
+            path, forces = [d for d, _ in self._pressed], [f for _, f in self._pressed]
+            report["model"] = explain(setting.kinds, setting.plant, path, forces, setting.dt_s)
+        return report
 
     def _draw(self) -> None:
         self._noise.extend(next(self._blocks).tolist())

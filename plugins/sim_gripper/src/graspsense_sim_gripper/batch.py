@@ -24,7 +24,8 @@ from graspsense.plugin_api import (
 from graspsense_sim_gripper import kernel
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant import PlantState
-from graspsense_sim_gripper.setting import CELL_OFFSET, Setting, device_info, laws_of, set_scene
+from graspsense_sim_gripper.setting import CELL_OFFSET, Setting, device_info, set_scene
+from graspsense_sim_gripper.terms.registry import laws_of
 
 WORTH_COMPILING: Final = 50
 """Grasps of one composition from which compiling it (1 to 2 s) takes less time than it saves."""

@@ -17,6 +17,7 @@ class SimConfig:
     object: str = "odwalla:full_closed"
     """Name in the catalogue, with its state: `odwalla:full_closed`, `can:empty_open`, `block`; `none`: nothing.
 
+    Or a scene file, as in `my_bottle.toml`.
     `can:empty_open#3` is one certain can: its width and stiffness are the same in every trial."""
     spread: bool = True
     """Whether instance, placement and friction vary with the seed."""
@@ -43,6 +44,16 @@ class SimConfig:
     """Where the fingers stop when they open."""
     skin_n_m: float = field(default=3e4, validator=gt(0.0))
     """Stiffness of one fingertip's cover: 1e4 to 1e5 N/m (an assumption); `inf` for a rigid one."""
+    skin_damping_n_s_m: float = field(default=0.0, validator=ge(0.0))
+    """Damper beside that spring, of one cover."""
+    skin_creep_n_m: float = field(default=0.0, validator=ge(0.0))
+    """Stiffness of a part of one cover that gives way in time, beside that spring."""
+    skin_creep_s: float = field(default=0.3, validator=gt(0.0))
+    """Time constant with which it does."""
+    drive_lag_s: float = field(default=0.0, validator=ge(0.0))
+    """Time constant with which the effort follows the command; 0: at once."""
+    explain: bool = False
+    """Whether the report lists how much each term of the object did (`--explain-model`)."""
     noise_counts: float = field(default=15.0, validator=ge(0.0))
     """Noise of a cell, standard deviation: margins of 125 to 225 counts are in use on the robot."""
     pad_delay_s: float = field(default=0.0, validator=and_(ge(0.0), le(0.04)))

@@ -26,7 +26,7 @@ from graspsense.plugin_api import TARING, Pads, bind, tick
 from graspsense_sim_gripper import plant
 from graspsense_sim_gripper.plant import PlantParams, PlantState
 from graspsense_sim_gripper.sensing import SensorParams, SensorState, felt_again, sense
-from graspsense_sim_gripper.terms import Law
+from graspsense_sim_gripper.terms.term import Law
 
 
 def _nothing(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
@@ -82,8 +82,8 @@ def sum_of(laws: Sequence[Law]) -> Law:
 def plant_of(laws: Sequence[Law]) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
     """Return `move` for an object that is the sum of these terms."""
     squeeze = bind(plant.squeeze, advance=sum_of(laws))
-    piece = bind(plant._piece, squeeze=squeeze, _felt=bind(plant._felt, squeeze=squeeze))
-    return bind(plant.move, _piece=piece)
+    piece = bind(plant._piece, _felt=bind(plant._felt, squeeze=squeeze))
+    return bind(plant.move, _driven=bind(plant._driven, _piece=piece))
 
 
 move: Any = _nothing
@@ -227,8 +227,11 @@ def _compiled(
         }
         copy = bind(plain, **parts)
         copy.__qualname__ = f"{plain.__qualname__}_{mark}"
-        # Only the outermost is kept on disk: the rest is inside it.
-        memo[key] = numba.njit(copy, nogil=True, cache=outermost)
+        # Only the outermost is kept on disk, the rest being inside it, and only it is called from the interpreter:
+        # a wrapper for that costs more to compile than most functions here.
+        memo[key] = numba.njit(
+            copy, nogil=True, cache=outermost, no_cpython_wrapper=not outermost, no_cfunc_wrapper=True
+        )
     return memo[key]  # type: ignore[no-any-return]
 
 

@@ -11,7 +11,7 @@ below breakaway nothing moves at all. A step is a kick, a drift and a kick (seco
 reversal are located inside it.
 
 The object is free on a table, its mass negligible beside m: a finger that touches first pushes it, with the
-table's friction on that pad, until both touch.
+table's friction on that pad, until both touch. Or it is held fast, and each finger presses its own half.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import ScrewLinkage, gap_and_rate
+from graspsense_sim_gripper.terms.relaxation import mean_share
 
 EVENTS_A_STEP: Final = 16
 """A step is cut at most this often; the rest is then taken whole."""
@@ -29,6 +30,9 @@ SEARCH: Final = 40
 FORCE_ROUNDING_N: Final = 1e-7
 FORCE_ROUNDING: Final = 1e-9
 """The search ends where the force balances to this, absolute and relative."""
+LAG_PIECES: Final = 4
+MOST_LAG_PIECES: Final = 1000
+"""Where the drive lags, its effort is taken in so many pieces a time constant, each at its mean."""
 
 
 class Drive(NamedTuple):
@@ -45,6 +49,16 @@ class Drive(NamedTuple):
     damping_n_s_m: float
     closed_rev: float
     open_rev: float
+    lag_s: float = 0.0
+    """Time constant with which the effort follows what is asked for; 0: at once."""
+
+
+class Skin(NamedTuple):
+    """What the two covers do beside being a spring, in series as that is: a damper, and an arm that creeps."""
+
+    damping_n_s_m: float
+    arm_n_m: float
+    tau_s: float
 
 
 class Thing(NamedTuple):
@@ -56,6 +70,9 @@ class Thing(NamedTuple):
     skins_n_m: float
     """Stiffness of the two fingertip covers in series; `inf`: rigid covers."""
     terms: Any
+    skin: Skin = Skin(0.0, 0.0, 1.0)
+    held: int = 0
+    """1: held fast where it stands, so that a finger which touches first presses it and does not push it."""
 
 
 class PlantParams(NamedTuple):
@@ -73,6 +90,9 @@ class Squeezed(NamedTuple):
     force_n: float
     slope_n_m: float
     states: Any
+    cover_m: float
+    """Compression of the two covers, kept where they creep or damp."""
+    arm_n: float
 
 
 class PlantState(NamedTuple):
@@ -88,7 +108,12 @@ class PlantState(NamedTuple):
     """Where the object stands off the gripper's centre line; positive is nearer the right finger."""
     touched: int
     squeezed: Squeezed
+    """The object; where it is held fast, its half at the left finger, as if the other did the same."""
     peak_n: float
+    effort_n: float
+    """What the drive gives at the moment, where it lags."""
+    right: Squeezed
+    """The half at the right finger of an object that is held fast."""
 
 
 def _unbound(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
@@ -102,21 +127,34 @@ def squeeze(thing: Thing, now: Squeezed, closure_m: float, h: float) -> Squeezed
     """Return the object after the fingers have come to `closure_m` (its width less the gap) within `h`.
 
     The covers' compression and the object's add up to the closure and carry one force; a secant search finds
-    the object's share. Where that force would pull, the object springs back by itself, free of force.
+    the object's share. Where that force would pull, the object and the covers spring back by themselves, free of
+    force.
     """
-    d0, force0, slope, states0 = now
+    d0, force0, slope, states0, cover0, arm0 = now
     skins = thing.skins_n_m
     terms = thing.terms
     if skins == math.inf:
         force, states = advance(terms, states0, d0, closure_m, h)
         if force >= 0.0:
-            return Squeezed(closure_m, force, slope, states)
+            return Squeezed(closure_m, force, slope, states, cover0, arm0)
         skins = 0.0
+    # The covers' force is `skins` times their compression, plus `shift`: a damper and an arm add to both.
+    shift = dashed = kept = 0.0
+    creeps = skins > 0.0 and (thing.skin.damping_n_s_m > 0.0 or thing.skin.arm_n_m > 0.0)
+    if creeps:
+        x = h / thing.skin.tau_s
+        kept = math.exp(-x)
+        dashed = thing.skin.arm_n_m * mean_share(x, kept)
+        if h > 0.0:
+            dashed += thing.skin.damping_n_s_m / h
+        skins += dashed
+        shift = arm0 * kept - dashed * cover0
+    free_cover = -shift / skins if creeps else 0.0
     while True:
         slope = max(slope, 1.0)
-        d1 = d0 + (skins * (closure_m - d0) - force0) / (skins + slope)
+        d1 = d0 + (skins * (closure_m - d0) + shift - force0) / (skins + slope)
         force, states = advance(terms, states0, d0, d1, h)
-        residual = force - skins * (closure_m - d1)
+        residual = force - (skins * (closure_m - d1) + shift)
         for _ in range(SEARCH):
             if abs(residual) <= FORCE_ROUNDING_N + FORCE_ROUNDING * abs(force):
                 break
@@ -128,12 +166,17 @@ def squeeze(thing: Thing, now: Squeezed, closure_m: float, h: float) -> Squeezed
             if abs(d2 - d1) > 1e-13:
                 slope = max((force2 - force) / (d2 - d1), 1.0)
             d1, force = d2, force2
-            residual = force - skins * (closure_m - d1)
-        if skins == 0.0:
-            return Squeezed(d1, 0.0, slope, states)
-        if force >= 0.0:
-            return Squeezed(d1, force, slope, states)
-        skins = 0.0
+            residual = force - (skins * (closure_m - d1) + shift)
+        touching = skins > 0.0 and force >= 0.0
+        if touching or skins == 0.0:
+            if not touching:
+                force = 0.0
+            if not creeps:
+                return Squeezed(d1, force, slope, states, cover0, arm0)
+            cover = closure_m - d1 if touching else free_cover
+            arm = arm0 * kept + thing.skin.arm_n_m * mean_share(h / thing.skin.tau_s, kept) * (cover - cover0)
+            return Squeezed(d1, force, slope, states, cover, arm)
+        skins = shift = 0.0
 
 
 def friction(drive: Drive, velocity_m_s: float, load_n: float) -> float:
@@ -147,7 +190,32 @@ def friction(drive: Drive, velocity_m_s: float, load_n: float) -> float:
 
 
 def move(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
-    """Return the plant after `dt` under a constant effort (N, positive squeezes)."""
+    """Return the plant after `dt` in which this effort was asked for (N, positive squeezes)."""
+    lag = params.drive.lag_s
+    pieces = 1
+    if lag > 0.0:
+        pieces = min(max(math.ceil(LAG_PIECES * dt / lag), 1), MOST_LAG_PIECES)
+    h = dt / pieces
+    for _ in range(pieces):
+        given = effort_n
+        if lag > 0.0:
+            decay = math.exp(-h / lag)
+            short = state.effort_n - effort_n
+            given = effort_n + short * mean_share(h / lag, decay)
+            state = _with_effort(state, effort_n + short * decay)
+        state = _driven(params, state, given, h)
+    return state
+
+
+def _with_effort(state: PlantState, effort_n: float) -> PlantState:
+    revolutions, speed, gap, rate, left, right, offset, touched, squeezed, peak, _, other = state
+    return PlantState(
+        revolutions, speed, gap, rate, left, right, offset, touched, squeezed, peak, effort_n, other
+    )
+
+
+def _driven(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
+    """Return the plant after `dt` under a constant effort."""
     drive, thing, steps = params
     if state.touched == 0:
         # Most ticks are one free piece of motion, or none.
@@ -172,7 +240,7 @@ def _piece(
     drive: Drive, thing: Thing, state: PlantState, effort_n: float, h: float, whole: bool
 ) -> tuple[PlantState, float]:
     """Return the plant after one piece of motion without an event inside, and how long it took."""
-    revolutions, speed, gap, rate, left, right, offset, touched, squeezed, peak = state
+    revolutions, speed, gap, rate, left, right, offset, touched, squeezed, peak, given, other = state
     load = 0.5 * (left + right)
     net = load - effort_n
     gain = rate / drive.inertia
@@ -186,12 +254,11 @@ def _piece(
         ):
             if touched == 0:
                 return state, h
-            squeezed = squeeze(thing, squeezed, thing.width_m - gap, h)
-            force = squeezed.force_n
-            # A pad that alone holds the object against the table goes on doing so.
-            left, right = max(force, min(left, thing.table_n)), max(force, min(right, thing.table_n))
-            peak = max(peak, force)
-            return PlantState(revolutions, 0.0, gap, rate, left, right, offset, touched, squeezed, peak), h
+            left, right, offset, squeezed, other = _felt(thing, state, gap, h, True)
+            peak = max(peak, squeezed.force_n, other.force_n)
+            return PlantState(
+                revolutions, 0.0, gap, rate, left, right, offset, touched, squeezed, peak, given, other
+            ), h
         direction = 1.0 if net > 0.0 else -1.0
     else:
         direction = 1.0 if speed > 0.0 else -1.0
@@ -207,7 +274,7 @@ def _piece(
 
     # The gap at which a finger touches, or once one does, the second.
     reach = thing.width_m + 2.0 * abs(offset)
-    touching = reach if gap > reach else thing.width_m
+    touching = reach if gap > reach else thing.width_m - (2.0 * abs(offset) if thing.held == 1 else 0.0)
     if gap > touching > gap1 and not whole:
         used = used * (gap - touching) / (gap - gap1)
         stops = False
@@ -216,9 +283,9 @@ def _piece(
         gap1 = min(gap1, touching)
 
     if touched == 1 or gap1 <= reach:
-        left, right, offset, squeezed = _felt(thing, state, gap1, used)
+        left, right, offset, squeezed, other = _felt(thing, state, gap1, used, False)
         touched = 1
-        peak = max(peak, squeezed.force_n)
+        peak = max(peak, squeezed.force_n, other.force_n)
         load = 0.5 * (left + right)
 
     if stops:
@@ -240,15 +307,25 @@ def _piece(
     elif revolutions1 <= drive.closed_rev and speed1 <= 0.0:
         revolutions1, speed1 = drive.closed_rev, 0.0
         gap1, rate1 = gap_and_rate(drive.link, revolutions1)
-    return PlantState(revolutions1, speed1, gap1, rate1, left, right, offset, touched, squeezed, peak), used
+    return PlantState(
+        revolutions1, speed1, gap1, rate1, left, right, offset, touched, squeezed, peak, given, other
+    ), used
 
 
-def _felt(thing: Thing, state: PlantState, gap_m: float, h: float) -> tuple[float, float, float, Squeezed]:
-    """Return the forces on the pads at this gap, reached in `h`, where the object then stands, and its state."""
+def _felt(
+    thing: Thing, state: PlantState, gap_m: float, h: float, still: bool
+) -> tuple[float, float, float, Squeezed, Squeezed]:
+    """Return the forces on the pads at this gap, reached in `h`, where the object then stands, and its state.
+
+    `still`: the fingers did not move.
+    """
     closure = thing.width_m - gap_m
-    offset, squeezed = state.offset_m, state.squeezed
+    offset = state.offset_m
     left = right = 0.0
-    if -closure <= 2.0 * abs(offset):
+    if still:
+        # A pad that alone holds the object against the table goes on doing so.
+        left, right = min(state.left_n, thing.table_n), min(state.right_n, thing.table_n)
+    elif thing.held == 0 and -closure <= 2.0 * abs(offset):
         pushed = 0.5 * max(-closure, 0.0)
         if pushed < abs(offset):
             right = thing.table_n if offset > 0.0 else 0.0
@@ -256,7 +333,19 @@ def _felt(thing: Thing, state: PlantState, gap_m: float, h: float) -> tuple[floa
         elif closure > 0.0:
             left, right = min(state.left_n, thing.table_n), min(state.right_n, thing.table_n)
         offset = pushed if offset >= 0.0 else -pushed
-    if closure > 0.0 or squeezed.compression_m != 0.0:
-        squeezed = squeeze(thing, squeezed, closure, h)
+    # Held fast, each finger presses its own half as if the other did the same; free, both press the whole.
+    squeezed, other = state.squeezed, state.right
+    shift = 2.0 * offset if thing.held == 1 else 0.0
+    for half in range(1 + thing.held):
+        one = squeezed if half == 0 else other
+        shut = closure - shift if half == 0 else closure + shift
+        if still or shut > 0.0 or one.compression_m != 0.0:
+            one = squeeze(thing, one, shut, h)
+        if half == 0:
+            squeezed = one
+        else:
+            other = one
+    if thing.held == 1:
+        return squeezed.force_n, other.force_n, offset, squeezed, other
     force = squeezed.force_n
-    return max(force, left), max(force, right), offset, squeezed
+    return max(force, left), max(force, right), offset, squeezed, other

@@ -1,24 +1,25 @@
-"""From a name to what is simulated: the catalogue, and one sampled instance of one of its objects.
+"""From a name to what is simulated: the catalogue, scene files, and one sampled instance of one of their objects.
 
-The catalogue is read strictly: an unknown key, a missing reason or a number out of range is an error that names
-the object and the key.
+Both are read strictly: an unknown key or a number out of range is an error that names the file or object, the
+table and the key. In the catalogue every figure stands with its reason; a file of one's own needs none.
 """
 
 from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from attrs import field, fields_dict, frozen
-from attrs.validators import ge, gt, in_
+from attrs.validators import ge, gt, in_, le
 
 from graspsense.plugin_api import ConfigError, UnknownName, suggestion
-from graspsense_sim_gripper.terms import TERMS
+from graspsense_sim_gripper.terms.registry import find_term, in_order
 
 GRAVITY_M_S2: Final = 9.80665
 PATCHES: Final = ("line", "face", "point")
@@ -28,31 +29,37 @@ def _positive() -> float:
     return field(validator=gt(0.0))
 
 
-def _not_negative() -> float:
-    return field(validator=ge(0.0))
+def _not_negative(default: float) -> float:
+    return field(default=default, validator=ge(0.0))
 
 
 @frozen(kw_only=True)
 class ObjectSpec:
-    """An object in one of its states, as the catalogue has it. SI units; spreads are standard deviations."""
+    """An object in one of its states, as a file has it. SI units; spreads are standard deviations."""
 
     name: str
-    summary: str
-    patch: str = field(validator=in_(PATCHES))
+    summary: str = ""
+    patch: str = field(default="line", validator=in_(PATCHES))
     """How it meets a pad: along a line, with a face, at a point."""
     width_m: float = _positive()
-    width_spread_m: float = _not_negative()
-    stiffness_spread: float = _not_negative()
-    offset_spread_m: float = _not_negative()
-    share: float = field(validator=gt(0.0))
+    width_spread_m: float = _not_negative(0.0)
+    stiffness_spread: float = _not_negative(0.0)
+    offset_m: float = 0.0
+    """How far it stands off the gripper's centre line, towards the right finger."""
+    offset_spread_m: float = _not_negative(0.0)
+    share: float = field(default=1.0, validator=[gt(0.0), le(1.0)])
     """Part of the force that lands on the fifteen cells."""
-    share_spread: float = _not_negative()
-    friction: float = _not_negative()
+    share_spread: float = _not_negative(0.0)
+    friction: float = _not_negative(0.3)
     """Coefficient of friction on the table."""
-    mass_kg: float = _positive()
+    held: bool = False
+    """Held fast: a finger that touches it first presses it and does not push it."""
+    mass_kg: float = field(default=0.1, validator=gt(0.0))
     terms: tuple[tuple[str, Mapping[str, float]], ...] = ()
-    """Kind and parameters of each term, in the order of `TERMS`."""
+    """Kind and parameters of each term, in the canonical order."""
     reasons: Mapping[str, str] = field(factory=dict)
+    file: str = ""
+    """Where it was read from; empty: the catalogue."""
 
 
 @frozen(kw_only=True)
@@ -72,17 +79,17 @@ class Instance:
 
 @cache
 def catalogue() -> Mapping[str, ObjectSpec]:
-    """Return every object in every state, by name (`odwalla:full_open`, `block`)."""
+    """Return every object of the catalogue in every state, by name (`odwalla:full_open`, `block`)."""
     text = files("graspsense_sim_gripper").joinpath("catalogue.toml").read_text(encoding="utf-8")
     specs: dict[str, ObjectSpec] = {}
     for name, table in tomllib.loads(text).items():
         states = table.pop("states", None)
         if states is None:
-            specs[name] = _spec(name, table)
+            specs[name] = _catalogued(name, table)
             continue
         for state, extra in states.items():
             both = {**table, **extra, "terms": [*table.get("terms", []), *extra.get("terms", [])]}
-            specs[f"{name}:{state}"] = _spec(f"{name}:{state}", both)
+            specs[f"{name}:{state}"] = _catalogued(f"{name}:{state}", both)
     return specs
 
 
@@ -100,7 +107,13 @@ def numbered(name: str) -> tuple[str, int | None]:
 
 
 def find(name: str) -> ObjectSpec:
-    """Return the object of this name. Raises UnknownName with what there is."""
+    """Return the object of this name, or that of a file whose name ends in `.toml`.
+
+    A name is looked up in the catalogue, then among the scenes that are shipped. Raises UnknownName with what
+    there is, ConfigError for a file that cannot be read as an object.
+    """
+    if name.endswith(".toml"):
+        return _of_file(Path(name))
     known = catalogue()
     if name in known:
         return known[name]
@@ -116,7 +129,10 @@ def find(name: str) -> ObjectSpec:
         raise UnknownName(
             f"object {kind!r} has no state {state!r}. Known: {', '.join(states)}.{suggestion(state, states)}"
         )
-    kinds = sorted({n.partition(":")[0] for n in known})
+    shipped = shipped_scenes()
+    if name in shipped:
+        return _from_text(shipped[name], name, f"scene {name}")
+    kinds = sorted({n.partition(":")[0] for n in known} | shipped.keys())
     raise UnknownName(f"no object named {kind!r}. Known: {', '.join(kinds)}.{suggestion(kind, kinds)}")
 
 
@@ -135,12 +151,13 @@ def instance_of(spec: ObjectSpec, rng: np.random.Generator | None, number: int |
     clipped = [min(max(d, -2.0), 2.0) for d in draws]
     parameters = []
     for kind, values in spec.terms:
-        scaled = {k: v * stiffer if k in _STIFFNESSES else v for k, v in values.items()}
-        parameters.append(TERMS[kind][0](**scaled))
+        term = find_term(kind)[1]
+        scaled = {k: v * stiffer if k in term.stiffnesses else v for k, v in values.items()}
+        parameters.append(term.params(**scaled))
     return Instance(
         spec=spec,
         width_m=spec.width_m + spec.width_spread_m * clipped[1],
-        offset_m=spec.offset_spread_m * clipped[2],
+        offset_m=spec.offset_m + spec.offset_spread_m * clipped[2],
         share=min(spec.share + spec.share_spread * clipped[3], 1.0),
         table_n=spec.friction * spec.mass_kg * GRAVITY_M_S2,
         kinds=tuple(kind for kind, _ in spec.terms),
@@ -168,41 +185,162 @@ def cell_weights(patch: str, row: float) -> tuple[float, ...]:
     return tuple(weight / total for weight in weights)
 
 
-# A thicker wall is stiffer and as much stronger.
-_STIFFNESSES: Final = frozenset({"k1_n_m", "k3_n_m3", "k_n_m", "hertz_n_m15", "crush_force_n"})
+@cache
+def shipped_scenes() -> Mapping[str, str]:
+    """Return the text of the scenes that come with the simulator, by name; `specs/scenes` of a checkout."""
+    folder = files("graspsense_sim_gripper").joinpath("scenes")
+    return {
+        one.name.removesuffix(".toml"): one.read_text(encoding="utf-8")
+        for one in sorted(folder.iterdir(), key=lambda one: one.name)
+        if one.name.endswith(".toml")
+    }
 
 
-def _spec(name: str, table: Mapping[str, Any]) -> ObjectSpec:
+def _of_file(path: Path) -> ObjectSpec:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ConfigError(f"no scene file {str(path)!r} (looked in {Path.cwd()})") from None
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is no UTF-8 text ({error})") from error
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    return _from_text(text, path.stem, str(path))
+
+
+@cache
+def _from_text(text: str, name: str, where: str) -> ObjectSpec:
+    """Return the object that a scene file describes; `where` names the file in errors."""
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{where}: is no TOML: {error}") from error
+    problems: list[str] = []
+    known = fields_dict(ObjectSpec).keys() - {"name", "reasons", "file"}
+    values: dict[str, Any] = {"name": name, "file": where}
+    for key, entry in table.items():
+        if key not in known:
+            problems.append(f"{key}: no such key. Known: {', '.join(sorted(known))}.{suggestion(key, known)}")
+        elif key in ("summary", "patch", "held"):
+            wanted = bool if key == "held" else str
+            if not isinstance(entry, wanted):
+                problems.append(f"{key}: {entry!r} is no {'true or false' if key == 'held' else 'text'}")
+            values[key] = entry
+        elif key != "terms":
+            values[key] = _number(entry, key, problems, negative=key == "offset_m")
+    if "width_m" not in table:
+        problems.append("width_m: is not given, and nothing has no width")
+    tables = table.get("terms", [])
+    if not isinstance(tables, list) or not all(isinstance(one, dict) for one in tables):
+        problems.append("terms: write a table [[terms]] for each")
+        tables = []
+    terms: list[tuple[str, Mapping[str, float]]] = []
+    for i, one in enumerate(tables, 1):
+        called = f"[[terms]] {i} ({one.get('type')})"
+        term = _term(
+            one,
+            called,
+            f"{called} ",
+            problems,
+            lambda where, entry: _number(entry, where, problems),
+        )
+        if term is not None:
+            terms.append(term)
+    if not problems:
+        try:
+            return _sorted_spec(values, terms)
+        except ValueError as error:
+            problems.append(str(error.args[0]))
+    raise ConfigError("\n".join(f"{where}: {problem}" for problem in problems))
+
+
+def _number(entry: Any, called: str, problems: list[str], negative: bool = False) -> float:
+    """Return the entry as a number; what is wrong with it is added to the problems."""
+    if isinstance(entry, bool) or not isinstance(entry, int | float):
+        problems.append(f"{called}: {entry!r} is no number")
+    elif not math.isfinite(entry):
+        problems.append(f"{called}: {entry!r} is no finite number")
+    elif entry < 0.0 and not negative:
+        problems.append(f"{called}: {entry!r} is negative")
+    else:
+        return float(entry)
+    return 0.0
+
+
+def _sorted_spec(values: Mapping[str, Any], terms: list[tuple[str, Mapping[str, float]]]) -> ObjectSpec:
+    order = in_order([kind for kind, _ in terms])
+    return ObjectSpec(**values, terms=tuple(terms[i] for i in order))
+
+
+def _term(
+    table: Mapping[str, Any],
+    called: str,
+    prefix: str,
+    problems: list[str],
+    number: Callable[[str, Any], float],
+) -> tuple[str, Mapping[str, float]] | None:
+    """Return the term's only name and its parameters, or None where it cannot be read at all.
+
+    `number` reads one figure, given where it stands: `prefix` and its key.
+    """
+    try:
+        kind, term = find_term(str(table.get("type", "")))
+    except UnknownName as error:
+        problems.append(f"{called}: {error}")
+        return None
+    names: list[str] = list(term.params._fields)
+    given = [key for key in table if key != "type"]
+    problems += [
+        f"{called}: no such key {key!r}. Known: {', '.join(names)}.{suggestion(key, names)}"
+        for key in given
+        if key not in names
+    ]
+    missing = [key for key in names if key not in table and key not in term.params._field_defaults]
+    if missing:
+        problems.append(f"{called}: missing {', '.join(missing)}")
+    before = len(problems)
+    found = {key: number(f"{prefix}{key}", table[key]) for key in given if key in names}
+    if len(problems) == before:
+        problems += [
+            f"{called} {key}: must be greater than 0"
+            for key in found
+            if key in term.positive and found[key] <= 0.0
+        ]
+    return kind, found
+
+
+def _catalogued(name: str, table: Mapping[str, Any]) -> ObjectSpec:
+    """Return an entry of the catalogue: every figure with its reason, nothing left to a default."""
     reasons: dict[str, str] = {}
     values: dict[str, Any] = {"name": name}
     for key, entry in table.items():
         if key == "terms":
             continue
         values[key] = entry if key in ("summary", "patch") else _figure(f"{name}.{key}", entry, reasons)
-    unknown = values.keys() - fields_dict(ObjectSpec).keys()
-    missing = fields_dict(ObjectSpec).keys() - values.keys() - {"terms", "reasons"}
+    fields = fields_dict(ObjectSpec)
+    unknown = values.keys() - fields.keys()
+    missing = fields.keys() - values.keys() - {"terms", "reasons", "offset_m", "held", "file"}
     if unknown or missing:
         raise ConfigError(f"object {name!r}: unknown {sorted(unknown)}, missing {sorted(missing)}")
-    terms = [_term(name, term, reasons) for term in table.get("terms", [])]
-    order = list(TERMS)
-    terms.sort(key=lambda term: order.index(term[0]))
+    problems: list[str] = []
+    terms = []
+    for one in table.get("terms", []):
+        kind = one.get("type")
+        term = _term(
+            one,
+            f"object {name!r}, term {kind!r}",
+            f"{name}.{kind}.",
+            problems,
+            lambda where, entry: _figure(where, entry, reasons),
+        )
+        if term is not None:
+            terms.append(term)
+    if problems:
+        raise ConfigError("\n".join(problems))
     try:
-        return ObjectSpec(**values, terms=tuple(terms), reasons=reasons)
+        return _sorted_spec({**values, "reasons": reasons}, terms)
     except ValueError as error:
         raise ConfigError(f"object {name!r}: {error}") from error
-
-
-def _term(name: str, term: Mapping[str, Any], reasons: dict[str, str]) -> tuple[str, Mapping[str, float]]:
-    kind = term.get("type")
-    if kind not in TERMS:
-        raise ConfigError(f"object {name!r}: no term {kind!r}. Known: {', '.join(TERMS)}")
-    wanted = set(TERMS[kind][0]._fields)  # type: ignore[attr-defined]
-    given = term.keys() - {"type"}
-    if wanted != given:
-        raise ConfigError(
-            f"object {name!r}, term {kind!r}: unknown {sorted(given - wanted)}, missing {sorted(wanted - given)}"
-        )
-    return kind, {key: _figure(f"{name}.{kind}.{key}", term[key], reasons) for key in sorted(given)}
 
 
 def _figure(where: str, entry: Any, reasons: dict[str, str]) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -15,15 +15,16 @@ from graspsense.plugin_api import (
     EFFORT,
     PR2_LINKAGES,
     Command,
+    ConfigError,
     DeviceInfo,
     gap_and_rate,
     revolutions_at,
 )
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant import Drive, PlantParams, PlantState, Squeezed, Thing
+from graspsense_sim_gripper.plant import Drive, PlantParams, PlantState, Skin, Squeezed, Thing
 from graspsense_sim_gripper.scene import Instance, cell_weights, find, instance_of, numbered
 from graspsense_sim_gripper.sensing import PAD_PERIOD_S, SensorParams, SensorState, first_sensed
-from graspsense_sim_gripper.terms import TERMS, Law
+from graspsense_sim_gripper.terms.registry import find_term
 
 EFFORT_LIMIT_N: Final = 100.0
 SPEED_LIMIT_M_S: Final = 0.2
@@ -77,12 +78,16 @@ class Setting:
 
 
 def set_scene(config: SimConfig, scene: str, seed: int) -> Setting:
-    """Return the grasp of this object (`none`: nothing there) with this seed. Raises UnknownName."""
+    """Return the grasp of this object (`none`: nothing there; `*.toml`: a scene file) with this seed.
+
+    Raises UnknownName, and ConfigError for a file that describes nothing which fits between the fingers.
+    """
     rng = np.random.default_rng(seed)
     instance = None
     if scene != "none":
         name, number = numbered(scene)
         instance = instance_of(find(name), rng if config.spread else None, number)
+        _check_fit(config, instance)
     plant, body = _plant(config, instance, rng)
     sensor = _sensor(config, instance, rng)
     return Setting(
@@ -96,9 +101,20 @@ def set_scene(config: SimConfig, scene: str, seed: int) -> Setting:
     )
 
 
-def laws_of(kinds: Sequence[str]) -> list[Law]:
-    """Return the laws of these terms, in order."""
-    return [TERMS[kind][1] for kind in kinds]
+def _check_fit(config: SimConfig, instance: Instance) -> None:
+    """Refuse a file's object that the open fingers would cut into. One of the catalogue is the gripper's to find."""
+    where = instance.spec.file
+    needs_m = instance.width_m + 2.0 * abs(instance.offset_m)
+    if where and instance.width_m <= 0.0:
+        raise ConfigError(
+            f"{where}: width_m: this one comes out {instance.width_m:g} m wide (width_spread_m)"
+        )
+    if where and needs_m >= config.open_gap_m:
+        what = "width_m" if instance.width_m >= config.open_gap_m else "offset_m"
+        raise ConfigError(
+            f"{where}: {what}: {instance.width_m:g} m wide and {instance.offset_m:g} m off the centre, it needs "
+            f"{needs_m:g} m, and the fingers open to {config.open_gap_m:g} m (gripper.open_gap_m)"
+        )
 
 
 def _plant(
@@ -122,6 +138,7 @@ def _plant(
         damping_n_s_m=float(config.damping_n_s_m),
         closed_rev=revolutions_at(link, 0.0),
         open_rev=revolutions_at(link, config.open_gap_m),
+        lag_s=float(config.drive_lag_s),
     )
     thing = Thing(
         # Nothing there: thinner than the closed gap, so that no finger ever touches it.
@@ -129,11 +146,18 @@ def _plant(
         table_n=instance.table_n if instance else 0.0,
         skins_n_m=0.5 * float(config.skin_n_m),
         terms=instance.terms if instance else (),
+        skin=Skin(
+            damping_n_s_m=0.5 * float(config.skin_damping_n_s_m),
+            arm_n_m=0.5 * float(config.skin_creep_n_m),
+            tau_s=float(config.skin_creep_s),
+        ),
+        held=1 if instance and instance.spec.held else 0,
     )
     gap, rate = gap_and_rate(link, drive.open_rev)
-    at_rest = Squeezed(0.0, 0.0, 0.0, tuple(TERMS[kind][2] for kind in instance.kinds) if instance else ())
+    kinds = instance.kinds if instance else ()
+    at_rest = Squeezed(0.0, 0.0, 0.0, tuple(find_term(kind)[1].at_rest for kind in kinds), 0.0, 0.0)
     offset = instance.offset_m if instance else 0.0
-    state = PlantState(drive.open_rev, 0.0, gap, rate, 0.0, 0.0, offset, 0, at_rest, 0.0)
+    state = PlantState(drive.open_rev, 0.0, gap, rate, 0.0, 0.0, offset, 0, at_rest, 0.0, 0.0, at_rest)
     return PlantParams(drive, thing, _substeps(drive, thing, rate, 1.0 / config.rate_hz)), state
 
 

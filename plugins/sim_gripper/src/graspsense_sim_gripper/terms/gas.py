@@ -1,0 +1,145 @@
+"""Gas trapped in a container, which may leak and may exchange heat with its walls."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from graspsense_sim_gripper.terms.relaxation import mean_share
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.vent import conductance
+
+
+class Gas(NamedTuple):
+    """Gas behind a wall that gives: displaced volume A0 d + A1 d^2 / 2, wall bulge C_w beside it.
+
+    `exponent` is 1 where the gas stays at its walls' temperature during a grasp (a small head space), 1.4 where
+    it does not; with `heat_s` it falls from the one to the other in that time. The pressure it stood at before
+    the grasp is carried by the wall and pushes nothing, and drives nothing through the vent.
+    """
+
+    area_m2: float
+    area_slope_m: float
+    volume_m3: float
+    pressure_pa: float
+    exponent: float
+    bulge_m3_pa: float
+    vent_m2: float = 0.0
+    """Area of an opening, from a pinhole to an open neck; 0: sealed."""
+    heat_s: float = math.inf
+    """Time constant with which the gas takes its walls' temperature."""
+
+
+class GasState(NamedTuple):
+    """Pressure above that at rest (Pa), and temperature above the walls' as a share of it."""
+
+    rise_pa: float
+    warmth: float = 0.0
+
+
+def gas(params: Gas, state: GasState, d0: float, d1: float, h: float) -> tuple[float, GasState]:
+    """Return the force of the pressure rise, an exponential midpoint step of second order.
+
+    With V the volume and w = V' + q what it and the vent's flow q take from the gas,
+
+        p' = (A d' - q + (V / n)(1 / T - 1) / tau) / (V / (n p) + C_w),    T' = -(n - 1) T w / V - (T - 1) / tau,
+
+    n the exponent, T the temperature over the walls', tau the heat's time constant: the gas laws of an ideal gas
+    with heat to walls that stay as warm as they are. Vent and heat relax exactly, however fast they are; what
+    comes in through the vent is taken to be as warm as what is there.
+    """
+    area, slope, whole, pressure, exponent, bulge, opening, heat_s = params
+    rise, warmth = state
+    swept0 = area * d0 + 0.5 * slope * d0 * d0
+    swept1 = area * d1 + 0.5 * slope * d1 * d1
+    lowest = -0.9 * pressure
+    warm = heat_s < math.inf
+    kept, heat_share = 1.0, 1.0
+    if warm:
+        kept = math.exp(-h / heat_s)
+        heat_share = mean_share(h / heat_s, kept)
+        exponent = 1.0 + (exponent - 1.0) * heat_share
+
+    # What the heat adds, as if it were swept volume.
+    volume = whole - swept0 + bulge * rise
+    heated = _heated(volume, warmth, warmth, kept, exponent) if warm else 0.0
+    own = _give(volume, pressure + rise, exponent)
+    give = own + bulge
+    middle = rise + 0.5 * (swept1 - swept0 + heated) / give
+    if opening > 0.0:
+        # The conductance at the pressure it leads to: the root of the orifice law makes this converge fast.
+        middle = rise
+        for _ in range(4):
+            x = 0.5 * h * conductance(opening, middle) / give
+            decay = math.exp(-x)
+            middle = rise * decay + 0.5 * (swept1 - swept0 + heated) / give * mean_share(x, decay)
+    if middle < lowest:
+        middle = lowest
+    half = 0.0
+    if warm:
+        taken = 0.5 * heated - own * (middle - rise)
+        half = 0.5 * warmth * (1.0 + kept) - (exponent - 1.0) * taken / (own * exponent * (pressure + rise))
+
+    volume = whole - 0.5 * (swept0 + swept1) + bulge * middle
+    if warm:
+        heated = _heated(volume, warmth, half, kept, exponent)
+    give = _give(volume, pressure + middle, exponent)
+    before = rise
+    if opening > 0.0:
+        x = h * conductance(opening, middle) / (give + bulge)
+        decay = math.exp(-x)
+        rise = rise * decay + (swept1 - swept0 + heated) / (give + bulge) * mean_share(x, decay)
+    else:
+        rise += (swept1 - swept0 + heated) / (give + bulge)
+    if rise < lowest:
+        rise = lowest
+    if warm:
+        taken = heated - give * (rise - before)
+        warmth = warmth * kept - (exponent - 1.0) * (1.0 + half) * taken / (
+            give * exponent * (pressure + middle)
+        )
+    return (area + slope * d1) * rise, GasState(rise, warmth)
+
+
+def _give(volume_m3: float, pressure_pa: float, exponent: float) -> float:
+    """Return how much volume (m3) the gas gives a pascal; a millilitre in a thousand is the least it holds."""
+    return (volume_m3 if volume_m3 > 1e-9 else 1e-9) / (exponent * pressure_pa)
+
+
+def _heated(volume_m3: float, warmth: float, half: float, kept: float, exponent: float) -> float:
+    """Return what the heat exchanged in a piece is worth as swept volume (m3), negative while the gas cools.
+
+    `exponent` is the one that holds over the piece, with the share of the heat that compression makes and loses
+    meanwhile in it already.
+    """
+    return volume_m3 * warmth * (kept - 1.0) / ((1.0 + half) * exponent)
+
+
+def rates(params: Gas, at: WorkingPoint) -> tuple[Rate, ...]:
+    """Return how fast the vent and the walls relax the gas, the vent at the pressure that builds up."""
+    sealed = params._replace(vent_m2=0.0, heat_s=math.inf)
+    force, _ = gas(sealed, GasState(0.0), 0.0, at.compression_m, 1.0)
+    area = params.area_m2 + params.area_slope_m * at.compression_m
+    rise = abs(force) / area if area > 0.0 else 0.0
+    found = []
+    if params.vent_m2 > 0.0:
+        # No more builds up than drives the swept volume out.
+        through = area * at.speed_m_s
+        for _ in range(60):
+            rise = min(rise, through / conductance(params.vent_m2, rise))
+        give = _give(params.volume_m3, params.pressure_pa, params.exponent) + params.bulge_m3_pa
+        found.append(Rate("relaxes", conductance(params.vent_m2, rise) / give))
+    if params.heat_s < math.inf:
+        found.append(Rate("relaxes", 1.0 / params.heat_s))
+    return tuple(found)
+
+
+TERM = Term(
+    name="gas",
+    summary="trapped gas with the wall's bulge, a vent and heat to the walls",
+    params=Gas,
+    law=gas,
+    at_rest=GasState(0.0),
+    rates=rates,
+    positive=("volume_m3", "pressure_pa", "exponent", "heat_s"),
+)

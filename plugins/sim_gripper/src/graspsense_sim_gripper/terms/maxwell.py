@@ -1,0 +1,49 @@
+"""A viscoelastic branch."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from graspsense_sim_gripper.terms.relaxation import mean_share
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
+
+
+class Maxwell(NamedTuple):
+    """A viscoelastic branch: a spring k in series with a damper k tau."""
+
+    k_n_m: float
+    tau_s: float
+
+
+class MaxwellState(NamedTuple):
+    """The branch's force."""
+
+    force_n: float
+
+
+def maxwell(
+    params: Maxwell, state: MaxwellState, d0: float, d1: float, h: float
+) -> tuple[float, MaxwellState]:
+    """Return the branch's force, exact for a straight path: q' = k d' - q / tau."""
+    x = h / params.tau_s
+    decay = math.exp(-x)
+    force = state.force_n * decay + params.k_n_m * (d1 - d0) * mean_share(x, decay)
+    return force, MaxwellState(force)
+
+
+def rates(params: Maxwell, at: WorkingPoint) -> tuple[Rate, ...]:
+    """Return 1 / tau."""
+    return (Rate("relaxes", 1.0 / params.tau_s),)
+
+
+TERM = Term(
+    name="maxwell",
+    summary="viscoelastic branch, q' = k d' - q / tau",
+    params=Maxwell,
+    law=maxwell,
+    at_rest=MaxwellState(0.0),
+    rates=rates,
+    positive=("tau_s",),
+    stiffnesses=("k_n_m",),
+)

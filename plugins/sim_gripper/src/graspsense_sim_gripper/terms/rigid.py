@@ -1,0 +1,45 @@
+"""A rigid body, which may break."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from graspsense_sim_gripper.terms.term import Term
+
+
+class Rigid(NamedTuple):
+    """A rigid body felt through its Hertz contact, K d^1.5; above the crush force it breaks for good."""
+
+    hertz_n_m15: float
+    crush_force_n: float = math.inf
+    broken_n_m: float = 0.0
+    """Stiffness of what is left."""
+
+
+class RigidState(NamedTuple):
+    """Whether it has broken (0 or 1)."""
+
+    broken: int
+
+
+def rigid(params: Rigid, state: RigidState, d0: float, d1: float, h: float) -> tuple[float, RigidState]:
+    """Return the contact force; a break is felt from the next piece of path on."""
+    if state.broken == 1:
+        return params.broken_n_m * d1, state
+    # Odd in d, so that a search that strays below zero still finds its way back.
+    force = params.hertz_n_m15 * d1 * math.sqrt(abs(d1))
+    if force > params.crush_force_n:
+        return force, RigidState(1)
+    return force, state
+
+
+TERM = Term(
+    name="rigid",
+    summary="rigid body through its Hertz contact, K d^1.5; breaks above its crush force",
+    params=Rigid,
+    law=rigid,
+    at_rest=RigidState(0),
+    positive=("hertz_n_m15",),
+    stiffnesses=("hertz_n_m15", "crush_force_n"),
+)

@@ -1,0 +1,67 @@
+"""A shell that wears with the work done on it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
+
+
+class Worn(NamedTuple):
+    """An elastic shell that softens and stays dented as it is worked.
+
+    Damage D = 1 - exp(-W / wear_j) of the work W done on it while it is pressed in, `earlier_j` of which was done
+    before this grasp. The damage takes the share `softening` D from its stiffness and leaves a set of `set_m` D:
+    force (1 - softening D) (k1 e + k3 e^3) with e = d - set_m D. The law was fixed before any grasp of a worn
+    bottle was simulated.
+    """
+
+    k1_n_m: float
+    k3_n_m3: float
+    wear_j: float
+    softening: float
+    set_m: float
+    earlier_j: float = 0.0
+
+
+class WornState(NamedTuple):
+    """The work done on it in this grasp (J), and its force (N)."""
+
+    work_j: float
+    force_n: float
+
+
+def worn(params: Worn, state: WornState, d0: float, d1: float, h: float) -> tuple[float, WornState]:
+    """Return the shell's force at the damage that this piece of path leaves."""
+    work = state.work_j
+    force = _force(params, work, d1)
+    if d1 > d0:
+        work += max(0.5 * (state.force_n + force) * (d1 - d0), 0.0)
+        force = _force(params, work, d1)
+    return force, WornState(work, force)
+
+
+def _force(params: Worn, work_j: float, d: float) -> float:
+    damage = 1.0 - math.exp(-(params.earlier_j + work_j) / params.wear_j)
+    pressed = d - params.set_m * damage
+    left = 1.0 - min(params.softening, 1.0) * damage
+    return left * (params.k1_n_m * pressed + params.k3_n_m3 * pressed * pressed * pressed)
+
+
+def rates(params: Worn, at: WorkingPoint) -> tuple[Rate, ...]:
+    """Return how fast it wears, work done per second over `wear_j`."""
+    force, _ = worn(params, WornState(0.0, 0.0), 0.0, at.compression_m, 1.0)
+    return (Rate("wears", max(force, 0.0) * at.speed_m_s / params.wear_j),)
+
+
+TERM = Term(
+    name="worn",
+    summary="elastic shell that softens and stays dented with the work done on it",
+    params=Worn,
+    law=worn,
+    at_rest=WornState(0.0, 0.0),
+    rates=rates,
+    positive=("k1_n_m", "wear_j"),
+    stiffnesses=("k1_n_m", "k3_n_m3"),
+)

@@ -1,0 +1,93 @@
+"""The model that comes with the simulator: what it says, and that its command makes it again."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("graspsense_c45", reason="the default model is a tree of graspsense-c45")
+
+from graspsense import load_pipeline
+from graspsense.cli.main import main
+
+KEPT = json.loads(files("graspsense_sim_gripper").joinpath("models/default.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def pipeline():
+    return load_pipeline("default")
+
+
+@pytest.mark.parametrize(
+    "name", ["odwalla:full_closed", "odwalla:full_open", "can:full_closed", "water:full_open"]
+)
+def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
+    said = pipeline.grasp(object=name, seed=5).prediction
+
+    assert said.label == name
+    assert said.probabilities[name] == max(said.probabilities.values())
+    assert any(step.startswith(("p_first ", "p_steady ", "f_steady ", "delta_t ")) for step in said.because)
+    assert "simulated grasps at 20 N, 10 mm/s" in said.model
+    assert said.warnings == ("trained on simulated grasps: right for the simulator, untested on real things",)
+
+
+@pytest.mark.parametrize("name", ["egg", "block", "toy"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_what_it_never_saw_is_unknown(pipeline, name, seed):
+    said = pipeline.grasp(object=name, seed=seed).prediction
+
+    assert said.label == "unknown"
+    assert "is unlike everything trained on" in said.because[0]
+
+
+def test_nothing_there_is_unknown(pipeline):
+    said = pipeline.grasp(object="none").prediction
+
+    assert said.label == "unknown"
+    assert said.because == ("no feature is defined: no pad felt 0.625 N",)
+
+
+def test_its_provenance_says_what_made_it():
+    provenance = KEPT["provenance"]
+
+    assert provenance["simulated"] is True
+    assert provenance["settings"]["controller"]["probing_force_n"] == 20.0
+    assert provenance["settings"]["controller"]["closing_speed_m_s"] == 0.01
+    assert provenance["settings"]["gripper"]["transmission"] == "pr2"
+    assert provenance["trials"] == sum(provenance["by_label"].values())
+    assert len(provenance["by_label"]) == 15
+    assert provenance["components"].keys() == {"gripper", "controller", "features"}
+    assert {"graspsense", "graspsense-c45", "numpy", "python"} == provenance["versions"].keys()
+
+
+def test_it_was_made_with_the_settings_of_today():
+    values = load_pipeline("default").settings.values
+
+    for table in ("gripper", "controller", "features"):
+        assert KEPT["provenance"]["settings"][table] == json.loads(json.dumps(values[table]))
+
+
+@pytest.mark.slow
+def test_its_command_makes_it_again(tmp_path: Path) -> None:
+    again = tmp_path / "default.json"
+    words = shlex.split(KEPT["provenance"]["command"])
+    words[words.index("--out") + 1] = str(again)
+    with pytest.raises(SystemExit) as ended:
+        main(words[1:])
+    assert not ended.value.code
+    made = json.loads(again.read_text(encoding="utf-8"))
+
+    for key in ("classifier", "settings", "target", "features"):
+        assert made[key] == KEPT[key]
+    nodes, kept = made["model"]["nodes"], KEPT["model"]["nodes"]
+    for column in ("attribute", "value", "n_sons", "weights"):
+        assert nodes[column] == kept[column]
+    for threshold, before in zip(nodes["threshold"], kept["threshold"], strict=True):
+        assert threshold == before or threshold == pytest.approx(before, rel=0.0, abs=1e-9)
+    for label, ends in KEPT["unknown"]["ranges"].items():
+        for one, before in zip(made["unknown"]["ranges"][label], ends, strict=True):
+            assert one == pytest.approx(before, rel=0.0, abs=1e-9)
