@@ -1,0 +1,197 @@
+"""Every classifier behind the role: c45 from its own distribution, the others scikit-learn's."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from graspsense.core.errors import ConfigError
+from graspsense.core.features import Features, FeatureTable
+from graspsense.plugin_api import create
+
+ALL = ["c45", "svm", "mlp", "forest", "knn", "tree"]
+NAMES, UNITS = ("p_first", "f_steady", "noise"), ("m", "N", "")
+
+
+def trials(n=40, seed=0, missing=0.0):
+    """Two bottles and a can: width and force tell them apart, the third feature nothing."""
+    rng = np.random.default_rng(seed)
+    labels = [("bottle:full", "bottle:empty", "can:full")[i % 3] for i in range(3 * n)]
+    centre = {"bottle:full": (0.058, 8.0), "bottle:empty": (0.058, 5.0), "can:full": (0.066, 8.0)}
+    values = np.array([(*centre[label], 0.0) for label in labels])
+    values += rng.normal(size=values.shape) * (0.0005, 0.3, 1.0)
+    values[rng.random(values.shape) < missing] = np.nan
+    return FeatureTable(names=NAMES, units=UNITS, values=values), labels
+
+
+def fitted(name, table, labels, seed=0, **config):
+    classifier = create("classifier", name, **config)
+    classifier.fit(table, labels, seed)
+    return classifier
+
+
+def rate(classifier, table, labels):
+    answers = classifier.probabilities(table).argmax(axis=1)
+    return np.mean([classifier.classes()[k] == label for k, label in zip(answers, labels, strict=True)])
+
+
+@pytest.mark.parametrize("name", ALL)
+class TestEvery:
+    def test_it_learns_what_can_be_learned(self, name):
+        classifier = fitted(name, *trials())
+
+        assert set(classifier.classes()) == {"bottle:full", "bottle:empty", "can:full"}
+        assert rate(classifier, *trials(seed=1)) > 0.95
+
+    def test_probabilities_sum_to_one_and_lead_to_what_it_explains(self, name):
+        classifier = fitted(name, *trials())
+        table, _ = trials(n=5, seed=2)
+        shares = classifier.probabilities(table)
+
+        assert shares.shape == (15, 3)
+        assert shares.sum(axis=1) == pytest.approx(np.ones(15))
+        for i in range(15):
+            said = classifier.explain(table.row(i))
+            assert said.label == classifier.classes()[shares[i].argmax()]
+            assert list(said.probabilities.values()) == pytest.approx(shares[i].tolist())
+            assert said.because
+
+    def test_missing_values_in_training_and_in_a_trial_have_an_answer(self, name):
+        classifier = fitted(name, *trials(missing=0.2))
+        table, labels = trials(seed=1, missing=0.1)
+
+        assert rate(classifier, table, labels) > 0.75
+        row = Features(
+            names=NAMES,
+            values=(0.0661, math.nan, 0.0),
+            units=UNITS,
+            reasons={"f_steady": "the fingers never came to rest"},
+        )
+        said = classifier.explain(row)
+        assert said.label == "can:full"
+        assert any("f_steady is missing" in one and "never came to rest" in one for one in said.because)
+
+    def test_a_feature_that_no_trial_had_and_one_that_is_constant(self, name):
+        table, labels = trials()
+        values = np.column_stack((table.values, np.full(len(labels), np.nan), np.full(len(labels), 7.0)))
+        wide = FeatureTable(names=(*NAMES, "none", "same"), units=(*UNITS, "", ""), values=values)
+        classifier = fitted(name, wide, labels)
+
+        assert rate(classifier, wide, labels) > 0.95
+        assert np.isfinite(classifier.probabilities(wide)).all()
+
+    def test_the_order_of_columns_does_not_matter(self, name):
+        classifier = fitted(name, *trials())
+        table, _ = trials(n=4, seed=3)
+
+        turned = table.columns(("noise", "p_first", "f_steady"))
+        assert (classifier.probabilities(turned) == classifier.probabilities(table)).all()
+
+    def test_two_labels_and_the_same_seed(self, name):
+        table, labels = trials()
+        two = [label.partition(":")[0] for label in labels]
+        first, again = fitted(name, table, two, seed=5), fitted(name, table, two, seed=5)
+
+        assert first.classes() == ("bottle", "can")
+        assert rate(first, table, two) > 0.95
+        assert (first.probabilities(table) == again.probabilities(table)).all()
+
+    def test_it_comes_back_from_json_the_same(self, name):
+        classifier = fitted(name, *trials(missing=0.1), seed=3)
+        table, _ = trials(seed=4, missing=0.1)
+        kept = json.loads(json.dumps(classifier.to_json(), allow_nan=False))
+        again = create("classifier", name)
+        again.from_json(kept)
+
+        assert again.classes() == classifier.classes()
+        assert (again.probabilities(table) == classifier.probabilities(table)).all()
+        assert again.explain(table.row(0)) == classifier.explain(table.row(0))
+        assert again.to_json() == classifier.to_json()
+
+    @pytest.mark.parametrize(
+        "damage", [{}, {"format": "pickle"}, {"features": [], "labels": [], "trials": [], "seed": 0}]
+    )
+    def test_what_is_no_model_is_refused(self, name, damage):
+        with pytest.raises((KeyError, TypeError, ValueError)):
+            create("classifier", name).from_json(damage)
+
+
+@pytest.mark.parametrize("name", ALL[1:])
+def test_one_label_is_refused(name):
+    table, labels = trials()
+    with pytest.raises(ValueError, match="nothing to tell apart"):
+        fitted(name, table, ["same"] * len(labels))
+
+
+def test_another_version_of_scikit_learn_is_said():
+    kept = fitted("knn", *trials()).to_json()
+    again = create("classifier", "knn")
+    again.from_json({**kept, "made_with": "scikit-learn 0.1"})
+
+    (warning,) = again.explain(trials()[0].row(0)).warnings
+    assert "made with scikit-learn 0.1 and made again with" in warning
+
+
+def test_trees_tell_their_path_in_the_features_own_units():
+    table, labels = trials()
+    row = Features(names=NAMES, values=(0.0661, 8.0, 0.0), units=UNITS)
+    for name, unit in (("c45", " m "), ("tree", " mm ")):
+        because = fitted(name, table, labels).explain(row).because
+        assert any(one.startswith("p_first") and unit in one and ">" in one for one in because)
+        assert "training trials" in because[-1]
+
+
+def test_neighbours_tell_their_votes():
+    row = Features(names=NAMES, values=(0.0661, 8.0, 0.0), units=UNITS)
+    because = fitted("knn", *trials(), neighbours=7).explain(row).because
+
+    assert because[-1].startswith("7 of the 7 nearest training trials are can:full; the nearest is ")
+
+
+def test_more_neighbours_than_trials():
+    table, labels = trials(n=1)
+
+    assert fitted("knn", table, labels, neighbours=50).probabilities(table).shape == (3, 3)
+
+
+def test_settings_are_checked():
+    with pytest.raises(ConfigError, match="confidence_factor"):
+        create("classifier", "c45", confidence_factor=1.5)
+    with pytest.raises(ConfigError, match="neighbours"):
+        create("classifier", "knn", neighbours=0)
+
+
+def test_pruning_against_held_out_trials_makes_a_smaller_tree():
+    table, labels = trials()
+    rng = np.random.default_rng(0)
+    noisy = [label if rng.random() > 0.2 else "can:full" for label in labels]
+    whole = fitted("c45", table, noisy, pruning="none", mdl_correction=False)
+    pruned = fitted("c45", table, noisy, pruning="reduced_error", mdl_correction=False)
+
+    def nodes(tree):
+        return len(tree.to_json()["nodes"]["attribute"])
+
+    assert nodes(pruned) < nodes(whole)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_scikit_learn_is_imported_when_one_of_its_own_is_fitted_and_not_before(name):
+    code = f"""
+import sys
+from graspsense.core.plugins import installed
+component = installed().find("classifier", {name!r})
+classifier = component.create(component.config_class()())
+assert "sklearn" not in sys.modules and "numba" not in sys.modules
+import numpy as np
+from graspsense.core.features import FeatureTable
+table = FeatureTable(names=("a",), units=("",), values=np.arange(20.0)[:, None])
+classifier.fit(table, ["x"] * 10 + ["y"] * 10, 0)
+assert ("sklearn" in sys.modules) is {name != "c45"}
+"""
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
+    assert ran.returncode == 0, ran.stderr

@@ -1,0 +1,243 @@
+"""What evaluate measures, on trials of which the truth is known."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from graspsense.core.config import Chosen
+from graspsense.core.errors import ConfigError
+from graspsense.core.features import FeatureTable
+from graspsense.core.labelled import Control, Labelled
+from graspsense.core.plugins import installed
+from graspsense.evaluation.confusion import confusion
+from graspsense.evaluation.crossval import thinned
+from graspsense.evaluation.evaluate import evaluate
+
+
+def learner(name="c45"):
+    component = installed().find("classifier", name)
+    return Chosen(component, component.config_class()())
+
+
+def table(*columns, names=None):
+    values = np.column_stack(columns)
+    names = names or tuple(f"x{k}" for k in range(values.shape[1]))
+    return FeatureTable(names=names, units=("",) * len(names), values=values)
+
+
+def labelled(labels, *columns, **more):
+    return Labelled(source="a test", table=table(*columns), labels=tuple(labels), **more)
+
+
+def judged(trials, name="c45", **more):
+    return evaluate(learner(name), trials, classifier=name, **more)
+
+
+STATES = ["can:full", "can:empty", "jar:full", "jar:empty"]
+
+
+def four_states(n=30, seed=0):
+    """Width tells can from jar, force tells full from empty."""
+    rng = np.random.default_rng(seed)
+    labels = [STATES[i % 4] for i in range(4 * n)]
+    width = np.array([60.0 if label.startswith("can") else 50.0 for label in labels]) + rng.normal(size=4 * n)
+    force = np.array([9.0 if label.endswith("full") else 3.0 for label in labels]) + rng.normal(size=4 * n)
+    return labels, width, force
+
+
+def test_what_can_be_told_apart_is_and_noise_is_not():
+    labels, width, force = four_states()
+    rng = np.random.default_rng(1)
+
+    good = judged(labelled(labels, width, force))
+    noise = judged(labelled(labels, rng.normal(size=120), rng.normal(size=120)))
+
+    assert good.headline.rate > 0.95
+    assert noise.headline.interval[0] < 0.25 < noise.headline.interval[1]
+    assert good.controls["majority_class"].rate.rate == 0.25
+    assert good.headline.n == good.confusion.n == 120
+    assert good.headline.correct == good.confusion.correct
+
+
+def test_class_and_state_given_the_class():
+    labels, width, force = four_states()
+    by_width = labelled(labels, width)
+
+    assert judged(by_width, target="class").headline.rate > 0.95
+    state = judged(by_width, target="state")
+    assert state.headline.interval[0] < 0.5 < state.headline.interval[1]
+    assert judged(labelled(labels, force), target="state").headline.rate > 0.95
+    # Only states of one's own class can be answered.
+    for i, one in enumerate(state.confusion.labels):
+        for j, other in enumerate(state.confusion.labels):
+            assert one[:3] == other[:3] or state.confusion.counts[i][j] == 0
+    assert state.controls["majority_class"].rate.rate == 0.5
+    assert set(state.by_class) == {"can", "jar"}
+
+
+def test_a_class_of_one_state_is_left_out_of_the_states():
+    labels, width, force = four_states()
+    labels = ["egg:whole" if label == "jar:full" else label for label in labels]
+    labels = ["egg:whole" if label == "jar:empty" else label for label in labels]
+    found = judged(labelled(labels, width, force), target="state")
+
+    assert found.headline.n == 60
+    assert "left out, as they have one state only: egg" in found.notes
+    with pytest.raises(ConfigError, match="has no state"):
+        judged(labelled(["a", "b"] * 20, width[:40]), target="state")
+
+
+def test_a_rate_that_is_the_instance_is_found_out():
+    """Each of 20 things has a width of its own, which says nothing of its label; noise is small beside it."""
+    rng = np.random.default_rng(0)
+    things = np.repeat(np.arange(20), 6)
+    labels = [("full", "empty")[thing % 2] for thing in things]
+    width = rng.normal(size=20)[things] + 1e-3 * rng.normal(size=120)
+    found = judged(labelled(labels, width, instances=tuple(f"thing{k}" for k in things)), "knn")
+
+    assert found.protocol == "instance_held_out"
+    assert found.protocols["stratified_10_fold"].rate.rate > 0.95
+    assert found.headline.rate < 0.75
+    held = found.controls["instance_held_out"]
+    assert held.rate == found.headline
+    assert held.difference.interval[0] > 0.2
+    assert any("the very things'" in warning for warning in found.warnings)
+
+
+def test_a_rate_that_is_the_moment_of_the_recording_is_found_out():
+    """A value that drifts, each label recorded now and then: neighbours in time are alike."""
+    rng = np.random.default_rng(0)
+    order = np.arange(120)
+    labels = [("full", "empty")[(i // 12) % 2] for i in order]
+    drift = 0.1 * order + 1e-3 * rng.normal(size=120)
+    found = judged(labelled(labels, drift, order=tuple(order.tolist())), "knn")
+
+    assert found.headline.rate > 0.85
+    assert found.controls["recording_order"].rate.rate < 0.7
+    assert found.controls["recording_order"].difference.interval[0] > 0.2
+    assert any("the moment's of the recording" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize("leak", [True, False])
+def test_what_is_known_before_the_contact_is_a_warning_only_where_it_tells(leak):
+    labels, width, force = four_states()
+    rng = np.random.default_rng(2)
+    posture = (width if leak else rng.normal(size=120)) + 0.0
+    control = Control(table=table(posture, names=("posture",)), what="posture before the grasp")
+    found = judged(labelled(labels, width, force, before_contact=control))
+
+    assert any("before any contact" in warning for warning in found.warnings) is leak
+    assert found.controls["before_contact"].what == "posture before the grasp"
+    assert (found.controls["before_contact"].rate.rate > 0.4) is leak
+
+
+def test_what_cannot_be_measured_is_null_with_a_reason():
+    labels, width, force = four_states()
+    found = judged(labelled(labels, width, force, no_instances="one thing a class")).as_json()
+
+    assert found["protocol"] == "stratified_10_fold"
+    assert found["controls"]["instance_held_out"]["rate"] is None
+    assert found["controls"]["instance_held_out"]["reason"] == "one thing a class"
+    for name in ("before_contact", "width_only", "recording_order"):
+        assert found["controls"][name]["rate"] is None
+        assert found["controls"][name]["reason"]
+
+
+def test_one_instance_of_a_label_cannot_be_held_out():
+    labels, width, force = four_states()
+    things = tuple("only can" if label.startswith("can") else f"jar{i % 5}" for i, label in enumerate(labels))
+    held = judged(labelled(labels, width, force, instances=things)).controls["instance_held_out"]
+
+    assert held.rate is None
+    assert held.reason == "one instance only, which cannot be held out and known: can:empty, can:full"
+
+
+def test_the_json_is_whole_and_stable():
+    labels, width, force = four_states()
+    trials = labelled(labels, width, force, order=tuple(range(120)))
+    first, again = (json.dumps(judged(trials, seed=2).as_json(), allow_nan=False) for _ in range(2))
+    found = json.loads(first)
+
+    assert first == again
+    assert found.keys() >= {
+        "protocol",
+        "n",
+        "rate",
+        "interval",
+        "labels",
+        "confusion",
+        "controls",
+        "learning_curve",
+    }
+    assert list(found["controls"])[:5] == [
+        "before_contact",
+        "width_only",
+        "instance_held_out",
+        "recording_order",
+        "majority_class",
+    ]
+    assert sum(map(sum, found["confusion"])) == found["n"] == 120
+    assert sum(found["confusion"][k][k] for k in range(4)) == found["correct"] == round(found["rate"] * 120)
+    # A row is the truth: every label was there thirty times.
+    assert [sum(row) for row in found["confusion"]] == [30] * 4
+
+
+def test_the_learning_curve_ends_at_the_headline_and_grows():
+    labels, width, force = four_states(n=60)
+    found = judged(labelled(labels, width, force))
+    curve = found.learning_curve
+
+    assert curve[-1].rate == found.headline
+    assert [round(point.trained_on) for point in curve] == [20, 44, 88, 152, 216]
+
+
+@pytest.mark.parametrize("n", [9, 4])
+def test_few_trials_are_said_or_refused(n):
+    labels, width, force = four_states()
+    trials = labelled(labels, width, force)
+    few = trials.rows(np.array([i for i in range(120) if i < 4 * n or labels[i] != "can:full"]))
+
+    assert "fewer trials than folds (10): can:full" in judged(few).notes
+    with pytest.raises(ConfigError, match="cannot be cut into 10 folds"):
+        judged(trials.rows(np.arange(8)))
+
+
+def test_a_label_of_one_trial_can_never_be_right_and_one_label_is_nothing():
+    labels, width, force = four_states()
+    alone = judged(labelled(["egg", *labels[1:]], width, force))
+
+    assert "one trial only, so that no fold can get it right: egg" in alone.notes
+    assert alone.by_class["egg"].correct == 0
+    with pytest.raises(ConfigError, match="has the label 'can': there is nothing to tell apart"):
+        judged(labelled(["can"] * 120, width))
+
+
+def test_unlike_trials_are_counted():
+    labels, width, force = four_states()
+    odd = evolve(labelled(labels, width, force))
+    odd.table.values[7] = 1e4
+
+    assert judged(odd).unlike.correct >= 1
+    assert judged(labelled(labels, width, np.zeros(120))).unlike.correct <= 3
+
+
+def test_a_smaller_share_lies_within_a_larger_one_and_keeps_every_label():
+    labels = ["a"] * 50 + ["b"] * 3
+    rows = np.arange(53)
+    small, large = (set(thinned(rows, labels, share, 0).tolist()) for share in (0.1, 0.4))
+
+    assert small <= large
+    assert {labels[i] for i in small} == {"a", "b"}
+    assert (len(small), len(large)) == (6, 21)
+
+
+def test_a_confusion_has_every_label_of_either_side():
+    found = confusion(["a", "b", "b"], ["a", "c", "b"])
+
+    assert found.labels == ("a", "b", "c")
+    assert found.counts == ((1, 0, 0), (0, 1, 1), (0, 0, 0))
+    assert (found.correct, found.n) == (2, 3)

@@ -1,0 +1,139 @@
+"""The iCub Grasp Dataset as labelled trials: the mapping on files of our own making, the figures on the real ones."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+
+from graspsense.core.config import Chosen
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.plugins import installed
+from graspsense.evaluation.evaluate import evaluate
+from graspsense.plugin_api import create
+from graspsense.trials.icub_features import read_dataset
+
+real_data = pytest.mark.skipif(
+    "GRASPSENSE_ICUB" not in os.environ,
+    reason="needs the iCub Grasp Dataset: name its folder in GRASPSENSE_ICUB",
+)
+
+
+def grasp(flexion, pressed):
+    """A file: all six flexion joints at each of these angles, every finger pressed by so many counts on one taxel."""
+    lines = ["-10000"]
+    for angle, counts in zip(flexion, pressed, strict=True):
+        lines.append(" ".join(["20", "80", *[str(angle)] * 6, "2"]))
+        lines.append(" ".join(["15.0"] * 5))
+        lines += [" ".join([str(240 - counts), *["240"] * 11])] * 5
+    return "\n".join(lines) + "\n"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for k in range(1, 4):
+        (tmp_path / f"can_{k}.txt").write_text(
+            grasp([10 + k, 14 + k, 16 + k, 16 + k, 16 + k], [0, 0, 10, 20, 20])
+        )
+        (tmp_path / f"none_{k}.txt").write_text(grasp([30, 40, 50, 60, 60], [0] * 5))
+        (tmp_path / f"full_coke_{k}.txt").write_text(grasp([30, 40, 50, 60, 60], [0] * 5))
+    (tmp_path / "README.txt").write_text("not a grasp")
+    return tmp_path
+
+
+def read(folder, **more):
+    return read_dataset(str(folder), create("feature-set", "chitta"), **more)
+
+
+def test_labels_order_and_what_is_left_out(folder):
+    found = read(folder)
+
+    assert found.labels == ("can",) * 3 + ("none",) * 3
+    assert found.order == (1, 2, 3) * 2
+    assert found.instances is None
+    assert found.no_instances
+    assert any(
+        "3 grasps of full_coke left out: their author calls them unreliable" in note for note in found.notes
+    )
+    assert any("times count frames" in note for note in found.notes)
+    assert read(folder, unreliable=True).labels == ("can",) * 3 + ("full_coke",) * 3 + ("none",) * 3
+
+
+def test_features_are_relative_to_the_first_frame_and_the_variant_adds_it_back(folder):
+    found = read(folder)
+    relative, absolute = found.table, found.variants["absolute"].table
+
+    # Contact in the third frame: six degrees on from the first, hence 80 - 6 mm; there it stays.
+    assert (
+        relative.values[0].tolist()[:4] == pytest.approx([0.074, 0.074, 1.0, 0.0])
+        or relative.values[0, 0] == 0.074
+    )
+    assert (relative.values[0, :2] == relative.values[1, :2]).all()
+    # The first frame differs by a degree from grasp to grasp: -1 mm a degree, and 15 counts on 12 taxels at rest.
+    assert absolute.values[:3, 0] - relative.values[:3, 0] == pytest.approx([-0.011, -0.012, -0.013])
+    assert absolute.values[:3, 2] - relative.values[:3, 2] == pytest.approx(0.1 * 15 * 12)
+    assert (absolute.values[:3, 3:] == relative.values[:3, 3:])[~np.isnan(relative.values[:3, 3:])].all()
+    assert np.isnan(relative.values[3:]).all()
+    assert any("3 of 6 grasps have no contact of both sides" in note for note in found.notes)
+    assert relative.units == ("m", "m", "N", "frame", "m/frame", "N/frame")
+
+
+def test_the_first_frame_as_it_stands(folder):
+    control = read(folder).before_contact
+
+    assert control.table.values.shape == (6, 74)
+    assert control.table.values[0].tolist() == [20.0, 80.0, *[11.0] * 6, 2.0, *[15.0] * 5, *[240.0] * 60]
+
+
+def test_a_folder_without_grasps_and_a_damaged_file(folder, tmp_path):
+    with pytest.raises(ConfigError, match="there is no folder"):
+        read(tmp_path / "nowhere")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ConfigError, match="holds no file of the iCub Grasp Dataset"):
+        read(tmp_path / "empty")
+    (folder / "can_2.txt").write_text((folder / "can_2.txt").read_text()[:-40])
+    with pytest.raises(DataDamaged, match=r"can_2\.txt, line"):
+        read(folder)
+
+
+@pytest.fixture(scope="module")
+def found():
+    labelled = read(os.environ["GRASPSENSE_ICUB"])
+    component = installed().find("classifier", "c45")
+    return evaluate(Chosen(component, component.config_class()()), labelled, classifier="c45")
+
+
+@real_data
+def test_the_first_frame_alone_gives_the_class_away_before_any_touch(found):
+    leak = found.controls["before_contact"]
+
+    assert leak.rate.n == 203
+    assert leak.rate.rate >= 0.9
+    assert any("before any contact" in warning for warning in found.warnings)
+
+
+@real_data
+def test_features_relative_to_it_are_a_tenth_below_the_absolute_ones(found):
+    assert found.protocol == "stratified_10_fold"
+    assert found.headline.rate <= found.controls["absolute"].rate.rate - 0.1
+    assert found.headline.interval[0] > found.controls["majority_class"].rate.interval[1]
+
+
+@real_data
+def test_blocks_of_recording_order_are_reported_with_their_interval(found):
+    blocks = found.as_json()["controls"]["recording_order"]
+
+    assert blocks["n"] == 203
+    assert blocks["difference"] == pytest.approx(found.headline.rate - blocks["rate"])
+    low, high = blocks["difference_interval"]
+    assert low < blocks["difference"] < high
+    assert blocks["difference_of"] == "stratified_10_fold less this"
+
+
+@real_data
+def test_no_instance_can_be_held_out_there(found):
+    held = found.as_json()["controls"]["instance_held_out"]
+
+    assert held["rate"] is None
+    assert held["reason"] == "every class of this set is one object, so that none can be held out"

@@ -1,0 +1,211 @@
+"""train, predict and evaluate, as a user types them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from graspsense.cli.main import main
+
+
+@pytest.fixture
+def run(capsys):
+    def run(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main([str(one) for one in arguments])
+        out, err = capsys.readouterr()
+        return ended.value.code or 0, out, err
+
+    return run
+
+
+@pytest.fixture
+def csv(tmp_path):
+    rng = np.random.default_rng(0)
+    lines = ["what,thing,p_first [m],f_steady [N]"]
+    for i in range(120):
+        kind, state = ("can", "jar")[i % 2], ("full", "empty")[(i // 2) % 2]
+        width = {"can": 0.066, "jar": 0.055}[kind] + 0.001 * rng.normal()
+        force = {"full": 9.0, "empty": 4.0}[state] + rng.normal()
+        lines.append(f"{kind}:{state},{kind}{i % 6},{width:.5f},{force:.3f}")
+    path = tmp_path / "mine.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_an_honest_rate_of_ones_own_csv_in_one_command(run, csv):
+    code, out, _ = run("evaluate", csv, "--label", "what", "--instance", "thing")
+
+    assert code == 0
+    assert "rate        0.9" in out
+    for line in (
+        "instance_held_out",
+        "stratified_10_fold",
+        "before_contact",
+        "width_only",
+        "recording_order",
+    ):
+        assert f"\n{line}" in out
+    assert "confusion (rows are the truth)" in out
+    assert "learning curve" in out
+    assert "no columns are named as known before the contact (--before COLUMNS)" in out
+
+
+def test_its_json(run, csv):
+    code, out, _ = run(
+        "evaluate", csv, "--label", "what", "--json", "--classifier", "knn", "-o", "classifier.neighbours=3"
+    )
+    found = json.loads(out)
+
+    assert code == 0
+    assert found["classifier"].startswith("graspsense/knn ")
+    assert found["settings"] == {"neighbours": 3}
+    assert found["protocol"] == "stratified_10_fold"
+    assert found["n"] == 120
+    assert found["labels"] == ["can:empty", "can:full", "jar:empty", "jar:full"]
+    assert found["controls"]["width_only"]["rate"] < 0.8 < found["rate"]
+
+
+def test_states_of_one_class(run, csv):
+    _, out, _ = run("evaluate", csv, "--label", "what", "--json", "--target", "state", "--only", "can")
+
+    assert json.loads(out)["labels"] == ["can:empty", "can:full"]
+
+
+def test_train_then_predict(run, csv, tmp_path):
+    model = tmp_path / "mine.json"
+    code, out, _ = run("train", csv, "--label", "what", "--instance", "thing", "--out", model)
+    assert code == 0
+    assert "labels      can:empty, can:full, jar:empty, jar:full" in out
+    assert f"how good    graspsense evaluate {csv} --label what --instance thing" in out
+    assert json.loads(model.read_text())["provenance"]["command"] == (
+        f"graspsense train {csv} --out {model} --label what --instance thing"
+    )
+
+    new = tmp_path / "new.csv"
+    new.write_text("f_steady,p_first,comment\n9.1,0.0661,a\n4.2,0.0549,b\n9.0,0.0300,c\n,0.066,d\n")
+    code, out, _ = run("predict", model, new, "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert [one["label"] for one in found["predictions"]][:3] == ["can:full", "jar:empty", "unknown"]
+    assert found["unknown"] == 1
+    assert found["rate"] is None
+    assert any("f_steady is missing" in one for one in found["predictions"][3]["because"])
+
+    code, out, _ = run("predict", model, csv, "--label", "what")
+    assert code == 0
+    assert "an answer of unknown counts as wrong" in out
+
+
+def test_a_model_of_states_or_classes(run, csv, tmp_path):
+    model = tmp_path / "states.json"
+    code, _, err = run("train", csv, "--label", "what", "--out", model, "--target", "state")
+    assert code == 2
+    assert "name it with --only, one of can, jar" in err
+    assert run("train", csv, "--label", "what", "--out", model, "--target", "state", "--only", "jar")[0] == 0
+    assert json.loads(model.read_text())["target"] == "state"
+    assert run("train", csv, "--label", "what", "--out", model, "--target", "class", "--json")[0] == 0
+    found = json.loads(run("predict", model, csv, "--label", "what", "--json")[1])
+    assert found["rate"]["rate"] > 0.9
+
+
+def test_features_are_kept(run, csv, tmp_path):
+    kept = tmp_path / "kept.csv"
+    run("evaluate", csv, "--label", "what", "--instance", "thing", "--keep", kept)
+    first = json.loads(run("evaluate", csv, "--label", "what", "--instance", "thing", "--json")[1])
+    again = json.loads(
+        run("evaluate", kept, "--label", "label", "--instance", "instance", "--order", "order", "--json")[1]
+    )
+
+    assert again["confusion"] == first["confusion"]
+    assert again["controls"]["recording_order"] == first["controls"]["recording_order"]
+
+
+def test_the_picture_of_the_confusion(run, csv, tmp_path):
+    pytest.importorskip("matplotlib", reason="needs matplotlib, the extra `plot`")
+    picture = tmp_path / "confusion.png"
+    code, _, err = run("evaluate", csv, "--label", "what", "--png", picture)
+
+    assert code == 0
+    assert f"drawn in {picture}" in err
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (
+            ["evaluate", "nothing"],
+            2,
+            "is no source of trials: name a FILE.csv, a data set as icub:FOLDER, or `simulated`",
+        ),
+        (["evaluate", "none.csv", "--label", "x"], 2, "none.csv cannot be read"),
+        (["evaluate", "none.csv"], 2, "which column of none.csv holds the label? Name it: --label COLUMN"),
+        (["evaluate", "nosuch:x"], 2, "no data set named 'nosuch'. Known: icub"),
+        (["evaluate", "icub:"], 2, "names no folder"),
+        (["evaluate", "icub:nowhere"], 2, "there is no folder nowhere"),
+        (["evaluate", "icub:x", "--label", "y"], 2, "--label is for a CSV source; this one is a data set"),
+        (
+            ["evaluate", "x.csv", "--instances", "3"],
+            2,
+            "--instances is for a simulated source; this one is a CSV",
+        ),
+        (["evaluate", "x.csv", "--label", "y", "--classifier", "treee"], 2, "no classifier named 'treee'"),
+        (
+            ["evaluate", "x.csv", "--label", "y", "-o", "controller.ramp_s=1"],
+            2,
+            "only keys of [classifier] and [features]",
+        ),
+        (["evaluate", "x.csv", "--label", "y", "-o", "classifier.trees=3"], 2, "no key 'trees'"),
+        (["evaluate", "simulated", "--instances", "0"], 2, "0 instances of an object: give 1 to 1000"),
+        (["evaluate", "simulated", "--trials", "0"], 2, "0 trials of an instance"),
+        (["evaluate", "simulated", "--objects", "canoe"], 2, "no object named 'canoe'"),
+        (["evaluate", "simulated", "--objects", "can,can:full_open"], 2, "an object is named twice"),
+        (["evaluate", "simulated", "--objects", "can:full_open#3"], 2, "without an instance"),
+        (["train", "x.csv", "--label", "y", "--out", "model.pkl"], 2, "a model's file ends in .json"),
+        (["predict", "nosuch", "x.csv"], 2, "no model named 'nosuch'"),
+    ],
+)
+def test_mistakes(run, monkeypatch, tmp_path, arguments, code, said):
+    monkeypatch.chdir(tmp_path)
+    ended, _, err = run(*arguments)
+
+    assert ended == code
+    assert said in err
+    assert "Traceback" not in err
+
+
+def test_other_columns_than_the_model_takes(run, csv, tmp_path):
+    model = tmp_path / "mine.json"
+    run("train", csv, "--label", "what", "--out", model)
+    other = tmp_path / "other.csv"
+    other.write_text("p_first [mm],f_steady [N]\n66,9\n")
+    code, _, err = run("predict", model, other)
+
+    assert code == 2
+    assert "takes p_first in m; here it is in mm" in err
+
+
+def test_simulated_trials_small_and_whole(run):
+    code, out, _ = run(
+        "evaluate",
+        "simulated",
+        "--objects",
+        "can",
+        "--instances",
+        "2",
+        "--trials",
+        "2",
+        "--folds",
+        "2",
+        "--json",
+    )
+    found = json.loads(out)
+
+    assert code == 0
+    assert found["n"] == 12
+    assert found["protocol"] == "instance_held_out"
+    assert found["controls"]["before_contact"]["n"] == 12
+    assert any("simulated" in note for note in found["notes"])

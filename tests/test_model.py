@@ -1,0 +1,235 @@
+"""A model's file, and what a model says of a grasp."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+
+import pytest
+from attrs import evolve
+from test_classifiers import NAMES, UNITS, trials
+
+from graspsense.core.config import Flag, resolve
+from graspsense.core.errors import ConfigError, DataDamaged, UnknownName
+from graspsense.core.features import UNKNOWN, Features
+from graspsense.core.labelled import Labelled
+from graspsense.core.model import load_model, model_for, train, write_model
+from graspsense.core.plugins import IsolatedPlugins, installed
+from graspsense.core.roles import DeviceInfo
+from graspsense.core.signals import EFFORT, Command
+
+CAN = Features(names=NAMES, values=(0.0661, 8.0, 0.0), units=UNITS)
+
+
+def model(name="c45", **provenance):
+    table, labels = trials()
+    component = installed().find("classifier", name)
+    labelled = Labelled(source="a test", table=table, labels=tuple(labels), provenance=provenance)
+    return train(component, component.config_class()(), labelled, name="test", seed=4)
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "model.json"
+    write_model(path, model())
+    return path
+
+
+def rewritten(path, **changes):
+    """Change a model's file and give it the digest that fits."""
+    content = {**json.loads(path.read_text()), **changes}
+    content.pop("sha256")
+    text = json.dumps(content, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
+    content["sha256"] = hashlib.sha256(text.encode()).hexdigest()
+    path.write_text(json.dumps(content))
+
+
+def device(clock):
+    relaxed = Command(EFFORT, 0.0, 1.0, 1.0)
+    return DeviceInfo(
+        name="x",
+        clock=clock,
+        rate_hz=1e3,
+        effort_limit_n=1.0,
+        speed_limit_m_s=1.0,
+        opening=None,
+        relaxed=relaxed,
+    )
+
+
+@pytest.mark.parametrize("name", ["c45", "knn"])
+def test_a_file_gives_back_the_model(tmp_path, name):
+    made = model(name)
+    write_model(tmp_path / "kept.json", made)
+    again = load_model(str(tmp_path / "kept.json"), installed())
+
+    table, _ = trials(seed=9)
+    assert (again.classifier.probabilities(table) == made.classifier.probabilities(table)).all()
+    assert again.as_json() == made.as_json()
+    assert again.predict(CAN).label == "can:full"
+
+
+def test_the_file_says_what_it_was_trained_on(file):
+    kept = json.loads(file.read_text())
+
+    assert kept["classifier"] == "graspsense-c45/c45"
+    assert kept["features"] == [["p_first", "m"], ["f_steady", "N"], ["noise", ""]]
+    assert kept["provenance"]["source"] == "a test"
+    assert kept["provenance"]["by_label"] == {"bottle:empty": 40, "bottle:full": 40, "can:full": 40}
+    assert kept["provenance"]["seed"] == 4
+    assert kept["provenance"]["versions"].keys() == {"graspsense", "graspsense-c45", "numpy", "python"}
+
+
+def test_a_thing_unlike_anything_is_unknown_and_says_why():
+    said = model().predict(Features(names=NAMES, values=(0.03, 8.0, 0.0), units=UNITS))
+
+    assert said.label == UNKNOWN
+    assert said.because[0].startswith("p_first = 30 mm is unlike everything trained on: the nearest, bottle:")
+    assert said.because[1].startswith("taken for a known thing, it would be bottle:")
+
+
+def test_nothing_felt_is_unknown_with_the_reason():
+    nothing = Features(
+        names=NAMES, values=(math.nan,) * 3, units=UNITS, reasons=dict.fromkeys(NAMES, "no contact")
+    )
+
+    assert model().predict(nothing).because == ("no feature is defined: no contact",)
+
+
+@pytest.mark.parametrize(
+    ("features", "why"),
+    [
+        (Features(names=("p_first",), values=(0.06,), units=("m",)), "there is no f_steady, noise here"),
+        (
+            Features(names=NAMES, values=(0.06, 8.0, 0.0), units=("m", "counts", "")),
+            "takes f_steady in N; here it is in",
+        ),
+    ],
+)
+def test_other_features_or_units_cannot_be_judged(features, why):
+    said = model().predict(features)
+
+    assert (said.label, said.probabilities) == (UNKNOWN, {})
+    assert why in said.because[0]
+
+
+def test_further_features_and_another_order_do_no_harm():
+    more = Features(
+        names=("x", "noise", "f_steady", "p_first"), values=(1.0, 0.0, 8.0, 0.0661), units=("", "", "N", "m")
+    )
+
+    assert model().predict(more).label == "can:full"
+
+
+def test_simulated_training_is_said_and_louder_on_a_real_gripper():
+    simulated = model(simulated=True)
+
+    assert simulated.predict(CAN).warnings == (
+        "trained on simulated grasps: right for the simulator, untested on real things",
+    )
+    assert simulated.predict(CAN, None, device("virtual")).warnings == simulated.predict(CAN).warnings
+    (warning,) = simulated.predict(CAN, None, device("device")).warnings
+    assert "this gripper is real" in warning
+    assert model().predict(CAN, None, device("device")).warnings == ()
+
+
+def test_another_force_speed_or_gripper_is_said():
+    values = resolve().values
+    trained = model(simulated=True, settings={t: values[t] for t in ("gripper", "controller", "features")})
+
+    def warned(*options, gripper=None):
+        flags = [Flag("--gripper", "gripper.type", gripper)] if gripper else []
+        return trained.predict(CAN, resolve(options=options, flags=flags)).warnings[1:]
+
+    assert warned() == ()
+    assert warned("gripper.object=can:empty_open", "run.seed=4") == ()
+    assert warned("controller.probing_force_n=17") == (
+        "trained on simulated grasps with probing force 20 N, this one was with 17 N (controller.probing_force_n)",
+    )
+    assert warned("controller.closing_speed_m_s=0.05") == (
+        "trained on simulated grasps with closing speed 10 mm/s, this one was with 50 mm/s "
+        "(controller.closing_speed_m_s)",
+    )
+    assert warned("gripper.transmission=pr2_paper") == (
+        "trained on simulated grasps with transmission pr2, this one was with pr2_paper (gripper.transmission)",
+    )
+    assert warned("gripper.recording=icub:some/file.txt", gripper="replay") == (
+        "trained on simulated grasps with gripper graspsense-sim-gripper/sim, this one was with graspsense/replay",
+    )
+
+
+class TestDamage:
+    def test_a_changed_number(self, file):
+        file.write_text(file.read_text().replace("0.25", "0.26", 1))
+
+        with pytest.raises(DataDamaged, match="not what its sha256 says"):
+            load_model(str(file), installed())
+
+    def test_half_a_file(self, file):
+        file.write_bytes(file.read_bytes()[:400])
+
+        with pytest.raises(DataDamaged, match="is no JSON"):
+            load_model(str(file), installed())
+
+    @pytest.mark.parametrize("content", [b"", b"[]", b"{}", b"\x80\x04\x95pickle", b'{"format": "other"}'])
+    def test_another_file(self, file, content):
+        file.write_bytes(content)
+
+        with pytest.raises(DataDamaged):
+            load_model(str(file), installed())
+
+    def test_a_later_version(self, file):
+        rewritten(file, version=2)
+
+        with pytest.raises(DataDamaged, match=r"has version 2; this graspsense .* reads 1"):
+            load_model(str(file), installed())
+
+    @pytest.mark.parametrize(
+        "changes",
+        [
+            {"features": None},
+            {"features": [["p_first"]]},
+            {"model": None},
+            {"model": {}},
+            {"unknown": {"reach": 3.0}},
+            {"unknown": {"reach": 5.0, "featureless": False, "ranges": {}, "spread": []}},
+        ],
+    )
+    def test_parts_that_are_missing(self, file, changes):
+        rewritten(file, **changes)
+
+        with pytest.raises(DataDamaged, match="is damaged"):
+            load_model(str(file), installed())
+
+    def test_a_classifier_that_is_not_installed_is_not_imported(self, file):
+        rewritten(file, classifier="os/system")
+
+        with pytest.raises(UnknownName, match="no classifier named 'os/system'"):
+            load_model(str(file), installed())
+
+
+def test_no_such_file_or_name(tmp_path):
+    with pytest.raises(ConfigError, match="cannot be read"):
+        load_model(str(tmp_path / "none.json"), installed())
+    with pytest.raises(UnknownName, match=r"write its name with \.json"):
+        load_model("nosuch", installed())
+    with (
+        IsolatedPlugins() as plugins,
+        pytest.raises(UnknownName, match="It comes with graspsense-sim-gripper"),
+    ):
+        load_model("default", plugins)
+
+
+def test_the_model_of_another_classifier_is_refused(file):
+    with pytest.raises(
+        ConfigError, match="was made by graspsense-c45/c45, but the classifier here is graspsense/knn"
+    ):
+        model_for(resolve(options=["classifier.type=knn", f"classifier.model={file}"]), installed())
+
+
+def test_a_classifier_without_a_model_says_how_to_get_one():
+    settings = resolve(options=["classifier.type=forest"])
+    with pytest.raises(ConfigError, match="graspsense train simulated --classifier forest --out"):
+        model_for(settings, installed())
+    assert model_for(evolve(settings, classifier=None), installed()) is None
