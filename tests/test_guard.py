@@ -84,11 +84,12 @@ numbers = st.floats(allow_nan=True, allow_infinity=True)
 def test_whatever_is_asked_nothing_leaves_over_a_limit_or_not_a_number(kind, value, effort, speed, v, left):
     command, state = guard(REAL, FRESH, frame(v, left), Command(kind, value, effort, speed))
     assert not math.isnan(command.value)
+    felt = left >= REAL.contact_force_n
     if command.kind in (EFFORT, FORCE):
-        assert abs(command.value) <= 100.0
+        assert abs(command.value) <= (100.0 if felt else REAL.first_effort_n)
     if command.kind == VELOCITY:
-        assert abs(command.value) <= 0.2
-    assert state.acted in (0, 1)
+        assert abs(command.value) <= (0.2 if felt else REAL.first_speed_m_s)
+    assert state.contact_seen == felt
 
 
 def test_touching_with_exactly_the_contact_force_counts_as_felt():
@@ -114,3 +115,9 @@ def test_a_small_effort_past_the_speed_limit_is_taken_away_like_a_large_one():
 def test_an_effort_within_its_limits_is_handed_on_as_it_is():
     asked = Command(EFFORT, 20.0, inf, inf)
     assert guard(LIMITS, FRESH, frame(), asked)[0] is asked
+
+
+@pytest.mark.parametrize("command", [Command(7, 1.0, inf, inf), Command(POSITION, inf, inf, inf)])
+def test_a_kind_nobody_knows_or_a_place_nobody_can_reach_stops_the_grasp(command):
+    halted, state = guard(LIMITS, FRESH, frame(), command)
+    assert (halted.kind, halted.value, state.stopped) == (EFFORT, 0.0, 1)

@@ -137,7 +137,7 @@ def test_a_folder_that_cannot_be_written_is_found_out_before_the_grasp(tmp_path)
     assert "approach" not in done.stderr
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_the_grasp_with_the_gripper_let_go(number):
     # 1e5 ticks a second make this grasp long enough to be interrupted; the first row says that it is under way.
     process = subprocess.Popen(

@@ -1,6 +1,7 @@
 """The runner: order of things, every way out, and a gripper that is never left squeezing."""
 
 import math
+import signal
 
 import pytest
 from grippers import CONTACT_S, REST_S, Scripted, bottle, squeezing
@@ -264,24 +265,111 @@ def test_a_real_gripper_is_held_weak_until_first_contact():
     assert max(c.value for c in gripper.commands) == 20.0
 
 
-def test_every_tick_reaches_the_sinks_and_a_failing_sink_leaves_the_gripper_safe():
-    class Counting:
-        def __init__(self):
-            self.ticks = 0
+class Counting:
+    def __init__(self):
+        self.ticks = 0
 
-        def take(self, frame, pads, phase, command):
-            self.ticks += 1
+    def take(self, frame, pads, phase, command):
+        self.ticks += 1
 
+
+class FullDisk:
+    def take(self, frame, pads, phase, command):
+        raise OSError("No space left on device")
+
+
+def test_every_tick_reaches_the_sinks_and_one_that_fails_decides_nothing():
     sink = Counting()
-    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN, sinks=[sink])
+    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN, sinks=[FullDisk(), sink])
+    assert grasp.outcome is Outcome.STEADY
     assert sink.ticks == len(grasp.trace) == grasp.counts["ticks"]
+    said = [event.what for event in grasp.events if "failed" in event.what]
+    assert said == ["FullDisk failed: OSError: No space left on device"]
 
-    class Full:
-        def take(self, frame, pads, phase, command):
-            raise OSError("No space left on device")
 
-    gripper = Scripted(squeezing, bottle)
-    grasp = run_grasp(gripper, HYBRID, RUN, sinks=[Full()])
-    assert grasp.outcome is Outcome.ABORTED
-    assert "No space left" in grasp.reason
+def test_however_often_somebody_interrupts_the_trace_is_kept_and_the_gripper_let_go():
+    class Hammered(Scripted):
+        """Ctrl-C at one tick of the squeeze, and then at every call that lets go."""
+
+        begun = False
+
+        def hammer(self):
+            if self.begun or self.k == 1200:
+                self.begun = True
+                signal.raise_signal(signal.SIGINT)
+
+        def read(self, timeout_s):
+            reading = super().read(timeout_s)
+            self.hammer()
+            return reading
+
+        def apply(self, command):
+            super().apply(command)
+            self.hammer()
+
+        def close(self):
+            self.hammer()
+            super().close()
+
+    gripper = Hammered(squeezing, bottle)
+    grasp = run_grasp(gripper, HYBRID, RUN)
+    assert (grasp.outcome, grasp.reason) == (Outcome.ABORTED, "interrupted")
+    assert len(grasp.trace) > 900
+    assert gripper.commands[-1].value == 0.0
+    assert gripper.closed == 1
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_other_ends_of_a_session_let_go_too_and_tell_who_listened_before(number):
+    class Ended(Scripted):
+        def read(self, timeout_s):
+            if self.k == 1200 and not heard:
+                signal.raise_signal(number)
+            return super().read(timeout_s)
+
+    heard = []
+    before = signal.signal(number, lambda number, frame: heard.append(number))
+    try:
+        gripper = Ended(squeezing, bottle)
+        grasp = run_grasp(gripper, HYBRID, RUN)
+    finally:
+        signal.signal(number, before)
+    assert (grasp.outcome, heard) == (Outcome.ABORTED, [number])
     assert let_go(gripper)
+
+
+def test_a_controller_that_never_ends_is_ended():
+    class Endless(HybridController):
+        @staticmethod
+        def step(params, state, frame, pads):
+            return Command(EFFORT, 30.0, math.inf, math.inf), state
+
+    gripper = Scripted(lambda t: 0.05, lambda t: (9.0, 9.0))
+    grasp = run_grasp(gripper, Endless(HybridConfig()), RunConfig(grasp_timeout_s=2.0, opening_timeout_s=1.0))
+    assert grasp.outcome is Outcome.ABORTED
+    assert "run.grasp_timeout_s" in grasp.reason
+    assert let_go(gripper)
+    assert len(grasp.trace) < 5001
+
+
+def test_a_device_whose_clock_stands_still_does_not_squeeze_for_ever():
+    class Frozen(Scripted):
+        def read(self, timeout_s):
+            frame, pads = super().read(timeout_s)
+            return frame._replace(t_s=min(frame.t_s, 1.2), gap_m=squeezing(min(frame.t_s, 1.2))), pads
+
+    gripper = Frozen(squeezing, bottle, clock="device")
+    grasp = run_grasp(gripper, HYBRID, RunConfig(grasp_timeout_s=2.0, opening_timeout_s=1.0))
+    assert grasp.outcome is Outcome.ABORTED
+    assert gripper.commands[-1].value == 0.0
+
+
+def test_a_report_that_fails_costs_nothing_else():
+    class Mute(Scripted):
+        def report(self):
+            raise ValueError("no report")
+
+    grasp = run_grasp(Mute(squeezing, bottle), HYBRID, RUN)
+    assert grasp.outcome is Outcome.STEADY
+    assert grasp.report == {"report_failed": "ValueError: no report"}

@@ -9,6 +9,7 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from typing import Any, Final, NoReturn
 
@@ -166,11 +167,12 @@ def _report(error: Exception, as_json: bool) -> int:
     if as_json:
         from graspsense.cli.output import echo_json
 
-        try:
+        with suppress(OSError):  # it may be what the error is about
             echo_json({"error": {"kind": type(error).__name__, "message": message, "exit_code": code}})
-        except OSError:  # it may be what the error is about
-            _give_up_stdout()
-    elif isinstance(error, OSError):
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
         _give_up_stdout()
     return code
 

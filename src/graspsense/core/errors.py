@@ -62,6 +62,11 @@ class RecordingEnded(Exception):
     """A replayed recording has no further frame. The runner turns it into an outcome; no user sees it."""
 
 
+def named(error: BaseException) -> str:
+    """Return an exception of anybody's in words: `ZeroDivisionError: float division by zero`."""
+    return f"{type(error).__name__}: {error}"
+
+
 def suggestion(found: str, allowed: Iterable[str]) -> str:
     """Return `" Did you mean 'x'?"` for the nearest allowed name, or an empty string."""
     near = get_close_matches(found, sorted(allowed), n=1, cutoff=0.5)

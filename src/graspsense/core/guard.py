@@ -6,6 +6,7 @@ first closing of a real gripper slow and weak until a contact has once been seen
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 from graspsense.core.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, Frame
@@ -68,8 +69,12 @@ def guard(
         value = min(max(value, -speed_limit), speed_limit)
     elif kind == FORCE:
         value = min(max(value, 0.0), effort_limit)
-    elif kind == POSITION:
+    elif kind == POSITION and value < inf:
         value = max(value, 0.0)
+    else:
+        # A kind nobody knows, or a place nobody can reach: as good as no number.
+        halt = Command(EFFORT, 0.0, params.effort_limit_n, params.speed_limit_m_s)
+        return halt, GuardState(contact_seen, acted + 1, 1)
     if value != asked:
         acted += 1
     elif kind == EFFORT:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import nan
 from pathlib import Path
 
 from attrs import frozen
 
 from graspsense.core.config import Flag, Settings, resolve
+from graspsense.core.entries import FeatureSetEntry
+from graspsense.core.errors import named
+from graspsense.core.features import UNKNOWN, Features, Prediction, missing
 from graspsense.core.model import model_for
 from graspsense.core.plugins import Plugins, installed
 from graspsense.core.roles import DeviceInfo
@@ -92,8 +96,18 @@ def grasp_with(
 
     plugins.run_starting(run)
     grasp = run_grasp(backend, controller, settings.run, sinks=sinks, on_event=tell, on_open=on_open)
-    features = feature_set.extract(grasp.trace)
-    prediction = None if model is None else model.predict(features, settings, grasp.device)
+    # Whatever fails from here on, the grasp was made and its trace is kept.
+    try:
+        features = feature_set.extract(grasp.trace)
+    except Exception as error:
+        features = _undefined(settings, f"{settings.features.component.qualified} failed: {named(error)}")
+    prediction = None
+    if model is not None:
+        try:
+            prediction = model.predict(features, settings, grasp.device)
+        except Exception as error:
+            why = f"{model.component} failed: {named(error)}"
+            prediction = Prediction(label=UNKNOWN, probabilities={}, because=(why,))
     trial = Trial(
         run=run,
         trace=grasp.trace,
@@ -110,3 +124,11 @@ def grasp_with(
     )
     plugins.run_finished(run, trial)
     return trial
+
+
+def _undefined(settings: Settings, why: str) -> Features:
+    """Return the declared features of the chosen set, all missing for this reason."""
+    entry = settings.features.component.entry
+    assert isinstance(entry, FeatureSetEntry)
+    names, units = zip(*entry.features, strict=True)
+    return Features(names=names, values=(nan,) * len(names), units=units, reasons=missing(names, why))

@@ -8,8 +8,10 @@ to relax; a lost gripper is told to relax. Then the gripper is closed.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
+from itertools import count
+from math import ceil
 from typing import Any, Protocol
 
 from attrs import field, frozen
@@ -17,8 +19,9 @@ from attrs.validators import ge, gt, instance_of
 
 from graspsense.core.binding import bind
 from graspsense.core.contact import CONTACT_FORCE_N, Stillness, at_rest, watch
-from graspsense.core.errors import DeviceLost, RecordingEnded, TareRefused
+from graspsense.core.errors import DeviceLost, RecordingEnded, TareRefused, named
 from graspsense.core.guard import GuardParams, GuardState, guard
+from graspsense.core.interrupts import Interrupts
 from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
 from graspsense.core.signals import APPROACH, RUNNING, SQUEEZE, Command, Frame, Outcome, Pads, Phase
 from graspsense.core.tick import (
@@ -47,6 +50,8 @@ class RunConfig:
     """Opening, taring and releasing each take at most this long."""
     frame_timeout_s: float = field(default=0.1, validator=gt(0.0))
     """No frame for this long on a device clock: the device is lost."""
+    grasp_timeout_s: float = field(default=300.0, validator=gt(0.0))
+    """Longest approach, squeeze and hold together: the end of a controller that never gives up by itself."""
     late_periods: float = field(default=5.0, validator=gt(0.0))
     """A frame older than this many periods counts as late."""
     first_effort_n: float = field(default=12.0, validator=gt(0.0))
@@ -116,28 +121,33 @@ def run_grasp(
     Raises NoDevice where the gripper cannot be opened. All that goes wrong later is an outcome.
     """
     began = time.perf_counter()
-    try:
-        info = backend.open(run.seed)
-        if on_open is not None:
-            on_open(info)
-        grasp = _Grasp(backend, controller, run, info, tuple(sinks), on_event)
-        outcome, reason = grasp.drive()
-    except BaseException:
-        backend.close()
-        raise
-    try:
-        backend.close()
-    except Exception as error:
+    with Interrupts() as interrupts:
+        try:
+            info = backend.open(run.seed)
+            if on_open is not None:
+                on_open(info)
+            grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
+            outcome, reason = grasp.drive()
+        except BaseException:
+            backend.close()
+            raise
         # The trace must outlive a backend that fails at the very end.
-        reason = f"the gripper could not be closed: {_in_words(error)} ({reason or outcome.words})"
-        outcome = Outcome.ABORTED
+        try:
+            report = dict(backend.report())
+        except Exception as error:
+            report = {"report_failed": named(error)}
+        try:
+            backend.close()
+        except Exception as error:
+            reason = f"the gripper could not be closed: {named(error)} ({reason or outcome.words})"
+            outcome = Outcome.ABORTED
     frames = grasp.recorder.frames
     return Grasp(
         trace=grasp.recorder.trace(),
         outcome=outcome,
         reason=reason,
         device=info,
-        report=dict(backend.report()),
+        report=report,
         counts={"ticks": len(frames), "late": grasp.late, "guarded": grasp.state.guard.acted},
         events=tuple(grasp.events),
         seconds_simulated=grasp.seconds() if info.clock == "virtual" else None,
@@ -145,8 +155,8 @@ def run_grasp(
     )
 
 
-def _in_words(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
+class _Overdue(Exception):
+    """A grasp that took longer than any may."""
 
 
 class _Grasp:
@@ -158,10 +168,12 @@ class _Grasp:
         controller: Controller[Any],
         run: RunConfig,
         info: DeviceInfo,
-        sinks: tuple[Sink, ...],
+        sinks: Iterable[Sink],
         on_event: Callable[[GraspEvent], None] | None,
+        interrupts: Interrupts,
     ) -> None:
-        self.backend, self.run, self.info, self.sinks, self.on_event = backend, run, info, sinks, on_event
+        self.backend, self.run, self.info, self.on_event = backend, run, info, on_event
+        self.sinks, self.interrupts = list(sinks), interrupts
         self.step = type(controller).step
         self.params = tick_params(info, controller, run)
         self.state: TickState = first_state(controller.init())
@@ -182,13 +194,13 @@ class _Grasp:
             ending = Outcome.DEVICE_LOST, str(error)
         except RecordingEnded:
             ending = self._recording_ended()
-        except TareRefused as error:
+        except (TareRefused, _Overdue) as error:
             ending = Outcome.ABORTED, str(error)
         except KeyboardInterrupt:
             ending = Outcome.ABORTED, "interrupted"
         except Exception as error:
-            # A controller or sink of anybody's may fail; the gripper must be let go and the trace kept.
-            ending = Outcome.ABORTED, _in_words(error)
+            # A controller of anybody's may fail; the gripper must be let go and the trace kept.
+            ending = Outcome.ABORTED, named(error)
         finally:
             # Of a lost gripper it is not known whether it still hears, so it is told to relax all the same.
             self._let_go(opens=not lost and not self.state.done)
@@ -214,7 +226,7 @@ class _Grasp:
         state, phase, watcher = self.state, self.state.phase, self.state.guard
         images: list[Pads] = []
         newest = 0
-        while True:
+        for _ in self._due():
             reading = read(run.frame_timeout_s)
             if reading is None:
                 raise DeviceLost(
@@ -251,9 +263,29 @@ class _Grasp:
                     record(frame, pads, phase, command)
             if recorded:
                 for sink in sinks:
-                    sink.take(frame, pads, phase, command)
+                    try:
+                        sink.take(frame, pads, phase, command)
+                    except Exception as error:
+                        # Who watches may not decide how a grasp ends.
+                        self.sinks = sinks = [one for one in sinks if one is not sink]
+                        self._event(frame.t_s, Phase(phase), f"{type(sink).__name__} failed: {named(error)}")
             if state.done or watcher.stopped:
                 return
+
+    def _due(self) -> Iterator[int]:
+        """Yield once a tick for as long as a grasp may take; a recording ends by itself.
+
+        Ticks are counted, not clocks read: a device whose clock stands still must not squeeze for ever.
+        """
+        if self.info.opening is None:
+            yield from count()
+        run = self.run
+        seconds = run.grasp_timeout_s + 3.0 * run.opening_timeout_s
+        yield from range(ceil(seconds * self.info.rate_hz))
+        raise _Overdue(
+            f"no end after {seconds:g} s of ticks: the controller neither ended the grasp nor gave it up "
+            "(run.grasp_timeout_s)"
+        )
 
     def _guard_event(self, frame: Frame, before: GuardState, now: GuardState) -> None:
         if now.stopped and not before.stopped:
@@ -278,7 +310,8 @@ class _Grasp:
                 still, began_s = Stillness(self.last.t_s, self.last.gap_m), self.last.t_s
                 give_up = time.perf_counter() + run.opening_timeout_s
                 fresh = GuardState(1, 0, 0)
-                while time.perf_counter() < give_up:
+                # A second Ctrl-C asks to hurry: then only relax.
+                while time.perf_counter() < give_up and self.interrupts.count < 2:
                     command, fresh = guard(self.params.guard, fresh, self.last, info.opening)
                     self.backend.apply(command)
                     reading = self.backend.read(run.frame_timeout_s)

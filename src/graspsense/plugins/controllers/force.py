@@ -9,10 +9,12 @@ from math import inf
 from typing import Literal, NamedTuple
 
 from attrs import field, frozen
-from attrs.validators import ge, gt, in_
+from attrs.validators import in_
 
 from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, Pads
 from graspsense.plugins.controllers.supervision import (
+    NOT_NEGATIVE,
+    POSITIVE,
     Progress,
     Supervision,
     SupervisionConfig,
@@ -26,15 +28,15 @@ from graspsense.plugins.controllers.supervision import (
 class ForceLoopConfig:
     """What the squeeze is to reach, and how."""
 
-    probing_force_n: float = field(default=20.0, validator=gt(0.0))
+    probing_force_n: float = field(default=20.0, validator=POSITIVE)
     """The effort of the squeeze; with `loop = "closed"`, the force on each pad."""
     loop: Literal["open", "closed"] = field(default="open", validator=in_(("open", "closed")))
     """`open`: a constant effort, as in the authors' code. `closed`: an integral loop on the pads' mean force."""
-    force_gain_1_s: float = field(default=4.0, validator=ge(0.0))
+    force_gain_1_s: float = field(default=4.0, validator=NOT_NEGATIVE)
     """Closed loop only: effort per second per newton of error; slow beside a cell image every 41 ms."""
-    force_tolerance_n: float = field(default=0.3, validator=gt(0.0))
+    force_tolerance_n: float = field(default=0.3, validator=POSITIVE)
     """Closed loop only: steady needs the mean force this near the one asked for (as in pr2_gripper_sensor)."""
-    effort_limit_n: float = field(default=100.0, validator=gt(0.0))
+    effort_limit_n: float = field(default=100.0, validator=POSITIVE)
     """Closed loop only: the effort stays within 0 and this."""
 
 

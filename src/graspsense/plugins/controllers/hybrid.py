@@ -10,7 +10,6 @@ from math import inf
 from typing import NamedTuple
 
 from attrs import field, frozen
-from attrs.validators import ge
 
 from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, Pads
 from graspsense.plugins.controllers.force import (
@@ -21,6 +20,7 @@ from graspsense.plugins.controllers.force import (
     squeezing_effort,
 )
 from graspsense.plugins.controllers.supervision import (
+    NOT_NEGATIVE,
     Progress,
     Supervision,
     SupervisionConfig,
@@ -40,7 +40,7 @@ from graspsense.plugins.controllers.velocity import (
 class HybridConfig(SupervisionConfig, ForceLoopConfig, VelocityLoopConfig):
     """Settings of the hybrid controller."""
 
-    ramp_s: float = field(default=0.0, validator=ge(0.0))
+    ramp_s: float = field(default=0.0, validator=NOT_NEGATIVE)
     """Time over which the effort goes from the velocity loop's last to the force law's (0: a hard switch)."""
 
 

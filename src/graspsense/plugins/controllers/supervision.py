@@ -11,7 +11,7 @@ from math import inf
 from typing import NamedTuple
 
 from attrs import field, frozen
-from attrs.validators import ge, gt
+from attrs.validators import and_, ge, gt, lt
 
 from graspsense.plugin_api import (
     APPROACH,
@@ -36,30 +36,34 @@ from graspsense.plugin_api import (
     watch,
 )
 
+POSITIVE = and_(gt(0.0), lt(inf))
+NOT_NEGATIVE = and_(ge(0.0), lt(inf))
+"""What a law's settings may be: numbers that a gripper can be held to."""
+
 
 @frozen(kw_only=True, slots=False)
 class SupervisionConfig:
     """Thresholds and time-outs that every control law of this package has."""
 
-    contact_force_n: float = field(default=CONTACT_FORCE_N, validator=gt(0.0))
+    contact_force_n: float = field(default=CONTACT_FORCE_N, validator=POSITIVE)
     """Contact is this much on both pads, over their tared zero."""
-    rest_speed_m_s: float = field(default=REST_SPEED_M_S, validator=gt(0.0))
+    rest_speed_m_s: float = field(default=REST_SPEED_M_S, validator=POSITIVE)
     """At rest is slower than this throughout the window."""
-    rest_window_s: float = field(default=REST_WINDOW_S, validator=gt(0.0))
-    edge_force_n: float = field(default=0.25, validator=gt(0.0))
+    rest_window_s: float = field(default=REST_WINDOW_S, validator=POSITIVE)
+    edge_force_n: float = field(default=0.25, validator=POSITIVE)
     """More than this on one edge cell while closing is a side impact (100 counts of the softest cell)."""
-    move_timeout_s: float = field(default=10.0, validator=gt(0.0))
+    move_timeout_s: float = field(default=10.0, validator=POSITIVE)
     """Longest approach; longer by itself where the closing speed needs it."""
-    steady_timeout_s: float = field(default=3.0, validator=gt(0.0))
+    steady_timeout_s: float = field(default=3.0, validator=POSITIVE)
     """Longest squeeze before the grasp counts as never steady."""
-    closed_gap_m: float = field(default=0.003, validator=ge(0.0))
+    closed_gap_m: float = field(default=0.003, validator=NOT_NEGATIVE)
     """Fingers closed to this gap: nothing is there, or after contact nothing is left."""
-    too_wide_m: float = field(default=0.001, validator=ge(0.0))
+    too_wide_m: float = field(default=0.001, validator=NOT_NEGATIVE)
     """Contact within this much of closing: the thing is wider than the opening."""
-    crush_share: float = field(default=0.2, validator=gt(0.0))
+    crush_share: float = field(default=0.2, validator=POSITIVE)
     """The force falling below this share of its peak while the gap falls by `crush_travel_m`: crushed."""
-    crush_travel_m: float = field(default=0.002, validator=gt(0.0))
-    slip_time_s: float = field(default=0.2, validator=gt(0.0))
+    crush_travel_m: float = field(default=0.002, validator=POSITIVE)
+    slip_time_s: float = field(default=0.2, validator=POSITIVE)
     """Both pads below half the contact force for this long, closed further than at the peak: slipped out.
 
     A finger that bounces off a rigid thing loses contact too, but opens.

@@ -10,10 +10,11 @@ from math import inf
 from typing import NamedTuple
 
 from attrs import field, frozen
-from attrs.validators import ge, gt
 
 from graspsense.plugin_api import EFFORT, Command, Controller, Frame, Pads
 from graspsense.plugins.controllers.supervision import (
+    NOT_NEGATIVE,
+    POSITIVE,
     Progress,
     Supervision,
     SupervisionConfig,
@@ -27,14 +28,14 @@ from graspsense.plugins.controllers.supervision import (
 class VelocityLoopConfig:
     """The loop's gains: those of the authors' code, 15000 and 25 with the integral held within 100 N."""
 
-    closing_speed_m_s: float = field(default=0.010, validator=gt(0.0))
+    closing_speed_m_s: float = field(default=0.010, validator=POSITIVE)
     """Rate at which the gap is to close."""
-    velocity_gain_n_s_m: float = field(default=15000.0, validator=ge(0.0))
+    velocity_gain_n_s_m: float = field(default=15000.0, validator=NOT_NEGATIVE)
     """Effort per error of speed, N s/m."""
-    integral_gain_n_m: float = field(default=25.0, validator=ge(0.0))
+    integral_gain_n_m: float = field(default=25.0, validator=NOT_NEGATIVE)
     """Effort per error of gap, N/m."""
-    integral_limit_n: float = field(default=100.0, validator=ge(0.0))
-    preload_n: float = field(default=7.0, validator=ge(0.0))
+    integral_limit_n: float = field(default=100.0, validator=NOT_NEGATIVE)
+    preload_n: float = field(default=7.0, validator=NOT_NEGATIVE)
     """Where the integral starts: the gripper's Coulomb friction (7 N is fed forward in pr2_gripper_sensor)."""
 
 

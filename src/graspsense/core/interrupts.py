@@ -1,0 +1,53 @@
+"""Signals that end a grasp: they stop it once, and never stop what lets go of the gripper."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from contextlib import suppress
+from types import FrameType, TracebackType
+from typing import Any, Final
+
+# Ctrl-C, a polite kill, and a terminal or an ssh session that went away.
+ENDING: Final = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
+
+
+class Interrupts:
+    """While entered, the first ending signal raises KeyboardInterrupt; later ones are only counted in `count`.
+
+    So the way out of a grasp is never itself interrupted, however often somebody presses Ctrl-C; it may look at
+    `count` and hurry. Only the main thread can take signals; elsewhere this does nothing. A signal that the
+    process ignores stays ignored.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._previous: dict[int, Any] = {}
+
+    def __enter__(self) -> Interrupts:
+        if threading.current_thread() is threading.main_thread():
+            for number in ENDING:
+                if signal.getsignal(number) not in (signal.SIG_IGN, None):
+                    self._previous[number] = signal.signal(number, self._take)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for number, previous in self._previous.items():
+            signal.signal(number, previous)
+
+    def _take(self, number: int, frame: FrameType | None) -> None:
+        self.count += 1
+        previous = self._previous[number]
+        if callable(previous) and previous is not signal.default_int_handler:
+            # Whoever listened before is told too; what it raises is raised here, once.
+            with suppress(KeyboardInterrupt):
+                previous(number, frame)
+        if self.count == 1:
+            raise KeyboardInterrupt
