@@ -117,6 +117,9 @@ def test_loss_is_told_with_its_reason() -> None:
     wire.reports.put(TransportGone("read error"))
     with pytest.raises(DeviceLost, match=r"read error.*graspsense devices"):
         link.next(10.0)
+    # No further write is tried: one to a device that answers nothing may block for seconds.
+    with pytest.raises(DeviceLost, match="read error"):
+        link.send(bytes(64))
     assert link.close()
     assert wire.closed.is_set()
 

@@ -126,20 +126,20 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         opened, self._opened = self._opened, None
         if opened is None:
             return
-        with suppress(DeviceLost):
-            if self._sent and not opened.link.gone:
+        if self._sent:
+            with suppress(DeviceLost):
                 self._send(opened, RELEASE_REPORT)
         if opened.link.gone:
             self._lost_serial = opened.identity.serial
         clean = opened.link.close()
-        self._report = self._counted(opened, clean)
+        self._report = {**self._counted(opened), "closed_cleanly": clean}
         if opened.emulation is not None:
             self._report["let_go_after_s"] = opened.emulation.wire.firmware.run_on()
 
     def report(self) -> Mapping[str, float | int | str | bool]:
-        """Return what was counted on the wire, until now or until it was closed."""
+        """Return what was counted on the wire; once closed also whether that went cleanly."""
         if self._opened is not None:
-            return self._counted(self._opened, True)
+            return self._counted(self._opened)
         return self._report or {}
 
     def stand_in(self) -> Pr2Backend:
@@ -189,7 +189,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         self._sent += 1
         opened.link.send(encode_output(command._replace(counter=self._sent & 0xFFFF)))
 
-    def _counted(self, opened: Opened, clean: bool) -> dict[str, float | int | str | bool]:
+    def _counted(self, opened: Opened) -> dict[str, float | int | str | bool]:
         link, emulation = opened.link, opened.emulation
         counted: dict[str, float | int | str | bool] = dict(emulation.body.report()) if emulation else {}
         counted.update(asdict(link.stream.counts))
@@ -198,7 +198,6 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             skipped=link.skipped,
             bad_cells=self._measure.bad_cells,
             commands_sent=self._sent,
-            closed_cleanly=clean,
         )
         if link.clock.offset_s == link.clock.offset_s:
             counted["clock_offset_s"] = link.clock.offset_s

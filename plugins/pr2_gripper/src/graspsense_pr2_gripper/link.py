@@ -58,7 +58,10 @@ class Link(ABC):
         """Let go of the device, bounded in time; return whether it was let go of cleanly."""
 
     def send(self, report: bytes) -> None:
-        """Send a command. Raises DeviceLost."""
+        """Send a command. Raises DeviceLost, at once where the device is known to be gone."""
+        if self.gone:
+            # A write to a device that answers nothing may block for seconds, each time.
+            raise DeviceLost(self.gone)
         try:
             self.transport.write(report)
         except TransportGone as gone:
