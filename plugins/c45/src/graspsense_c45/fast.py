@@ -405,8 +405,9 @@ def _partition(
     spare_values: Array,
 ) -> None:
     """Move the rows that go left to the front, both parts keeping their order."""
-    # Written to both places and counted in one: what a row does is hard to foresee, and a branch would often guess wrong.
-    at, kept = begin, 0
+    # Written to both places and counted in one: a branch on where a row goes would often be guessed wrong.
+    at: Number = begin
+    kept: Number = 0
     for i in range(begin, stop):
         row, value = rows[i], values[i]
         left = np.int64(goes_left[row])
