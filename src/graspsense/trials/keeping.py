@@ -55,6 +55,7 @@ def kept_grasp(
             on_open(device)
         described.update(device_metadata(device))
         recorder.metadata(DEVICE, described)
+        recorder.wait_ready()
 
     try:
         recorder.metadata(START, start.as_metadata())

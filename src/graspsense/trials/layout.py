@@ -15,6 +15,9 @@ from graspsense.core.signals import CELLS, Frame
 VERSION: Final = 1
 """Of this layout; it stands in the metadata `graspsense` of every recording."""
 
+PART: Final = ".part"
+"""Behind the name of a recording that is not whole yet."""
+
 TICK_TOPIC: Final = "/grasp/tick"
 PADS_TOPIC: Final = "/grasp/pads"
 
@@ -66,3 +69,5 @@ IS_PADS: Final = b"P"
 IS_METADATA: Final = b"M"
 IS_END: Final = b"E"
 """The trial is over: end the file and give it its name."""
+READY: Final = "ready\n"
+"""What the writer's process says when the file is there; its last word is one line of JSON."""

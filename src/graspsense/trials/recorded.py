@@ -27,6 +27,7 @@ from graspsense.trials.layout import (
     PADS,
     PADS_FIELDS,
     PADS_TOPIC,
+    PART,
     SCHEMAS,
     START,
     TICK,
@@ -35,7 +36,6 @@ from graspsense.trials.layout import (
     VERSION,
 )
 from graspsense.trials.recording import Recording
-from graspsense.trials.recording_file import PART
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -30,6 +30,8 @@ from graspsense.trials.layout import (
     IS_TICK,
     LENGTH_WIRE,
     PADS_WIRE,
+    PART,
+    READY,
     TICK_WIRE,
 )
 
@@ -116,6 +118,24 @@ class Recorder:
             data = PADS_WIRE.pack(IS_PADS, pads.t_s, pads.counter, *pads.left, *pads.right) + data
         self._send(data)
 
+    def wait_ready(self) -> None:
+        """Wait until the writing process has its file, so that it is not behind when the fingers begin to move.
+
+        Raises NotKept with the reason where it has none.
+        """
+        assert self._process.stdout is not None
+        out = self._process.stdout.fileno()
+        said = b""
+        while not said.endswith(b"\n"):
+            if not select.select([out], [], [], LAST_WORD_S)[0]:
+                raise NotKept(f"the process that records {self.path} does not start")
+            data = os.read(out, 4096)
+            if not data:
+                raise NotKept(f"the process that records {self.path} has died at its start")
+            said += data
+        if said.decode() != READY:
+            raise self._not_kept(json.loads(said))
+
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Hand over a metadata record and wait until it is taken: not while the fingers are under control."""
         body = json.dumps([name, dict(values)]).encode()
@@ -125,11 +145,7 @@ class Recorder:
         """Wait until the recording is whole on the disk. Raises NotKept with the reason where it is not."""
         answer = self._last_word(IS_END)
         if answer is None or "sha256" not in answer:
-            reason = "its process has died" if answer is None else answer.get("error", "it was left")
-            raise NotKept(
-                f"the recording {self.path} could not be written: {reason}. What there is of it stands in "
-                f"{self.path.name}.part: see `graspsense recover`"
-            )
+            raise self._not_kept(answer)
         return Recorded(
             path=self.path,
             sha256=answer["sha256"],
@@ -144,6 +160,14 @@ class Recorder:
     def leave(self) -> None:
         """End without a word that the trial is over: what was felt stays as `.part`, and nothing if nothing was."""
         self._last_word(b"")
+
+    def _not_kept(self, answer: Mapping[str, Any] | None) -> NotKept:
+        reason = "its process has died" if answer is None else answer.get("error", "it was left")
+        part = self.path.with_name(self.path.name + PART)
+        hint = (
+            f". What there is of it stands in {part.name}: see `graspsense recover`" if part.exists() else ""
+        )
+        return NotKept(f"the recording {self.path} could not be written: {reason}{hint}")
 
     def _send(self, data: bytes) -> None:
         waiting = self._waiting
@@ -197,7 +221,7 @@ class Recorder:
         self._drain(word)
         try:
             out, _ = self._process.communicate(timeout=LAST_WORD_S)
-            answer = json.loads(out)
+            answer = json.loads(out.decode().removeprefix(READY))
         except (subprocess.TimeoutExpired, ValueError):
             self._process.kill()
             self._process.communicate()

@@ -18,10 +18,9 @@ from attrs import frozen
 from mcap.writer import CompressionType, Writer
 
 from graspsense import __version__
-from graspsense.trials.layout import CDR_HEADER, PADS_TOPIC, SCHEMAS, TICK_TOPIC
+from graspsense.trials.layout import CDR_HEADER, PADS_TOPIC, PART, SCHEMAS, TICK_TOPIC
 
 CHUNK_NS: Final = 50_000_000
-PART: Final = ".part"
 
 
 @frozen(kw_only=True)

@@ -23,6 +23,7 @@ from graspsense.trials.layout import (
     IS_TICK,
     LENGTH_WIRE,
     PADS_WIRE,
+    READY,
     TICK_WIRE,
 )
 from graspsense.trials.recording_file import RecordingFile
@@ -35,7 +36,7 @@ NICER: Final = 5
 
 
 def main(path: str) -> int:
-    """Write the recording and print one line of JSON: what was written, or the error."""
+    """Write the recording; print a line when ready, and one of JSON at the end: what was written, or the error."""
     # Ctrl-C is for the program that grasps; this one ends with its input.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
@@ -50,6 +51,8 @@ def main(path: str) -> int:
 
 def _write(path: Path) -> dict[str, object]:
     file = RecordingFile(path)
+    sys.stdout.write(READY)
+    sys.stdout.flush()
     buffer = bytearray()
     while True:
         data = os.read(0, READ_BYTES)

@@ -22,11 +22,11 @@ from graspsense.core.features import Features
 from graspsense.core.plugins import installed
 from graspsense.trials.before_contact import before_contact
 from graspsense.trials.content import Ending, Row, beginning_in, ending_in
-from graspsense.trials.layout import DEVICE, START, TICK
+from graspsense.trials.layout import DEVICE, PART, START, TICK
 from graspsense.trials.layout import PADS as PADS_STRUCT
 from graspsense.trials.recorded import RecordedGrasp, read_recorded
 from graspsense.trials.recorder import NotKept
-from graspsense.trials.recording_file import PART, RecordingFile, Written
+from graspsense.trials.recording_file import RecordingFile, Written
 from graspsense.trials.store import RecordingFacts, Store
 
 if TYPE_CHECKING:

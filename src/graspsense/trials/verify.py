@@ -10,8 +10,8 @@ from typing import Any
 from attrs import frozen
 
 from graspsense.core.errors import DataDamaged, GraspsenseError
+from graspsense.trials.layout import PART
 from graspsense.trials.recorded import read_recorded
-from graspsense.trials.recording_file import PART
 from graspsense.trials.recover import CUT
 from graspsense.trials.store import Store, integrity, stored_rows
 

@@ -1,0 +1,61 @@
+"""Records trials of 1 kHz in real time until it is killed; the tests of kills start it as a program.
+
+    python paced_recorder.py STORE PROGRESS SECONDS
+
+Into the file PROGRESS goes, before each tick is handed over, the number of the trial and of the tick, and at the
+beginning of each trial the writer's process. Each trial that is kept is printed.
+"""
+
+import json
+import mmap
+import struct
+import sys
+import time
+from pathlib import Path
+
+from kept import DEVICE_JSON, beginning, command, ending, frame, pads
+
+from graspsense.trials.layout import DEVICE, START, TRIAL
+from graspsense.trials.recorder import Recorder
+from graspsense.trials.store import RecordingFacts, Store
+
+PROGRESS = struct.Struct("<qqq")
+"""Trial, tick handed over last, process id of the writer."""
+
+
+def main(folder: str, progress: str, seconds: float) -> None:
+    Path(progress).write_bytes(bytes(PROGRESS.size))
+    with (
+        Path(progress).open("r+b") as file,
+        mmap.mmap(file.fileno(), 0) as shared,
+        Store.open(folder) as store,
+    ):
+        trial = 0
+        while True:
+            trial += 1
+            record(store, trial, seconds, shared)
+
+
+def record(store: Store, trial: int, seconds: float, shared: mmap.mmap) -> None:
+    start = beginning(instance=f"can#{trial}")
+    recorder = Recorder(store.new_recording(start.made_at))
+    recorder.metadata(START, start.as_metadata())
+    recorder.metadata(DEVICE, {"device": json.dumps(DEVICE_JSON)})
+    recorder.wait_ready()
+    began = time.perf_counter()
+    for k in range(round(seconds * 1000)):
+        while (late := began + k * 0.001 - time.perf_counter()) > 0:
+            time.sleep(late)
+        recorder.take(frame(k), pads(k), 3, command(k))
+        PROGRESS.pack_into(shared, 0, trial, k, recorder._process.pid)
+    end = ending()
+    recorder.metadata(TRIAL, end.as_metadata())
+    done = recorder.finish()
+    facts = RecordingFacts(name=done.path.name, sha256=done.sha256, size=done.size, counts=done.counts)
+    store.add(start, end, DEVICE_JSON, facts)
+    sys.stdout.write(f"kept {trial}\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2], float(sys.argv[3]))

@@ -1,0 +1,145 @@
+"""SIGKILL at random moments: of a recorder together with its writer, and of `graspsense collect`.
+
+Twenty kills each, or as many as GRASPSENSE_KILLS says; with GRASPSENSE_KILLS_REPORT a file gets what was found.
+"""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from paced_recorder import PROGRESS
+
+from graspsense.trials.recorded import read_recorded
+from graspsense.trials.recover import recover_store
+from graspsense.trials.store import Store
+from graspsense.trials.verify import verify_store
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="needs /proc, to see a writer end"),
+]
+
+KILLS = int(os.environ.get("GRASPSENSE_KILLS", "20"))
+MOST_MISSING_S = 0.1
+HERE = Path(__file__).parent
+
+
+def report(name, **found):
+    path = os.environ.get("GRASPSENSE_KILLS_REPORT")
+    if path:
+        with Path(path).open("a") as file:
+            file.write(json.dumps({"test": name, "kills": KILLS, **found}) + "\n")
+
+
+def writers_of(folder):
+    """Return the processes that write recordings into this folder."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):
+            words = path.read_bytes().split(b"\0")
+            if b"graspsense.trials.recording_process" in words and any(
+                str(folder).encode() in w for w in words
+            ):
+                found.append(path.parent.name)
+    return found
+
+
+def recovered(folder):
+    """Return what `recover` says of each file, once no writer that outlived its program is at work any more."""
+    until = time.monotonic() + 60.0
+    while writers_of(folder):
+        assert time.monotonic() < until, "a writer outlived its program by a minute"
+        time.sleep(0.02)
+    with Store.open(folder) as store:
+        return recover_store(store)
+
+
+def kill(*pids):
+    for pid in pids:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+
+
+def check(folder, announced):
+    """Every announced trial is there and counts, every file opens, and SQLite and all hashes are well."""
+    found = recovered(folder)
+    assert [one for one in found if one.what == "failed"] == []
+    with Store.read(folder) as store:
+        there = {one.instance or one.label for one in store.page(limit=10_000) if one.whole}
+        assert announced <= there
+    verified = verify_store(folder)
+    assert verified.problems == ()
+    assert verified.unfinished == ()
+    return found
+
+
+def test_a_recorder_killed_with_its_writer_loses_at_most_100_ms_of_the_running_trial(tmp_path):
+    """Both processes at once: the worst case. Killed alone, the writer would still write all it was given."""
+    draw = random.Random(9)
+    missing = []
+    for k in range(KILLS):
+        folder, progress = tmp_path / f"{k}", tmp_path / f"{k}.progress"
+        program = [sys.executable, str(HERE / "paced_recorder.py"), str(folder), str(progress), "0.4"]
+        with subprocess.Popen(program, stdout=subprocess.PIPE, text=True) as process:
+            while not (progress.exists() and any(progress.read_bytes())):
+                time.sleep(0.005)
+            time.sleep(draw.uniform(0.0, 1.2))
+            _, _, writer = PROGRESS.unpack(progress.read_bytes())
+            kill(*draw.sample([process.pid, writer], 2))
+            printed = process.stdout.read()
+        trial, last, writer_now = PROGRESS.unpack(progress.read_bytes())
+        announced = {f"can#{line.split()[1]}" for line in printed.splitlines()}
+        found = check(folder, announced)
+        if f"can#{trial}" in announced or writer_now != writer:
+            continue  # nothing was running, or a new writer had begun between the look and the kill
+        with Store.read(folder) as store:
+            running = [one for one in store.page(limit=1000) if one.instance == f"can#{trial}"]
+            ticks = len(read_recorded(store.recording_of(running[0].recording))) if running else 0
+        if ticks == 0:
+            assert [one.what for one in found] in ([], ["empty"])
+        missing.append((last + 1 - ticks) / 1000.0)
+    report("recorder", running=len(missing), most_missing_s=max(missing), missing_s=sorted(missing))
+    assert len(missing) >= KILLS // 3
+    assert max(missing) <= MOST_MISSING_S
+
+
+def test_a_killed_collect_loses_no_trial_and_goes_on(tmp_path):
+    """One store all along: killed again and again, it goes on until everything is there."""
+    draw = random.Random(10)
+    folder, each = tmp_path / "trials", 3 * KILLS
+    command = [sys.executable, "-m", "graspsense", "collect", "--save", str(folder), "--each", str(each)]
+    command += ["--labels", "can:full_open,block", "-o", "classifier.type=none"]
+    announced, saved = 0, 0
+    for _ in range(KILLS):
+        with subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        ) as process:
+            process.stdin.write("\n" * 2 * each)
+            process.stdin.flush()
+            line = ""
+            while "next:" not in line:
+                line = process.stderr.readline()
+                assert line, "collect ended by itself"
+            time.sleep(draw.uniform(0.0, 1.2))
+            kill(process.pid)
+            said = process.stderr.read()
+        announced += sum(" steady" in one and one.startswith("trial ") for one in said.splitlines())
+        found = check(folder, set())
+        saved += sum(one.what == "saved" for one in found)
+        with Store.read(folder) as store:
+            assert sum(store.counts("collect").values()) >= announced
+    report("collect", announced=announced, saved=saved)
+    assert announced > 0
+    with Store.read(folder) as store:
+        numbers = [one.id for one in store.page(set_aside=None, limit=10_000)]
+        assert numbers == sorted(set(numbers), reverse=True)
+        for one in store.page(limit=10_000):
+            trial = store.trial(one.id)
+            assert len(read_recorded(trial.recording)) == trial.recorder["ticks"]
