@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import signal
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from graspsense.cli.model_table import print_model
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json, echo_table, talk
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from types import FrameType
 
     from graspsense.core.config import Settings
     from graspsense.core.runner import Sink
@@ -28,6 +27,9 @@ BAR: Final = 24
 @pipeline_options
 @click.option("--save", metavar="DIR", help="Keep the trial in the store DIR, with its recording.")
 @click.option("--label", metavar="CLASS:STATE", help="With --save: what it was, as in can:full_open#2.")
+@click.option(
+    "--explain-model", is_flag=True, help="Simulated: list the size of every term. (gripper.explain)"
+)
 @click.option("--dry-run", is_flag=True, help="Say what would be done; open nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
 def run(
@@ -38,6 +40,7 @@ def run(
     seed: int | None,
     save: str | None,
     label: str | None,
+    explain_model: bool,
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -52,6 +55,8 @@ def run(
     from graspsense.core.trial import trial_as_json
     from graspsense.core.wiring import check
 
+    if explain_model:
+        options = (*options, "gripper.explain=true")
     settings = settings_of(pipeline, gripper, object_name, options, seed)
     check(settings)
     if dry_run:
@@ -61,19 +66,17 @@ def run(
         raise click.UsageError("--label goes with a trial that is kept: add --save DIR")
     sinks = () if as_json else (LiveRows(),)
     kept: dict[str, Any] | None = None
-    previous = signal.signal(signal.SIGTERM, _interrupt)
-    try:
-        if save is None:
-            trial = grasp_with(settings, installed(), sinks=sinks)
-        else:
-            trial, kept = _kept(save, label, settings, sinks)
-    finally:
-        signal.signal(signal.SIGTERM, previous)
+    if save is None:
+        trial = grasp_with(settings, installed(), sinks=sinks)
+    else:
+        trial, kept = _kept(save, label, settings, sinks)
 
     if as_json:
         echo_json(trial_as_json(trial) if kept is None else {**trial_as_json(trial), "kept": kept})
     else:
         print_trial(trial)
+        if "model" in trial.report:
+            print_model(trial.report["model"])
     if kept is not None and kept["problem"]:
         talk(f"graspsense: {kept['problem']}")
         raise click.exceptions.Exit(EXIT_NOT_KEPT)
@@ -143,12 +146,6 @@ def _phase_name(phase: int) -> str:
     from graspsense.core.signals import Phase
 
     return Phase(phase).name.lower()
-
-
-def _interrupt(signum: int, frame: FrameType | None) -> None:
-    """Turn SIGTERM into what Ctrl-C raises, so that the runner lets go of the gripper."""
-    del signum, frame
-    raise KeyboardInterrupt
 
 
 def print_trial(trial: Trial) -> None:

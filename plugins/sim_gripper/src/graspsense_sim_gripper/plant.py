@@ -139,7 +139,7 @@ def squeeze(thing: Thing, now: Squeezed, closure_m: float, h: float) -> Squeezed
             return Squeezed(closure_m, force, slope, states, cover0, arm0)
         skins = 0.0
     # The covers' force is `skins` times their compression, plus `shift`: a damper and an arm add to both.
-    shift = dashed = kept = 0.0
+    shift = dashed = kept = force = 0.0
     creeps = skins > 0.0 and (thing.skin.damping_n_s_m > 0.0 or thing.skin.arm_n_m > 0.0)
     if creeps:
         x = h / thing.skin.tau_s
@@ -150,15 +150,21 @@ def squeeze(thing: Thing, now: Squeezed, closure_m: float, h: float) -> Squeezed
         skins += dashed
         shift = arm0 * kept - dashed * cover0
     free_cover = -shift / skins if creeps else 0.0
-    while True:
-        slope = max(slope, 1.0)
-        d1 = d0 + (skins * (closure_m - d0) + shift - force0) / (skins + slope)
+    # Free until now, it is met where it stands; pressed until now, it is let go where its force would pull.
+    touching = force0 > 0.0 and skins > 0.0
+    d1 = d0
+    states = states0
+    for attempt in range(3):
+        stiff = skins if touching else 0.0
+        push = shift if touching else 0.0
+        slope = max(now.slope_n_m, 1.0)
+        d1 = d0 + (stiff * (closure_m - d0) + push - force0) / (stiff + slope)
         force, states = advance(terms, states0, d0, d1, h)
-        residual = force - (skins * (closure_m - d1) + shift)
+        residual = force - (stiff * (closure_m - d1) + push)
         for _ in range(SEARCH):
             if abs(residual) <= FORCE_ROUNDING_N + FORCE_ROUNDING * abs(force):
                 break
-            d2 = d1 - residual / (skins + slope)
+            d2 = d1 - residual / (stiff + slope)
             if d2 == d1:
                 break
             force2, states = advance(terms, states0, d0, d2, h)
@@ -166,17 +172,22 @@ def squeeze(thing: Thing, now: Squeezed, closure_m: float, h: float) -> Squeezed
             if abs(d2 - d1) > 1e-13:
                 slope = max((force2 - force) / (d2 - d1), 1.0)
             d1, force = d2, force2
-            residual = force - (skins * (closure_m - d1) + shift)
-        touching = skins > 0.0 and force >= 0.0
-        if touching or skins == 0.0:
-            if not touching:
-                force = 0.0
-            if not creeps:
-                return Squeezed(d1, force, slope, states, cover0, arm0)
-            cover = closure_m - d1 if touching else free_cover
-            arm = arm0 * kept + thing.skin.arm_n_m * mean_share(h / thing.skin.tau_s, kept) * (cover - cover0)
-            return Squeezed(d1, force, slope, states, cover, arm)
-        skins = shift = 0.0
+            residual = force - (stiff * (closure_m - d1) + push)
+        if touching:
+            if force >= 0.0:
+                break
+            touching = False
+        else:
+            if attempt > 0 or skins == 0.0 or closure_m <= d1 + free_cover:
+                break
+            touching = True
+    if not touching:
+        force = 0.0
+    if not creeps:
+        return Squeezed(d1, force, slope, states, cover0, arm0)
+    cover = closure_m - d1 if touching else free_cover
+    arm = arm0 * kept + thing.skin.arm_n_m * mean_share(h / thing.skin.tau_s, kept) * (cover - cover0)
+    return Squeezed(d1, force, slope, states, cover, arm)
 
 
 def friction(drive: Drive, velocity_m_s: float, load_n: float) -> float:

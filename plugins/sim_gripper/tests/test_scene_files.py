@@ -1,0 +1,293 @@
+"""Scenes of one's own: read strictly, held fast or free, explained, and with terms of somebody else's."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from textwrap import dedent
+
+import pytest
+from click.testing import CliRunner
+
+from graspsense.cli.main import cli
+from graspsense.core.runner import RunConfig, run_grasp
+from graspsense.plugin_api import ConfigError, UnknownName, create
+from graspsense_sim_gripper.backend import SimBackend
+from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.kernel import plant_of
+from graspsense_sim_gripper.scene import find, shipped_scenes
+from graspsense_sim_gripper.setting import set_scene
+from graspsense_sim_gripper.terms.registry import laws_of
+
+HYBRID = create("controller", "hybrid")
+
+BOTTLE = """
+    width_m = 0.06
+    [[terms]]
+    type = "maxwell"
+    k_n_m = 200.0
+    tau_s = 0.3
+    [[terms]]
+    type = "elastic"
+    k1_n_m = 2000.0
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    def write(text, name="bottle"):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(dedent(text))
+        return str(path)
+
+    return write
+
+
+def test_a_file_needs_no_more_than_a_width_and_its_terms(scene):
+    spec = find(scene(BOTTLE))
+    assert (spec.name, spec.width_m, spec.held) == ("bottle", 0.06, False)
+    # In the canonical order, whatever the file's.
+    assert [kind for kind, _ in spec.terms] == ["elastic", "maxwell"]
+
+
+@pytest.mark.parametrize("name", sorted(shipped_scenes()))
+def test_every_shipped_scene_is_grasped_and_stays_steady(name):
+    done = run_many(SimConfig(sensor="ideal"), HYBRID, [name], [0])[0]
+    assert done.outcome.name == "STEADY"
+    assert 10.0 < done.body.peak_n < 40.0
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("width_m = 0.2", r"bottle.toml: width_m: 0.2 m wide .* fingers open to 0.086 m"),
+        ("width_m = 0.08\noffset_m = -0.02", r"bottle.toml: offset_m: .* needs 0.12 m"),
+        ("width_m = -0.01", r"bottle.toml: width_m: -0.01 is negative"),
+        ("width_m = 0.0", r"bottle.toml: 'width_m' must be > 0"),
+        ("width_m = nan", r"bottle.toml: width_m: nan is no finite number"),
+        ("width_m = inf", r"bottle.toml: width_m: inf is no finite number"),
+        ("width_m = '5 cm'", r"bottle.toml: width_m: '5 cm' is no number"),
+        ("width_m = true", r"bottle.toml: width_m: True is no number"),
+        ("patch = 'face'", r"bottle.toml: width_m: is not given"),
+        ("width_m = 0.05\nheld = 1", r"bottle.toml: held: 1 is no true or false"),
+        ("width_m = 0.05\nwidht_m = 0.05", r"bottle.toml: widht_m: no such key.*Did you mean 'width_m'\?"),
+        ("width_m = 0.05\nterms = 3", r"bottle.toml: terms: write a table \[\[terms\]\] for each"),
+        (
+            "width_m = 0.05\n[[terms]]\ntype='spring'",
+            r"bottle.toml: \[\[terms\]\] 1 \(spring\): no term 'spring'",
+        ),
+        ("width_m = 0.05\n[[terms]]\ntype='maxwell'\nk_n_m=1", r"\[\[terms\]\] 1 \(maxwell\): missing tau_s"),
+        (
+            "width_m = 0.05\n[[terms]]\ntype='maxwell'\nk_n_m=1\ntau_s=0",
+            r"bottle.toml: \[\[terms\]\] 1 \(maxwell\) tau_s: must be greater than 0",
+        ),
+        (
+            "width_m = 0.05\n[[terms]]\ntype='loss'\ndamping_n_s_m=-1",
+            r"bottle.toml: \[\[terms\]\] 1 \(loss\) damping_n_s_m: -1 is negative",
+        ),
+        ("width_m = ", r"bottle.toml: is no TOML"),
+    ],
+)
+def test_a_file_that_makes_no_sense_is_refused_by_file_table_and_field(scene, text, says):
+    with pytest.raises(ConfigError, match=says):
+        set_scene(SimConfig(), scene(text), 0)
+
+
+def test_a_file_that_is_not_there_and_a_name_that_nothing_has(tmp_path):
+    with pytest.raises(ConfigError, match=r"no scene file .*nope.toml"):
+        find(str(tmp_path / "nope.toml"))
+    with pytest.raises(UnknownName, match=r"no object named 'spong'.*sponge.*Did you mean 'sponge'\?"):
+        find("spong")
+
+
+def pressed(config, effort_n, seconds, **changes):
+    """Press with this effort for so long; return the setting and the plant at each millisecond."""
+    setting = set_scene(config, changes.pop("scene"), 0)
+    move, body, bodies = plant_of(laws_of(setting.kinds)), setting.body, []
+    for _ in range(round(seconds / setting.dt_s)):
+        body = move(setting.plant, body, effort_n, setting.dt_s)
+        bodies.append(body)
+    return setting, bodies
+
+
+def test_an_object_held_fast_is_pressed_by_the_finger_that_meets_it_first(scene):
+    text = "width_m = 0.06\noffset_m = 0.002\n{}[[terms]]\ntype = 'elastic'\nk1_n_m = 2000.0\n"
+    config = SimConfig(spread=False, coulomb_n=0.0, breakaway_n=0.0, load_share=0.0, damping_n_s_m=1000.0)
+    _, fast = pressed(config, 10.0, 6.0, scene=scene(text.format("held = true\n")))
+    end = fast[-1]
+    # Each half is twice as stiff as the whole; effort is the mean of the two pads.
+    assert end.right_n - end.left_n == pytest.approx(2000.0 * 4 * 0.002 / (1 + 2000.0 / 1.5e4), rel=1e-3)
+    assert 0.5 * (end.left_n + end.right_n) == pytest.approx(10.0, rel=1e-2)
+    assert end.offset_m == pytest.approx(0.002)
+    _, free = pressed(config, 10.0, 6.0, scene=scene(text.format("")))
+    assert free[-1].left_n == free[-1].right_n == pytest.approx(10.0, rel=1e-2)
+    assert free[-1].offset_m == 0.0
+
+
+def test_a_drive_that_lags_gives_its_effort_as_a_first_order_rise(scene):
+    quick = SimConfig(spread=False, coulomb_n=0.0, breakaway_n=0.0, damping_n_s_m=0.0)
+    lagging = SimConfig(
+        spread=False, coulomb_n=0.0, breakaway_n=0.0, damping_n_s_m=0.0, drive_lag_s=0.05, rate_hz=100.0
+    )
+    _, at_once = pressed(quick, 2.0, 0.2, scene=scene(BOTTLE))
+    _, later = pressed(lagging, 2.0, 0.2, scene=scene(BOTTLE))
+    # Impulse of 1 - exp(-t / tau) over 0.2 s: 0.2 - 0.05 (1 - exp(-4)).
+    ratio = later[-1].speed_rev_s / at_once[-1].speed_rev_s
+    assert ratio == pytest.approx((0.2 - 0.05 * 0.9817) / 0.2, rel=2e-3)
+    assert later[-1].effort_n == pytest.approx(2.0 * 0.9817, rel=1e-3)
+
+
+def test_covers_that_creep_give_way_and_covers_that_damp_lower_no_force_at_rest(scene):
+    hard = scene("width_m = 0.03\n[[terms]]\ntype = 'rigid'\nhertz_n_m15 = 1e10\n")
+    plain = SimConfig(spread=False, coulomb_n=0.0, breakaway_n=0.0, load_share=0.0, damping_n_s_m=2000.0)
+    creeping = SimConfig(
+        spread=False, coulomb_n=0.0, breakaway_n=0.0, load_share=0.0, damping_n_s_m=2000.0,
+        skin_creep_n_m=1e5, skin_creep_s=0.5, skin_damping_n_s_m=500.0,
+    )  # fmt: skip
+    _, stiff = pressed(plain, 20.0, 20.0, scene=hard)
+    _, soft = pressed(creeping, 20.0, 20.0, scene=hard)
+    assert soft[-1].squeezed.force_n == pytest.approx(20.0, rel=1e-2)
+    # The arm has let go: the gap is where the spring alone leaves it, and got there later.
+    assert soft[-1].gap_m == pytest.approx(stiff[-1].gap_m, abs=2e-5)
+    first = next(k for k, b in enumerate(soft) if b.touched)
+    assert soft[first + 300].gap_m > stiff[first + 300].gap_m + 1e-4
+
+
+def test_a_bottle_with_a_deep_snap_stays_dented(scene):
+    text = """
+        width_m = 0.06
+        [[terms]]
+        type = "snap"
+        k1_n_m = 1500.0
+        critical_m = 0.004
+        drop_n = 8.0
+        fall_m = 0.003
+        k2_n_m = 3000.0
+    """
+    config = SimConfig(spread=False)
+    setting = set_scene(config, scene(text), 0)
+    move, body = plant_of(laws_of(setting.kinds)), setting.body
+    for _ in range(3000):
+        body = move(setting.plant, body, 25.0, 1e-3)
+    assert body.squeezed.force_n > 8.0
+    for _ in range(3000):
+        body = move(setting.plant, body, -30.0, 1e-3)
+    assert body.squeezed.force_n == 0.0
+    # On the second branch, where it crosses zero: 6 - 8 + 3000 (d - 0.007) = 0.
+    assert body.squeezed.compression_m == pytest.approx(0.007 + 2.0 / 3000.0, rel=1e-3)
+
+
+def test_the_explanation_adds_up_to_the_force_that_was_felt():
+    grasp = run_grasp(
+        SimBackend(SimConfig(object="odwalla:full_closed", explain=True)), HYBRID, RunConfig(seed=3)
+    )
+    model = grasp.report["model"]
+    rows = {row["term"]: row for row in model["terms"]}
+    assert list(rows) == ["elastic", "maxwell", "gas"]
+    assert sum(row["at_peak_n"] for row in rows.values()) == pytest.approx(model["peak_n"], rel=1e-3)
+    assert model["peak_n"] == pytest.approx(grasp.report["true_peak_force_n"], rel=1e-3)
+    assert sum(row["share"] for row in rows.values()) == pytest.approx(1.0)
+    assert rows["maxwell"]["rates"] == [{"what": "relaxes", "per_s": 2.5}]
+    # A spring gives back what was put in; a branch that relaxes does not.
+    assert abs(rows["elastic"]["lost_j"]) < 1e-3 * rows["elastic"]["work_j"]
+    assert rows["maxwell"]["lost_j"] > 0.2 * rows["maxwell"]["work_j"] > 0.0
+    assert rows["elastic"]["expected_n"] == pytest.approx(rows["elastic"]["peak_n"], rel=1e-3)
+
+
+def test_run_explains_the_model_in_the_terminal_and_in_json():
+    shown = CliRunner().invoke(cli, ["run", "--object", "leaking_bottle", "--explain-model"])
+    assert shown.exit_code == 0
+    table = shown.output[shown.output.index("model       1") :].splitlines()
+    assert table[1].split()[:2] == ["term", "peak"]
+    assert [line.split()[0] for line in table[2:4]] == ["elastic", "gas"]
+    assert "relaxes in 5 s" in table[3]
+    none = CliRunner().invoke(cli, ["run", "--object", "none", "--explain-model", "--json"])
+    assert json.loads(none.stdout)["report"]["model"] == {"touched": False, "terms": []}
+
+
+# ---------------------------------------------------------------------------------- somebody else's term
+
+PLUGIN = """
+    from graspsense.plugin_api import hookimpl
+
+    GRASPSENSE_API = (1, 0)
+
+    @hookimpl(optionalhook=True)
+    def graspsense_sim_terms():
+        from lab_gel import TERM
+        yield TERM
+"""
+
+GEL = '''
+    """A gel that stiffens as it is pressed."""
+
+    from typing import NamedTuple
+
+    from graspsense_sim_gripper.terms import NoState, Term
+
+
+    class Gel(NamedTuple):
+        k_n_m: float
+        thickness_m: float
+
+
+    def gel(params, state, d0, d1, h):
+        """Return the force: a spring that would be infinitely stiff at its thickness."""
+        room = max(params.thickness_m - d1, 1e-6)
+        return params.k_n_m * d1 * params.thickness_m / room, state
+
+
+    TERM = Term(name="gel", summary="gel", params=Gel, law=gel, positive=("thickness_m",))
+'''
+
+PROGRAM = """
+    import sys
+    import numpy as np
+    from graspsense.plugin_api import create
+    from graspsense_sim_gripper.batch import run_many
+    from graspsense_sim_gripper.config import SimConfig
+
+    law, (scene, *compiled) = create("controller", "hybrid"), sys.argv[1:]
+    done = [run_many(SimConfig(spread=False), law, [scene], [0], compiled=one == "yes")[0] for one in compiled]
+    print(done[0].outcome.name, done[0].body.squeezed.force_n, done[0].body.peak_n)
+    print(all(np.array_equal(done[0].trace.gap_m, one.trace.gap_m) for one in done))
+"""
+
+SCENE = """
+    width_m = 0.05
+    [[terms]]
+    type = "gel"
+    k_n_m = 1000.0
+    thickness_m = 0.02
+    [[terms]]
+    type = "elastic"
+    k1_n_m = 500.0
+"""
+
+
+@pytest.mark.parametrize("compiled", [("no",), pytest.param(("no", "yes"), marks=pytest.mark.slow)])
+def test_a_term_of_another_distribution_is_composed_like_ours(tmp_path, scene, compiled):
+    site = tmp_path / "site"
+    info = site / "lab_terms-0.3.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-terms\nVersion: 0.3\n")
+    (info / "entry_points.txt").write_text("[graspsense.plugins]\nlab = lab_plugin\n")
+    (site / "lab_plugin.py").write_text(dedent(PLUGIN))
+    (site / "lab_gel.py").write_text(dedent(GEL))
+    (tmp_path / "program.py").write_text(dedent(PROGRAM))
+    paths = [str(site), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+
+    def run(text, *arguments):
+        command = [sys.executable, str(tmp_path / "program.py"), scene(text), *arguments]
+        return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+
+    done = run(SCENE, *compiled)
+    assert done.stdout.splitlines()[0].startswith("STEADY"), done.stderr
+    assert done.stdout.splitlines()[1] == "True"
+    # By its only name, too; and checked like ours.
+    assert run(SCENE.replace('"gel"', '"lab-terms/gel"'), "no").stdout == run(SCENE, "no").stdout
+    assert "(gel) thickness_m: must be greater than 0" in run(SCENE.replace("0.02", "0.0"), "no").stderr

@@ -1,0 +1,37 @@
+"""The table of `run --explain-model`: how much each term of a simulated object did in this grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import click
+
+
+def print_model(model: Mapping[str, Any]) -> None:
+    """Print what a simulated gripper reports as `model`: one row a term."""
+    click.echo()
+    if not model["touched"]:
+        click.echo("model       nothing was touched, so no term did anything")
+        return
+    click.echo(
+        f"model       {model['peak_n']:.2f} N at most, {model['compression_m'] * 1e3:.3f} mm pressed in, "
+        f"{model['covers_m'] * 1e3:.3f} mm of the fingertips' covers"
+    )
+    click.echo(
+        f"{'term':<16}{'peak':>10}{'at the top':>12}{'share':>8}{'work':>11}{'lost':>11}{'expected':>11}"
+        "  time constants"
+    )
+    for row in model["terms"]:
+        click.echo(
+            f"{row['term']:<16}{row['peak_n']:>8.3f} N{row['at_peak_n']:>10.3f} N{row['share']:>8.1%}"
+            f"{row['work_j'] * 1e3:>8.2f} mJ{row['lost_j'] * 1e3:>8.2f} mJ{row['expected_n']:>9.3f} N"
+            f"  {_times(row['rates'])}"
+        )
+
+
+def _times(rates: Iterable[Mapping[str, Any]]) -> str:
+    return (
+        ", ".join(f"{rate['what']} in {1.0 / rate['per_s']:.3g} s" for rate in rates if rate["per_s"] > 0.0)
+        or "-"
+    )
