@@ -109,14 +109,10 @@ def trials_of(source: str, progress: Progress, given: Mapping[str, Any]) -> Labe
 
 def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) -> Chosen:
     """Return the classifier that is to learn: by its name, or that of the pipeline where there is one."""
-    from attrs import evolve
-
-    from graspsense.core.config import Chosen
-
     if _kind(source) == SIMULATED:
         chosen = _settings(given, classifier).classifier
         assert chosen is not None
-        return Chosen(chosen.component, evolve(chosen.config, model=None))
+        return chosen
     return _alone("classifier", classifier or DEFAULT_CLASSIFIER, given)
 
 
@@ -210,7 +206,8 @@ def _csv(source: str, given: Mapping[str, Any]) -> Labelled:
 
 
 def _data_set(source: str, given: Mapping[str, Any]) -> Labelled:
-    from graspsense.core.errors import ConfigError
+    from graspsense.core.errors import ConfigError, PluginUnavailable
+    from graspsense.core.labelled import Labelled
     from graspsense.core.plugins import installed
 
     name, _, folder = source.partition(":")
@@ -218,7 +215,11 @@ def _data_set(source: str, given: Mapping[str, Any]) -> Labelled:
         raise ConfigError(f"{source!r} names no folder: write it after the colon")
     reader = installed().dataset(name).load()
     features = _alone("features", "chitta", given).create()
-    found: Labelled = reader(folder, features, unreliable=given["unreliable"])
+    found = reader(folder, features, unreliable=given["unreliable"])
+    if not isinstance(found, Labelled):
+        raise PluginUnavailable(
+            f"data set {name!r} cannot be used here: its reader gave {type(found).__name__}, not Labelled"
+        )
     return found
 
 
