@@ -217,8 +217,8 @@ def test_missing_folder(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("recording", "says"),
     [
-        ("full_bottle_1.txt", "does not say what kind of recording it is: write icub:, mcap:, rosbag:, store: before"),
-        ("icb:full_bottle_1.txt", "unknown kind of recording 'icb'. Known: icub:, mcap:, rosbag:, store:. Did you mean 'icub'?"),
+        ("full_bottle_1.txt", "does not say what kind of recording it is: write csv:, icub:, mcap:, rosbag:, store: before"),
+        ("icb:full_bottle_1.txt", "unknown kind of recording 'icb'. Known: csv:, icub:, mcap:, rosbag:, store:. Did you mean 'icub'?"),
         ("icub:", "names no file"),
     ],
 )

@@ -28,6 +28,8 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "replay": ("graspsense.cli.replay:replay", "Put a recording through a pipeline."),
     "recover": ("graspsense.cli.recover:recover", "Save what a killed program left."),
     "verify": ("graspsense.cli.verify:verify", "Check every hash and file of a store."),
+    "export": ("graspsense.cli.export:export", "Write trials or a recording for other programs."),
+    "import": ("graspsense.cli.import_:import_", "Take in what somebody else recorded."),
     "train": ("graspsense.cli.train:train", "Make a model from labelled trials."),
     "predict": ("graspsense.cli.predict:predict", "Ask a model what trials are of."),
     "evaluate": ("graspsense.cli.evaluate:evaluate", "Measure an honest recognition rate."),

@@ -99,6 +99,11 @@ def graspsense_datasets() -> Iterable[DatasetEntry]:
         target="graspsense.trials.icub_features:read_dataset",
         summary="iCub Grasp Dataset (Soh, Su and Demiris 2012), as icub:FOLDER",
     )
+    yield DatasetEntry(
+        name="store",
+        target="graspsense.trials.store_table:read_dataset",
+        summary="labelled trials of a store, as store:FOLDER",
+    )
 
 
 @hookimpl

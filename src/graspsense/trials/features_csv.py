@@ -27,7 +27,7 @@ _HEADING: Final = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]")
 _DECIMAL_COMMA: Final = re.compile(r"[-+]?\d+,\d+")
 
 
-class _Columns:
+class Columns:
     """A CSV as columns of text, with the line that each row begins in."""
 
     def __init__(self, path: Path) -> None:
@@ -147,7 +147,7 @@ def read_labelled(
     Raises ConfigError where a column is not there or is no label, DataDamaged where the file is not what it
     claims to be.
     """
-    columns = _Columns(path)
+    columns = Columns(path)
     labels = _labels(columns, label)
     things = None if instance is None else _named(columns, instance, "the instance")
     notes: list[str] = []
@@ -190,7 +190,7 @@ def read_labelled(
 
 def read_table(path: Path, names: Sequence[str]) -> FeatureTable:
     """Return these columns of a CSV. Raises ConfigError, DataDamaged."""
-    return _Columns(path).table(list(names))
+    return Columns(path).table(list(names))
 
 
 def write_labelled(path: Path, labelled: Labelled) -> None:
@@ -232,7 +232,7 @@ def _text(path: Path) -> str:
         ) from None
 
 
-def _labels(columns: _Columns, label: str) -> list[str]:
+def _labels(columns: Columns, label: str) -> list[str]:
     labels = _named(columns, label, "the label")
     if len(set(labels)) > max(2, len(labels) // 2):
         raise ConfigError(
@@ -246,7 +246,7 @@ def _labels(columns: _Columns, label: str) -> list[str]:
     return labels
 
 
-def _named(columns: _Columns, name: str, what: str) -> list[str]:
+def _named(columns: Columns, name: str, what: str) -> list[str]:
     cells = columns.column(name, what)
     for line, cell in zip(columns.lines, cells, strict=True):
         if cell.lower() in MISSING:
@@ -254,7 +254,7 @@ def _named(columns: _Columns, name: str, what: str) -> list[str]:
     return cells
 
 
-def _feature_names(columns: _Columns, taken: set[str], notes: list[str]) -> list[str]:
+def _feature_names(columns: Columns, taken: set[str], notes: list[str]) -> list[str]:
     names, left, counters = [], [], []
     for name in columns.names:
         if name in taken:

@@ -28,6 +28,12 @@ def _stored(name: str) -> Recording:
     return stored_recording(name)
 
 
+def _csv(name: str) -> Recording:
+    from graspsense.trials.csv_squeeze import read_squeeze
+
+    return read_squeeze(name)
+
+
 def _bag(name: str) -> Recording:
     from graspsense.trials.rosbag import read_bag
 
@@ -35,6 +41,7 @@ def _bag(name: str) -> Recording:
 
 
 KINDS: Final[Mapping[str, Callable[[str], Recording]]] = {
+    "csv": _csv,
     "icub": read_recording,
     "mcap": _mcap,
     "rosbag": _bag,

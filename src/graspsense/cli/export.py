@@ -1,0 +1,52 @@
+"""`graspsense export`: trials and recordings for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from graspsense.cli.output import echo_json, talk
+
+
+@click.command(short_help="Write trials or a recording for other programs.")
+@click.argument("source", metavar="DIR|DIR#NUMBER|FILE.mcap")
+@click.option(
+    "--to",
+    "target",
+    required=True,
+    metavar="FILE",
+    help="The file to write; its ending says what: .csv .npz .arff .parquet .mcap .toml",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
+def export(source: str, target: str, as_json: bool) -> None:
+    """Write the trials of the store DIR as a table (.csv .npz .arff .parquet), or one recorded grasp, tick by tick.
+
+    One grasp is a trial of a store, DIR#NUMBER, or a FILE.mcap: .csv .npz .parquet, .mcap for a copy of the
+    recording, .toml for the settings that made it. No file is ever overwritten.
+    """
+    from graspsense.core.errors import ConfigError
+    from graspsense.trials import export_table, export_trace
+    from graspsense.trials.recorded import read_recorded
+    from graspsense.trials.stored import stored_grasp
+
+    path, source = Path(target), source.removeprefix("store:")
+    table = Path(source).is_dir()
+    writers = export_table.WRITERS if table else export_trace.WRITERS
+    if path.suffix not in writers:
+        what = "the table of a store" if table else "one grasp"
+        raise ConfigError(f"{target!r}: {what} can be written as {', '.join(writers)}")
+    if table:
+        trials = export_table.trial_table(source)
+        export_table.WRITERS[path.suffix](path, trials)
+        written = {"trials": len(trials.features), "features": list(trials.features.names)}
+    else:
+        grasp = read_recorded(source) if source.endswith(".mcap") else stored_grasp(source)
+        export_trace.WRITERS[path.suffix](path, grasp)
+        written = {"ticks": len(grasp), "images": len(grasp.pads)}
+    if as_json:
+        echo_json({"file": target, **written})
+    else:
+        talk(
+            f"{target}: {', '.join(f'{value} {key}' for key, value in written.items() if key != 'features')}"
+        )

@@ -1,0 +1,81 @@
+"""`graspsense import`: take in what somebody else recorded."""
+
+from __future__ import annotations
+
+import click
+
+from graspsense.cli.output import echo_json, talk
+
+
+@click.command("import", short_help="Take in what somebody else recorded.")
+@click.argument("sources", nargs=-1, required=True, metavar="FILE.csv|KIND:NAME...")
+@click.option("--save", metavar="DIR", required=True, help="The store to keep them in.")
+@click.option("--label", metavar="CLASS:STATE", help="What was squeezed, as in can:full_open#2.")
+@click.option("--time", metavar="COLUMN", help="CSV: the column of the time, in s.")
+@click.option(
+    "--gap", metavar="COLUMN", help="CSV: that of the gap between the fingers, in m; POS*0.001 from mm."
+)
+@click.option(
+    "--force", "forces", metavar="COLUMN", multiple=True, help="CSV: the force in N; twice for two pads."
+)
+@click.option("--effort", metavar="COLUMN", help="CSV: the effort in N.")
+@click.option("--velocity", metavar="COLUMN", help="CSV: the gap's rate in m/s, negative as it closes.")
+@click.option(
+    "--pipeline", metavar="NAME|FILE", default="default", help="What draws the features.  [default]"
+)
+@click.option(
+    "-o",
+    "options",
+    metavar="TABLE.KEY=VALUE",
+    multiple=True,
+    help="A key of the pipeline, as in -o controller.probing_force_n=17. May be given again.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print what was kept as JSON.")
+def import_(
+    sources: tuple[str, ...],
+    save: str,
+    label: str | None,
+    time: str | None,
+    gap: str | None,
+    forces: tuple[str, ...],
+    effort: str | None,
+    velocity: str | None,
+    pipeline: str,
+    options: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Keep other people's squeezes as trials: each with its recording, its features and its label.
+
+    A FILE.csv needs --time, --gap and --force; KIND:NAME is what another reader reads, as rosbag:FILE.bag.
+    """
+    from graspsense.core.config import Flag, resolve
+    from graspsense.core.plugins import installed
+    from graspsense.core.wiring import check
+    from graspsense.trials.csv_squeeze import named
+    from graspsense.trials.importing import import_recording
+    from graspsense.trials.labels import labels_of
+    from graspsense.trials.store import Store
+
+    columns = {"time": time, "gap": gap, "effort": effort, "velocity": velocity}
+    given = {what: [one] for what, one in columns.items() if one is not None}
+    if forces:
+        given["force"] = list(forces)
+    labels = {} if label is None else labels_of(label)
+    kept = []
+    with Store.open(save) as store:
+        for source in sources:
+            csv = source.lower().endswith((".csv", ".tsv", ".txt")) and ":" not in source
+            if given and not csv:
+                raise click.UsageError(f"--{next(iter(given))} is for a CSV; {source} is none")
+            recording = f"csv:{named(source, given)}" if csv else source
+            flags = (
+                Flag("--gripper", "gripper.type", "replay"),
+                Flag("SOURCE", "gripper.recording", recording),
+            )
+            settings = resolve(pipeline, options=options, flags=flags)
+            check(settings)
+            trial, number = import_recording(store, settings, installed(), labels)
+            kept.append({"source": source, "trial": number, "outcome": trial.outcome.words})
+            talk(f"{source}: trial {number}, {trial.outcome.words}")
+    if as_json:
+        echo_json({"store": save, "trials": kept})

@@ -1,0 +1,79 @@
+"""One recorded grasp as a file for other programs: CSV, NPZ, Parquet, the recording itself, or its settings."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from graspsense.core.trace import PAD_COLUMNS, TICK_COLUMNS
+from graspsense.trials.content import beginning_in
+from graspsense.trials.export_table import parquet
+from graspsense.trials.layout import PADS_FIELDS, TICK_FIELDS
+from graspsense.trials.whole_file import write_whole
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.trials.recorded import RecordedGrasp
+
+
+def write_csv(path: Path, grasp: RecordedGrasp) -> None:
+    """Write a line a tick, empty where a channel is missing; the cell images go to `NAME-pads.csv`."""
+    if len(grasp.pads):
+        write_whole(_pads_beside(path), _csv(grasp.pads, PADS_FIELDS))
+    write_whole(path, _csv(grasp.ticks, TICK_FIELDS))
+
+
+def write_npz(path: Path, grasp: RecordedGrasp) -> None:
+    """Write the columns of the trace as arrays, as `graspsense.Trace` names them."""
+    trace, out = grasp.trace(), io.BytesIO()
+    columns = {name: getattr(trace, name) for name in (*TICK_COLUMNS, *PAD_COLUMNS)}
+    np.savez_compressed(out, allow_pickle=False, **columns)
+    write_whole(path, out.getvalue())
+
+
+def write_parquet(path: Path, grasp: RecordedGrasp) -> None:
+    """Write a row a tick; the cell images go to `NAME-pads.parquet`. Raises PluginUnavailable without pyarrow."""
+    ticks = parquet({name: (grasp.ticks[name], "") for name in TICK_FIELDS})
+    if len(grasp.pads):
+        write_whole(_pads_beside(path), parquet({name: (grasp.pads[name], "") for name in PADS_FIELDS}))
+    write_whole(path, ticks)
+
+
+def write_mcap(path: Path, grasp: RecordedGrasp) -> None:
+    """Copy the recording as it is."""
+    write_whole(path, grasp.path.read_bytes())
+
+
+def write_toml(path: Path, grasp: RecordedGrasp) -> None:
+    """Write the settings that made it: a pipeline file that runs by itself."""
+    write_whole(path, beginning_in(grasp.metadata, str(grasp.path)).settings.encode())
+
+
+WRITERS: Final[Mapping[str, Callable[[Path, RecordedGrasp], None]]] = {
+    ".csv": write_csv,
+    ".npz": write_npz,
+    ".parquet": write_parquet,
+    ".mcap": write_mcap,
+    ".toml": write_toml,
+}
+"""Ending of a file to what writes it."""
+
+
+def _csv(rows: NDArray[np.void], fields: tuple[str, ...]) -> bytes:
+    out = io.StringIO(newline="")
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(fields)
+    for row in rows.tolist():
+        writer.writerow(["" if isinstance(one, float) and math.isnan(one) else repr(one) for one in row])
+    return out.getvalue().encode()
+
+
+def _pads_beside(path: Path) -> Path:
+    return path.with_name(f"{path.stem}-pads{path.suffix}")

@@ -1,0 +1,169 @@
+"""Export: what is written is read back by programs that know nothing of graspsense."""
+
+import csv
+import math
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+from kept import frame, keep, pads
+from scipy.io import arff
+
+from graspsense.cli.main import main
+from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.trials.features_csv import read_labelled
+from graspsense.trials.store import Store
+from graspsense.trials.store_table import labelled_store, read_dataset
+
+
+@pytest.fixture
+def folder(tmp_path):
+    with Store.open(tmp_path / "trials") as store:
+        keep(store, "can:full_open", "can#1", values=(0.066, 5.5))
+        keep(store, "can:it's open", "can#2", values=(0.1 + 0.2, None))
+        keep(store, None, values=(0.05, 1.0))
+        store.set_aside(keep(store), "undone")
+        keep(store, "can:full_open", "can#1", outcome="aborted", values=(None, None))
+    return tmp_path / "trials"
+
+
+@pytest.fixture
+def export(capsys):
+    def export(source, target):
+        with pytest.raises(SystemExit) as ended:
+            main(["export", str(source), "--to", str(target)])
+        _, err = capsys.readouterr()
+        assert "Traceback" not in err
+        return ended.value.code, err
+
+    return export
+
+
+def test_the_table_as_csv(folder, export, tmp_path):
+    assert export(folder, tmp_path / "t.csv")[0] == 0
+    with (tmp_path / "t.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["trial"] for row in rows] == ["1", "2", "3", "5"]
+    assert float(rows[1]["p_first [m]"]) == 0.1 + 0.2
+    assert (rows[1]["f_steady [N]"], rows[2]["label"], rows[3]["outcome"]) == ("", "", "aborted")
+
+
+def test_a_csv_of_ours_is_a_table_to_learn_from(folder, export, tmp_path):
+    with Store.open(folder) as store:
+        store.set_aside(3, "no label")
+    export(folder, tmp_path / "t.csv")
+    found = read_labelled(
+        tmp_path / "t.csv", "label", instance="instance", order="trial", features=["p_first"]
+    )
+    assert found.labels == ("can:full_open", "can:it's open", "can:full_open")
+    assert found.table.units == ("m",)
+
+
+def test_the_table_as_arff_is_read_by_scipy(folder, export, tmp_path):
+    with Store.open(folder) as store:
+        store.set_aside(3, "no label")
+    assert export(folder, tmp_path / "t.arff")[0] == 0
+    data, about = arff.loadarff(tmp_path / "t.arff")
+    assert about.names() == ["p_first", "f_steady", "label"]
+    assert data["p_first"][:2].tolist() == [0.066, 0.1 + 0.2]
+    assert math.isnan(data["f_steady"][1])
+    assert data["label"][0] == b"can:full_open"
+
+
+def test_the_table_as_npz(folder, export, tmp_path):
+    assert export(folder, tmp_path / "t.npz")[0] == 0
+    with np.load(tmp_path / "t.npz", allow_pickle=False) as found:
+        assert found["features"].tolist() == ["p_first", "f_steady"]
+        assert found["units"].tolist() == ["m", "N"]
+        assert found["values"][:2].tolist()[0] == [0.066, 5.5]
+        assert found["label"].tolist() == ["can:full_open", "can:it's open", "", "can:full_open"]
+
+
+def test_one_grasp_tick_by_tick(folder, export, tmp_path):
+    for ending in ("csv", "npz", "mcap", "toml"):
+        assert export(f"{folder}#1", tmp_path / f"one.{ending}")[0] == 0
+    with (tmp_path / "one.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["gap_m"]) for row in rows] == [frame(k).gap_m for k in range(120)]
+    assert {row["edge_left_n"] for row in rows} == {""}
+    with (tmp_path / "one-pads.csv").open(newline="") as file:
+        assert float(next(csv.DictReader(file))["right_00"]) == pads(0).right[0]
+    with np.load(tmp_path / "one.npz", allow_pickle=False) as found:
+        assert found["pad_left"].shape == (3, 22)
+    (recording,) = [
+        one
+        for one in (folder / "recordings").iterdir()
+        if one.read_bytes() == (tmp_path / "one.mcap").read_bytes()
+    ]
+    assert recording.is_file()
+    assert tomllib.loads((tmp_path / "one.toml").read_text())["controller"]["probing_force_n"] == 20.0
+    # A recording without a store, as well.
+    assert export(recording, tmp_path / "again.npz")[0] == 0
+
+
+def test_nothing_is_ever_overwritten(folder, export, tmp_path):
+    (tmp_path / "t.csv").write_text("mine")
+    code, err = export(folder, tmp_path / "t.csv")
+    assert (code, (tmp_path / "t.csv").read_text()) == (2, "mine")
+    assert "is there already" in err
+
+
+@pytest.mark.parametrize(
+    ("source", "target"), [("", "t.xlsx"), ("", "t.mcap"), ("#1", "t.arff"), ("#9", "t.csv")]
+)
+def test_what_cannot_be_written_is_told(folder, export, tmp_path, source, target):
+    code, err = export(f"{folder}{source}", tmp_path / target)
+    assert code == 2
+    assert "can be written as" in err or "has no trial 9" in err
+    assert not (tmp_path / target).exists()
+
+
+def test_without_pyarrow_parquet_says_what_to_install(folder, tmp_path, monkeypatch):
+    from graspsense.trials.export_table import trial_table, write_parquet
+
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(PluginUnavailable, match=r"graspsense\[parquet\]"):
+        write_parquet(tmp_path / "t.parquet", trial_table(folder))
+
+
+def test_parquet_is_read_by_pyarrow(folder, export, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
+    assert export(folder, tmp_path / "t.parquet")[0] == 0
+    table = parquet.read_table(tmp_path / "t.parquet")
+    assert table["f_steady"].to_pylist() == [5.5, None, 1.0, None]
+    assert table.schema.field("p_first").metadata == {b"unit": b"m"}
+    assert export(f"{folder}#1", tmp_path / "one.parquet")[0] == 0
+    assert parquet.read_table(tmp_path / "one.parquet")["gap_m"].to_pylist()[5] == frame(5).gap_m
+    assert parquet.read_table(tmp_path / "one-pads.parquet").num_rows == 3
+
+
+def test_labelled_trials_of_a_store_are_a_data_set(folder):
+    found = labelled_store(str(folder))
+    assert found.labels == ("can:full_open", "can:it's open")
+    assert found.instances == ("can#1", "can#2")
+    assert found.order == (1, 2)
+    assert found.table.names == ("p_first", "f_steady")
+    assert found.table.values[0].tolist() == [0.066, 5.5]
+    assert math.isnan(found.table.values[1, 1])
+    assert found.before_contact.table.values.tolist() == [[0.08], [0.08]]
+    assert found.width.table.names == ("p_first",)
+    assert found.provenance["simulated"]
+    assert any("simulated" in note for note in found.notes)
+    assert found.provenance["settings"]["controller"]["probing_force_n"] == 20.0
+
+
+def test_other_features_than_those_kept_are_refused(folder):
+    from graspsense.plugin_api import create
+
+    assert len(read_dataset(str(folder), create("feature-set", "chitta"))) == 2
+    other = create("feature-set", "chitta", force="left")
+    with pytest.raises(ConfigError, match="have no effect on them"):
+        read_dataset(str(folder), other)
+
+
+def test_a_store_without_labels_says_how_to_get_some(tmp_path):
+    with Store.open(tmp_path / "t") as store:
+        keep(store, None)
+    with pytest.raises(ConfigError, match="graspsense collect"):
+        labelled_store(str(tmp_path / "t"))

@@ -1,0 +1,135 @@
+"""Other people's squeezes: a CSV whose columns their user names, through the pipeline and into a store."""
+
+import json
+import sys
+
+import pytest
+from grippers import bottle, squeezing
+
+from graspsense.cli.main import main
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.trials.csv_squeeze import named, read_squeeze
+from graspsense.trials.recorded import read_recorded
+from graspsense.trials.store import Store
+
+TICKS = 2200
+
+
+@pytest.fixture
+def squeeze(tmp_path):
+    """A squeeze in milliseconds and millimetres, at odd times, with semicolons."""
+    path = tmp_path / "squeeze.csv"
+    lines = ["stamp ms;opening;F left;F right;note"]
+    for k in range(TICKS):
+        left, right = bottle(k * 0.001)
+        lines.append(f"{5000 + k};{squeezing(k * 0.001) * 1000:.9g};{left:.9g};{right:.9g};x")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def name_of(path, force=("F left", "F right"), time="stamp ms*0.001", gap="opening*0.001"):
+    return named(str(path), {"time": [time], "gap": [gap], "force": list(force)})
+
+
+def test_columns_are_what_the_user_says_in_si_units(squeeze):
+    recording = read_squeeze(name_of(squeeze))
+    assert len(recording.readings) == TICKS
+    assert recording.rate_hz == pytest.approx(1000.0)
+    frame = recording.readings[1200].frame
+    assert frame.t_s == pytest.approx(6.2)
+    assert frame.gap_m == pytest.approx(squeezing(1.2))
+    assert (frame.force_left_n, frame.force_right_n) == pytest.approx(bottle(1.2))
+    assert frame.velocity_m_s == pytest.approx(-0.012, rel=1e-3)
+    assert frame.effort_n != frame.effort_n  # nobody said which column it is
+
+
+def test_one_force_is_that_of_both_pads_and_said_so(squeeze):
+    recording = read_squeeze(name_of(squeeze, force=["F left"]))
+    frame = recording.readings[-1].frame
+    assert frame.force_left_n == frame.force_right_n > 1.0
+    assert any("one force was recorded" in note for note in recording.notes)
+
+
+@pytest.mark.parametrize(
+    ("query", "says"),
+    [
+        ("", "which column of .* is time"),
+        ("?time=stamp ms&gap=opening", "is force"),
+        ("?time=stamp ms&gap=opning&force=F left", "no column 'opning'.*Did you mean 'opening'"),
+        ("?time=stamp ms&gap=opening&force=F left&forse=x", "'forse' is no part of a squeeze.*'force'"),
+        ("?time=stamp ms&gap=opening*mm&force=F left", "'mm' in 'opening\\*mm' is no factor"),
+        ("?time=stamp ms&gap=opening*0&force=F left", "is no factor"),
+        ("?time=stamp ms&gap=opening&gap=opening&force=F left", "2 columns are given for gap: 1 at most"),
+    ],
+)
+def test_a_name_that_makes_no_sense_is_told(squeeze, query, says):
+    with pytest.raises(ConfigError, match=says):
+        read_squeeze(f"{squeeze}{query}")
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("5000;1;1;1;x", "line 4: the time goes from .* it must rise"),
+        ("5002;;1;1;x", r"line 4: opening \(gap\) is missing"),
+        ("5002;wide;1;1;x", "line 4: opening is 'wide', which is no number"),
+        ("5002;1;1;1", "line 4: 4 values where the header names 5"),
+    ],
+)
+def test_a_line_that_is_no_squeeze_is_told_with_its_number(squeeze, line, says):
+    lines = squeeze.read_text().splitlines()
+    squeeze.write_text("\n".join([*lines[:3], line, *lines[4:]]))
+    with pytest.raises(DataDamaged, match=says):
+        read_squeeze(name_of(squeeze))
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main([str(one) for one in arguments])
+    out, err = capsys.readouterr()
+    return ended.value.code, out, err
+
+
+def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squeeze, tmp_path, capsys):
+    columns = [
+        "--time",
+        "stamp ms*0.001",
+        "--gap",
+        "opening*0.001",
+        "--force",
+        "F left",
+        "--force",
+        "F right",
+    ]
+    store = tmp_path / "store"
+    code, out, err = run(
+        capsys, "import", squeeze, "--save", store, *columns, "--label", "jar:full#3", "-o",
+        "classifier.type=none", "--json",
+    )  # fmt: skip
+    assert code == 0, err
+    assert json.loads(out)["trials"] == [{"source": str(squeeze), "trial": 1, "outcome": "steady"}]
+    with Store.read(store) as opened:
+        kept = opened.trial(1)
+        assert opened.counts() == {("jar:full", "jar#3"): 1}
+    assert not kept.listed.simulated
+    features = dict(zip((name for name, _ in kept.features), kept.values, strict=True))
+    # `squeezing` and `bottle`: contact at 1.0 s and 60 mm, rest at 1.5 s and 54 mm with 8 N.
+    assert features["p_first"] == pytest.approx(0.060, abs=1e-5)
+    assert features["p_steady"] == pytest.approx(0.054, abs=1e-5)
+    assert features["f_steady"] == pytest.approx(8.0, abs=0.01)
+    assert features["delta_t"] == pytest.approx(0.5, abs=0.002)
+    # The recording goes on after the controller had enough.
+    recorded = read_recorded(kept.recording)
+    assert len(recorded) == TICKS
+    assert recorded.readings()[-1].frame.t_s == pytest.approx(7.199)
+    code, out, err = run(capsys, "replay", f"{store}#1", "--json")
+    assert code == 0, err
+    assert json.loads(out)["features"] == features
+
+
+def test_options_of_a_csv_with_another_kind_are_refused(tmp_path, capsys):
+    code, _, err = run(capsys, "import", "icub:x.txt", "--save", tmp_path / "s", "--gap", "g")
+    assert code == 2
+    assert "--gap is for a CSV" in err
+    assert "Traceback" not in err
+    assert sys.exc_info() == (None, None, None)
