@@ -7,13 +7,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graspsense.plugin_api import PR2_LINKAGES, gap_and_rate, revolutions_at
-from graspsense_sim_gripper.kernel import plant_of
-from graspsense_sim_gripper.plant import Drive, PlantParams, PlantState, Squeezed, Thing
+from graspsense.plugin_api import PR2_LINKAGES, bind, gap_and_rate, revolutions_at
+from graspsense_sim_gripper.kernel import plant_of, sum_of
+from graspsense_sim_gripper.plant import Drive, PlantParams, PlantState, Squeezed, Thing, squeeze
 from graspsense_sim_gripper.terms.elastic import Elastic, elastic
+from graspsense_sim_gripper.terms.foam import Foam
+from graspsense_sim_gripper.terms.gas import Gas
+from graspsense_sim_gripper.terms.liquid import Liquid
 from graspsense_sim_gripper.terms.loss import Loss, loss
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
+from graspsense_sim_gripper.terms.registry import TERMS
+from graspsense_sim_gripper.terms.rigid import Rigid, RigidState, rigid
+from graspsense_sim_gripper.terms.slosh import Slosh
 from graspsense_sim_gripper.terms.term import NoState
+from graspsense_sim_gripper.terms.worn import Worn
 
 LINK = PR2_LINKAGES["pr2"]
 TICK = 1e-3
@@ -247,3 +254,50 @@ def test_a_damper_in_the_contents_lengthens_the_squeeze():
     empty = until_still(*SPRING, laws=(elastic,), states=(NoState(),))
     full = until_still(*SPRING, Loss(1000.0), laws=(elastic, loss), states=(NoState(), NoState()))
     assert full > 1.5 * empty
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.floats(0.0, 9.0).map(lambda e: 10.0**e),
+    st.floats(2.0, 9.0).map(lambda e: 10.0**e),
+    st.booleans(),
+)
+def test_covers_and_object_carry_one_force_however_stiff_they_are(stiffness, skins, hertz):
+    law, params, state = (
+        (rigid, Rigid(30.0 * stiffness), RigidState(0))  # as stiff as that where 0.5 mm deep
+        if hertz
+        else (elastic, Elastic(stiffness, 0.0), NoState())
+    )
+    search = bind(squeeze, advance=sum_of([law]))
+    body = Thing(0.05, 0.0, skins, (params,))
+    now = Squeezed(0.0, 0.0, 0.0, (state,), 0.0, 0.0)
+    for closure in (1e-6, 1e-4, 5e-3, 1e-2, 5e-3, 1e-4, -1e-3, -0.02, 1e-5, 3e-3):
+        now = search(body, now, closure, 1e-3)
+        felt, _ = law(params, state, 0.0, now.compression_m, 1e-3)
+        if closure > 0.0:
+            assert now.force_n == pytest.approx(felt, rel=1e-6, abs=1e-6)
+            # Two lengths that nearly cancel: what is left is known to their rounding.
+            rounding = 1e-6 + 4e-16 * skins * abs(closure)
+            assert now.force_n == pytest.approx(skins * (closure - now.compression_m), rel=1e-6, abs=rounding)
+        else:
+            assert now.force_n == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "params"),
+    [
+        ("foam", Foam(10.0, 0.01, 1.8, 200.0, 0.02, 100.0, 1.0)),
+        ("worn", Worn(2000.0, 2e6, 0.2, 0.4, 0.002)),
+        ("gas", Gas(1.2e-3, 0.02, 3e-5, 101325.0, 1.4, 1e-10, 1e-7, 2.0)),
+        ("slosh", Slosh(0.2, 4.0, 0.02)),
+        ("liquid", Liquid(1.2e-3, 5e-4, 0.08, 1e-10)),
+    ],
+)
+def test_a_stuck_gripper_does_not_creep_whatever_it_holds(name, params):
+    term = TERMS[name]
+    params = PlantParams(drive(), thing(Elastic(2000.0, 0.0), params, skins=1.5e4), 1)
+    state = run(params, at(0.0501, (NoState(), term.at_rest)), 23.0, 3.0, (elastic, term.law))
+    assert state.speed_rev_s == 0.0
+    after = run(params, state, 23.0, 1e6, (elastic, term.law), dt=1e3)
+    assert after.revolutions == state.revolutions
+    assert math.isfinite(after.squeezed.force_n)
