@@ -44,8 +44,9 @@ def run(capsys, monkeypatch):
         out, err = capsys.readouterr()
         return Ran(ended.value.code, out, err)
 
-    with IsolatedPlugins():
-        yield run
+    # By the patch, not as a context: a test that patches it again is then undone in the right order.
+    monkeypatch.setattr(loader, "_current", IsolatedPlugins())
+    return run
 
 
 def adding(name: str, command: click.Command):
