@@ -15,11 +15,11 @@ from datetime import date
 from importlib.metadata import version
 
 import numpy as np
+
+from graspsense.plugin_api import create
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.setting import set_scene
-
-from graspsense.plugin_api import create
 
 PHASES, EGGS = 41, 200
 
