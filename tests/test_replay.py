@@ -214,11 +214,14 @@ def test_missing_folder(tmp_path: Path) -> None:
         read_recording(f"{tmp_path}/nowhere/full_bottle_1.txt")
 
 
+KNOWN = "csv:, icub:, mcap:, rosbag:, store:"
+
+
 @pytest.mark.parametrize(
     ("recording", "says"),
     [
-        ("full_bottle_1.txt", "does not say what kind of recording it is: write csv:, icub:, mcap:, rosbag:, store: before"),
-        ("icb:full_bottle_1.txt", "unknown kind of recording 'icb'. Known: csv:, icub:, mcap:, rosbag:, store:. Did you mean 'icub'?"),
+        ("full_bottle_1.txt", f"does not say what kind of recording it is: write {KNOWN} before"),
+        ("icb:full_bottle_1.txt", f"unknown kind of recording 'icb'. Known: {KNOWN}. Did you mean 'icub'?"),
         ("icub:", "names no file"),
     ],
 )
