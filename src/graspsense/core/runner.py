@@ -133,14 +133,15 @@ def run_grasp(
             raise
         # The trace must outlive a backend that fails at the very end.
         try:
-            report = dict(backend.report())
-        except Exception as error:
-            report = {"report_failed": named(error)}
-        try:
             backend.close()
         except Exception as error:
             reason = f"the gripper could not be closed: {named(error)} ({reason or outcome.words})"
             outcome = Outcome.ABORTED
+        # After closing: what came of that is worth reporting too.
+        try:
+            report = dict(backend.report())
+        except Exception as error:
+            report = {"report_failed": named(error)}
     frames = grasp.recorder.frames
     return Grasp(
         trace=grasp.recorder.trace(),
