@@ -10,9 +10,12 @@ from typing import Any
 import click
 
 
-def echo_json(value: object) -> None:
-    """Print a value as JSON. JSON knows no infinities and no NaN: they become `"inf"`, `"-inf"` and null."""
-    click.echo(json.dumps(_finite(value), indent=2, ensure_ascii=False, allow_nan=False))
+def echo_json(value: object, long: bool = False) -> None:
+    """Print a value as JSON. JSON knows no infinities and no NaN: they become `"inf"`, `"-inf"` and null.
+
+    A long one comes in one line, which takes a fifth of the time.
+    """
+    click.echo(json.dumps(_finite(value), indent=None if long else 2, ensure_ascii=False, allow_nan=False))
 
 
 def talk(text: str) -> None:
@@ -29,8 +32,12 @@ def echo_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 def _finite(value: Any) -> Any:
-    if isinstance(value, float) and not math.isfinite(value):
+    if isinstance(value, float):
+        if math.isfinite(value):
+            return value
         return None if math.isnan(value) else str(value)
+    if value is None or isinstance(value, str | int):
+        return value
     if isinstance(value, Mapping):
         return {str(key): _finite(one) for key, one in value.items()}
     if isinstance(value, list | tuple):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -12,6 +12,10 @@ from graspsense.cli.sources import SOURCES, is_csv, source_options, trials_of
 
 if TYPE_CHECKING:
     from graspsense.core.features import FeatureTable, Prediction
+    from graspsense.core.model import Model
+
+MOST_WITH_REASONS: Final = 1000
+"""Trials that are explained one by one; of more, nobody reads every reason, and each takes a millisecond."""
 
 
 @click.command(
@@ -31,6 +35,7 @@ if TYPE_CHECKING:
 def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     """Predict and print."""
     from graspsense.cli.progress import Progress
+    from graspsense.core.errors import ConfigError
     from graspsense.core.model import load_model
     from graspsense.core.plugins import installed
     from graspsense.evaluation.evaluate import rate_as_json
@@ -53,10 +58,15 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
         labels = labelled.aimed(asked.target).labels
     misfit = asked.misfit(table)
     if misfit:
-        from graspsense.core.errors import ConfigError
-
         raise ConfigError(misfit)
-    predictions = [asked.predict(table.row(i)) for i in range(len(table))]
+    if len(table) > MOST_WITH_REASONS:
+        notes = (
+            *notes,
+            f"reasons are given for up to {MOST_WITH_REASONS} trials; these are more, so none has any",
+        )
+        predictions = _without_reasons(asked, table)
+    else:
+        predictions = [asked.predict(table.row(i)) for i in range(len(table))]
     rate = None
     if labels is not None:
         rate = Rate(
@@ -75,7 +85,8 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
                 "unknown": sum(not _known(one) for one in predictions),
                 "warnings": warnings,
                 "notes": list(notes),
-            }
+            },
+            long=len(predictions) > MOST_WITH_REASONS,
         )
         return
     for text in (*warnings, *notes):
@@ -90,6 +101,21 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     echo_table(header, rows)
     if rate is not None:
         click.echo(f"\nrate        {rate.words}   (an answer of unknown counts as wrong)")
+
+
+def _without_reasons(model: Model, table: FeatureTable) -> list[Prediction]:
+    """Return the answers to many trials, asked all at once."""
+    from graspsense.core.features import Prediction
+
+    labels, shares = model.answers(table)
+    classes = model.classifier.classes()
+    warnings = model.predict(table.row(0)).warnings
+    return [
+        Prediction(
+            label=label, probabilities=dict(zip(classes, row, strict=True)), because=(), warnings=warnings
+        )
+        for label, row in zip(labels, shares.tolist(), strict=True)
+    ]
 
 
 def _known(prediction: Prediction) -> bool:

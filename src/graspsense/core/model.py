@@ -26,6 +26,8 @@ from graspsense.core.firstparty import MODELS
 from graspsense.core.novelty import Novelty, novelty_from, novelty_of
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from graspsense.core.config import Settings
     from graspsense.core.labelled import Labelled
     from graspsense.core.plugins import Component, Plugins
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
 
 FORMAT: Final = "graspsense model"
 VERSION: Final = 1
+
+_EQUAL: Final = 1e-6
 
 _NOT_COMPARED: Final = frozenset({"type", "object", "recording", "model"})
 """Keys that differ from grasp to grasp, or say where something lies."""
@@ -110,6 +114,24 @@ class Model:
             warnings=warnings,
             model=self.in_a_line,
         )
+
+    def answers(self, table: FeatureTable) -> tuple[list[str], NDArray[np.float64]]:
+        """Return for each trial of a table the label that `predict` gives, and the probabilities, all at once.
+
+        The probabilities have shape (trials, classes), in the order of the classifier's classes; they are those of
+        a trial that is unknown, too. Raises ConfigError where the table is none for this model.
+        """
+        misfit = self.misfit(table)
+        if misfit:
+            raise ConfigError(misfit)
+        chosen = table.columns(self.names)
+        shares = self.classifier.probabilities(chosen)
+        unlike = self.novelty.unlike_rows(chosen).tolist()
+        classes = self.classifier.classes()
+        # Shares that are equal but for rounding are equal: the first of them is the answer.
+        best = np.argmax(shares >= shares.max(axis=1, keepdims=True) - _EQUAL, axis=1).tolist()
+        labels = [UNKNOWN if strange else classes[k] for strange, k in zip(unlike, best, strict=True)]
+        return labels, shares
 
     def misfit(self, given: Features | FeatureTable) -> str:
         """Return why the model cannot be asked about these features, or an empty string where it can."""

@@ -24,6 +24,7 @@ REACH: Final = 3.0
 """Standard deviations outside of a class's own range that are still like it."""
 _ROUNDING: Final = 1e-9
 """Share of a value by which a feature that was constant in training may differ from it."""
+_ROWS_AT_ONCE: Final = 4096
 
 
 @frozen(kw_only=True, eq=False)
@@ -69,12 +70,13 @@ class Novelty:
     def unlike_rows(self, table: FeatureTable) -> NDArray[np.bool_]:
         """Return for each trial of a table whether it is unlike every class."""
         values = table.columns(self.names).values
-        return np.array([self._is_unlike(row) for row in values], dtype=np.bool_)
-
-    def _is_unlike(self, values: NDArray[np.float64]) -> bool:
-        if np.isnan(values).all():
-            return not self.featureless
-        return bool(_worst(self._outside(values)).min() > REACH)
+        unlike = np.empty(len(values), dtype=np.bool_)
+        for start in range(0, len(values), _ROWS_AT_ONCE):
+            some = values[start : start + _ROWS_AT_ONCE]
+            outside = _worst(self._outside(some[:, np.newaxis, :]))
+            unlike[start : start + len(some)] = outside.min(axis=1) > REACH
+        unlike[np.isnan(values).all(axis=1)] = not self.featureless
+        return unlike
 
     def _outside(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return in spreads how far outside each class's range each value lies; NaN where that is not known."""
@@ -153,9 +155,9 @@ def novelty_from(names: Sequence[str], units: Sequence[str], kept: Mapping[str, 
 
 
 def _worst(outside: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the largest of each row; infinite where nothing in it is known."""
+    """Return the largest along the last axis; infinite where nothing there is known."""
     known = ~np.isnan(outside)
-    return np.where(known.any(axis=1), np.where(known, outside, -1.0).max(axis=1), np.inf)
+    return np.where(known.any(axis=-1), np.where(known, outside, -1.0).max(axis=-1), np.inf)
 
 
 def _plain(values: NDArray[np.float64]) -> list[float | None]:

@@ -1,0 +1,149 @@
+"""How fast a store of 100 000 trials is searched, read as a table, and predicted on.
+
+    python benchmarks/store.py [--json] [--trials 100000] [--folder DIR]
+
+The rows are made up and their recordings are not there: what is timed is the database. The time of a command is
+that of the work in a process that has started; the median of several.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import random
+import sqlite3
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from graspsense.core.errors import GraspsenseError
+from graspsense.core.model import load_model, train
+from graspsense.core.plugins import installed
+from graspsense.plugin_api import create
+from graspsense.trials.content import Beginning, Ending, Row
+from graspsense.trials.store import RecordingFacts, Store
+from graspsense.trials.store_table import labelled_store
+
+LABELS = ("can:full_open", "can:empty_open", "odwalla:full_closed", "odwalla:full_open", "odwalla:empty_open")
+FEATURES = (
+    ("p_first", "m"),
+    ("p_steady", "m"),
+    ("f_steady", "N"),
+    ("delta_t", "s"),
+    ("dp_dt", "m/s"),
+    ("df_dt", "N/s"),
+)
+BEFORE = (("gap_at_start", "m"), ("velocity_before", "m/s"), ("effort_before", "N"))
+SETTINGS = '[gripper]\ntype = "graspsense-sim-gripper/sim"\nobject = "{}"\n\n[run]\nseed = {}\n'
+REPEATS = 5
+
+
+def fill(store: Store, trials: int) -> None:
+    """Write so many trials, each in its own transaction."""
+    draw = random.Random(1)
+    # The store's own transaction is one a trial; to fill it in reasonable time the disk need not follow each.
+    store._connection.execute("PRAGMA synchronous = OFF")
+    for k in range(trials):
+        label = LABELS[k % len(LABELS)]
+        values = tuple(draw.gauss(LABELS.index(label), 0.3) for _ in FEATURES)
+        start = Beginning(
+            made_at=f"2026-{1 + k % 12:02d}-{1 + k % 28:02d}T10:00:00.000+00:00",
+            origin="collect",
+            labels={"label": label, "instance": f"{label.partition(':')[0]}#{k % 40}"},
+            settings=SETTINGS.format(label, k),
+            provenance={"config_sha256": "0" * 64, "seed": k, "components": {}, "note": "x" * 600},
+        )
+        end = Ending(
+            trial={"outcome": "steady" if k % 50 else "slipped", "events": ["x" * 60] * 20},
+            features=Row(features=FEATURES, values=values),
+            before=Row(features=BEFORE, values=(0.08, -0.01, 10.0)),
+        )
+        facts = RecordingFacts(name=f"{k:08d}.mcap", sha256="0" * 64, size=300_000, counts={"ticks": 7000})
+        store.add(start, end, {"serial": f"S{k % 3}"}, facts)
+
+
+def median_s(work: Callable[[], object]) -> float:
+    """Return the median time of several runs."""
+    taken = []
+    for _ in range(REPEATS):
+        began = time.perf_counter()
+        work()
+        taken.append(time.perf_counter() - began)
+    return statistics.median(taken)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--trials", type=int, default=100_000)
+    parser.add_argument("--folder", help="Keep the store here and use it again.")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(given.folder or scratch)
+        with Store.open(folder) as store:
+            there = store.query("SELECT count(*) FROM trial")[0][0]
+            began = time.perf_counter()
+            fill(store, max(0, given.trials - there))
+            filling_s = time.perf_counter() - began
+        result = measure(folder)
+    result["filling_s"] = filling_s
+    if given.json:
+        print(json.dumps(result, indent=2))
+        return
+    for key, value in result.items():
+        print(f"{key:<24}{value if not isinstance(value, float) else round(value, 4)}")
+
+
+def measure(folder: Path) -> dict[str, object]:
+    """Return what was found, with the machine."""
+    labelled = labelled_store(str(folder))
+    plugins = installed()
+    try:
+        component = plugins.find("classifier", "c45")
+        config = create("classifier", "c45").config
+    except GraspsenseError:
+        component = plugins.find("classifier", "tree")
+        config = create("classifier", "tree").config
+    few = labelled.rows(np.arange(2000))
+    model = train(component, config, few, name="benchmark")
+    with tempfile.TemporaryDirectory() as scratch:
+        path = Path(scratch) / "model.json"
+        path.write_text(json.dumps(model.as_json()))
+        model = load_model(str(path), plugins)
+
+    def page() -> None:
+        with Store.read(folder) as store:
+            assert len(store.page(label=LABELS[0], outcome="slipped", since="2026-06-01")) == 50
+
+    def rare_page() -> None:
+        with Store.read(folder) as store:
+            store.page(label=LABELS[1], since="2027-01-01")
+
+    def predict() -> None:
+        model.answers(labelled_store(str(folder)).table)
+
+    return {
+        "date": date.today().isoformat(),
+        "machine": f"{platform.processor() or platform.machine()}, {platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        "sqlite": sqlite3.sqlite_version,
+        "trials": len(labelled),
+        "store_bytes": (folder / "store.sqlite").stat().st_size,
+        "page_s": median_s(page),
+        "page_without_a_hit_s": median_s(rare_page),
+        "table_s": median_s(lambda: labelled_store(str(folder))),
+        "predict_s": median_s(predict),
+        "classifier": component.qualified,
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+"""A model asked about many trials at once says what it says of each alone."""
+
+import json
+
+import numpy as np
+import pytest
+
+from graspsense.core.errors import ConfigError
+from graspsense.core.features import UNKNOWN, FeatureTable
+from graspsense.core.labelled import Labelled
+from graspsense.core.model import train
+from graspsense.core.plugins import installed
+from graspsense.plugin_api import create
+
+NAMES = ("p_first", "f_steady", "dp_dt")
+
+
+def table(rows):
+    return FeatureTable(names=NAMES, units=("m", "N", "m/s"), values=np.asarray(rows, dtype=np.float64))
+
+
+@pytest.fixture(scope="module")
+def rows():
+    draw = np.random.default_rng(4)
+    values = draw.normal(size=(240, 3)) + np.repeat(np.arange(3.0), 80)[:, None] * 1.5
+    values[draw.random(values.shape) < 0.1] = np.nan
+    return values
+
+
+@pytest.mark.parametrize("name", ["c45", "knn", "tree", "svm"])
+def test_all_at_once_is_one_by_one(rows, name):
+    labels = tuple(np.repeat(["a:x", "b:y", "c:z"], 80).tolist())
+    labelled = Labelled(source="made up", table=table(rows), labels=labels)
+    component = installed().find("classifier", name)
+    model = train(component, create("classifier", name).config, labelled, name="m")
+    far = np.array([[50.0, 0.0, 0.0], [np.nan, np.nan, np.nan], [0.0, np.nan, -70.0]])
+    asked = table(np.concatenate((rows, rows + 2.0, far)))
+    found, shares = model.answers(asked)
+    alone = [model.predict(asked.row(i)) for i in range(len(asked))]
+    assert found == [one.label for one in alone]
+    assert UNKNOWN in found
+    assert set(found) > {"a:x", "b:y", "c:z"}
+    expected = [list(one.probabilities.values()) for one in alone]
+    np.testing.assert_allclose(shares, expected, atol=1e-12)
+
+
+def test_a_table_without_a_feature_of_the_model_is_refused(rows):
+    labelled = Labelled(source="made up", table=table(rows), labels=("a", "b", "c") * 80)
+    model = train(
+        installed().find("classifier", "knn"), create("classifier", "knn").config, labelled, name="m"
+    )
+    with pytest.raises(ConfigError, match="there is no f_steady"):
+        model.answers(labelled.table.columns(["p_first", "dp_dt"]))
+
+
+def test_predict_answers_many_without_reasons_and_says_so(rows, tmp_path, capsys):
+    from graspsense.cli.main import main
+
+    lines = ["label,p_first [m],f_steady [N],dp_dt [m/s]"]
+    for k, row in enumerate(np.tile(rows, (5, 1)).tolist()):
+        lines.append(",".join([("a", "b", "c")[k % 240 // 80], *("" if v != v else repr(v) for v in row)]))
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    source, model = str(tmp_path / "t.csv"), str(tmp_path / "m.json")
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        out, err = capsys.readouterr()
+        assert ended.value.code == 0, err
+        return out
+
+    run("train", source, "--label", "label", "--classifier", "tree", "--out", model)
+    found = json.loads(run("predict", model, source, "--label", "label", "--json"))
+    assert found["n"] == len(found["predictions"]) == 1200
+    assert any("none has any" in note for note in found["notes"])
+    right = sum(one["label"] == one["truth"] for one in found["predictions"])
+    assert found["rate"]["correct"] == right > 600
