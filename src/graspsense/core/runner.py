@@ -11,11 +11,11 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from itertools import count
-from math import ceil
+from math import ceil, inf
 from typing import Any, Protocol
 
 from attrs import field, frozen
-from attrs.validators import ge, gt, instance_of
+from attrs.validators import ge, gt, instance_of, lt
 
 from graspsense.core.binding import bind
 from graspsense.core.contact import CONTACT_FORCE_N, Stillness, at_rest, watch
@@ -46,11 +46,11 @@ class RunConfig:
     """Decides everything drawn at random."""
     hold_s: float = field(default=0.25, validator=ge(0.0))
     """How long a steady grasp is held before the fingers open."""
-    opening_timeout_s: float = field(default=5.0, validator=gt(0.0))
+    opening_timeout_s: float = field(default=5.0, validator=[gt(0.0), lt(inf)])
     """Opening, taring and releasing each take at most this long."""
     frame_timeout_s: float = field(default=0.1, validator=gt(0.0))
     """No frame for this long on a device clock: the device is lost."""
-    grasp_timeout_s: float = field(default=300.0, validator=gt(0.0))
+    grasp_timeout_s: float = field(default=300.0, validator=[gt(0.0), lt(inf)])
     """Longest approach, squeeze and hold together: the end of a controller that never gives up by itself."""
     late_periods: float = field(default=5.0, validator=gt(0.0))
     """A frame older than this many periods counts as late."""

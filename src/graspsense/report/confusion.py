@@ -51,7 +51,8 @@ def confusion_png(confusion: Confusion, title: str, path: Path) -> None:
     axes.set_ylabel("true")
     axes.set_title(title, fontsize=9)
     try:
-        figure.savefig(path, format="png")
+        # A title is wider than a small matrix.
+        figure.savefig(path, format="png", bbox_inches="tight")
     except OSError as error:
         raise ConfigError(f"the picture cannot be written to {path}: {error.strerror}") from error
 
