@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import sqlite3
+import struct
 import subprocess
 import sys
 import threading
@@ -255,7 +256,7 @@ def test_a_row_cannot_name_a_file_outside_of_the_store(store, name):
     [
         ("label", "can:empty_open"),
         ("outcome", "slipped"),
-        ('"values"', "[0.067,5.5]"),
+        ('"values"', struct.pack("<2d", 0.067, 5.5)),
         ("made_at", "2020-01-01"),
     ],
 )
@@ -368,13 +369,14 @@ def test_a_word_that_is_no_label_is_refused(word):
 
 
 def test_the_file_is_readable_without_us(store):
-    """With nothing but SQLite: labels, outcomes, and features as JSON that SQLite's own functions read."""
+    """With nothing but SQLite: labels, outcomes, and features as float64 in the order that stands beside them."""
     keep(store)
     with sqlite3.connect(store.folder / "store.sqlite") as connection:
         rows = connection.execute(
-            """SELECT label, outcome, json_extract("values", '$[0]') FROM trial"""
+            """SELECT label, outcome, "values", json_extract(trial_json, '$.outcome')
+            FROM trial JOIN detail ON detail.trial = trial.id"""
         ).fetchall()
         (names,) = connection.execute("SELECT features FROM feature_set ORDER BY id LIMIT 1").fetchone()
     connection.close()
-    assert rows == [("can:full_open", "steady", 0.066)]
+    assert rows == [("can:full_open", "steady", struct.pack("<2d", 0.066, 5.5), "steady")]
     assert json.loads(names)[0] == ["p_first", "m"]

@@ -7,8 +7,10 @@ store's row is made from it, so that a row can be made again from a recording al
 from __future__ import annotations
 
 import json
+import struct
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from math import nan
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import field, frozen
@@ -80,6 +82,10 @@ class Row:
             "values": list(self.values),
             "reasons": dict(self.reasons),
         }
+
+    def packed(self) -> bytes:
+        """Return the values as little-endian float64, NaN where missing."""
+        return struct.pack(f"<{len(self.values)}d", *(nan if one is None else one for one in self.values))
 
     @classmethod
     def from_json(cls, value: Mapping[str, Any]) -> Row:

@@ -15,10 +15,12 @@ import re
 import secrets
 import shutil
 import sqlite3
+import struct
 import tempfile
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from math import isnan
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -229,8 +231,8 @@ class Store:
             # An object by name is there only where somebody put it there: in a simulation.
             "simulated": int(bool(settings["gripper"].get("object"))),
             "recipe": _hash(json_text(recipe(settings))),
-            "values": json_text(features.values),
-            "before": json_text(before.values),
+            "values": features.packed(),
+            "before": before.packed(),
             "recording": recording.name,
             "recording_sha256": recording.sha256,
             "recording_bytes": recording.size,
@@ -299,7 +301,7 @@ class Store:
             return Kept(
                 listed=listed,
                 features=tuple((str(name), str(unit)) for name, unit in json.loads(features)),
-                values=tuple(None if one is None else float(one) for one in json.loads(values)),
+                values=tuple(None if isnan(one) else one for (one,) in struct.iter_unpack("<d", values)),
                 labels=_table(labels),
                 settings=settings,
                 recipe=recipe(tomllib.loads(settings)),
@@ -381,7 +383,7 @@ class Store:
     def _parsing(self, number: int) -> Iterator[None]:
         try:
             yield
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError, struct.error) as error:
             raise self._damaged(f"trial {number} cannot be read ({type(error).__name__}: {error})") from error
 
     def _damaged(self, what: str) -> DataDamaged:
@@ -404,7 +406,7 @@ _AID: Final = (
 def row_sha256(sets: Sequence[str], trial: Mapping[str, Any], detail: Mapping[str, Any]) -> str:
     """Return the hash of a row: of both feature sets and of the columns of both tables."""
     columns = [*sets, *(trial[name] for name in _TRIAL), *(detail[name] for name in _DETAIL)]
-    return _hash(json_text(columns))
+    return _hash(json_text([one.hex() if isinstance(one, bytes) else one for one in columns]))
 
 
 def stored_rows(store: Store) -> Iterator[tuple[int, str, str, int, str, str]]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -43,60 +42,59 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
 
 def labelled_store(folder: str) -> Labelled:
     """Return the labelled trials of the store in this folder. Raises ConfigError, DataDamaged."""
+    counting = f"FROM trial WHERE {COUNTS} AND label IS NOT NULL"
     with Store.read(folder) as store:
-        rows = store.query(
-            f"""SELECT id, label, instance, simulated, recipe, feature_set, "values", before_set, before
-            FROM trial WHERE {COUNTS} AND label IS NOT NULL ORDER BY id"""
-        )
-        if not rows:
+        newest_ones = store.query(f"SELECT id, feature_set {counting} ORDER BY id DESC LIMIT 1")
+        if not newest_ones:
             raise ConfigError(
                 f"the store in {folder} has no labelled trial that ended by itself: `graspsense collect --save "
                 f"{folder} --labels ...` makes them"
             )
+        ((number, chosen),) = newest_ones
+        newest = store.trial(number)
         sets = dict(store.query("SELECT id, features FROM feature_set"))
-        newest = store.trial(rows[-1][0])
-    columns = list(zip(*rows, strict=True))
-    notes = ["features as they were drawn when the trials were kept"]
-    chosen = columns[5][-1]
-    if len(set(columns[5])) > 1:
-        notes.append(
-            f"{sum(one != chosen for one in columns[5])} trials left out: they have other features than the newest"
+        rows = store.query(
+            f"""SELECT id, label, instance, "values", before, before_set, simulated, recipe {counting}
+            AND feature_set = ? ORDER BY id""",
+            (chosen,),
         )
-        columns = list(zip(*(row for row in rows if row[5] == chosen), strict=True))
-    numbers, labels, instances, simulated, recipes, _, values, before_sets, before = columns
+        ((every,),) = store.query(f"SELECT count(*) {counting}")
+    numbers, labels, instances, values, before, of_before, models, settings = zip(*rows, strict=True)
     table = _table(folder, sets[chosen], values)
-    if len(set(recipes)) > 1:
-        notes.append(
-            f"recorded with {len(set(recipes))} different settings of gripper, controller or features"
-        )
-    kinds = Counter(simulated)
-    if kinds[1]:
-        share = "all" if not kinds[0] else f"{kinds[1]} of {len(simulated)}"
+    notes = ["features as they were drawn when the trials were kept"]
+    if every != len(rows):
+        notes.append(f"{every - len(rows)} trials left out: they have other features than the newest")
+    recipes = len(set(settings))
+    if recipes > 1:
+        notes.append(f"recorded with {recipes} different settings of gripper, controller or features")
+    simulated = sum(models)
+    if simulated:
+        share = "all" if simulated == len(rows) else f"{simulated} of {len(rows)}"
         notes.append(f"simulated: {share} trials come from a model of gripper and objects")
+    before_sets = set(of_before)
     unnamed = sum(one is None for one in instances)
-    one_before = len(set(before_sets)) == 1
     has_width = "p_first" in table.names
     return Labelled(
         source=f"store:{folder}",
         table=table,
-        labels=tuple(labels),
-        instances=None if unnamed else tuple(instances),
+        labels=labels,
+        instances=None if unnamed else instances,
         no_instances=f"{unnamed} trials do not name the very thing (can:full_open#2)",
-        order=tuple(numbers),
+        order=numbers,
         before_contact=Control(
-            table=_table(folder, sets[before_sets[0]], before),
+            table=_table(folder, sets[min(before_sets)], before),
             what=f"the first {SPAN_S:g} s of the approach: gap, speed, effort, pad forces",
         )
-        if one_before
+        if len(before_sets) == 1
         else None,
         no_before_contact="the trials do not have the same features from before the contact",
         width=Control(table=table.columns(["p_first"]), what="p_first alone") if has_width else None,
         no_width="there is no feature p_first",
         notes=tuple(notes),
         provenance={
-            "simulated": bool(kinds[1]),
+            "simulated": bool(simulated),
             "store": str(folder),
-            "newest_trial": numbers[-1],
+            "newest_trial": number,
             "settings": recipe(tomllib.loads(newest.settings)),
             "components": newest.provenance.get("components", {}),
         },
@@ -104,11 +102,11 @@ def labelled_store(folder: str) -> Labelled:
 
 
 def feature_table(
-    folder: str, wanted: Sequence[tuple[str, str]], sets: Sequence[str], values: Sequence[str]
+    folder: str, wanted: Sequence[tuple[str, str]], sets: Sequence[str], values: Sequence[bytes]
 ) -> FeatureTable:
     """Return the table of these features of trials that may have different ones; NaN where a trial has it not.
 
-    `sets` are the JSON of each trial's own features, `values` of its numbers. Raises DataDamaged.
+    `sets` are the JSON of each trial's own features, `values` its numbers as they are stored. Raises DataDamaged.
     """
     numbers = np.full((len(values), len(wanted)), np.nan)
     kinds = np.array(sets)
@@ -123,16 +121,14 @@ def feature_table(
     )
 
 
-def _table(folder: str, features: str, values: Sequence[str]) -> FeatureTable:
-    """Return the table of JSON lists of numbers, null where missing."""
+def _table(folder: str, features: str, values: Sequence[bytes]) -> FeatureTable:
+    """Return the table of packed numbers."""
     try:
         named = [(str(name), str(unit)) for name, unit in json.loads(features)]
-        rows = json.loads(f"[{','.join(values)}]")
-        numbers: NDArray[np.float64] = np.array(rows, dtype=np.float64)
-        if numbers.size == 0:
-            numbers = numbers.reshape(len(values), len(named))
-        if numbers.shape != (len(values), len(named)):
-            raise ValueError(f"{numbers.shape} numbers for {len(values)} trials with {len(named)} features")
+        numbers: NDArray[np.float64] = np.frombuffer(b"".join(values), dtype="<f8").astype(np.float64)
+        numbers = numbers.reshape(len(values), len(named))
+        if set(map(len, values)) != {8 * len(named)} or np.isinf(numbers).any():
+            raise ValueError("numbers are missing, or infinite")
     except (ValueError, TypeError) as error:
         raise DataDamaged(
             f"the features in the store in {folder} are damaged ({error}): graspsense verify {folder}"

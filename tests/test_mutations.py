@@ -1,0 +1,187 @@
+"""Stores, recordings, models and settings that were truncated or changed at random places.
+
+Whatever is read of them, it is what was written or an error of ours; nothing is run, and no file changes by being
+read. A few hundred each; with GRASPSENSE_MUTATIONS as many as it says.
+"""
+
+import hashlib
+import json
+import os
+import random
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from kept import SETTINGS, beginning, ending, keep, write_recording
+
+from graspsense.core.config import resolve
+from graspsense.core.errors import GraspsenseError
+from graspsense.core.labelled import Labelled
+from graspsense.core.model import load_model, train
+from graspsense.core.plugins import installed
+from graspsense.plugin_api import create
+from graspsense.trials.content import beginning_in, ending_in
+from graspsense.trials.recorded import read_recorded
+from graspsense.trials.recover import recover_file
+from graspsense.trials.store import Store
+from graspsense.trials.store_table import labelled_store
+from graspsense.trials.verify import verify_store
+
+MUTATIONS = int(os.environ.get("GRASPSENSE_MUTATIONS", "0"))
+NUMBER = MUTATIONS or 150
+
+
+def mutated(data, draw):
+    """Return the bytes cut short, with some changed, a piece missing, twice there, or zeroed."""
+    data = bytearray(data)
+    at = draw.randrange(len(data))
+    length = min(draw.choice([1, 4, 64, 4096]), len(data) - at)
+    match draw.randrange(6):
+        case 0:
+            del data[at:]
+        case 1:
+            for _ in range(draw.choice([1, 1, 4, 40])):
+                data[draw.randrange(len(data))] = draw.randrange(256)
+        case 2:
+            del data[at : at + length]
+        case 3:
+            data[at:at] = data[at : at + length]
+        case 4:
+            data[at : at + length] = bytes(length)
+        case _:
+            data[at] ^= 1 << draw.randrange(8)
+    return bytes(data)
+
+
+def digests(folder):
+    files = (one for one in folder.rglob("*") if one.is_file() and not one.name.endswith(("-shm", "-wal")))
+    return {one: hashlib.sha256(one.read_bytes()).hexdigest() for one in files}
+
+
+def test_recordings(tmp_path):
+    """What a strict reader gives is what was written, to the byte; salvage gives ticks that were written."""
+    path = tmp_path / "g.mcap"
+    write_recording(path, 200, beginning(), ending())
+    good = path.read_bytes()
+    whole = read_recorded(path)
+    written = {whole.ticks.tobytes()[k : k + 120] for k in range(0, 200 * 120, 120)}
+    draw = random.Random(1)
+    told = 0
+    for _ in range(NUMBER):
+        bad = mutated(good, draw)
+        path.write_bytes(bad)
+        try:
+            found = read_recorded(path)
+            beginning_in(found.metadata, "it")
+            ending_in(found.metadata, "it")
+            assert found.ticks.tobytes() == whole.ticks.tobytes()
+            assert found.pads.tobytes() == whole.pads.tobytes()
+        except GraspsenseError:
+            told += 1
+        copy = tmp_path / "copy.mcap"
+        with suppress(GraspsenseError):
+            saved = read_recorded(path, salvage=True)
+            assert {saved.ticks.tobytes()[k : k + 120] for k in range(0, len(saved) * 120, 120)} <= written
+            recover_file(path, copy)
+            read_recorded(copy)
+        copy.unlink(missing_ok=True)
+        assert path.read_bytes() == bad
+    assert told > 0.8 * NUMBER
+
+
+def test_stores(tmp_path):
+    """A store that opens is one in which `verify` finds what was changed, or nothing that matters was."""
+    folder = tmp_path / "trials"
+    with Store.open(folder) as store:
+        for k in range(12):
+            keep(
+                store, f"can:{'full' if k % 2 else 'empty'}", f"can#{k % 3}", values=(0.06 + k, 5.0), ticks=2
+            )
+        good_rows = store.query("SELECT * FROM trial")
+        good_details = store.query("SELECT * FROM detail")
+    good = (folder / "store.sqlite").read_bytes()
+    draw = random.Random(2)
+    told = silent = 0
+    for _ in range(NUMBER):
+        for one in folder.glob("store.sqlite*"):
+            one.unlink()
+        (folder / "store.sqlite").write_bytes(mutated(good, draw))
+        before = digests(folder)
+        try:
+            problems = verify_store(folder).problems
+            with Store.read(folder) as store:
+                for one in store.page(set_aside=None):
+                    with suppress(GraspsenseError):
+                        store.trial(one.id)
+                rows = store.query("SELECT * FROM trial")
+                same = rows == good_rows and store.query("SELECT * FROM detail") == good_details
+            labelled_store(str(folder))
+            if problems:
+                told += 1
+            else:
+                assert same or fewer(rows, good_rows)
+                silent += 1
+        except GraspsenseError:
+            told += 1
+        assert digests(folder) == before
+    assert told > silent
+
+
+def fewer(rows, good):
+    """Whether rows are gone or moved to another number, but none has other content: their recordings have no row."""
+    return {row[1:] for row in rows} <= {row[1:] for row in good}
+
+
+def test_models(tmp_path):
+    table_of = np.random.default_rng(1).normal(size=(40, 2)) + np.repeat([[0.0], [3.0]], 20, axis=0)
+    from graspsense.core.features import FeatureTable
+
+    labelled = Labelled(
+        source="made up",
+        table=FeatureTable(names=("a", "b"), units=("m", "N"), values=table_of),
+        labels=("x",) * 20 + ("y",) * 20,
+    )
+    plugins = installed()
+    path = tmp_path / "m.json"
+    for name in ("c45", "tree"):
+        model = train(plugins.find("classifier", name), create("classifier", name).config, labelled, name="m")
+        good = json.dumps(model.as_json()).encode()
+        content = json.loads(good)
+        draw = random.Random(3)
+        told = 0
+        for _ in range(NUMBER):
+            bad = mutated(good, draw)
+            path.write_bytes(bad)
+            try:
+                load_model(str(path), plugins)
+            except GraspsenseError:
+                told += 1
+            else:
+                assert json.loads(bad) == content
+            assert path.read_bytes() == bad
+        assert told > 0.9 * NUMBER
+
+
+def test_settings(tmp_path):
+    path = tmp_path / "p.toml"
+    good = SETTINGS.encode()
+    draw = random.Random(4)
+    told = 0
+    for _ in range(NUMBER):
+        bad = mutated(good, draw)
+        path.write_bytes(bad)
+        try:
+            resolve(str(path))
+        except GraspsenseError:
+            told += 1
+        assert path.read_bytes() == bad
+    assert told > 0.2 * NUMBER
+
+
+@pytest.mark.slow
+def test_a_hundred_times_as_many(tmp_path, monkeypatch):
+    """The same with thousands of each; a hundredth of it is what the quick run takes."""
+    monkeypatch.setitem(globals(), "NUMBER", MUTATIONS or 1500)
+    for test in (test_recordings, test_stores, test_models, test_settings):
+        (tmp_path / test.__name__).mkdir()
+        test(tmp_path / test.__name__)
