@@ -16,7 +16,7 @@ from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.trials import schema
 from graspsense.trials.labels import labels_of
 from graspsense.trials.recorder import NotKept
-from graspsense.trials.recover import facts_of
+from graspsense.trials.recover import facts_of, recover_store
 from graspsense.trials.store import Store
 from graspsense.trials.verify import verify_store
 
@@ -348,6 +348,22 @@ def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
         assert kept >= 1
     found = verify_store(disk)
     assert (found.trials, found.problems) == (kept, ())
+
+
+@needs_mounts
+def test_a_grasp_ends_as_it_would_have_when_the_disk_fills_up_under_it(mounted):
+    disk = mounted("size=200k")
+    command = [sys.executable, "-m", "graspsense", "run", "-o", "classifier.type=none", "--save", str(disk)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert "outcome     steady" in done.stdout
+    assert "No space left on device" in done.stderr
+    assert "Traceback" not in done.stderr
+    mounted("size=4m", remount=True)
+    with Store.open(disk) as store:
+        (found,) = recover_store(store)
+        assert found.what == "saved"
+        assert found.ticks > 500
 
 
 @pytest.mark.parametrize(

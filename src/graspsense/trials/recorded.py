@@ -211,7 +211,7 @@ class _Reading:
             raise DataDamaged(
                 f"the recording {self.path} has version {version[:20]!r}; this graspsense reads version {VERSION}"
             )
-        if not self.started:
+        if not self.started and not salvage:
             raise DataDamaged(f"{self.path} is no MCAP file: {damage or 'it does not begin like one'}")
         try:
             device = json.loads(self.metadata.get(DEVICE, {}).get("device", "{}"))
