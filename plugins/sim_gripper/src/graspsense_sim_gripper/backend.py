@@ -41,6 +41,7 @@ class SimBackend(BatchBackend[SimConfig]):
         self._images: list[tuple[list[float], list[float]]] = []
         self._pads = NO_PADS
         self._effort_n: float | None = None
+        self._explains = self.config.explain
         # Compression and force at each tick since the first contact, where they are to be explained.
         self._pressed: list[tuple[float, float]] = []
         return device_info(self.config)
@@ -55,7 +56,7 @@ class SimBackend(BatchBackend[SimConfig]):
         else:
             self._body = self._move(setting.plant, self._body, effort, dt)
             self._ticks += 1
-            if self.config.explain and self._body.touched == 1:
+            if self._explains and self._body.touched == 1:
                 # Of an object that is held fast the half that is pressed harder.
                 half = max(self._body.squeezed, self._body.right, key=lambda one: one.force_n)
                 self._pressed.append((half.compression_m, half.force_n))

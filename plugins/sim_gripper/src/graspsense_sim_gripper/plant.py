@@ -203,17 +203,15 @@ def friction(drive: Drive, velocity_m_s: float, load_n: float) -> float:
 def move(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
     """Return the plant after `dt` in which this effort was asked for (N, positive squeezes)."""
     lag = params.drive.lag_s
-    pieces = 1
-    if lag > 0.0:
-        pieces = min(max(math.ceil(LAG_PIECES * dt / lag), 1), MOST_LAG_PIECES)
+    if lag <= 0.0:
+        return _driven(params, state, effort_n, dt)
+    pieces = min(max(math.ceil(LAG_PIECES * dt / lag), 1), MOST_LAG_PIECES)
     h = dt / pieces
     for _ in range(pieces):
-        given = effort_n
-        if lag > 0.0:
-            decay = math.exp(-h / lag)
-            short = state.effort_n - effort_n
-            given = effort_n + short * mean_share(h / lag, decay)
-            state = _with_effort(state, effort_n + short * decay)
+        decay = math.exp(-h / lag)
+        short = state.effort_n - effort_n
+        given = effort_n + short * mean_share(h / lag, decay)
+        state = _with_effort(state, effort_n + short * decay)
         state = _driven(params, state, given, h)
     return state
 
