@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 from attrs import field, frozen
 from attrs.validators import ge, instance_of
 
-from graspsense.plugin_api import ClassifierConfig
-from graspsense.plugins.classifiers.scikit import Fitted, ScikitClassifier, most_likely
+from graspsense.plugins.classifiers.scikit import Fitted, KeptConfig, ScikitClassifier, most_likely
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @frozen(kw_only=True)
-class MlpConfig(ClassifierConfig):
+class MlpConfig(KeptConfig):
     """Settings of the network."""
 
     hidden: int = field(default=20, validator=[instance_of(int), ge(1)])

@@ -2,8 +2,8 @@
 
 Missing features are filled with the median of the training trials (0 where no training trial had the feature),
 then every feature is brought to mean 0 and standard deviation 1 over the training trials. A model is kept as its
-training trials, settings and seed, and made again from them when it is loaded: nothing is unpickled, and with the
-same version of scikit-learn it is the same model.
+training trials, settings and seed, and made again from them when it is loaded, or as the fitted estimator itself
+through skops: nothing is unpickled, and with the same version of scikit-learn it is the same model.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from attrs import frozen
+from attrs import field, frozen
+from attrs.validators import in_
 
 from graspsense.plugin_api import Classifier, ClassifierConfig, Features, FeatureTable, Prediction, in_words
 
@@ -22,6 +23,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 ScikitConfigT = TypeVar("ScikitConfigT", bound=ClassifierConfig)
+
+
+@frozen(kw_only=True)
+class KeptConfig(ClassifierConfig):
+    """What the classifiers whose model can be kept in two ways have in common."""
+
+    kept_as: Literal["trials", "skops"] = field(default="trials", validator=in_(("trials", "skops")))
+    """How a model is kept: its training trials, or the fitted estimator (needs the extra skops)."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -131,14 +140,22 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Return the training trials with the seed: what it takes to make the model again."""
+        """Return the training trials with the seed, or the estimator: what it takes to make the model again."""
         import sklearn
 
         fitted = self._model()
-        return {
+        kept: dict[str, Any] = {
             "made_with": self._made_with or f"scikit-learn {sklearn.__version__}",
             "seed": fitted.seed,
             "features": [list(one) for one in zip(fitted.table.names, fitted.table.units, strict=True)],
+        }
+        if getattr(self.config, "kept_as", "trials") == "skops":
+            from graspsense.plugins.classifiers.skops_text import as_text
+
+            ready = {name: getattr(fitted, name).tolist() for name in ("fill", "mean", "scale")}
+            return {**kept, **ready, "skops": as_text(fitted.estimator)}
+        return {
+            **kept,
             "labels": list(fitted.labels),
             "trials": [
                 [None if math.isnan(value) else value for value in row]
@@ -151,12 +168,35 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         import numpy as np
 
         names, units = zip(*((str(name), str(unit)) for name, unit in model["features"]), strict=True)
+        self._made_with = str(model["made_with"])
+        if "skops" in model:
+            self._fitted = self._from_skops(model, names, units)
+            return
         labels = [str(label) for label in model["labels"]]
         values = np.array(model["trials"], dtype=np.float64)
         if values.shape != (len(labels), len(names)) or np.isinf(values).any():
             raise ValueError("its training trials do not fit its labels and features")
         self.fit(FeatureTable(names=names, units=units, values=values), labels, int(model["seed"]))
-        self._made_with = str(model["made_with"])
+
+    def _from_skops(self, model: Mapping[str, Any], names: tuple[str, ...], units: tuple[str, ...]) -> Fitted:
+        import numpy as np
+
+        from graspsense.plugins.classifiers.skops_text import from_text
+
+        fill, mean, scale = (np.array(model[name], dtype=np.float64) for name in ("fill", "mean", "scale"))
+        for one in (fill, mean, scale):
+            if one.shape != (len(names),) or not np.isfinite(one).all():
+                raise ValueError("how its trials are made ready does not fit its features")
+        kind = type(self.estimator(int(model["seed"]), 2))
+        return Fitted(
+            estimator=from_text(model["skops"], kind, len(names)),
+            table=FeatureTable(names=names, units=units, values=np.empty((0, len(names)))),
+            labels=(),
+            seed=int(model["seed"]),
+            fill=fill,
+            mean=mean,
+            scale=scale,
+        )
 
     def _model(self) -> Fitted:
         if self._fitted is None:
@@ -169,7 +209,9 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         here = f"scikit-learn {sklearn.__version__}"
         if self._made_with in ("", here):
             return ()
-        return (f"this model was made with {self._made_with} and made again with {here}: it may differ",)
+        return (
+            f"this model was made with {self._made_with} and made again, or read, with {here}: it may differ",
+        )
 
 
 def most_likely(shares: Sequence[float], classes: Sequence[str], what: str) -> str:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 from attrs import field, frozen
 from attrs.validators import gt
 
-from graspsense.plugin_api import ClassifierConfig
-from graspsense.plugins.classifiers.scikit import Fitted, ScikitClassifier, most_likely
+from graspsense.plugins.classifiers.scikit import Fitted, KeptConfig, ScikitClassifier, most_likely
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @frozen(kw_only=True)
-class SvmConfig(ClassifierConfig):
+class SvmConfig(KeptConfig):
     """Settings of the machine; the kernel's width is scikit-learn's `scale`."""
 
     c: float = field(default=10.0, validator=gt(0.0))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from attrs import field, frozen
 from attrs.validators import ge, in_, instance_of
 
-from graspsense.plugin_api import ClassifierConfig, in_words
-from graspsense.plugins.classifiers.scikit import Fitted, ScikitClassifier
+from graspsense.plugin_api import in_words
+from graspsense.plugins.classifiers.scikit import Fitted, KeptConfig, ScikitClassifier
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @frozen(kw_only=True)
-class TreeConfig(ClassifierConfig):
+class TreeConfig(KeptConfig):
     """Settings of the tree."""
 
     criterion: Literal["entropy", "gini"] = field(default="entropy", validator=in_(("entropy", "gini")))

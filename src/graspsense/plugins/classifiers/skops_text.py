@@ -1,0 +1,68 @@
+"""A fitted estimator of scikit-learn as text, through skops: no pickle, and of no type that is not listed here.
+
+skops is the extra `skops`. What its own list of safe types lacks is `TRUSTED`; a file that holds any other type is
+refused before anything of it is made.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from typing import Any, Final
+
+from graspsense.plugin_api import PluginUnavailable
+
+TRUSTED: Final = ("sklearn.tree._tree.Tree",)
+"""Types that estimators of ours need beyond those that skops takes for safe: the arrays of a decision tree."""
+HINT: Final = (
+    'a model kept as skops needs skops.\n  in a clone: pip install -e ".[skops]"     published: '
+    'pip install "graspsense[skops]"'
+)
+
+
+def as_text(estimator: Any) -> str:
+    """Return a fitted estimator as text. Raises PluginUnavailable without skops."""
+    return base64.b64encode(_skops().dumps(estimator)).decode("ascii")
+
+
+def from_text(text: str, kind: type, features: int) -> Any:
+    """Return the fitted estimator, which must be of this kind and take so many features.
+
+    Raises PluginUnavailable without skops, ValueError where it is anything else, or of a type that is not listed.
+    """
+    skops = _skops()
+    try:
+        data = base64.b64decode(text, validate=True)
+        foreign = sorted(set(skops.get_untrusted_types(data=data)) - set(TRUSTED))
+        if foreign:
+            raise ValueError(f"it holds types that no model of ours needs: {', '.join(foreign)[:200]}")
+        estimator = skops.loads(data, trusted=list(TRUSTED))
+    except (ValueError, binascii.Error):
+        raise
+    except Exception as error:  # skops and what it calls raise whatever a broken archive makes them
+        raise ValueError(f"it is no estimator ({type(error).__name__}: {error})") from error
+    if type(estimator) is not kind or getattr(estimator, "n_features_in_", None) != features:
+        raise ValueError(f"it is no {kind.__name__} of {features} features")
+    for one in getattr(estimator, "estimators_", [estimator]):
+        if hasattr(one, "tree_"):
+            _check_tree(one.tree_, features)
+    return estimator
+
+
+def _check_tree(tree: Any, features: int) -> None:
+    """Refuse a tree that leads out of its arrays: compiled code follows it without looking."""
+    n, left, right = tree.node_count, tree.children_left, tree.children_right
+    inner = left >= 0
+    for k, child in enumerate(zip(left.tolist(), right.tolist(), strict=True)):
+        if child != (-1, -1) and not all(k < one < n for one in child):
+            raise ValueError("a tree of it leads nowhere")
+    if ((tree.feature[inner] < 0) | (tree.feature[inner] >= features)).any():
+        raise ValueError("a tree of it asks for a feature that is not there")
+
+
+def _skops() -> Any:
+    try:
+        import skops.io
+    except ImportError as error:
+        raise PluginUnavailable(HINT) from error
+    return skops.io

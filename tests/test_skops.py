@@ -1,0 +1,116 @@
+"""Models that are kept as their fitted estimator, through skops, and what is refused of them."""
+
+import base64
+import json
+import sys
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+from graspsense.core.errors import DataDamaged, PluginUnavailable
+from graspsense.core.features import FeatureTable
+from graspsense.core.labelled import Labelled
+from graspsense.core.model import load_model, train, write_model
+from graspsense.core.plugins import installed
+from graspsense.plugin_api import create
+
+
+def trials(seed=1):
+    values = np.random.default_rng(seed).normal(size=(60, 3)) + np.repeat(np.arange(3.0), 20)[:, None] * 2.0
+    values[3, 1] = np.nan
+    table = FeatureTable(names=("a", "b", "c"), units=("m", "N", "s"), values=values)
+    return Labelled(source="made up", table=table, labels=("x",) * 20 + ("y",) * 20 + ("z",) * 20)
+
+
+def trained(name, tmp_path):
+    config = create("classifier", name, kept_as="skops").config
+    model = train(installed().find("classifier", name), config, trials(), name="m")
+    write_model(tmp_path / "m.json", model)
+    return model
+
+
+@pytest.mark.parametrize("name", ["svm", "mlp", "forest", "tree"])
+def test_it_comes_back_the_same_without_its_training_trials(name, tmp_path):
+    model = trained(name, tmp_path)
+    content = json.loads((tmp_path / "m.json").read_text())
+    assert "trials" not in content["model"]
+    again = load_model(str(tmp_path / "m.json"), installed())
+    asked = trials(2).table
+    assert again.answers(asked)[0] == model.answers(asked)[0]
+    assert (again.answers(asked)[1] == model.answers(asked)[1]).all()
+    assert again.predict(asked.row(0)).because == model.predict(asked.row(0)).because
+
+
+def resigned(path, change):
+    """Change a model's content and give it the hash of the changed one, as somebody with bad intent would."""
+    from graspsense.core.model import _digest
+
+    content = json.loads(path.read_text())
+    change(content["model"])
+    content.pop("sha256")
+    path.write_text(json.dumps({**content, "sha256": _digest(content)}))
+
+
+def test_types_that_are_not_listed_are_refused_before_anything_is_made(tmp_path):
+    skops = import_module("skops.io")
+    from sklearn.neighbors import KNeighborsClassifier
+
+    trained("tree", tmp_path)
+    path = tmp_path / "m.json"
+    other = KNeighborsClassifier().fit(np.random.default_rng(1).normal(size=(20, 3)), [0, 1] * 10)
+    resigned(path, lambda model: model.update(skops=base64.b64encode(skops.dumps(other)).decode()))
+    with pytest.raises(DataDamaged, match=r"types that no model of ours needs: .*KDTree"):
+        load_model(str(path), installed())
+
+
+def test_an_estimator_of_another_kind_is_refused(tmp_path):
+    skops = import_module("skops.io")
+    from sklearn.linear_model import LogisticRegression
+
+    trained("tree", tmp_path)
+    other = LogisticRegression().fit(np.eye(3), [0, 1, 2])
+    resigned(
+        tmp_path / "m.json", lambda model: model.update(skops=base64.b64encode(skops.dumps(other)).decode())
+    )
+    with pytest.raises(DataDamaged, match="no DecisionTreeClassifier of 3 features"):
+        load_model(str(tmp_path / "m.json"), installed())
+
+
+def test_a_tree_that_leads_out_of_its_arrays_is_refused(tmp_path):
+    skops = import_module("skops.io")
+    model = trained("tree", tmp_path)
+    estimator = model.classifier._fitted.estimator
+    state = estimator.tree_.__getstate__()
+    state["nodes"]["left_child"][0] = 10**6
+    estimator.tree_.__setstate__(state)
+    data = base64.b64encode(skops.dumps(estimator)).decode()
+    resigned(tmp_path / "m.json", lambda content: content.update(skops=data))
+    with pytest.raises(DataDamaged, match="leads nowhere"):
+        load_model(str(tmp_path / "m.json"), installed())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "no base64!",
+        base64.b64encode(b"no archive").decode(),
+        base64.b64encode(b"\x80\x04K\x01.").decode(),
+    ],
+)
+def test_what_is_no_estimator_is_told(tmp_path, text):
+    trained("tree", tmp_path)
+    resigned(tmp_path / "m.json", lambda model: model.update(skops=text))
+    with pytest.raises(DataDamaged, match="is damaged"):
+        load_model(str(tmp_path / "m.json"), installed())
+
+
+def test_without_skops_it_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "skops", None)
+    monkeypatch.setitem(sys.modules, "skops.io", None)
+    classifier = create("classifier", "tree", kept_as="skops")
+    found = trials()
+    classifier.fit(found.table, found.labels, 0)
+    with pytest.raises(PluginUnavailable, match=r"graspsense\[skops\]"):
+        classifier.to_json()
