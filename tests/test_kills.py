@@ -52,13 +52,19 @@ def writers_of(folder):
 
 
 def recovered(folder):
-    """Return what `recover` says of each file, once no writer that outlived its program is at work any more."""
-    until = time.monotonic() + 60.0
-    while writers_of(folder):
-        assert time.monotonic() < until, "a writer outlived its program by a minute"
-        time.sleep(0.02)
-    with Store.open(folder) as store:
-        return recover_store(store)
+    """Return what `recover` says of each file, once no writer that outlived its program is at work any more.
+
+    A writer that its program had just begun when it was killed may show itself only after a first look.
+    """
+    until, found = time.monotonic() + 60.0, []
+    while True:
+        while writers_of(folder):
+            assert time.monotonic() < until, "a writer outlived its program by a minute"
+            time.sleep(0.02)
+        with Store.open(folder) as store:
+            found += recover_store(store)
+        if not verify_store(folder).unfinished or time.monotonic() > until:
+            return found
 
 
 def kill(*pids):
