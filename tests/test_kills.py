@@ -38,33 +38,24 @@ def report(name, **found):
             file.write(json.dumps({"test": name, "kills": KILLS, **found}) + "\n")
 
 
-def writers_of(folder):
-    """Return the processes that write recordings into this folder."""
+def at_work(folder):
+    """Return the processes that were started for this folder: writers, and what is about to become one."""
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         with suppress(OSError):
-            words = path.read_bytes().split(b"\0")
-            if b"graspsense.trials.recording_process" in words and any(
-                str(folder).encode() in w for w in words
-            ):
+            if str(folder).encode() in path.read_bytes():
                 found.append(path.parent.name)
     return found
 
 
 def recovered(folder):
-    """Return what `recover` says of each file, once no writer that outlived its program is at work any more.
-
-    A writer that its program had just begun when it was killed may show itself only after a first look.
-    """
-    until, found = time.monotonic() + 60.0, []
-    while True:
-        while writers_of(folder):
-            assert time.monotonic() < until, "a writer outlived its program by a minute"
-            time.sleep(0.02)
-        with Store.open(folder) as store:
-            found += recover_store(store)
-        if not verify_store(folder).unfinished or time.monotonic() > until:
-            return found
+    """Return what `recover` says of each file, once no writer that outlived its program is at work any more."""
+    until = time.monotonic() + 60.0
+    while at_work(folder):
+        assert time.monotonic() < until, "a writer outlived its program by a minute"
+        time.sleep(0.02)
+    with Store.open(folder) as store:
+        return recover_store(store)
 
 
 def kill(*pids):

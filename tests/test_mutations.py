@@ -181,7 +181,7 @@ def test_settings(tmp_path):
 @pytest.mark.slow
 def test_a_hundred_times_as_many(tmp_path, monkeypatch):
     """The same with thousands of each; a hundredth of it is what the quick run takes."""
-    monkeypatch.setitem(globals(), "NUMBER", MUTATIONS or 1500)
+    monkeypatch.setitem(globals(), "NUMBER", MUTATIONS or 600)
     for test in (test_recordings, test_stores, test_models, test_settings):
         (tmp_path / test.__name__).mkdir()
         test(tmp_path / test.__name__)

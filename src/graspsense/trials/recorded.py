@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import zstandard
 from attrs import field, frozen
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
@@ -278,20 +279,18 @@ _PHASE: Final = TICK_FIELDS.index("phase")
 _COMMAND: Final = TICK_FIELDS.index("command")
 
 
-def _unpacked(chunk: Chunk) -> Iterator[McapRecord]:
+def _unpacked(chunk: Chunk) -> Sequence[McapRecord]:
+    """Return the records in a chunk. Raises ValueError, before anything large is made of a small lie."""
     if chunk.uncompressed_size > LARGEST_RECORD:
         raise ValueError(f"it claims to unpack to {chunk.uncompressed_size} bytes")
-    if chunk.compression == "zstd":
-        import zstandard
-
-        if zstandard.frame_content_size(chunk.data) > LARGEST_RECORD:
-            raise ValueError("it would unpack to more than any chunk of ours")
-    elif chunk.compression:
+    if chunk.compression not in ("", "zstd"):
         raise ValueError(f"its compression {chunk.compression[:20]!r} is none of ours")
     try:
-        yield from breakup_chunk(chunk, validate_crc=True)
-    except Exception as error:  # zstandard has an error class of its own
-        raise ValueError(f"{type(error).__name__}: {error}") from error
+        if chunk.compression and zstandard.frame_content_size(chunk.data) > LARGEST_RECORD:
+            raise ValueError("it would unpack to more than any chunk of ours")
+        return breakup_chunk(chunk, validate_crc=True)
+    except zstandard.ZstdError as error:
+        raise ValueError(f"it does not unpack: {error}") from error
 
 
 def _images(pads: NDArray[np.void]) -> list[Pads]:

@@ -498,6 +498,9 @@ def _reader(path: Path) -> tuple[sqlite3.Connection, Path | None]:
         connection.close()
         if error.sqlite_errorcode & 0xFF not in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY):
             raise
+    except BaseException:
+        connection.close()
+        raise
     # A disk that takes no file for what readers share. Nobody writes there, so nothing has to be shared.
     log = path.with_name(path.name + "-wal")
     if log.is_file() and log.stat().st_size:
@@ -513,7 +516,7 @@ def _told(folder: Path) -> Iterator[None]:
     """Turn what SQLite says into what a user can act on."""
     try:
         yield
-    except sqlite3.DatabaseError as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:  # what SQLite says may quote the damage
         code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
         reason = _REASONS.get(code)
         if reason is not None:
