@@ -63,14 +63,14 @@ def block() -> dict[str, float]:
 
 def eggs() -> dict[str, float]:
     crush = np.array(
-        [set_scene(SimConfig(), "egg", s).plant.thing.terms[0].crush_force_n for s in range(EGGS)]
+        [set_scene(SimConfig(), "egg", s).plant.thing.terms[1].params.crush_force_n for s in range(EGGS)]
     )
     result: dict[str, float] = {"eggs": EGGS, "egg_weakest_n": float(crush.min())}
     for name in ("hybrid", "force"):
         controller = create("controller", name, probing_force_n=20.0)
         done = run_many(SimConfig(), controller, ["egg"] * EGGS, range(EGGS))
         peaks = np.array([one.body.peak_n for one in done])
-        broken = sum(one.body.squeezed.states[0].broken for one in done)
+        broken = sum(one.body.squeezed.states[1].broken for one in done)
         result[f"egg_{name}_broken"] = broken
         result[f"egg_{name}_peak_most_n"] = float(peaks.max())
         if name == "hybrid":

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from attrs import evolve, fields
 
-from graspsense.core.runner import RunConfig, run_grasp
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import EFFORT, Command, Trace, bind, create
 from graspsense_sim_gripper import kernel
 from graspsense_sim_gripper.backend import SimBackend
@@ -68,8 +69,8 @@ def test_every_object_and_law_gives_one_trace_plain_and_compiled(controller):
 
 def test_the_backend_gives_the_same_whatever_stands_beside_a_grasp():
     backend = SimBackend(SimConfig())
-    alone = backend.run_many(HYBRID, ["toy"], [3])[0]
-    among = backend.run_many(HYBRID, ["block", "toy", "block"], [1, 3, 3])[1]
+    alone = backend.run_many(HYBRID, ["toy"], [3], traces=True)[0].trace
+    among = backend.run_many(HYBRID, ["block", "toy", "block"], [1, 3, 3], traces=True)[1].trace
     assert_same(alone, among)
 
 
@@ -169,15 +170,15 @@ PROGRAM = """
     from graspsense_sim_gripper.terms.term import NoState
     from graspsense.plugin_api import bind
 
-    def soft(p, s, d0, d1, h):
+    def soft(p, s, d0, d1, h, v1):
         return 1.0 * p.k1_n_m * d1, s
 
-    def hard(p, s, d0, d1, h):
+    def hard(p, s, d0, d1, h, v1):
         return 5.0 * p.k1_n_m * d1, s
 
     for name in sys.argv[1:]:
         law = kernel.compiled(kernel.sum_of([{{"soft": soft, "hard": hard}}[name]]), {{}})
-        print(name, law((Elastic(100.0, 0.0),), (NoState(),), 0.0, 1.0, 1.0)[0])
+        print(name, law((Elastic(100.0, 0.0),), (NoState(),), 0.0, 1.0, 1.0, 0.0)[0])
 """
 
 
@@ -226,11 +227,11 @@ def test_a_sum_of_many_terms_is_the_sum_of_each():
     laws = [elastic, loss, elastic, loss, elastic]
     params = (Elastic(1.0, 0.0), Loss(10.0), Elastic(100.0, 0.0), Loss(1e3), Elastic(1e4, 0.0))
     states = (NoState(),) * 5
-    force, after = kernel.sum_of(laws)(params, states, 0.0, 1.0, 1.0)
+    force, after = kernel.sum_of(laws)(params, states, 0.0, 1.0, 1.0, 1.0 / 1.0)
     assert force == pytest.approx(11111.0)
     assert after == states
-    assert kernel.compiled(kernel.sum_of(laws), {})(params, states, 0.0, 1.0, 1.0)[0] == force
-    assert kernel.sum_of([])((), (), 0.0, 1.0, 1.0) == (0.0, ())
+    assert kernel.compiled(kernel.sum_of(laws), {})(params, states, 0.0, 1.0, 1.0, 1.0 / 1.0)[0] == force
+    assert kernel.sum_of([])((), (), 0.0, 1.0, 1.0, 1.0 / 1.0) == (0.0, ())
 
 
 def test_bind_refuses_what_it_cannot_bind():

@@ -12,7 +12,8 @@ import pytest
 from click.testing import CliRunner
 
 from graspsense.cli.main import cli
-from graspsense.core.runner import RunConfig, run_grasp
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import ConfigError, UnknownName, create
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import run_many
@@ -234,7 +235,7 @@ GEL = '''
         thickness_m: float
 
 
-    def gel(params, state, d0, d1, h):
+    def gel(params, state, d0, d1, h, v1):
         """Return the force: a spring that would be infinitely stiff at its thickness."""
         room = max(params.thickness_m - d1, 1e-6)
         return params.k_n_m * d1 * params.thickness_m / room, state

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from graspsense.core.runner import RunConfig, run_grasp
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import (
     PAD_COUNTS_PER_N,
     PR2_ENCODER_TICKS,
@@ -123,3 +124,19 @@ def test_the_same_seed_is_the_same_grasp_to_the_bit():
     assert not np.array_equal(one.trace.gap_m[:100], other.trace.gap_m[:100]) or (
         not np.array_equal(one.trace.pad_left[0], other.trace.pad_left[0])
     )
+
+
+def test_cells_that_are_not_there_read_their_offset_and_the_others_as_before():
+    whole, middle = (
+        grasp(object="odwalla:full_closed", spread=False, pad_cells=cells).trace for cells in (15, 3)
+    )
+    moved = np.ptp(middle.pad_left[:, 7:], axis=0) > 0
+    assert np.flatnonzero(moved).tolist() == [6, 7, 8]  # the middle row, across the line of contact
+    before = whole.pad_left[whole.pad_t_s < 2.0]
+    assert np.array_equal(middle.pad_left[middle.pad_t_s < 2.0][:, 13:16], before[:, 13:16])
+
+
+def test_pads_can_report_more_often_or_less():
+    for period in (0.01, 0.2):
+        trace = grasp(object="odwalla:full_closed", pad_period_s=period).trace
+        assert np.diff(trace.pad_t_s) == pytest.approx(period, abs=0.0011)

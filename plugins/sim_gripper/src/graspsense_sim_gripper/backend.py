@@ -2,36 +2,72 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any, Unpack
 
 from graspsense.plugin_api import (
     CELLS,
     NO_PADS,
     BatchBackend,
+    BatchOptions,
     Command,
     Controller,
     DeviceInfo,
+    Frame,
+    Grasped,
     Pads,
     Reading,
-    Trace,
+    RunConfig,
+    Variant,
+    bind,
+    maker,
     tare,
 )
+from graspsense_sim_gripper.checking import Control, checked_choice, standard
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.kernel import plant_of
-from graspsense_sim_gripper.sensing import felt_again, sense
+from graspsense_sim_gripper.linear import Linear, linear_of, move_of
+from graspsense_sim_gripper.plant import PlantParams, PlantState, Squeezed
+from graspsense_sim_gripper.scene import kinds_in
+from graspsense_sim_gripper.sensing import SensorState, felt_again, sense
 from graspsense_sim_gripper.setting import CELL_OFFSET, device_info, set_scene
-from graspsense_sim_gripper.terms.registry import laws_of
+from graspsense_sim_gripper.terms.registry import find_term, laws_of
+
+# Where a tick runs in the interpreter, making its tuples is a good part of its cost.
+_sense = bind(sense, Frame=maker(Frame), SensorState=maker(SensorState))
+_reading = maker(Reading)
+_COMPILED: Mapping[str, bool | None] = {"worth": None, "always": True, "never": False}
+_PLANT_TUPLES = {"PlantState": maker(PlantState), "Squeezed": maker(Squeezed)}
 
 
 class SimBackend(BatchBackend[SimConfig]):
     """A PR2 gripper, its fingertips and an object, as a model. Everything it says is simulated."""
 
+    def __init__(self, config: SimConfig) -> None:
+        super().__init__(config)
+        self._control: Control | None = None
+
+    def expect(self, controller: Controller[Any], run: RunConfig) -> None:
+        """Take the controller for which the model of the object is to be chosen."""
+        self._control = Control(controller, run)
+
     def open(self, seed: int) -> DeviceInfo:
-        """Set the scene that the config and the seed describe. Raises UnknownName for an unknown object."""
-        self._setting = setting = set_scene(self.config, self.config.object, seed)
-        self._move = plant_of(laws_of(setting.kinds))
+        """Set the scene that the config and the seed describe.
+
+        Raises UnknownName for an unknown object, ConfigError where no model is as exact as asked for.
+        """
+        chooser = partial(checked_choice, control=self._control or standard(self.config))
+        self._setting = setting = set_scene(self.config, self.config.object, seed, chooser)
+        self._move: Callable[[Any, PlantState, float, float], PlantState] = plant_of(
+            laws_of(setting.kinds), **_PLANT_TUPLES
+        )
+        by_maps = linear_of(self.config, setting)
+        self._plant: PlantParams | Linear = setting.plant
+        if by_maps is not None:
+            self._plant, shape = by_maps
+            self._move = move_of(setting.kinds, shape, self._move, **_PLANT_TUPLES)
         self._body, self._sensor = setting.body, setting.sensed
         self._ticks = 0
         zero = (CELL_OFFSET[0],) * CELLS
@@ -54,7 +90,7 @@ class SimBackend(BatchBackend[SimConfig]):
         if effort is None:
             effort = 0.0
         else:
-            self._body = self._move(setting.plant, self._body, effort, dt)
+            self._body = self._move(self._plant, self._body, effort, dt)
             self._ticks += 1
             if self._explains and self._body.touched == 1:
                 # Of an object that is held fast the half that is pressed harder.
@@ -64,7 +100,7 @@ class SimBackend(BatchBackend[SimConfig]):
         if self._sensor.images >= len(images):
             self._draw()
         left, right = self._zero
-        frame, self._sensor = sense(
+        frame, self._sensor = _sense(
             setting.sensor,
             self._sensor,
             self._body,
@@ -80,7 +116,7 @@ class SimBackend(BatchBackend[SimConfig]):
         if count != self._pads.counter:
             image = images[count - 1]
             self._pads = Pads(self._sensor.image_t_s, count, tuple(image[0]), tuple(image[1]))
-        return Reading(frame, self._pads)
+        return _reading(frame, self._pads)
 
     def apply(self, command: Command) -> None:
         """Take an effort for the next tick."""
@@ -101,15 +137,21 @@ class SimBackend(BatchBackend[SimConfig]):
 
         With `explain` in the settings, also how much each term of the object did, under `model`.
         """
-        report: dict[str, Any] = {
-            "simulated": True,
-            "true_peak_force_n": self._body.peak_n,
-            "broken": any(getattr(state, "broken", 0) == 1 for state in self._body.squeezed.states),
-        }
+        report = _known(self._body, self._setting.kinds)
+        choice = self._setting.choice
+        if choice is not None:
+            if isinstance(self._plant, Linear):
+                choice = choice.by_maps()
+            report["selection"] = {
+                "fidelity": self.config.fidelity,
+                **choice.plain(),
+                "steps": self._body.steps,
+                "within": choice.covers(self._body.peak_n),
+            }
         if self.config.explain:
             setting = self._setting
             path, forces = [d for d, _ in self._pressed], [f for _, f in self._pressed]
-            report["model"] = explain(setting.kinds, setting.plant, path, forces, setting.dt_s)
+            report["model"] = explain(setting.kinds, setting.terms, setting.plant, path, forces, setting.dt_s)
         return report
 
     def _draw(self) -> None:
@@ -118,11 +160,46 @@ class SimBackend(BatchBackend[SimConfig]):
             ([0.0] * CELLS, [0.0] * CELLS) for _ in range(len(self._noise) - len(self._images))
         )
 
+    def variants(self) -> tuple[Variant, ...]:
+        """Return each scheme at each fidelity, from coarse to fine."""
+        from graspsense_sim_gripper.variants import variants
+
+        return variants()
+
     def run_many(
-        self, controller: Controller[Any], scenes: Sequence[str], seeds: Sequence[int]
-    ) -> list[Trace]:
+        self,
+        controller: Controller[Any],
+        scenes: Sequence[str],
+        seeds: Sequence[int],
+        **options: Unpack[BatchOptions],
+    ) -> list[Grasped]:
         """Grasp each object with its seed; compiled, on all cores, where numba is installed and it pays."""
         # Imported here: one grasp in the terminal needs neither threads nor compiling.
-        from graspsense_sim_gripper.batch import run_many
+        from graspsense_sim_gripper.batch import grasps
 
-        return [done.trace for done in run_many(self.config, controller, scenes, seeds)]
+        done = grasps(self.config, controller, scenes, seeds, _COMPILED[self.config.compile], options)
+        return [
+            Grasped(
+                outcome=one.outcome,
+                reason=one.reason,
+                drawn=one.drawn,
+                trace=one.kept,
+                report=_known(one.body, kinds_in(scene)),
+            )
+            for one, scene in zip(done, scenes, strict=True)
+        ]
+
+
+def _known(body: PlantState, kinds: Sequence[str]) -> dict[str, Any]:
+    """Return what only the model knows at the end of a grasp."""
+    states = (
+        (kind, half.states[i]) for half in (body.squeezed, body.right) for i, kind in enumerate(kinds, 1)
+    )
+    beyond = {f"{kind}: {why}": None for kind, state in states if (why := find_term(kind)[1].beyond(state))}
+    return {
+        "simulated": True,
+        "true_peak_force_n": body.peak_n,
+        "resolved": body.unresolved == 0,
+        "broken": any(getattr(state, "broken", 0) == 1 for state in body.squeezed.states),
+        "beyond": "; ".join(beyond),
+    }

@@ -1,48 +1,53 @@
-"""Many grasps at once: the compiled loop on all cores where numba is there, the plain one where it is not."""
+"""Many grasps at once: the compiled loop on all cores where numba is there, the plain one where it is not.
+
+Threads take slices of the batch in turn. A compiled loop runs in its thread, without the interpreter's lock; a plain
+one in a process of that thread's, since plain loops would wait for each other. What a grasp gives follows from its
+scene and seed alone, so the number of workers decides nothing but the time.
+"""
 
 from __future__ import annotations
 
 import os
+import threading
 import warnings
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from itertools import repeat
-from typing import Any, Final
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import ExitStack
+from typing import Any, Final, Unpack
 
-import numpy as np
-from attrs import frozen
+from attrs import define, field
 
-from graspsense.plugin_api import (
-    CELLS,
-    Controller,
-    Outcome,
-    RunConfig,
-    Trace,
-    first_state,
-    tick_params,
-)
+from graspsense.plugin_api import BatchOptions, Controller, RunConfig
 from graspsense_sim_gripper import kernel
+from graspsense_sim_gripper.common_composition import as_compiled, compiled_kinds
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant import PlantState
-from graspsense_sim_gripper.setting import CELL_OFFSET, Setting, device_info, set_scene
-from graspsense_sim_gripper.terms.registry import laws_of
+from graspsense_sim_gripper.one_of_many import (
+    Composition,
+    Done,
+    Job,
+    Storage,
+    chooser_of,
+    composition_of,
+    grasp_compiled,
+    loop_of,
+    plainly,
+)
+from graspsense_sim_gripper.plain_process import NotHandedOver, PlainProcess
+from graspsense_sim_gripper.scene import kinds_in, numbered
+from graspsense_sim_gripper.setting import Chooser, Setting, set_scene
 
 WORTH_COMPILING: Final = 50
-"""Grasps of one composition from which compiling it (1 to 2 s) takes less time than it saves."""
-TICKS: Final = 12_000
-IMAGES: Final = 256
-"""Room for a grasp of 10 s; one that needs more is done again with twice that."""
+"""Grasps of one composition from which compiling it takes less time than it saves."""
+WORTH_A_PROCESS: Final = 16
+"""Plain grasps a worker from which starting a process for them, half a second, takes less time than it saves."""
+SLICE: Final = 16
+AHEAD: Final = 8
+"""Slices a worker that are done before one that takes long."""
+REPORT_S: Final = 0.2
 
 _MEMO: dict[str, Any] = {}
-
-
-@frozen(kw_only=True, eq=False)
-class Done:
-    """One grasp of many: its trace, how it ended, and the plant at the end (the true peak force is in it)."""
-
-    trace: Trace
-    outcome: Outcome
-    body: PlantState
+_COMPILING: Final = threading.Lock()
 
 
 def run_many(
@@ -52,109 +57,202 @@ def run_many(
     seeds: Sequence[int],
     *,
     compiled: bool | None = None,
+    **options: Unpack[BatchOptions],
 ) -> list[Done]:
-    """Grasp each scene with its seed and return what came of each in that order, the same for any number of cores.
+    """Grasp each scene with its seed and return what came of each in that order, the same for any number of workers.
 
-    `compiled` asks for compiling or forbids it; by default a composition is compiled from `WORTH_COMPILING`
-    grasps on. Where a controller or a term cannot be compiled the plain loop runs, and a warning says why.
+    Traces are kept unless the options say otherwise. `compiled` asks for compiling or forbids it; by default a
+    composition is compiled from `WORTH_COMPILING` grasps on. Where a controller or a term cannot be compiled the
+    plain loop runs, and a warning says why.
     """
+    return list(grasps(config, controller, scenes, seeds, compiled, {"traces": True, **options}))
+
+
+def grasps(
+    config: SimConfig,
+    controller: Controller[Any],
+    scenes: Sequence[str],
+    seeds: Sequence[int],
+    compiled: bool | None,
+    options: BatchOptions,
+) -> Iterator[Done]:
+    """Yield what `run_many` returns, one after the other."""
+    unknown = options.keys() - BatchOptions.__annotations__.keys()
+    if unknown:
+        raise TypeError(f"run_many has no {sorted(unknown)}; it has {sorted(BatchOptions.__annotations__)}")
     if len(scenes) != len(seeds):
         raise ValueError(f"{len(scenes)} scenes and {len(seeds)} seeds: give one seed a scene")
-    step = type(controller).step
-    run = RunConfig()
-    law_params, law_state = tick_params(device_info(config), controller, run), first_state(controller.init())
-
-    groups: dict[tuple[str, ...], list[int]] = {}
-    settings: list[Setting] = []
-    for i, (scene, seed) in enumerate(zip(scenes, seeds, strict=True)):
-        setting = set_scene(config, scene, seed)
-        settings.append(setting)
-        groups.setdefault(setting.kinds, []).append(i)
-
-    done: list[Done | None] = [None] * len(scenes)
-    for kinds, members in groups.items():
-        plain = kernel.grasp_of(laws_of(kinds), step)
-
-        def one(i: int, loop: Callable[..., Any], on_arrays: bool) -> None:
-            done[i] = _grasp(loop, on_arrays, settings[i], law_params, law_state)
-
-        if compiled or (compiled is None and len(members) >= WORTH_COMPILING):
-            try:
-                fast = kernel.compiled(plain, _MEMO)
-                # The first call compiles; the others then run beside each other without the interpreter's lock.
-                with kernel.refusals():
-                    one(members[0], fast, True)
-            except kernel.NotCompilable as error:
-                warnings.warn(
-                    f"these grasps run in plain Python, about a hundred times slower: {error}", stacklevel=2
-                )
-            else:
-                with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-                    list(pool.map(one, members[1:], repeat(fast), repeat(True)))
-                continue
-        for i in members:
-            one(i, plain, False)
-    return [one for one in done if one is not None]
-
-
-def _grasp(
-    loop: Callable[..., Any], on_arrays: bool, setting: Setting, law_params: Any, law_state: Any
-) -> Done:
-    room, blocks, noise = 1, setting.noise(), np.zeros((0, 2 * CELLS))
-    while True:
-        ticks, images = TICKS * room, IMAGES * room
-        while len(noise) < images:
-            noise = np.concatenate([noise, next(blocks)])
-        cells = np.full((images, 2, CELLS), np.nan)
-        times, columns = np.zeros(images), np.zeros((ticks, len(COLUMNS)))
-        zeros = np.full((2, CELLS), CELL_OFFSET[0])
-        storage: tuple[Any, ...] = (zeros[0], zeros[1], noise, cells, times, columns)
-        if not on_arrays:
-            # Lists are what plain Python indexes quickly.
-            storage = tuple(part.tolist() for part in storage)
-        recorded, body, sensor, state = loop(
-            setting.plant,
-            setting.sensor,
-            setting.dt_s,
-            law_params,
-            setting.body,
-            setting.sensed,
-            law_state,
-            *storage,
-        )
-        if state.done == 1 or state.guard.stopped == 1:
-            break
-        room *= 2
-    _, _, _, cells, times, columns = (np.asarray(part) for part in storage)
-    trace = _trace(columns[:recorded], cells[: sensor.images], times[: sensor.images])
-    return Done(trace=trace, outcome=Outcome(state.law.outcome), body=body)
-
-
-COLUMNS: Final = (
-    "t_s",
-    "gap_m",
-    "velocity_m_s",
-    "effort_n",
-    "force_left_n",
-    "force_right_n",
-    "edge_left_n",
-    "edge_right_n",
-    "status",
-    "phase",
-    "command",
-)
-
-
-def _trace(columns: Any, cells: Any, times: Any) -> Trace:
-    parts: dict[str, Any] = {name: np.ascontiguousarray(columns[:, k]) for k, name in enumerate(COLUMNS)}
-    for name in ("status", "phase"):
-        parts[name] = parts[name].astype(np.int64)
-    # The runner keeps the image that was there when the approach began, and those after it.
-    begin = int(np.searchsorted(times, parts["t_s"][0], side="right")) - 1 if len(columns) else 0
-    begin = max(begin, 0)
-    return Trace(
-        **parts,
-        pad_t_s=times[begin:].copy(),
-        pad_left=cells[begin:, 0].copy(),
-        pad_right=cells[begin:, 1].copy(),
+    job = Job(
+        config=config,
+        controller=controller,
+        run=options.get("run") or RunConfig(),
+        draw=options.get("draw"),
+        traces=options.get("traces", False),
     )
+    workers = options.get("workers") or os.cpu_count() or 1
+    batch = _Batch(job, scenes, seeds, max(1, workers), compiled)
+    try:
+        yield from batch.grasps(options.get("progress"))
+    finally:
+        for note in batch.notes:
+            warnings.warn(note, stacklevel=2)
+
+
+@define(eq=False)
+class _Batch:
+    job: Job
+    scenes: Sequence[str]
+    seeds: Sequence[int]
+    workers: int
+    compiled: bool | None
+    notes: dict[str, None] = field(factory=dict, init=False)
+    """What is to be said of how they ran, each once."""
+    chooser: Chooser = field(init=False)
+    of_kinds: Counter[tuple[str, ...]] = field(factory=Counter, init=False)
+    counts: Counter[Composition] = field(factory=Counter, init=False)
+    fast: dict[Composition, bool] = field(factory=dict, init=False)
+    """Which compositions run compiled."""
+    loops: dict[Composition, Callable[..., Any]] = field(factory=dict, init=False)
+    """The compiled loops that have run once."""
+    own: threading.local = field(factory=threading.local, init=False)
+    processes: ExitStack = field(factory=ExitStack, init=False)
+
+    def grasps(self, progress: Callable[[int, int], None] | None) -> Iterator[Done]:
+        """Run them all; yield what came of each in order, so that who keeps little of it holds little."""
+        total = len(self.scenes)
+        self._plan()
+        slices = range(0, total, SLICE)
+        workers = max(1, min(self.workers, len(slices)))
+        running: dict[Future[list[Done]], int] = {}
+        ready: dict[int, list[Done]] = {}
+        asked = given = finished = 0
+        with self.processes, ThreadPoolExecutor(max_workers=workers) as pool:
+            try:
+                while True:
+                    # A slice a worker and one in reserve: nothing piles up, and an interruption is soon heard.
+                    while len(running) < 2 * workers and asked < min(len(slices), given + AHEAD * workers):
+                        running[pool.submit(self._slice, slices[asked])] = asked
+                        asked += 1
+                    if progress is not None:
+                        progress(finished, total)
+                    if not running:
+                        break
+                    for future in wait(running, REPORT_S, FIRST_COMPLETED).done:
+                        k = running.pop(future)
+                        ready[k] = future.result()
+                        finished += len(ready[k])
+                    while given in ready:
+                        yield from ready.pop(given)
+                        given += 1
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                # Whoever waits for a process is then told that it has gone.
+                self.processes.close()
+                raise
+
+    def __attrs_post_init__(self) -> None:
+        self.chooser = chooser_of(self.job, self._trial_loop)
+
+    def _plan(self) -> None:
+        """Decide what is compiled, and choose the models; names that nobody knows are refused here."""
+        names = Counter(scene if scene == "none" else numbered(scene)[0] for scene in self.scenes)
+        for name, n in names.items():
+            self.of_kinds[compiled_kinds(kinds_in(name))] += n
+        for name, n in names.items():
+            composition = composition_of(self.job.config, self._setting(name, 0))
+            self.counts[composition] += n
+        for composition, n in self.counts.items():
+            self.fast[composition] = self._worth(n)
+
+    def _worth(self, n: int) -> bool:
+        return n >= WORTH_COMPILING if self.compiled is None else self.compiled
+
+    def _setting(self, scene: str, seed: int) -> Setting:
+        return set_scene(self.job.config, scene, seed, self.chooser)
+
+    def _trial_loop(
+        self, setting: Setting, step: Callable[..., Any]
+    ) -> tuple[Callable[..., Any], Setting] | None:
+        """Return the compiled loop for a trial grasp, that of the grasps themselves; None where those run plain."""
+        composition = composition_of(self.job.config, setting)
+        # What maps may take is checked by steps, which would be compiled for that alone.
+        straight = self.job.config.transmission == "straight"
+        if straight or not self._worth(self.of_kinds[composition.kinds]):
+            return None
+        try:
+            loop = kernel.compiled(loop_of(composition, step), _MEMO)
+        except kernel.NotCompilable:
+            return None
+
+        def guarded(*given: Any) -> Any:
+            with _COMPILING, kernel.refusals():
+                return loop(*given)
+
+        return guarded, as_compiled(setting)
+
+    def _slice(self, begin: int) -> list[Done]:
+        """Run the slice that begins there."""
+        scenes, seeds = self.scenes[begin : begin + SLICE], self.seeds[begin : begin + SLICE]
+        found: dict[int, Done] = {}
+        plain: list[int] = []
+        for i, (scene, seed) in enumerate(zip(scenes, seeds, strict=True)):
+            setting = self._setting(scene, seed)
+            one = self._fast(setting)
+            if one is None:
+                plain.append(i)
+            else:
+                found[i] = one
+        if plain:
+            done = self._plain([scenes[i] for i in plain], [seeds[i] for i in plain])
+            found.update(zip(plain, done, strict=True))
+        return [found[i] for i in range(len(scenes))]
+
+    def _fast(self, setting: Setting) -> Done | None:
+        """Run one grasp compiled; None where it is to run plain."""
+        kinds = composition_of(self.job.config, setting)
+        if kinds not in self.fast:
+            # Friction drawn anew may leave it piecewise linear in one trial and not in the next.
+            self.fast[kinds] = any(fast for one, fast in self.fast.items() if one.kinds == kinds.kinds)
+        if not self.fast[kinds]:
+            return None
+        loop = self.loops.get(kinds)
+        if loop is None:
+            # The first call compiles; meanwhile the others wait, for they would compile the same once more.
+            with _COMPILING:
+                try:
+                    plain = loop_of(kinds, type(self.job.controller).step)
+                    loop = kernel.compiled(plain, _MEMO)
+                    with kernel.refusals():
+                        one = grasp_compiled(self.job, setting, loop, self._storage())
+                    self.loops[kinds] = loop
+                    return one
+                except kernel.NotCompilable as error:
+                    self.fast[kinds] = False
+                    self._slowly(str(error))
+                    return None
+        return grasp_compiled(self.job, setting, loop, self._storage())
+
+    def _slowly(self, why: str) -> None:
+        how = f"on {self.workers} cores" if self._apart() else "on one core"
+        self.notes[f"these grasps run in plain Python {how}, about a hundred times slower: {why}"] = None
+
+    def _apart(self) -> bool:
+        """Return whether plain grasps are worth processes of their own."""
+        plain = sum(n for kinds, n in self.counts.items() if not self.fast[kinds])
+        return self.workers > 1 and plain >= WORTH_A_PROCESS * self.workers
+
+    def _plain(self, scenes: Sequence[str], seeds: Sequence[int]) -> list[Done]:
+        if self._apart() and not getattr(self.own, "alone", False):
+            try:
+                if not hasattr(self.own, "process"):
+                    self.own.process = self.processes.enter_context(PlainProcess(self.job))
+                return self.own.process.run(scenes, seeds)  # type: ignore[no-any-return]
+            except NotHandedOver as error:
+                self.own.alone = True
+                self.notes[f"plain grasps run on one core: {error}"] = None
+        return [plainly(self.job, scene, seed) for scene, seed in zip(scenes, seeds, strict=True)]
+
+    def _storage(self) -> Storage:
+        if not hasattr(self.own, "storage"):
+            self.own.storage = Storage()
+        return self.own.storage  # type: ignore[no-any-return]

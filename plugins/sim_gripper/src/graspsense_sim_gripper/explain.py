@@ -11,9 +11,14 @@ from graspsense_sim_gripper.terms.term import WorkingPoint
 
 
 def explain(
-    kinds: Sequence[str], plant: PlantParams, path_m: Sequence[float], forces_n: Sequence[float], dt_s: float
+    kinds: Sequence[str],
+    terms: Sequence[Any],
+    plant: PlantParams,
+    path_m: Sequence[float],
+    forces_n: Sequence[float],
+    dt_s: float,
 ) -> dict[str, Any]:
-    """Return the size of every term, as plain values.
+    """Return the size of every term, as plain values, whether it was kept in this grasp's model or not.
 
     `path_m` holds the compression of the object at each tick from the first contact on, `forces_n` the force that
     went with it. A term has its greatest force (`peak_n`), its force and its share of the whole where the whole
@@ -31,13 +36,16 @@ def explain(
         seconds=len(path_m) * dt_s,
     )
     rows: list[dict[str, Any]] = []
-    for name, params in zip(kinds, plant.thing.terms, strict=True):
+    for name, params in zip(kinds, terms, strict=True):
         term = find_term(name)[1]
         state, force, work, put_in = term.at_rest, 0.0, 0.0, 0.0
         along: list[float] = []
         for i in range(len(path_m)):
             before = force
-            force, state = term.law(params, state, path[i], path[i + 1], dt_s)
+            # The rate between this tick and the next, as far as ticks tell.
+            ahead = path[i + 2] if i + 2 < len(path) else path[i + 1]
+            speed = 0.5 * (ahead - path[i]) / dt_s
+            force, state = term.law(params, state, path[i], path[i + 1], dt_s, speed)
             along.append(force)
             work += 0.5 * (before + force) * (path[i + 1] - path[i])
             if i == top:

@@ -11,25 +11,28 @@ composition loaded from disk can silently run another's code, and an edited help
 
 from __future__ import annotations
 
+import dis
 import functools
 import hashlib
 import os
 import re
 import sys
 import types
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import TARING, Pads, bind, tick
-from graspsense_sim_gripper import plant
+from graspsense_sim_gripper import linear, plant
+from graspsense_sim_gripper.linear_modes import Shape
 from graspsense_sim_gripper.plant import PlantParams, PlantState
 from graspsense_sim_gripper.sensing import SensorParams, SensorState, felt_again, sense
 from graspsense_sim_gripper.terms.term import Law
 
 
-def _nothing(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
+def _nothing(params: Any, states: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
     return 0.0, ()
 
 
@@ -39,30 +42,30 @@ third: Any = _nothing
 rest: Any = _nothing
 
 
-def _one(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
-    force, state = first(params[0], states[0], d0, d1, h)
+def _one(params: Any, states: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
+    force, state = first(params[0], states[0], d0, d1, h, v1)
     return force, (state,)
 
 
-def _two(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
-    force1, state1 = first(params[0], states[0], d0, d1, h)
-    force2, state2 = second(params[1], states[1], d0, d1, h)
+def _two(params: Any, states: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
+    force1, state1 = first(params[0], states[0], d0, d1, h, v1)
+    force2, state2 = second(params[1], states[1], d0, d1, h, v1)
     return force1 + force2, (state1, state2)
 
 
-def _three(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
-    force1, state1 = first(params[0], states[0], d0, d1, h)
-    force2, state2 = second(params[1], states[1], d0, d1, h)
-    force3, state3 = third(params[2], states[2], d0, d1, h)
-    return force1 + force2 + force3, (state1, state2, state3)
+def _three(params: Any, states: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
+    force1, state1 = first(params[0], states[0], d0, d1, h, v1)
+    force2, state2 = second(params[1], states[1], d0, d1, h, v1)
+    force3, state3 = third(params[2], states[2], d0, d1, h, v1)
+    return force1 + (force2 + force3), (state1, state2, state3)
 
 
-def _three_and_more(params: Any, states: Any, d0: float, d1: float, h: float) -> tuple[float, Any]:
-    force1, state1 = first(params[0], states[0], d0, d1, h)
-    force2, state2 = second(params[1], states[1], d0, d1, h)
-    force3, state3 = third(params[2], states[2], d0, d1, h)
-    more, others = rest(params[3:], states[3:], d0, d1, h)
-    return force1 + force2 + force3 + more, (state1, state2, state3, *others)
+def _three_and_more(params: Any, states: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
+    force1, state1 = first(params[0], states[0], d0, d1, h, v1)
+    force2, state2 = second(params[1], states[1], d0, d1, h, v1)
+    force3, state3 = third(params[2], states[2], d0, d1, h, v1)
+    more, others = rest(params[3:], states[3:], d0, d1, h, v1)
+    return force1 + (force2 + (force3 + more)), (state1, state2, state3, *others)
 
 
 def sum_of(laws: Sequence[Law]) -> Law:
@@ -79,15 +82,52 @@ def sum_of(laws: Sequence[Law]) -> Law:
     return bind(_three_and_more, first=laws[0], second=laws[1], third=laws[2], rest=more)
 
 
-def plant_of(laws: Sequence[Law]) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
-    """Return `move` for an object that is the sum of these terms."""
-    squeeze = bind(plant.squeeze, advance=sum_of(laws))
-    piece = bind(plant._piece, _felt=bind(plant._felt, squeeze=squeeze))
-    return bind(plant.move, _driven=bind(plant._driven, _piece=piece))
+def plant_of(
+    laws: Sequence[Law], **tuples: Any
+) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
+    """Return `move` for an object that is the sum of these terms.
+
+    `tuples` are what makes the plant's named tuples, where that is not their class (see `maker`).
+    """
+    squeeze = bind(plant.squeeze, advance=sum_of(laws), **tuples)
+    felt = bind(plant._felt, squeeze=squeeze)
+    stuck = bind(plant._stuck, _felt=felt, **tuples)
+    step = bind(plant._step, _felt=felt, _stuck=stuck, _implicit=bind(plant._implicit, _felt=felt), **tuples)
+    glide = bind(plant._glide, **{name: made for name, made in tuples.items() if name == "PlantState"})
+    return bind(plant.move, _driven=bind(plant._driven, _step=step, _glide=glide))
 
 
 move: Any = _nothing
 control: Any = _nothing
+
+
+COLUMNS: Final = (
+    "t_s",
+    "gap_m",
+    "velocity_m_s",
+    "effort_n",
+    "force_left_n",
+    "force_right_n",
+    "edge_left_n",
+    "edge_right_n",
+    "status",
+    "phase",
+    "command",
+)
+"""The rows of the recorded table, one a column of the trace."""
+
+
+class Loop(NamedTuple):
+    """Where the loop stands between two calls: ticks done and recorded, the images of before the taring."""
+
+    ticks: int
+    recorded: int
+    phase: int
+    untared: int
+    effort_n: float
+
+
+NOT_BEGUN: Final = Loop(0, 0, -1, 0, 0.0)
 
 
 def grasp(
@@ -95,6 +135,8 @@ def grasp(
     sensor_params: SensorParams,
     dt: float,
     tick_params: Any,
+    most_ticks: int,
+    loop: Loop,
     body: PlantState,
     sensor: SensorState,
     state: Any,
@@ -104,26 +146,29 @@ def grasp(
     images: Any,
     image_times: Any,
     columns: Any,
-) -> tuple[int, PlantState, SensorState, Any]:
-    """Run one whole grasp; return how many ticks were recorded, and the plant, the sensor, the state at the end.
+) -> tuple[Loop, PlantState, SensorState, Any]:
+    """Run a grasp to its end, for `most_ticks`, or until there is no more room; return where everything stands.
 
     The runner's loop on arrays: `left_zero` and `right_zero` (22,) hold the zero before the tare and become the
-    tare; `images` (k, 2, 22), NaN at first, and `image_times` (k,) are filled; `columns` (n, 11) gets a row a
-    tick from the approach on: the frame without its `dt_s`, then phase and command. It ends where they are full.
+    tare; `images` (k, 2, 22), the last one NaN at first, and `image_times` (k,) are filled; `columns` (11, n) get
+    a number each a tick from the approach on: the frame without its `dt_s`, then phase and command. Where `images` or
+    `columns` are full it is called again, with larger ones that begin alike and with what it returned.
     """
-    effort = 0.0
-    ticks = 0
-    recorded = 0
-    untared = 0
-    phase = -1
-    while recorded < len(columns) and sensor.images < len(images):
+    ticks, recorded, phase, untared, effort = loop
+    room = len(columns[0])
+    times, gaps, velocities, efforts = columns[0], columns[1], columns[2], columns[3]
+    lefts, rights, left_edges, right_edges = columns[4], columns[5], columns[6], columns[7]
+    statuses, phases, commands = columns[8], columns[9], columns[10]
+    count = sensor.images
+    pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
+    while ticks < most_ticks and recorded < room and sensor.images < len(images):
         frame, sensor = sense(
             sensor_params, sensor, body, ticks * dt, dt, effort, left_zero, right_zero, noise, images
         )
-        count = sensor.images
-        if count > 0:
+        if sensor.images != count:
+            count = sensor.images
             image_times[count - 1] = sensor.image_t_s
-        pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
+            pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
         command, state = control(tick_params, state, frame, pads)
         stepped = phase != TARING
         if state.phase != phase:
@@ -134,24 +179,23 @@ def grasp(
             untared = count
         effort = command.value
         if phase > TARING and stepped:
-            row = columns[recorded]
-            row[0] = frame.t_s
-            row[1] = frame.gap_m
-            row[2] = frame.velocity_m_s
-            row[3] = frame.effort_n
-            row[4] = frame.force_left_n
-            row[5] = frame.force_right_n
-            row[6] = frame.edge_left_n
-            row[7] = frame.edge_right_n
-            row[8] = frame.status
-            row[9] = phase
-            row[10] = effort
+            times[recorded] = frame.t_s
+            gaps[recorded] = frame.gap_m
+            velocities[recorded] = frame.velocity_m_s
+            efforts[recorded] = frame.effort_n
+            lefts[recorded] = frame.force_left_n
+            rights[recorded] = frame.force_right_n
+            left_edges[recorded] = frame.edge_left_n
+            right_edges[recorded] = frame.edge_right_n
+            statuses[recorded] = frame.status
+            phases[recorded] = phase
+            commands[recorded] = effort
             recorded += 1
+        ticks += 1
         if state.done == 1 or state.guard.stopped == 1:
             break
         body = move(plant_params, body, effort, dt)
-        ticks += 1
-    return recorded, body, sensor, state
+    return Loop(ticks, recorded, phase, untared, effort), body, sensor, state
 
 
 def _tare(images: Any, begin: int, end: int, left_zero: Any, right_zero: Any) -> None:
@@ -166,12 +210,30 @@ def _tare(images: Any, begin: int, end: int, left_zero: Any, right_zero: Any) ->
         right_zero[i] = right / (end - begin)
 
 
-def grasp_of(laws: Sequence[Law], step: Callable[..., Any]) -> Callable[..., Any]:
-    """Return `grasp` for an object of these terms under this control law, in plain Python."""
-    return bind(grasp, move=plant_of(laws), control=bind(tick, step=step))
+def grasp_of(
+    laws: Sequence[Law], step: Callable[..., Any], *, by_maps: tuple[Sequence[str], Shape] | None = None
+) -> Callable[..., Any]:
+    """Return `grasp` for an object of these terms under this control law, in plain Python.
+
+    `by_maps`: their names and the shape of the maps, where its plant parameters are a `Linear` and exact maps take the
+    ticks that they can.
+    """
+    move: Any = plant_of(laws)
+    if by_maps is not None:
+        move = linear.move_of(*by_maps, move)
+    return bind(grasp, move=move, control=bind(tick, step=step))
 
 
 # ------------------------------------------------------------------------------------------------- compiling
+
+
+SHORT_CODE: Final = 400
+"""Bytes of byte code up to which a function is taken into all that call it."""
+LONG_CODE: Final = 2000
+"""Bytes from which on a function stays a call where it would come to stand in several places."""
+LEADING: Final = (plant.move.__code__, plant._driven.__code__)
+"""What does little but lead to the next: taken in before types are inferred, since every level of calls has all that
+is below it compiled once more."""
 
 
 class NotCompilable(Exception):
@@ -204,33 +266,46 @@ def compiled(function: Callable[..., Any], memo: dict[str, Any]) -> Callable[...
     except ImportError as error:
         raise NotCompilable('numba is not installed: pip install "graspsense-sim-gripper[fast]"') from error
     _use_cache_folder()
-    return _compiled(function, memo, numba, outermost=True, above=())
+    copies: Counter[types.CodeType] = Counter()
+    _count(_plain(function), 1, (), copies)
+    return _compiled(function, memo, numba, copies, outermost=True)
 
 
 def _compiled(
     function: Callable[..., Any],
     memo: dict[str, Any],
     numba: types.ModuleType,
+    copies: Counter[types.CodeType],
     outermost: bool,
-    above: tuple[int, ...],
+    places: int = 0,
 ) -> Callable[..., Any]:
     plain = _plain(function)
-    if id(plain) in above:
-        raise NotCompilable(f"{plain.__module__}.{plain.__qualname__} calls itself, which cannot be compiled")
     mark = fingerprint(plain)
     key = f"{mark}{'!' if outermost else ''}"
     if key not in memo:
+        counts = _places(plain.__code__)
         parts = {
-            name: _compiled(value, memo, numba, outermost=False, above=(*above, id(plain)))
-            for name, value in _reached(plain)
-            if isinstance(_unwrapped(value), types.FunctionType)
+            name: _compiled(value, memo, numba, copies, outermost=False, places=counts[name])
+            for name, value in _functions(plain)
         }
+        code = plain.__code__
+        # A call that stays one hands all numbers of the tuples over, which takes longer than most functions here. So
+        # what stands in one place goes there, and what is short goes everywhere.
+        once = places == 1 and (len(code.co_code) < LONG_CODE or copies[code] == 1)
         copy = bind(plain, **parts)
         copy.__qualname__ = f"{plain.__qualname__}_{mark}"
         # Only the outermost is kept on disk, the rest being inside it, and only it is called from the interpreter:
         # a wrapper for that costs more to compile than most functions here.
         memo[key] = numba.njit(
-            copy, nogil=True, cache=outermost, no_cpython_wrapper=not outermost, no_cfunc_wrapper=True
+            copy,
+            nogil=True,
+            cache=outermost,
+            no_cpython_wrapper=not outermost,
+            no_cfunc_wrapper=True,
+            forceinline=once or len(code.co_code) <= SHORT_CODE,
+            inline="always" if places == 1 and code in LEADING else "never",
+            # Nothing here allocates, and counting references to the arrays that are handed on took half of a tick.
+            _nrt=False,
         )
     return memo[key]  # type: ignore[no-any-return]
 
@@ -273,6 +348,39 @@ def _described(function: types.FunctionType, above: tuple[int, ...]) -> Iterator
             yield repr(value)
         else:
             yield getattr(value, "__qualname__", getattr(value, "__name__", type(value).__qualname__))
+
+
+def _count(
+    function: types.FunctionType, copies: int, above: tuple[int, ...], found: Counter[types.CodeType]
+) -> None:
+    """Count in how many places the code of each function would stand if all were taken in."""
+    if id(function) in above:
+        raise NotCompilable(
+            f"{function.__module__}.{function.__qualname__} calls itself, which cannot be compiled"
+        )
+    found[function.__code__] += copies
+    counts = _places(function.__code__)
+    for name, value in _functions(function):
+        _count(_plain(value), copies * counts[name], (*above, id(function)), found)
+
+
+def _functions(function: types.FunctionType) -> list[tuple[str, Any]]:
+    """Return the functions that this one calls, by name."""
+    return [
+        (name, value)
+        for name, value in _reached(function)
+        if isinstance(_unwrapped(value), types.FunctionType)
+    ]
+
+
+def _places(code: types.CodeType) -> Counter[str]:
+    """Return in how many places the code reads each global name."""
+    return Counter(
+        str(one.argval)
+        for each in _codes(code)
+        for one in dis.get_instructions(each)
+        if one.opname == "LOAD_GLOBAL"
+    )
 
 
 def _reached(function: types.FunctionType) -> list[tuple[str, Any]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Callable, Mapping
-from functools import cache
+from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
@@ -60,6 +60,16 @@ class ObjectSpec:
     reasons: Mapping[str, str] = field(factory=dict)
     file: str = ""
     """Where it was read from; empty: the catalogue."""
+
+    @cached_property
+    def stiff_parts(self) -> tuple[tuple[Any, tuple[bool, ...]], ...]:
+        """The parameters of each term, and which of them a thicker wall makes larger."""
+        parts = []
+        for kind, values in self.terms:
+            term = find_term(kind)[1]
+            params = term.params(**values)
+            parts.append((params, tuple(name in term.stiffnesses for name in params._fields)))
+        return tuple(parts)
 
 
 @frozen(kw_only=True)
@@ -136,6 +146,13 @@ def find(name: str) -> ObjectSpec:
     raise UnknownName(f"no object named {kind!r}. Known: {', '.join(kinds)}.{suggestion(kind, kinds)}")
 
 
+def kinds_in(scene: str) -> tuple[str, ...]:
+    """Return the terms of the object in a scene, by the name of that. Raises UnknownName and ConfigError."""
+    if scene == "none":
+        return ()
+    return tuple(kind for kind, _ in find(numbered(scene)[0]).terms)
+
+
 def instance_of(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None = None) -> Instance:
     """Return an instance drawn from the spec's spreads; with no generator, the spec's own figures, centred.
 
@@ -149,11 +166,12 @@ def instance_of(spec: ObjectSpec, rng: np.random.Generator | None, number: int |
     # Lognormal, so that no draw makes a stiffness negative; two standard deviations at the most elsewhere.
     stiffer = math.exp(spec.stiffness_spread * draws[0])
     clipped = [min(max(d, -2.0), 2.0) for d in draws]
-    parameters = []
-    for kind, values in spec.terms:
-        term = find_term(kind)[1]
-        scaled = {k: v * stiffer if k in term.stiffnesses else v for k, v in values.items()}
-        parameters.append(term.params(**scaled))
+    parameters = [
+        params._make(
+            [value * stiffer if stiff else value for value, stiff in zip(params, which, strict=True)]
+        )
+        for params, which in spec.stiff_parts
+    ]
     return Instance(
         spec=spec,
         width_m=spec.width_m + spec.width_spread_m * clipped[1],
@@ -183,6 +201,15 @@ def cell_weights(patch: str, row: float) -> tuple[float, ...]:
             weights.append(math.exp(-(r * r + c * c) / 0.5))
     total = sum(weights)
     return tuple(weight / total for weight in weights)
+
+
+@cache
+def nearest_the_middle(cells: int) -> frozenset[int]:
+    """Return which cells of the gripping face, of 0 to 14, lie nearest its middle: so many of them."""
+    # Rows are 6 mm apart, columns 5.6 mm.
+    return frozenset(
+        sorted(range(15), key=lambda i: math.hypot(6.0 * (i // 3 - 2), 5.6 * (i % 3 - 1)))[:cells]
+    )
 
 
 @cache

@@ -1,11 +1,11 @@
 """What the gripper feels of the plant: a quantised encoder with its filter, and 22 cells a fingertip.
 
 The encoder counts motor ticks; the gap is their image through the transmission, its rate a difference with a
-first-order filter. A cell image is taken every 41 ms, beside frames at the control rate: the force that lands on
-the gripping face is spread over its fifteen cells by the patch of contact, the rest lands beside them; each cell
-has an offset of its own, noise, whole counts and 16 bits. The ideal sensor gives gap, rate and force exactly, at
-every tick, and has no cells. An image can be told to arrive later than it was taken, as over a bus that carries
-it in pieces.
+first-order filter. A cell image is taken every 41 ms, or as the settings say, beside frames at the control rate: the
+force that lands on the gripping face is spread over its fifteen cells by the patch of contact, the rest lands beside
+them; each cell has an offset of its own, noise, whole counts and 16 bits. The ideal sensor gives gap, rate and force
+exactly, at every tick, and has no cells. An image can be told to arrive later than it was taken, as over a bus that
+carries it in pieces.
 """
 
 from __future__ import annotations
@@ -26,19 +26,21 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.plant import PlantState
 
-PAD_PERIOD_S: Final = 0.041
-"""The PR2's pads report every 41 ms (pr2_gripper_sensor, pressure_observer.cpp)."""
 VELOCITY_FILTER_S: Final = 0.003
 """Time constant of the rate's filter: below 10 ms, or the velocity loop becomes a limit cycle."""
 LARGEST_COUNT: Final = 65535.0
 
 
 class SensorParams(NamedTuple):
-    """The sensing chain of one grasp. `share` is the part of the force that lands on the fifteen cells."""
+    """The sensing chain of one grasp. `share` is the part of the force that lands on the fifteen cells.
+
+    A cell of the gripping face whose weight is 0 is not there: it reads its offset, always.
+    """
 
     ideal: int
     link: ScrewLinkage
     pad_phase_s: float
+    pad_period_s: float
     pad_delay_s: float
     share: float
     noise_counts: float
@@ -115,7 +117,7 @@ def sense(
     velocity += dt_s / (VELOCITY_FILTER_S + dt_s) * (moved / dt_s - velocity)
 
     # A tenth of a nanosecond of grace, as ticks and image times are sums of different steps.
-    due_s = params.pad_phase_s + count * PAD_PERIOD_S - 1e-10
+    due_s = params.pad_phase_s + count * params.pad_period_s - 1e-10
     if under_way == 0 and t_s >= due_s:
         under_way, taken_left, taken_right = 1, plant.left_n, plant.right_n
     if under_way == 1 and t_s >= due_s + params.pad_delay_s:
@@ -161,9 +163,15 @@ def _image(
     params: SensorParams, weights: Any, offset: Any, force_n: float, noise: Any, first: int, cells: Any
 ) -> None:
     counts = force_n * params.share * PAD_COUNTS_PER_N
+    spread = params.noise_counts
     for i in range(CELLS):
-        value = offset[i] + params.noise_counts * noise[first + i]
+        value = offset[i] + spread * noise[first + i]
         if i >= FIRST_PAD_CELL:
-            value += counts * weights[i - FIRST_PAD_CELL]
-        value = math.floor(value + 0.5)
-        cells[i] = min(max(value, 0.0), LARGEST_COUNT)
+            weight = weights[i - FIRST_PAD_CELL]
+            value = value + counts * weight if weight > 0.0 else offset[i]
+        value = float(math.floor(value + 0.5))
+        if value < 0.0:
+            value = 0.0
+        elif value > LARGEST_COUNT:
+            value = LARGEST_COUNT
+        cells[i] = value

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
+from copy import deepcopy
 from typing import Any, Final
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import (
@@ -17,14 +18,34 @@ from graspsense.plugin_api import (
     Command,
     ConfigError,
     DeviceInfo,
+    ScrewLinkage,
     gap_and_rate,
     revolutions_at,
+    straight_linkage,
 )
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant import Drive, PlantParams, PlantState, Skin, Squeezed, Thing
-from graspsense_sim_gripper.scene import Instance, cell_weights, find, instance_of, numbered
-from graspsense_sim_gripper.sensing import PAD_PERIOD_S, SensorParams, SensorState, first_sensed
-from graspsense_sim_gripper.terms.registry import find_term
+from graspsense_sim_gripper.plant import Drive, PlantParams, PlantState, Skin, Steps, Thing
+from graspsense_sim_gripper.scene import (
+    Instance,
+    ObjectSpec,
+    cell_weights,
+    find,
+    instance_of,
+    nearest_the_middle,
+    numbered,
+)
+from graspsense_sim_gripper.selection import (
+    CAREFUL,
+    WHOLE,
+    Choice,
+    Rung,
+    choose,
+    growth,
+    tolerance,
+    untouched,
+    whole,
+)
+from graspsense_sim_gripper.sensing import SensorParams, SensorState, first_sensed
 
 EFFORT_LIMIT_N: Final = 100.0
 SPEED_LIMIT_M_S: Final = 0.2
@@ -34,10 +55,23 @@ OPENING_N: Final = -20.0
 TARE_IMAGES: Final = 6
 CELL_OFFSET: Final = (3300.0, 250.0)
 """Mean and spread of an unloaded cell's counts: 2900 to 3800 are reported."""
+UNLOADED: Final = (CELL_OFFSET[0],) * CELLS
+EVEN: Final = (1.0 / 15.0,) * 15
+"""What each cell carries where nothing says how the force is spread."""
 IMAGES_A_BLOCK: Final = 64
-RESOLVED: Final = 0.05
-"""Natural frequency times step stays below this: peaks are then good to better than 1 %."""
-STIFFEST_N_M: Final = 1e9
+REFERENCE: Final = 1e-3
+"""The accuracy that a reference's steps begin at."""
+SETTLED: Final = 1e-5
+"""Where speed and force after a tick change by less than this part of the accuracy, halving the steps ends."""
+FORCE_N: Final = 20.0
+SPEED_M_S: Final = 0.01
+"""The force and the speed of a grasp that nobody says anything of: those of the paper."""
+STRAIGHT: Final = straight_linkage(4e-4)
+"""The encoder of a straight drive then sees a third of a micrometre, as a PR2's does."""
+
+
+def _linkage(config: SimConfig) -> ScrewLinkage:
+    return STRAIGHT if config.transmission == "straight" else PR2_LINKAGES[config.transmission]
 
 
 def device_info(config: SimConfig) -> DeviceInfo:
@@ -51,7 +85,7 @@ def device_info(config: SimConfig) -> DeviceInfo:
         opening=Command(EFFORT, OPENING_N, math.inf, math.inf),
         relaxed=Command(EFFORT, 0.0, math.inf, math.inf),
         tare_images=0 if config.sensor == "ideal" else TARE_IMAGES,
-        notes=("simulated: every figure below comes from a model",),
+        notes=("simulated: every figure comes from a model",),
     )
 
 
@@ -61,43 +95,66 @@ class Setting:
 
     kinds: tuple[str, ...]
     """The object's terms."""
+    terms: tuple[Any, ...]
+    """Their parameters, whether the model keeps them or not."""
     plant: PlantParams
     body: PlantState
     sensor: SensorParams
     sensed: SensorState
     dt_s: float
-    drawn: Mapping[str, Any]
-    """State of the seed's generator after all of the above was drawn."""
+    choice: Choice | None
+    """Which model of the object this is; None where there is none."""
+    drawn: np.random.Generator
+    """The seed's generator after all of the above was drawn; nobody draws from it any more."""
 
     def noise(self) -> Iterator[NDArray[np.float64]]:
         """Yield blocks of rows of 44 standard normal numbers, one row an image; the same at every call."""
-        rng = np.random.default_rng()
-        rng.bit_generator.state = self.drawn
+        rng = deepcopy(self.drawn)
         while True:
             yield rng.standard_normal((IMAGES_A_BLOCK, 2 * CELLS))
 
 
-def set_scene(config: SimConfig, scene: str, seed: int) -> Setting:
+def set_scene(config: SimConfig, scene: str, seed: int, chooser: Chooser | None = None) -> Setting:
     """Return the grasp of this object (`none`: nothing there; `*.toml`: a scene file) with this seed.
 
-    Raises UnknownName, and ConfigError for a file that describes nothing which fits between the fingers.
+    `chooser` as of `setting_of`. Raises UnknownName, and ConfigError for a file that describes nothing which fits
+    between the fingers.
+    """
+    if scene == "none":
+        return setting_of(config, None, seed)
+    name, number = numbered(scene)
+    return setting_of(config, find(name), seed, number, chooser)
+
+
+def setting_of(
+    config: SimConfig,
+    spec: ObjectSpec | None,
+    seed: int,
+    number: int | None = None,
+    chooser: Chooser | None = None,
+) -> Setting:
+    """Return the grasp of an object of this kind, or of its instance of this number. Raises ConfigError.
+
+    `chooser` says which model it has; without one it is `choice_of`, which no trial grasp has checked.
     """
     rng = np.random.default_rng(seed)
-    instance = None
-    if scene != "none":
-        name, number = numbered(scene)
-        instance = instance_of(find(name), rng if config.spread else None, number)
+    instance = choice = None
+    if spec is not None:
+        instance = instance_of(spec, rng if config.spread else None, number)
         _check_fit(config, instance)
-    plant, body = _plant(config, instance, rng)
+        choice = (chooser or choice_of)(config, spec)
+    plant, body = _plant(config, instance, choice, rng)
     sensor = _sensor(config, instance, rng)
     return Setting(
         kinds=instance.kinds if instance else (),
+        terms=instance.terms if instance else (),
         plant=plant,
         body=body,
         sensor=sensor,
         sensed=first_sensed(sensor, body),
         dt_s=1.0 / config.rate_hz,
-        drawn=rng.bit_generator.state,
+        choice=choice,
+        drawn=rng,
     )
 
 
@@ -118,19 +175,19 @@ def _check_fit(config: SimConfig, instance: Instance) -> None:
 
 
 def _plant(
-    config: SimConfig, instance: Instance | None, rng: np.random.Generator
+    config: SimConfig, instance: Instance | None, choice: Choice | None, rng: np.random.Generator
 ) -> tuple[PlantParams, PlantState]:
     """Return the plant's numbers and its state before the grasp: open, at rest, nothing touched.
 
     Friction varies between trials, so it is drawn here.
     """
-    link = PR2_LINKAGES[config.transmission]
+    link = _linkage(config)
     friction_n = float(config.coulomb_n)
     if config.spread:
         friction_n = max(friction_n + config.coulomb_spread_n * float(rng.standard_normal()), 0.0)
     drive = Drive(
         link=link,
-        inertia=4.0 * math.pi * math.pi * config.rotor_kg_m2,
+        inertia=_rotor(config),
         coulomb_n=friction_n,
         breakaway_n=max(float(config.breakaway_n), friction_n),
         stribeck_m_s=float(config.stribeck_m_s),
@@ -140,12 +197,25 @@ def _plant(
         open_rev=revolutions_at(link, config.open_gap_m),
         lag_s=float(config.drive_lag_s),
     )
-    thing = Thing(
+    thing = _thing(config, instance)
+    steps = Steps(tolerance(config.accuracy))
+    if instance is not None and choice is not None:
+        thing, steps = choice.apply(thing, instance.kinds), choice.steps
+    gap, rate = gap_and_rate(link, drive.open_rev)
+    at_rest = untouched(instance.kinds if instance else ())
+    offset = instance.offset_m if instance else 0.0
+    state = PlantState(drive.open_rev, 0.0, gap, rate, 0.0, 0.0, offset, 0, at_rest, 0.0, 0.0, at_rest)
+    return PlantParams(drive, thing, steps), state
+
+
+def _thing(config: SimConfig, instance: Instance | None) -> Thing:
+    """Return the object with all its terms, and the covers it is felt through."""
+    return Thing(
         # Nothing there: thinner than the closed gap, so that no finger ever touches it.
         width_m=instance.width_m if instance else -1.0,
         table_n=instance.table_n if instance else 0.0,
         skins_n_m=0.5 * float(config.skin_n_m),
-        terms=instance.terms if instance else (),
+        terms=whole(instance.terms if instance else ()),
         skin=Skin(
             damping_n_s_m=0.5 * float(config.skin_damping_n_s_m),
             arm_n_m=0.5 * float(config.skin_creep_n_m),
@@ -153,23 +223,93 @@ def _plant(
         ),
         held=1 if instance and instance.spec.held else 0,
     )
-    gap, rate = gap_and_rate(link, drive.open_rev)
-    kinds = instance.kinds if instance else ()
-    at_rest = Squeezed(0.0, 0.0, 0.0, tuple(find_term(kind)[1].at_rest for kind in kinds), 0.0, 0.0)
-    offset = instance.offset_m if instance else 0.0
-    state = PlantState(drive.open_rev, 0.0, gap, rate, 0.0, 0.0, offset, 0, at_rest, 0.0, 0.0, at_rest)
-    return PlantParams(drive, thing, _substeps(drive, thing, rate, 1.0 / config.rate_hz)), state
+
+
+Chooser = Callable[[SimConfig, ObjectSpec], Choice]
+_CHOICES: dict[tuple[SimConfig, int, Rung, float, float], tuple[ObjectSpec, Choice]] = {}
+
+
+def choice_of(
+    config: SimConfig,
+    spec: ObjectSpec,
+    *,
+    rung: Rung = CAREFUL,
+    force_n: float | None = None,
+    speed_m_s: float | None = None,
+) -> Choice:
+    """Return the model for this object: chosen once for the spec's own figures, so that all its instances share it.
+
+    What the config expects of the grasp comes before the force and the speed given here.
+    """
+    force_n = config.expected_force_n or force_n or FORCE_N
+    speed_m_s = config.expected_speed_m_s or speed_m_s or SPEED_M_S
+    if config.fidelity != "scene" and rung.model_share > 0.0:
+        rung = WHOLE
+    key = (config, id(spec), rung, force_n, speed_m_s)
+    if key not in _CHOICES:
+        instance = instance_of(spec, None)
+        link = _linkage(config)
+        _, rate = gap_and_rate(link, revolutions_at(link, min(max(instance.width_m, 0.0), config.open_gap_m)))
+        choice = choose(
+            _thing(config, instance),
+            instance.kinds,
+            accuracy=config.accuracy,
+            force_n=force_n,
+            speed_m_s=speed_m_s,
+            dt_s=1.0 / config.rate_hz,
+            mass_kg=_rotor(config) / (rate * rate),
+            damping_n_s_m=config.damping_n_s_m,
+            rubs=config.coulomb_n > 0.0,
+            rung=rung,
+        )
+        steps = choice.steps
+        if config.scheme != "auto":
+            steps = steps._replace(stiff=1 if config.scheme == "implicit" else 0)
+        if config.step_s is not None:
+            steps = steps._replace(tolerance=math.inf, longest_s=float(config.step_s))
+        if config.fidelity == "reference":
+            steps = steps._replace(
+                tolerance=min(steps.tolerance, tolerance(REFERENCE)),
+                settle=SETTLED * config.accuracy,
+                growth=min(steps.growth, growth(REFERENCE)),
+            )
+        _CHOICES[key] = (spec, evolve(choice, steps=steps))
+    return _CHOICES[key][1]
+
+
+def _rotor(config: SimConfig) -> float:
+    """Return the inertia on the motor's angle, as `Drive` has it."""
+    if config.transmission == "straight":
+        return config.moving_mass_kg * STRAIGHT.pitch_m * STRAIGHT.pitch_m
+    return 4.0 * math.pi * math.pi * config.rotor_kg_m2
 
 
 def _sensor(config: SimConfig, instance: Instance | None, rng: np.random.Generator) -> SensorParams:
     """Return the sensing chain; the cells' offsets and the phase of the pads' clock are drawn here."""
+    if config.sensor == "ideal":
+        return SensorParams(
+            ideal=1,
+            link=_linkage(config),
+            pad_phase_s=0.0,
+            pad_period_s=float(config.pad_period_s),
+            pad_delay_s=0.0,
+            share=1.0,
+            noise_counts=0.0,
+            left_weights=EVEN,
+            right_weights=EVEN,
+            left_offset=UNLOADED,
+            right_offset=UNLOADED,
+        )
     mean, spread = CELL_OFFSET
     offsets = (mean + spread * rng.standard_normal((2, CELLS))).tolist()
-    weights = cell_weights(instance.spec.patch, instance.patch_row) if instance else (1.0 / 15.0,) * 15
+    weights = cell_weights(instance.spec.patch, instance.patch_row) if instance else EVEN
+    there = nearest_the_middle(config.pad_cells)
+    weights = tuple([weight if cell in there else 0.0 for cell, weight in enumerate(weights)])
     return SensorParams(
-        ideal=1 if config.sensor == "ideal" else 0,
-        link=PR2_LINKAGES[config.transmission],
-        pad_phase_s=float(rng.random()) * PAD_PERIOD_S,
+        ideal=0,
+        link=_linkage(config),
+        pad_phase_s=float(rng.random()) * float(config.pad_period_s),
+        pad_period_s=float(config.pad_period_s),
         pad_delay_s=float(config.pad_delay_s),
         share=float(instance.share) if instance else 1.0,
         noise_counts=float(config.noise_counts),
@@ -178,10 +318,3 @@ def _sensor(config: SimConfig, instance: Instance | None, rng: np.random.Generat
         left_offset=tuple(offsets[0]),
         right_offset=tuple(offsets[1]),
     )
-
-
-def _substeps(drive: Drive, thing: Thing, rate_m_rev: float, dt: float) -> int:
-    """Return into how many steps a tick is cut near the object, from the stiffest it can feel."""
-    stiffest = min(thing.skins_n_m, STIFFEST_N_M)
-    mass = drive.inertia / (rate_m_rev * rate_m_rev)
-    return max(1, math.ceil(math.sqrt(stiffest / mass) * dt / RESOLVED))

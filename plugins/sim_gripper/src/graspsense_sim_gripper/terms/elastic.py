@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.term import NoState, Term
+from graspsense_sim_gripper.terms.term import Limit, LinearForm, NoState, Term, WorkingPoint
 
 
 class Elastic(NamedTuple):
@@ -14,9 +14,21 @@ class Elastic(NamedTuple):
     k3_n_m3: float = 0.0
 
 
-def elastic(params: Elastic, state: NoState, d0: float, d1: float, h: float) -> tuple[float, NoState]:
+def elastic(
+    params: Elastic, state: NoState, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, NoState]:
     """Return the shell's force."""
     return params.k1_n_m * d1 + params.k3_n_m3 * d1 * d1 * d1, state
+
+
+def limits(params: Elastic, at: WorkingPoint) -> tuple[Limit, ...]:
+    """Return the spring that it is at small compressions."""
+    return (Limit("spring", spring_n_m=params.k1_n_m),)
+
+
+def linear(params: Elastic) -> LinearForm | None:
+    """Return the spring that it is where it does not stiffen."""
+    return LinearForm(params.k1_n_m) if params.k3_n_m3 == 0.0 else None
 
 
 TERM = Term(
@@ -24,5 +36,7 @@ TERM = Term(
     summary="elastic shell, k1 d + k3 d^3",
     params=Elastic,
     law=elastic,
+    limits=limits,
+    linear=linear,
     stiffnesses=("k1_n_m", "k3_n_m3"),
 )

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.terms.relaxation import mean_share
-from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
-from graspsense_sim_gripper.terms.vent import conductance
+from graspsense_sim_gripper.terms.relaxation import late_share, mean_share
+from graspsense_sim_gripper.terms.term import Limit, Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.vent import LAMINAR_BELOW_PA, conductance
+
+MOST_LOOKS: Final = 4
+LOOKED: Final = 1e-5
+"""A change of the pressure by this share changes its conductance by less, and only that of the middle of a step."""
+
+LEAST_M3: Final = 1e-9
+"""A millilitre in a thousand is the least it holds."""
 
 
 class Gas(NamedTuple):
@@ -35,9 +42,11 @@ class GasState(NamedTuple):
 
     rise_pa: float
     warmth: float = 0.0
+    spent: int = 0
+    """1: it was pressed by more than it held, so that only the wall and the vent were left to give way."""
 
 
-def gas(params: Gas, state: GasState, d0: float, d1: float, h: float) -> tuple[float, GasState]:
+def gas(params: Gas, state: GasState, d0: float, d1: float, h: float, v1: float) -> tuple[float, GasState]:
     """Return the force of the pressure rise, an exponential midpoint step of second order.
 
     With V the volume and w = V' + q what it and the vent's flow q take from the gas,
@@ -46,10 +55,11 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float) -> tuple[f
 
     n the exponent, T the temperature over the walls', tau the heat's time constant: the gas laws of an ideal gas
     with heat to walls that stay as warm as they are. Vent and heat relax exactly, however fast they are; what
-    comes in through the vent is taken to be as warm as what is there.
+    comes in through the vent is taken to be as warm as what is there. Pressed by more than it holds the gas is gone,
+    and what it was in no longer gives but by its wall and its vent.
     """
     area, slope, whole, pressure, exponent, bulge, opening, heat_s = params
-    rise, warmth = state
+    rise, warmth, spent = state
     swept0 = area * d0 + 0.5 * slope * d0 * d0
     swept1 = area * d1 + 0.5 * slope * d1 * d1
     lowest = -0.9 * pressure
@@ -61,7 +71,7 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float) -> tuple[f
         exponent = 1.0 + (exponent - 1.0) * heat_share
 
     # What the heat adds, as if it were swept volume.
-    volume = whole - swept0 + bulge * rise
+    volume = max(whole - swept0 + bulge * rise, LEAST_M3)
     heated = _heated(volume, warmth, warmth, kept, exponent) if warm else 0.0
     own = _give(volume, pressure + rise, exponent)
     give = own + bulge
@@ -69,10 +79,13 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float) -> tuple[f
     if opening > 0.0:
         # The conductance at the pressure it leads to: the root of the orifice law makes this converge fast.
         middle = rise
-        for _ in range(4):
-            x = 0.5 * h * conductance(opening, middle) / give
+        for _ in range(MOST_LOOKS):
+            guess = middle
+            x = 0.5 * h * conductance(opening, guess) / give
             decay = math.exp(-x)
             middle = rise * decay + 0.5 * (swept1 - swept0 + heated) / give * mean_share(x, decay)
+            if abs(middle - guess) <= LOOKED * (abs(middle) + LAMINAR_BELOW_PA):
+                break
     if middle < lowest:
         middle = lowest
     half = 0.0
@@ -80,7 +93,7 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float) -> tuple[f
         taken = 0.5 * heated - own * (middle - rise)
         half = 0.5 * warmth * (1.0 + kept) - (exponent - 1.0) * taken / (own * exponent * (pressure + rise))
 
-    volume = whole - 0.5 * (swept0 + swept1) + bulge * middle
+    volume = max(whole - 0.5 * (swept0 + swept1) + bulge * middle, LEAST_M3)
     if warm:
         heated = _heated(volume, warmth, half, kept, exponent)
     give = _give(volume, pressure + middle, exponent)
@@ -88,7 +101,9 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float) -> tuple[f
     if opening > 0.0:
         x = h * conductance(opening, middle) / (give + bulge)
         decay = math.exp(-x)
-        rise = rise * decay + (swept1 - swept0 + heated) / (give + bulge) * mean_share(x, decay)
+        # What is swept faster at the end than in the mean the vent has had less time for.
+        late = ((area + slope * d1) * v1 * h - (swept1 - swept0)) * late_share(x, decay)
+        rise = rise * decay + ((swept1 - swept0 + heated) * mean_share(x, decay) + late) / (give + bulge)
     else:
         rise += (swept1 - swept0 + heated) / (give + bulge)
     if rise < lowest:
@@ -98,12 +113,14 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float) -> tuple[f
         warmth = warmth * kept - (exponent - 1.0) * (1.0 + half) * taken / (
             give * exponent * (pressure + middle)
         )
-    return (area + slope * d1) * rise, GasState(rise, warmth)
+    if whole - swept1 + bulge * rise <= LEAST_M3:
+        spent = 1
+    return (area + slope * d1) * rise, GasState(rise, warmth, spent)
 
 
 def _give(volume_m3: float, pressure_pa: float, exponent: float) -> float:
-    """Return how much volume (m3) the gas gives a pascal; a millilitre in a thousand is the least it holds."""
-    return (volume_m3 if volume_m3 > 1e-9 else 1e-9) / (exponent * pressure_pa)
+    """Return how much volume (m3) the gas gives a pascal."""
+    return volume_m3 / (exponent * pressure_pa)
 
 
 def _heated(volume_m3: float, warmth: float, half: float, kept: float, exponent: float) -> float:
@@ -118,7 +135,7 @@ def _heated(volume_m3: float, warmth: float, half: float, kept: float, exponent:
 def rates(params: Gas, at: WorkingPoint) -> tuple[Rate, ...]:
     """Return how fast the vent and the walls relax the gas, the vent at the pressure that builds up."""
     sealed = params._replace(vent_m2=0.0, heat_s=math.inf)
-    force, _ = gas(sealed, GasState(0.0), 0.0, at.compression_m, 1.0)
+    force, _ = gas(sealed, GasState(0.0), 0.0, at.compression_m, 1.0, 0.0)
     area = params.area_m2 + params.area_slope_m * at.compression_m
     rise = abs(force) / area if area > 0.0 else 0.0
     found = []
@@ -134,6 +151,25 @@ def rates(params: Gas, at: WorkingPoint) -> tuple[Rate, ...]:
     return tuple(found)
 
 
+def limits(params: Gas, at: WorkingPoint) -> tuple[Limit, ...]:
+    """Return it as a spring, and without the vent, the heat or both, at its walls' temperature or with none of it."""
+    found = []
+    for name, exponent in (("isothermal", 1.0), ("adiabatic", params.exponent)):
+        give = _give(params.volume_m3, params.pressure_pa, exponent) + params.bulge_m3_pa
+        sealed = params._replace(vent_m2=0.0, heat_s=math.inf, exponent=exponent)
+        found.append(Limit(f"{name} spring", spring_n_m=params.area_m2 * params.area_m2 / give))
+        found.append(Limit(f"sealed, {name}", sealed))
+        if params.vent_m2 > 0.0:
+            found.append(Limit(name, sealed._replace(vent_m2=params.vent_m2)))
+    found.append(Limit("sealed", params._replace(vent_m2=0.0)))
+    return tuple(found)
+
+
+def beyond(state: GasState) -> str:
+    """Return what happened where more was displaced than there was gas."""
+    return "pressed by more than it holds; from there on only wall and vent gave" if state.spent == 1 else ""
+
+
 TERM = Term(
     name="gas",
     summary="trapped gas with the wall's bulge, a vent and heat to the walls",
@@ -141,5 +177,7 @@ TERM = Term(
     law=gas,
     at_rest=GasState(0.0),
     rates=rates,
+    limits=limits,
     positive=("volume_m3", "pressure_pa", "exponent", "heat_s"),
+    beyond=beyond,
 )

@@ -6,7 +6,7 @@ import math
 from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.terms.oscillator import Motion, moved
-from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, WorkingPoint
 
 GRAVITY_M_S2: Final = 9.80665
 
@@ -45,7 +45,7 @@ def _seen(params: Liquid) -> _AtCompression:
     )
 
 
-def liquid(params: Liquid, state: Motion, d0: float, d1: float, h: float) -> tuple[float, Motion]:
+def liquid(params: Liquid, state: Motion, d0: float, d1: float, h: float, v1: float) -> tuple[float, Motion]:
     """Return the force of the liquid's pressure on the wall; exact for a straight path."""
     mass, k, damping, wall = _seen(params)
     if h > 0.0:
@@ -61,6 +61,27 @@ def rates(params: Liquid, at: WorkingPoint) -> tuple[Rate, ...]:
     return (Rate("swings", math.sqrt((k + wall) / mass)), Rate("relaxes", 0.5 * damping / mass))
 
 
+def limits(params: Liquid, at: WorkingPoint) -> tuple[Limit, ...]:
+    """Return what it is where the column follows at once, and where it does not move."""
+    _, k, damping, wall = _seen(params)
+    return (
+        Limit("column that follows", None, k * wall / (k + wall), damping),
+        Limit("column that stands", None, wall),
+    )
+
+
+def linear(params: Liquid) -> LinearForm:
+    """Return the column's motion behind the wall."""
+    mass, k, damping, wall = _seen(params)
+    return LinearForm(
+        spring_n_m=wall,
+        rates=((0.0, 1.0), (-(k + wall) / mass, -damping / mass)),
+        by_compression=(0.0, wall / mass),
+        by_speed=(0.0, 0.0),
+        force=(-wall, 0.0),
+    )
+
+
 TERM = Term(
     name="liquid",
     summary="liquid pressed up a neck: weight, viscosity and inertia behind the wall's bulge",
@@ -68,5 +89,7 @@ TERM = Term(
     law=liquid,
     at_rest=Motion(0.0, 0.0),
     rates=rates,
+    limits=limits,
+    linear=linear,
     positive=("area_m2", "neck_m2", "column_m", "bulge_m3_pa", "density_kg_m3"),
 )

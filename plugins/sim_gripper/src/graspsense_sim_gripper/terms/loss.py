@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.term import NoState, Term
+from graspsense_sim_gripper.terms.term import Limit, LinearForm, NoState, Term, WorkingPoint
 
 
 class Loss(NamedTuple):
@@ -13,11 +13,26 @@ class Loss(NamedTuple):
     damping_n_s_m: float
 
 
-def loss(params: Loss, state: NoState, d0: float, d1: float, h: float) -> tuple[float, NoState]:
-    """Return the damper's mean force over the piece."""
-    if h <= 0.0:
-        return 0.0, state
-    return params.damping_n_s_m * (d1 - d0) / h, state
+def loss(params: Loss, state: NoState, d0: float, d1: float, h: float, v1: float) -> tuple[float, NoState]:
+    """Return the damper's force."""
+    return params.damping_n_s_m * v1, state
 
 
-TERM = Term(name="loss", summary="damper on the compression; fitted where it is used", params=Loss, law=loss)
+def limits(params: Loss, at: WorkingPoint) -> tuple[Limit, ...]:
+    """Return the damper that it is."""
+    return (Limit("damper", damper_n_s_m=params.damping_n_s_m),)
+
+
+def linear(params: Loss) -> LinearForm:
+    """Return the damper that it is."""
+    return LinearForm(0.0, params.damping_n_s_m)
+
+
+TERM = Term(
+    name="loss",
+    summary="damper on the compression; fitted where it is used",
+    params=Loss,
+    law=loss,
+    limits=limits,
+    linear=linear,
+)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.relaxation import mean_share
-from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.relaxation import late_share, mean_share
+from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, WorkingPoint
 
 
 class Maxwell(NamedTuple):
@@ -23,18 +23,34 @@ class MaxwellState(NamedTuple):
 
 
 def maxwell(
-    params: Maxwell, state: MaxwellState, d0: float, d1: float, h: float
+    params: Maxwell, state: MaxwellState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, MaxwellState]:
-    """Return the branch's force, exact for a straight path: q' = k d' - q / tau."""
+    """Return the branch's force, exact where the rate of compression changes evenly: q' = k d' - q / tau."""
     x = h / params.tau_s
     decay = math.exp(-x)
-    force = state.force_n * decay + params.k_n_m * (d1 - d0) * mean_share(x, decay)
+    late = late_share(x, decay)
+    force = state.force_n * decay + params.k_n_m * ((d1 - d0) * (mean_share(x, decay) - late) + h * v1 * late)
     return force, MaxwellState(force)
 
 
 def rates(params: Maxwell, at: WorkingPoint) -> tuple[Rate, ...]:
     """Return 1 / tau."""
     return (Rate("relaxes", 1.0 / params.tau_s),)
+
+
+def limits(params: Maxwell, at: WorkingPoint) -> tuple[Limit, ...]:
+    """Return what it is where it relaxes at once, and where it does not relax."""
+    return (
+        Limit("damper", damper_n_s_m=params.k_n_m * params.tau_s),
+        Limit("spring", spring_n_m=params.k_n_m),
+    )
+
+
+def linear(params: Maxwell) -> LinearForm:
+    """Return q' = k d' - q / tau, the force q."""
+    return LinearForm(
+        rates=((-1.0 / params.tau_s,),), by_compression=(0.0,), by_speed=(params.k_n_m,), force=(1.0,)
+    )
 
 
 TERM = Term(
@@ -44,6 +60,8 @@ TERM = Term(
     law=maxwell,
     at_rest=MaxwellState(0.0),
     rates=rates,
+    limits=limits,
+    linear=linear,
     positive=("tau_s",),
     stiffnesses=("k_n_m",),
 )

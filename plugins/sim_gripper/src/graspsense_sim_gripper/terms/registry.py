@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Final
 
-from graspsense.plugin_api import UnknownName, collect, suggestion
+from graspsense.plugin_api import UnknownName, bind, collect, suggestion
 from graspsense_sim_gripper.terms import (
     elastic,
     foam,
@@ -21,6 +21,7 @@ from graspsense_sim_gripper.terms import (
     surface,
     worn,
 )
+from graspsense_sim_gripper.terms.remainder import remainder, where_kept
 from graspsense_sim_gripper.terms.term import Law, Term
 
 TERMS: Final[dict[str, Term]] = {
@@ -81,5 +82,8 @@ def in_order(names: Sequence[str]) -> list[int]:
 
 
 def laws_of(names: Sequence[str]) -> list[Law]:
-    """Return the laws of these terms, in order. Raises UnknownName."""
-    return [find_term(name)[1].law for name in names]
+    """Return the laws of an object of these terms, as its parts are kept: what limits leave over, then each term's.
+
+    Their parameters are `Kept`. Raises UnknownName.
+    """
+    return [bind(where_kept, law=one) for one in (remainder, *(find_term(name)[1].law for name in names))]

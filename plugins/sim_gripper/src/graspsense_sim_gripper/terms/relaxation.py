@@ -1,4 +1,4 @@
-"""Exponential relaxation over one piece of path, which two terms share."""
+"""Exponential relaxation over one piece of path, which terms share."""
 
 from __future__ import annotations
 
@@ -6,3 +6,15 @@ from __future__ import annotations
 def mean_share(x: float, decay: float) -> float:
     """Return (1 - decay) / x for decay = exp(-x): what is left, on average, of what came in evenly meanwhile."""
     return (1.0 - decay) / x if x > 1e-6 else 1.0 - 0.5 * x
+
+
+def late_share(x: float, decay: float) -> float:
+    """Return what the same leaves of a rate whose mean is zero, from -1 at the start evenly to 1 at the end.
+
+    So q' = k v - q / tau comes to q0 decay + k h (v_mean mean_share + (v_end - v_mean) late_share) for a rate v that
+    changes evenly over h, x being h / tau.
+    """
+    if x < 1e-3:
+        return x * (1.0 - 0.5 * x) / 6.0
+    share = (1.0 - decay) / x
+    return 2.0 * (1.0 - share) / x - share

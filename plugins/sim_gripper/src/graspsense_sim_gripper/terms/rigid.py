@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.term import Term
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 
 
 class Rigid(NamedTuple):
@@ -23,7 +23,9 @@ class RigidState(NamedTuple):
     broken: int
 
 
-def rigid(params: Rigid, state: RigidState, d0: float, d1: float, h: float) -> tuple[float, RigidState]:
+def rigid(
+    params: Rigid, state: RigidState, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, RigidState]:
     """Return the contact force; a break is felt from the next piece of path on."""
     if state.broken == 1:
         return params.broken_n_m * d1, state
@@ -34,12 +36,19 @@ def rigid(params: Rigid, state: RigidState, d0: float, d1: float, h: float) -> t
     return force, state
 
 
+def rates(params: Rigid, at: WorkingPoint) -> tuple[Rate, ...]:
+    """Return none: what has broken stays so, and what has not remembers nothing."""
+    del params, at
+    return ()
+
+
 TERM = Term(
     name="rigid",
     summary="rigid body through its Hertz contact, K d^1.5; breaks above its crush force",
     params=Rigid,
     law=rigid,
     at_rest=RigidState(0),
+    rates=rates,
     positive=("hertz_n_m15",),
     stiffnesses=("hertz_n_m15", "crush_force_n"),
 )

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from graspsense_sim_gripper.terms.oscillator import Motion, moved
-from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import LinearForm, Rate, Term, WorkingPoint
 
 
 class Slosh(NamedTuple):
@@ -18,20 +18,34 @@ class Slosh(NamedTuple):
     damping_ratio: float = 0.0
 
 
-def slosh(params: Slosh, state: Motion, d0: float, d1: float, h: float) -> tuple[float, Motion]:
-    """Return the force with which the mass hangs back; exact for a straight path."""
+def slosh(params: Slosh, state: Motion, d0: float, d1: float, h: float, v1: float) -> tuple[float, Motion]:
+    """Return the force with which the mass hangs back; its motion is exact for a straight path."""
     w = 2.0 * math.pi * params.frequency_hz
     a, square = params.damping_ratio * w, w * w
-    speed = (d1 - d0) / h if h > 0.0 else 0.0
     if h > 0.0:
+        speed = (d1 - d0) / h
         state = moved(state, a, square, square * d0 + 2.0 * a * speed, square * speed, h)
-    return params.mass_kg * (square * (d1 - state.y_m) + 2.0 * a * (speed - state.v_m_s)), state
+    return params.mass_kg * (square * (d1 - state.y_m) + 2.0 * a * (v1 - state.v_m_s)), state
 
 
 def rates(params: Slosh, at: WorkingPoint) -> tuple[Rate, ...]:
     """Return the mode's frequency and how fast it dies out."""
     w = 2.0 * math.pi * params.frequency_hz
     return (Rate("swings", w), Rate("relaxes", params.damping_ratio * w))
+
+
+def linear(params: Slosh) -> LinearForm:
+    """Return the mode's motion on the wall."""
+    mass, w = params.mass_kg, 2.0 * math.pi * params.frequency_hz
+    a, square = params.damping_ratio * w, w * w
+    return LinearForm(
+        spring_n_m=mass * square,
+        damper_n_s_m=2.0 * a * mass,
+        rates=((0.0, 1.0), (-square, -2.0 * a)),
+        by_compression=(0.0, square),
+        by_speed=(0.0, 2.0 * a),
+        force=(-mass * square, -2.0 * a * mass),
+    )
 
 
 TERM = Term(
@@ -41,5 +55,6 @@ TERM = Term(
     law=slosh,
     at_rest=Motion(0.0, 0.0),
     rates=rates,
+    linear=linear,
     positive=("mass_kg", "frequency_hz"),
 )

@@ -20,7 +20,7 @@ class Snap(NamedTuple):
     k2_n_m: float
 
 
-def snap(params: Snap, state: NoState, d0: float, d1: float, h: float) -> tuple[float, NoState]:
+def snap(params: Snap, state: NoState, d0: float, d1: float, h: float, v1: float) -> tuple[float, NoState]:
     """Return the shell's force, three straight branches.
 
     Where the branch falls more steeply than the fingertips' covers are stiff the shell jumps across it.

@@ -7,8 +7,8 @@ from typing import Any, Final, NamedTuple
 
 from attrs import frozen
 
-Law = Callable[[Any, Any, float, float, float], tuple[float, Any]]
-"""`law(params, state, d0, d1, h) -> (force, state)`: the compression goes straight from d0 to d1 (m) in h (s)."""
+Law = Callable[[Any, Any, float, float, float, float], tuple[float, Any]]
+"""`law(params, state, d0, d1, h, v1) -> (force, state)`: from d0 to d1 (m) in h (s), then at v1 (m/s)."""
 
 PIECES: Final = 256
 
@@ -18,11 +18,12 @@ class NoState(NamedTuple):
 
 
 class WorkingPoint(NamedTuple):
-    """What a grasp does with an object: how far it compresses it, how fast, and for how long."""
+    """What a grasp does with an object: how far it compresses it, how fast, for how long, and up to what force."""
 
     compression_m: float
     speed_m_s: float
     seconds: float
+    force_n: float = 1.0
 
 
 class Rate(NamedTuple):
@@ -32,10 +33,70 @@ class Rate(NamedTuple):
     per_s: float
 
 
-def no_rates(params: Any, at: WorkingPoint) -> tuple[Rate, ...]:
-    """Return the rates of a term without states of its own: none."""
+class Limit(NamedTuple):
+    """What a term comes to where its states are fast or slow: a spring and a damper, or itself with other numbers."""
+
+    name: str
+    params: Any = None
+    """The term's own parameters there; None: it is the spring and the damper alone."""
+    spring_n_m: float = 0.0
+    damper_n_s_m: float = 0.0
+
+
+class LinearForm(NamedTuple):
+    """A term that is linear: s' = A s + b d + c d' of its states s, force k d + g d' + f s.
+
+    d is the compression (m); the states are the fields of the term's state, in their order, all floats. A form
+    without `rates` leaves the state as it is.
+    """
+
+    spring_n_m: float = 0.0
+    """k"""
+    damper_n_s_m: float = 0.0
+    """g, not negative"""
+    rates: tuple[tuple[float, ...], ...] = ()
+    """A, a row a state"""
+    by_compression: tuple[float, ...] = ()
+    """b"""
+    by_speed: tuple[float, ...] = ()
+    """c"""
+    force: tuple[float, ...] = ()
+    """f"""
+
+
+class OwnContact(NamedTuple):
+    """A term with a contact of its own: linear while it touches and while it is parted, its force the same between.
+
+    It touches where d + reach s (m) is greater than 0.
+    """
+
+    touching: LinearForm
+    parted: LinearForm
+    reach: tuple[float, ...]
+
+
+def not_linear(params: Any) -> LinearForm | OwnContact | None:
+    """Return the linear form of a term that has none."""
+    del params
+    return None
+
+
+def no_limits(params: Any, at: WorkingPoint) -> tuple[Limit, ...]:
+    """Return the limits of a term that has none: it is kept or dropped."""
     del params, at
     return ()
+
+
+def no_rates(params: Any, at: WorkingPoint) -> tuple[Rate, ...]:
+    """Return the rates of a term that does not give any: of one with a state nobody knows then how it moves."""
+    del params, at
+    return ()
+
+
+def never_beyond(state: Any) -> str:
+    """Return why the law of a term does not hold, of one that always does: nothing."""
+    del state
+    return ""
 
 
 NO_STATE: Final = NoState()
@@ -57,9 +118,15 @@ class Term:
     law: Law
     at_rest: Any = NO_STATE
     rates: Callable[[Any, WorkingPoint], tuple[Rate, ...]] = no_rates
+    limits: Callable[[Any, WorkingPoint], tuple[Limit, ...]] = no_limits
+    """What may stand for it, cheapest first; whether it may is found by the force it then gives."""
+    linear: Callable[[Any], LinearForm | OwnContact | None] = not_linear
+    """Its linear form with these parameters, or None. Where all terms have one, exact maps take the scene's ticks."""
     positive: tuple[str, ...] = ()
     stiffnesses: tuple[str, ...] = ()
     """Parameters that a thicker wall makes larger: they vary between instances."""
+    beyond: Callable[[Any], str] = never_beyond
+    """Told a state, why its law was pressed beyond what it describes; empty where it was not."""
 
     def __attrs_post_init__(self) -> None:
         fields = getattr(self.params, "_fields", None)
@@ -79,10 +146,10 @@ class Term:
         state, most, seconds = self.at_rest, 0.0, at.compression_m / at.speed_m_s
         for k in range(PIECES):
             d0, d1 = at.compression_m * k / PIECES, at.compression_m * (k + 1) / PIECES
-            force, state = self.law(params, state, d0, d1, seconds / PIECES)
+            force, state = self.law(params, state, d0, d1, seconds / PIECES, at.speed_m_s)
             most = max(most, abs(force))
         rest = at.seconds - seconds
         if rest > 0.0:
-            force, state = self.law(params, state, at.compression_m, at.compression_m, rest)
+            force, state = self.law(params, state, at.compression_m, at.compression_m, rest, 0.0)
             most = max(most, abs(force))
         return most

@@ -32,7 +32,9 @@ class WornState(NamedTuple):
     force_n: float
 
 
-def worn(params: Worn, state: WornState, d0: float, d1: float, h: float) -> tuple[float, WornState]:
+def worn(
+    params: Worn, state: WornState, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, WornState]:
     """Return the shell's force at the damage that this piece of path leaves."""
     work = state.work_j
     force = _force(params, work, d1)
@@ -51,7 +53,7 @@ def _force(params: Worn, work_j: float, d: float) -> float:
 
 def rates(params: Worn, at: WorkingPoint) -> tuple[Rate, ...]:
     """Return how fast it wears, work done per second over `wear_j`."""
-    force, _ = worn(params, WornState(0.0, 0.0), 0.0, at.compression_m, 1.0)
+    force, _ = worn(params, WornState(0.0, 0.0), 0.0, at.compression_m, 1.0, 0.0)
     return (Rate("wears", max(force, 0.0) * at.speed_m_s / params.wear_j),)
 
 

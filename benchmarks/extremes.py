@@ -1,0 +1,588 @@
+"""The extremes that the simulator has to bear: a row a case, with what must hold and whether it does. Simulated.
+
+    python benchmarks/extremes.py [--quick] [--json] [--table]
+
+The fingers close at a set speed, touch, and squeeze with a constant effort for a while; no controller of a grasp is
+in it but in the rows on the sampled controller, so that what fails is the plant. A scene runs as it does for a user:
+exact maps take the ticks where it is piecewise linear (`by` then says `maps`), steps do elsewhere. The reference of a
+case is the same with every term kept and each tick in steps halved until it stands still, never maps. For contacts as
+stiff or masses as light as in the grid it is compiled, where numba is there. A squeeze there is 0.15 s long: it has
+then bounced and stands. `--table` prints the table of the documentation. `--quick` takes fewer stiffnesses and masses,
+no tick of 1e-5 s, and the energy of no spring that stiffens.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import math
+import os
+import platform
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from datetime import date
+from functools import cache
+from importlib.metadata import version
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+from selection import controller_is_stable
+
+from graspsense.plugin_api import ConfigError, bind, create
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.kernel import NotCompilable, compiled, plant_of
+from graspsense_sim_gripper.linear import linear_of, move_of
+from graspsense_sim_gripper.plant import PlantState
+from graspsense_sim_gripper.scene import ObjectSpec, find
+from graspsense_sim_gripper.setting import Setting, setting_of
+from graspsense_sim_gripper.terms.registry import laws_of
+
+Row = dict[str, Any]
+FloatArray = NDArray[np.float64]
+HERE: Final = Path(__file__).parent
+HELD: Final = 0.05
+"""Peak and rms may differ by this share."""
+BASE: Final = SimConfig(sensor="ideal", spread=False, transmission="straight", moving_mass_kg=100.0)
+SMOOTH: Final = evolve(BASE, skin_n_m=math.inf, coulomb_n=0.0, breakaway_n=0.0, load_share=0.0)
+"""Rigid covers and no friction."""
+
+
+def object_of(*terms: tuple[str, dict[str, float]], width_m: float = 0.05, **more: Any) -> ObjectSpec:
+    return ObjectSpec(name="extreme", width_m=width_m, friction=0.0, terms=terms, **more)
+
+
+move: Any = None
+
+
+def _pressing(params: Any, state: Any, carrying_n: float, effort_n: float, dt: float, forces: Any) -> Any:
+    """Fill `forces` with the mean force on the pads after each tick; return the plant at the end."""
+    for i in range(len(forces)):
+        state = move(params, state, effort_n if state.touched == 1 else carrying_n, dt)
+        forces[i] = 0.5 * (state.left_n + state.right_n)
+    return state
+
+
+@frozen(kw_only=True)
+class Ready:
+    """A plant as a user's run of this config has it."""
+
+    setting: Setting
+    params: Any
+    move: Callable[[Any, PlantState, float, float], PlantState]
+    by: str
+
+
+def ready(config: SimConfig, spec: ObjectSpec) -> Ready:
+    """Return the plant of this scene, by exact maps where it is piecewise linear, as the backend has it."""
+    setting = setting_of(config, spec, 0)
+    steps = plant_of(laws_of(setting.kinds))
+    found = linear_of(config, setting)
+    if found is None:
+        return Ready(setting=setting, params=setting.plant, move=steps, by="steps")
+    params, shape = found
+    return Ready(setting=setting, params=params, move=move_of(setting.kinds, shape, steps), by="maps")
+
+
+@cache
+def _compiled(kinds: tuple[str, ...]) -> Callable[..., Any]:
+    """Return the squeeze of an object of these terms in steps, compiled where that is to be had."""
+    plain = bind(_pressing, move=plant_of(laws_of(kinds)))
+    try:
+        return compiled(plain, {})
+    except NotCompilable:
+        return plain
+
+
+def press(
+    config: SimConfig,
+    spec: ObjectSpec,
+    *,
+    speed_m_s: float = 0.01,
+    effort_n: float = 20.0,
+    seconds: float = 0.3,
+    fast: bool = False,
+) -> tuple[FloatArray, PlantState, Ready]:
+    """Return the force at each tick, the plant at the end, and what it was. `fast`: steps are compiled."""
+    config = evolve(
+        config,
+        # Met inside a tick of any length here: at its very end, who has touched is a matter of rounding.
+        open_gap_m=min(spec.width_m + 2.0 * abs(spec.offset_m) + 0.0537 * speed_m_s, 0.09),
+        expected_speed_m_s=max(speed_m_s, 1e-6),
+        expected_force_n=max(effort_n, 1.0),
+    )
+    plant = ready(config, spec)
+    drive, state, dt = plant.setting.plant.drive, plant.setting.body, plant.setting.dt_s
+    # It comes with its speed, so that the tick of a slow controller does not blur it.
+    state = state._replace(speed_rev_s=-speed_m_s / state.rate_m_rev)
+    carrying = drive.coulomb_n + drive.damping_n_s_m * speed_m_s
+    forces = np.zeros(max(round(seconds / dt), 1))
+    loop = (
+        _compiled(plant.setting.kinds) if fast and plant.by == "steps" else bind(_pressing, move=plant.move)
+    )
+    state = loop(plant.params, state, carrying, effort_n, dt, forces)
+    return forces, state, plant
+
+
+def rms_of(forces: FloatArray, expected: FloatArray) -> float:
+    """Return the rms of the difference of two traces, over that of the expected one (a newton at the least)."""
+    return float(np.sqrt(np.mean((forces - expected) ** 2)) / max(np.sqrt(np.mean(expected**2)), 1.0))
+
+
+def against_reference(config: SimConfig, spec: ObjectSpec, **how: Any) -> Row:
+    """Return errors of peak and trace, whether all is finite, and what the simulator says of the peak itself."""
+    forces, state, plant = press(config, spec, **how)
+    expected, wanted, _ = press(evolve(config, fidelity="reference"), spec, **how)
+    choice = plant.setting.choice
+    flagged = choice is not None and choice.contact.decision == "peak not resolved"
+    return {
+        "by": plant.by,
+        "peak_error": abs(state.peak_n - wanted.peak_n) / max(wanted.peak_n, 1.0),
+        "rms_error": rms_of(forces, expected),
+        "peak_n": state.peak_n,
+        "finite": bool(np.isfinite(forces).all() and math.isfinite(state.peak_n)),
+        "flagged": flagged or state.unresolved > 0,
+    }
+
+
+def light_surface(stiffness: float, ratio: float, mass_kg: float = 1.0) -> ObjectSpec:
+    """Return a mass on a spring behind a contact of this stiffness."""
+    mass = ratio * mass_kg
+    spring = max(0.1 * stiffness, 1.0)
+    damping = 0.2 * math.sqrt(spring * mass)
+    return object_of(
+        ("surface", {"mass_kg": mass, "k_n_m": spring, "damping_n_s_m": damping, "contact_n_m": stiffness})
+    )
+
+
+def stiffness_and_mass(quick: bool) -> Iterator[Row]:
+    """By steps, with friction that is greater at rest, and by exact maps, with friction that is not."""
+    stiffnesses = (1e2, 1e4, 1e6, 1e9) if quick else (1.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9)
+    ratios = (1e-3, 1e3) if quick else (1e-6, 1e-3, 1.0, 1e3)
+    rubs = evolve(BASE, moving_mass_kg=1.0, skin_n_m=math.inf, damping_n_s_m=20.0, coulomb_n=0.5)
+    for config in (evolve(rubs, breakaway_n=0.6), evolve(rubs, breakaway_n=0.5)):
+        for stiffness in stiffnesses:
+            for ratio in ratios:
+                spec = light_surface(stiffness, ratio)
+                row = against_reference(config, spec, seconds=0.15, effort_n=10.0, fast=True)
+                inside = 1e2 <= stiffness <= 1e6 and 1e-3 <= ratio <= 1e3
+                resolved = row["peak_error"] <= HELD and row["rms_error"] <= HELD
+                told = resolved or (not inside and row["flagged"])
+                if stiffness > 1e6:
+                    told = row["flagged"]
+                yield {
+                    "case": f"contact stiffness, mass ratio (by {row['by']})",
+                    "value": [stiffness, ratio],
+                    **row,
+                    "holds": row["finite"] and told,
+                }
+
+
+def thin_object(quick: bool) -> Iterator[Row]:
+    """What is thin or light is met and borne: with all effort there is after friction, or while it is thrown back."""
+    config = evolve(BASE, skin_n_m=math.inf)
+    for width in (1e-5, 1e-3):
+        for speed in (0.01, 0.2):
+            spec = object_of(("elastic", {"k1_n_m": 1e6}), width_m=width)
+            forces, state, _ = press(config, spec, speed_m_s=speed, seconds=0.1)
+            finite = bool(np.isfinite(forces).all())
+            # Pressed flat, it is the end of travel that stops the fingers; else the spring takes up what moves.
+            energy_n = speed * math.sqrt(1e6 * config.moving_mass_kg)
+            least = 0.8 * min(energy_n, 1e6 * width)
+            yield {
+                "case": "no tunnelling",
+                "value": [width, speed],
+                "peak_n": state.peak_n,
+                "finite": finite,
+                "holds": finite and state.peak_n > least,
+            }
+    for ratio in (1e-6, 1e-3):
+        light = light_surface(1e6, ratio, config.moving_mass_kg)
+        row = against_reference(config, light, seconds=0.1, fast=True)
+        yield {
+            "case": "no tunnelling",
+            "value": [ratio, 0.01],
+            **row,
+            "holds": row["finite"] and row["peak_n"] > 1.0 and row["rms_error"] <= HELD,
+        }
+
+
+SHELL: Final = ("elastic", {"k1_n_m": 2000.0})
+GAS: Final = {"area_m2": 1e-3, "area_slope_m": 0.0, "pressure_pa": 101325.0, "exponent": 1.4}
+BULGE: Final = 1e-10
+CLOSE: Final = evolve(BASE, accuracy=1e-4, fidelity="full")
+"""What approaches a limit is compared with it where the steps' own error is none."""
+
+
+def gas(volume_m3: float, **more: float) -> ObjectSpec:
+    return object_of(SHELL, ("gas", {**GAS, "volume_m3": volume_m3, "bulge_m3_pa": BULGE, **more}))
+
+
+def tends(case: str, of: Callable[[float], ObjectSpec], limit: ObjectSpec, at: float, order: float) -> Row:
+    """Return whether an object comes nearer to a limit by this order as its parameter goes to 0 (order < 0: to inf).
+
+    The difference of their traces at `at` and at half of it (order < 0: twice) gives the order that is seen.
+    """
+    expected, _, _ = press(CLOSE, limit)
+    towards = 0.5 if order > 0.0 else 2.0
+    far, near = (rms_of(press(CLOSE, of(x))[0], expected) for x in (at, towards * at))
+    seen = math.copysign(math.log2(far / near), order)
+    return {
+        "case": f"{case}, order of its limit",
+        "value": at,
+        "difference": near,
+        "order": seen,
+        "finite": math.isfinite(near),
+        "holds": abs(seen - order) <= 0.1 and near <= 0.05,
+    }
+
+
+def across(case: str, of: Callable[[float], ObjectSpec], values: Sequence[float]) -> Iterator[Row]:
+    """Yield a row for each place between these values where the model changes: no jump there beyond the accuracy."""
+
+    def made(value: float) -> tuple[str, ...]:
+        choice = press(BASE, of(value), seconds=1e-3)[2].setting.choice
+        return () if choice is None else choice.made
+
+    for least, most in pairwise(values):
+        if made(least) == made(most):
+            continue
+        before = made(least)
+        while most / least > 1.0 + 1e-6:
+            middle = math.sqrt(least * most)
+            if made(middle) == before:
+                least = middle
+            else:
+                most = middle
+        one, other = press(BASE, of(least))[0], press(BASE, of(most))[0]
+        jump = rms_of(one, other)
+        yield {
+            "case": f"{case}, where the model changes",
+            "value": most,
+            "rms_error": jump,
+            "finite": math.isfinite(jump),
+            "holds": jump <= BASE.accuracy,
+        }
+
+
+def head_space(quick: bool) -> Iterator[Row]:
+    """Half a litre of which this share is air: less of it tends to the wall's own A^2 / C, more to the empty bottle."""
+    for share in (1e-3, 1e-2, 1e-1, 0.5, 1.0):
+        row = against_reference(BASE, gas(5e-4 * share))
+        yield {"case": "head space", "value": share, **row, "holds": row["rms_error"] <= 0.01}
+    wall = object_of(("elastic", {"k1_n_m": 2000.0 + GAS["area_m2"] ** 2 / BULGE}))
+    yield tends("head space", lambda share: gas(5e-4 * share), wall, 2e-3, 1.0)
+    yield tends("head space (filled in)", lambda share: gas(5e-4 * (1.0 - share)), gas(5e-4), 0.02, 1.0)
+
+
+def vents(quick: bool) -> Iterator[Row]:
+    """A narrow one tends to a sealed bottle by its area, a wide one, where the flow is viscous, to none by its too."""
+    areas = (0.0, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
+    for area in areas:
+        row = against_reference(BASE, gas(5e-5, vent_m2=area))
+        yield {"case": "vent", "value": area, **row, "holds": row["rms_error"] <= 0.01}
+    yield tends("vent", lambda area: gas(5e-5, vent_m2=area), gas(5e-5), 1e-9, 1.0)
+    yield tends("vent", lambda area: gas(5e-5, vent_m2=area), object_of(SHELL), 2e-4, -1.0)
+    yield from across("vent", lambda area: gas(5e-5, vent_m2=area), areas[1:])
+
+
+def arm(tau_s: float) -> ObjectSpec:
+    return object_of(SHELL, ("maxwell", {"k_n_m": 1000.0, "tau_s": tau_s}))
+
+
+def relaxation(quick: bool) -> Iterator[Row]:
+    """A fast arm tends to a damper k tau, and so to nothing; a slow one to a spring."""
+    times = (1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e3, 1e6, 1e9)
+    for tau in times:
+        row = against_reference(BASE, arm(tau))
+        yield {"case": "relaxation time", "value": tau, **row, "holds": row["rms_error"] <= 0.01}
+    yield tends("relaxation time", arm, object_of(SHELL), 1e-3, 1.0)
+    yield tends("relaxation time", arm, object_of(("elastic", {"k1_n_m": 3000.0})), 100.0, -1.0)
+    for tau in (1e-9, 1e-5, 1e-3):
+        damper = object_of(SHELL, ("loss", {"damping_n_s_m": 1000.0 * tau}))
+        error = rms_of(press(CLOSE, arm(tau))[0], press(CLOSE, damper)[0])
+        yield {
+            "case": "relaxation time, as the damper k tau",
+            "value": tau,
+            "rms_error": error,
+            "finite": math.isfinite(error),
+            "holds": error <= 0.01,
+        }
+    yield from across("relaxation time", arm, times)
+
+
+def energy(quick: bool) -> Iterator[Row]:
+    """With the drive off and no friction: kinetic energy and that of the springs, tick by tick, in and out again."""
+    mass, k1 = 100.0, 2e4
+    for k3 in (0.0,) if quick else (0.0, 1e9):
+        for scheme in ("auto", "implicit"):
+            for where, damping in itertools.product(("drive", "contents"), (0.0, 1.0, 1e3, 1e6)):
+                drive, contents = (damping, 0.0) if where == "drive" else (0.0, damping)
+                config = evolve(
+                    SMOOTH,
+                    damping_n_s_m=drive,
+                    open_gap_m=0.0505,
+                    expected_speed_m_s=0.05,
+                    scheme=scheme,
+                )
+                spec = object_of(
+                    ("elastic", {"k1_n_m": k1, "k3_n_m3": k3}), ("loss", {"damping_n_s_m": contents})
+                )
+                plant = ready(config, spec)
+                state = plant.setting.body
+                state = state._replace(speed_rev_s=-0.05 / state.rate_m_rev)
+                most, first = -math.inf, 0.5 * mass * 0.05**2
+                last = first
+                for _ in range(400):
+                    state = plant.move(plant.params, state, 0.0, plant.setting.dt_s)
+                    speed, d = state.speed_rev_s * state.rate_m_rev, state.squeezed.compression_m
+                    now = 0.5 * (mass * speed * speed + k1 * d * d + 0.5 * k3 * d**4)
+                    most, last = max(most, (now - last) / first), now
+                yield {
+                    "case": f"stored energy with the drive off (by {plant.by})",
+                    "value": [k3, scheme, where, damping],
+                    "rise": most,
+                    "finite": math.isfinite(last),
+                    "holds": most <= 1e-9,
+                }
+
+
+def stuck(quick: bool) -> Iterator[Row]:
+    """Below breakaway nothing moves, above it something does, and what is held stays for as long as one likes."""
+    bottle = find("odwalla:full_closed")
+    for geared, friction in ((True, 8.0), (False, 7.0)):
+        for effort in (0.0, 5.0, 6.99, 8.01, 30.0, 100.0):
+            config = evolve(BASE, transmission="pr2" if geared else "straight", breakaway_n=friction)
+            plant = ready(config, bottle if geared else object_of(SHELL))
+            begin = state = plant.setting.body._replace(revolutions=plant.setting.body.revolutions - 1.0)
+            for _ in range(1000):
+                state = plant.move(plant.params, state, effort, plant.setting.dt_s)
+            moved = state.revolutions != begin.revolutions
+            yield {
+                "case": "effort, below breakaway and above",
+                "value": ["pr2" if geared else "straight", effort],
+                "by": plant.by,
+                "finite": math.isfinite(state.gap_m),
+                "holds": moved == (effort > friction),
+            }
+    steps = ready(evolve(BASE, transmission="pr2"), bottle)
+    begin = steps.setting.body._replace(revolutions=steps.setting.body.revolutions - 1.0)
+    state = steps.move(steps.params, begin, 7.9, 1e6)
+    yield {
+        "case": "hold of 1e6 s",
+        "value": ["pr2", "open"],
+        "finite": math.isfinite(state.gap_m),
+        "holds": state.revolutions == begin.revolutions,
+    }
+    _, held, pr2 = press(evolve(BASE, transmission="pr2"), bottle, seconds=2.0)
+    yield _hold("pr2", pr2, held, 1e3)
+    # A map is for its tick, of which the longest is 0.1 s: so an hour, and 1e6 s by the plant that it hands over to.
+    config = evolve(BASE, breakaway_n=BASE.coulomb_n, rate_hz=10.0)
+    _, held, maps = press(config, object_of(SHELL, ("maxwell", {"k_n_m": 100.0, "tau_s": 0.1})), seconds=5.0)
+    yield _hold("straight, an hour", maps, held, 0.1, 36_000)
+    steps = evolve(maps, params=maps.setting.plant, move=plant_of(laws_of(maps.setting.kinds)), by="steps")
+    yield _hold("straight", steps, held, 1e3)
+
+
+def _hold(what: str, plant: Ready, state: PlantState, dt: float, count: int = 1000) -> Row:
+    after = state
+    for _ in range(count):
+        after = plant.move(plant.params, after, 20.0, dt)
+    return {
+        "case": "hold of 1e6 s",
+        "value": [what, count * dt],
+        "by": plant.by,
+        "moved_m": after.gap_m - state.gap_m,
+        "finite": math.isfinite(after.left_n),
+        "holds": state.speed_rev_s == 0.0 and after.revolutions == state.revolutions,
+    }
+
+
+def approach(quick: bool) -> Iterator[Row]:
+    """Against a spring without friction F + sqrt(F^2 + v^2 k m), of which v sqrt(k m) is left without effort.
+
+    With a damper beyond the critical one the peak falls to the static value, F itself, as the speed falls.
+    """
+    stiffness = 1e5
+    spec = object_of(("elastic", {"k1_n_m": stiffness}))
+    config = evolve(SMOOTH, damping_n_s_m=0.0, accuracy=1e-3)
+    mass = config.moving_mass_kg
+    critical = 2.0 * math.sqrt(stiffness * mass)
+    speeds = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.2)
+    for effort in (0.0, 20.0):
+        for speed in speeds:
+            # The effort comes with the tick that follows the touch: a tick of 1e-4 s makes little of that.
+            short = evolve(config, rate_hz=1e4)
+            _, state, plant = press(short, spec, speed_m_s=speed, effort_n=effort, seconds=0.15)
+            exact = effort + math.sqrt(effort**2 + speed**2 * stiffness * mass)
+            error = abs(state.peak_n / exact - 1.0)
+            yield {
+                "case": "approach speed",
+                "value": [speed, effort],
+                "by": plant.by,
+                "peak_error": error,
+                "holds": error <= (1e-3 if effort == 0.0 else 0.01),
+            }
+    before = 0.0
+    for speed in speeds:
+        damped = evolve(config, damping_n_s_m=1.2 * critical)
+        _, state, plant = press(damped, spec, speed_m_s=speed, effort_n=20.0, seconds=1.0)
+        over = state.peak_n / 20.0 - 1.0
+        yield {
+            "case": "approach speed, peak over the static force",
+            "value": speed,
+            "by": plant.by,
+            "over": over,
+            "holds": over >= before - 1e-3 and (speed > 1e-3 or abs(over) <= 1e-3),
+        }
+        before = over
+
+
+def ticks(quick: bool) -> Iterator[Row]:
+    bottle, linear = find("odwalla:empty_open"), arm(0.1)
+    for rate in (1e5, 1e3, 1e2, 10.0):
+        if quick and rate > 1e4:
+            continue
+        for spec, friction in ((bottle, 8.0), (linear, BASE.coulomb_n)):
+            row = against_reference(evolve(BASE, rate_hz=rate, breakaway_n=friction), spec, seconds=0.5)
+            yield {"case": "control tick", "value": 1.0 / rate, **row, "holds": row["rms_error"] <= 0.01}
+        yield _looped(rate)
+
+
+def _looped(rate_hz: float) -> Row:
+    """The sampled velocity loop: whether it is unstable is what its eigenvalues say, and no error of the plant's."""
+    config = evolve(BASE, rate_hz=rate_hz, breakaway_n=BASE.coulomb_n, open_gap_m=0.09)
+    spec = object_of(SHELL, width_m=0.01)
+    gain = create("controller", "hybrid").config.velocity_gain_n_s_m
+    plant, exact = ready(config, spec), ready(evolve(config, fidelity="reference"), spec)
+    state, same, dt = plant.setting.body, exact.setting.body, plant.setting.dt_s
+    speeds, expected = [], []
+    for _ in range(round(2.0 / dt)):
+        effort = min(max(gain * (0.02 + state.speed_rev_s * state.rate_m_rev), -100.0), 100.0)
+        state = plant.move(plant.params, state, effort, dt)
+        same = exact.move(exact.params, same, effort, dt)
+        speeds.append(state.speed_rev_s * state.rate_m_rev)
+        expected.append(same.speed_rev_s * same.rate_m_rev)
+    error = max(abs(a - b) for a, b in zip(speeds, expected, strict=True)) / 0.02
+    late = speeds[-max(len(speeds) // 5, 5) :]
+    unstable = not controller_is_stable(plant.setting)
+    swings = max(late) - min(late) > 0.02
+    return {
+        "case": "control tick, the sampled controller",
+        "value": dt,
+        "by": plant.by,
+        "controller": "unstable" if unstable else "stable",
+        "swings": swings,
+        "rms_error": error,
+        "holds": error <= 0.01 and unstable == swings,
+    }
+
+
+def sizes(quick: bool) -> Iterator[Row]:
+    wrong: dict[str, Callable[[], Any]] = {
+        "width_m nan": lambda: object_of(width_m=math.nan),
+        "width_m -0.01": lambda: object_of(width_m=-0.01),
+        "width_m 0.2": lambda: setting_of(BASE, object_of(width_m=0.2, file="wide.toml"), 0),
+        "rotor_kg_m2 1e-30": lambda: SimConfig(rotor_kg_m2=1e-30),
+        "noise_counts inf": lambda: SimConfig(noise_counts=math.inf),
+        "damping_n_s_m inf": lambda: SimConfig(damping_n_s_m=math.inf),
+        "accuracy 0": lambda: SimConfig(accuracy=0.0),
+    }
+    for what, make in wrong.items():
+        said = ""
+        try:
+            make()
+        except (ConfigError, ValueError, TypeError) as error:
+            said = str(error)
+        yield {"case": "sizes", "value": what, "holds": what.split()[0] in said}
+
+
+CASES: Final = (
+    stiffness_and_mass,
+    thin_object,
+    head_space,
+    vents,
+    relaxation,
+    energy,
+    stuck,
+    approach,
+    ticks,
+    sizes,
+)
+
+
+def machine() -> str:
+    """Return date, machine, interpreter and commit, as the documentation has them."""
+    today = date.today()
+    told = ["git", "describe", "--always", "--dirty", "--exclude=*"]
+    try:
+        commit = subprocess.run(told, capture_output=True, text=True, check=True, cwd=HERE).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        commit = "unknown"
+    where = f"{platform.machine()} with {os.cpu_count()} cores, Python {platform.python_version()}"
+    return f"{today.day} {today:%B %Y}, {where}, commit {commit}"
+
+
+def table(rows: list[Row]) -> Iterator[str]:
+    """Yield Markdown: a line a kind of case, then each row that does not hold with its figures."""
+    yield "| case | rows | hold | largest error of peak | of the trace (rms) |"
+    yield "|---|---|---|---|---|"
+    for case in dict.fromkeys(row["case"] for row in rows):
+        mine = [row for row in rows if row["case"] == case]
+        inside = [row for row in mine if not row.get("flagged")]
+        cells = [_largest(inside, name) for name in ("peak_error", "rms_error")]
+        held = sum(bool(row["holds"]) for row in mine)
+        yield f"| {case} | {len(mine)} | {held} | {cells[0]} | {cells[1]} |"
+    missed = [row for row in rows if not row["holds"]]
+    if missed:
+        yield ""
+        yield "Does not hold:"
+        yield ""
+    for row in missed:
+        figures = ", ".join(f"{k} {v:.1e}" for k, v in row.items() if isinstance(v, float) and k != "value")
+        yield f"- {row['case']}, {row['value']}: {figures}"
+
+
+def _largest(rows: list[Row], name: str) -> str:
+    figures = [row[name] for row in rows if name in row]
+    return f"{max(figures):.1e}" if figures else "-"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="fewer values a case")
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--table", action="store_true")
+    given = parser.parse_args()
+    rows = [row for case in CASES for row in case(given.quick)]
+    result = {
+        "date": date.today().isoformat(),
+        "machine": f"{platform.machine()}, {platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        "graspsense-sim-gripper": version("graspsense-sim-gripper"),
+        "run": machine(),
+        "hold": sum(bool(row["holds"]) for row in rows),
+        "cases": len(rows),
+        "rows": rows,
+    }
+    if given.json:
+        print(json.dumps(result, indent=2))
+        return
+    if given.table:
+        quick = " --quick" if given.quick else ""
+        print(f"From `python benchmarks/extremes.py{quick} --table`, {machine()}.\n")
+        print("\n".join(table(rows)))
+        return
+    for row in rows:
+        print("ok  " if row["holds"] else "NOT ", {k: v for k, v in row.items() if k != "holds"})
+    print(f"{result['hold']} of {result['cases']} hold")
+
+
+if __name__ == "__main__":
+    main()

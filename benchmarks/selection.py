@@ -1,0 +1,377 @@
+"""Whether the choice of a model keeps its word, and what it saves: random scenes against their references. Simulated.
+
+    python benchmarks/selection.py [--scenes 500] [--first 0] [--json | --table]
+
+A scene is drawn from the distribution below by its number. It is grasped by the hybrid controller, with ideal sensors,
+in the model chosen for an error of 10 %, 1 % and 0.1 %, once more at 1 % with every term kept, and in the reference:
+every term, each tick in steps halved until it stands still, from an accuracy of 0.01 % on. The error is that of
+`graspsense_sim_gripper.deviation`; an outcome that differs is one without bound, a refusal a miss. `cost_ratio` is the
+median time of the compiled loop at 1 % over that of the full model, compiled and stepped by the same rule; choosing the
+model and compiling are left out of both.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import platform
+import sys
+import time
+from collections import Counter
+from datetime import date
+from functools import partial
+from importlib.metadata import version
+from typing import Any, Final
+
+import numpy as np
+from attrs import evolve, frozen
+
+from graspsense.plugin_api import HOLD, ConfigError, RunConfig, create
+from graspsense_sim_gripper import kernel
+from graspsense_sim_gripper.checking import Control, checked_choice
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.deviation import Course, deviation
+from graspsense_sim_gripper.one_of_many import Done, Job, Storage, grasp_once
+from graspsense_sim_gripper.plant import PlantState
+from graspsense_sim_gripper.scene import ObjectSpec
+from graspsense_sim_gripper.setting import Setting, setting_of
+from graspsense_sim_gripper.terms.registry import find_term, in_order, laws_of
+from graspsense_sim_gripper.terms.remainder import Kept
+
+ACCURACIES: Final = (0.1, 0.01, 0.001)
+CASES: Final = (*((f"{accuracy:g}", accuracy, "scene") for accuracy in ACCURACIES), ("full", 0.01, "full"))
+"""Name, accuracy and fidelity of each model that a scene is grasped in."""
+REFERENCE: Final = 1e-4
+KINDS: Final = ("elastic", "rigid", "maxwell", "gas", "loss", "foam", "surface", "liquid", "slosh")
+"""Every scene is run as one composition of all these, its own kept: so there is one to compile."""
+DUMMIES: Final = {
+    "elastic": (1.0, 0.0),
+    "rigid": (1.0, math.inf, 0.0),
+    "maxwell": (1.0, 1.0),
+    "gas": (1e-3, 0.0, 1e-4, 1e5, 1.0, 1e-10, 0.0, math.inf),
+    "loss": (1.0,),
+    "foam": (1.0, 0.01, 1.5, 0.0, 1.0, 0.0, 1.0),
+    "surface": (1.0, 1.0, 1.0, 1.0),
+    "liquid": (1e-3, 1e-4, 0.1, 1e-10, 1e3, 1e-3),
+    "slosh": (1.0, 1.0, 0.1),
+}
+
+
+@frozen(kw_only=True)
+class Scene:
+    """One scene of the distribution."""
+
+    number: int
+    spec: ObjectSpec
+    config: SimConfig
+    speed_m_s: float
+
+
+def scene_of(number: int) -> Scene:
+    """Return the scene of this number."""
+    rng = np.random.default_rng([20261121, number])
+
+    def log(least: float, most: float) -> float:
+        return float(math.exp(rng.uniform(math.log(least), math.log(most))))
+
+    stiffness, speed = log(1e2, 1e6), log(1e-3, 0.2)
+    terms: dict[str, dict[str, float]] = {}
+    body = rng.choice(["elastic", "rigid", "foam"], p=[0.6, 0.25, 0.15])
+    if body == "elastic":
+        # It stiffens, so that the softest is not pressed flat.
+        terms["elastic"] = {"k1_n_m": stiffness, "k3_n_m3": stiffness * log(1e3, 1e5)}
+    elif body == "rigid":
+        # As stiff as that where it bears 20 N.
+        terms["rigid"] = {"hertz_n_m15": (stiffness / 1.5) ** 1.5 / math.sqrt(20.0)}
+    elif body == "foam":
+        terms["foam"] = {"force_n": 20.0, "at_m": 20.0 / stiffness if stiffness > 1e3 else 0.02}
+        terms["foam"] |= {"exponent": rng.uniform(1.2, 3.0), "arm1_n_m": stiffness * log(1e-3, 1.0)}
+        terms["foam"] |= {"tau1_s": log(1e-6, 1e6)}
+    if rng.random() < 0.9:
+        # About 100 kg move with the gap.
+        terms["surface"] = {
+            "mass_kg": 100.0 * log(1e-3, 1e3),
+            "k_n_m": max(stiffness * log(1e-2, 1e2), 500.0),
+        }
+        terms["surface"] |= {"damping_n_s_m": log(0.1, 1e5), "contact_n_m": stiffness}
+    if rng.random() < 0.9:
+        terms["maxwell"] = {"k_n_m": stiffness * log(1e-3, 2.0), "tau_s": log(1e-9, 1e9)}
+    if rng.random() < 0.9:
+        terms["gas"] = {"area_m2": log(1e-4, 2e-3), "area_slope_m": float(rng.choice([0.0, 0.02]))}
+        terms["gas"] |= {"volume_m3": log(5e-7, 5e-4), "pressure_pa": 101325.0, "exponent": 1.4}
+        terms["gas"] |= {"bulge_m3_pa": log(1e-11, 1e-9), "heat_s": log(1e-3, 1e3)}
+        terms["gas"] |= {"vent_m2": 0.0 if rng.random() < 0.2 else log(1e-10, 1e-3)}
+    if rng.random() < 0.9:
+        terms["loss"] = {"damping_n_s_m": log(1e-3, 1e6)}
+    if rng.random() < 0.3:
+        terms["liquid"] = {"area_m2": log(1e-4, 2e-3), "neck_m2": log(1e-5, 1e-3), "column_m": log(0.01, 0.1)}
+        terms["liquid"] |= {"bulge_m3_pa": log(1e-11, 1e-9), "viscosity_pa_s": log(1e-3, 10.0)}
+    if rng.random() < 0.3:
+        terms["slosh"] = {"mass_kg": log(1e-3, 3.0), "frequency_hz": log(1.0, 100.0)}
+        terms["slosh"] |= {"damping_ratio": log(1e-3, 0.3)}
+    order = list(terms)
+    spec = ObjectSpec(
+        name=f"scene {number}",
+        width_m=0.05,
+        offset_m=float(rng.uniform(-2e-3, 2e-3)) if rng.random() < 0.5 else 0.0,
+        mass_kg=log(1e-2, 1.0),
+        held=bool(rng.random() < 0.3),
+        terms=tuple((order[i], terms[order[i]]) for i in in_order(order)),
+    )
+    # Far enough to reach the speed, near enough for 20 s.
+    config = SimConfig(
+        sensor="ideal",
+        spread=False,
+        open_gap_m=spec.width_m + 2.0 * abs(spec.offset_m) + min(max(speed, 3e-3), 0.02),
+        damping_n_s_m=log(1.0, 100.0),
+        skin_n_m=log(1e4, 1e5),
+        skin_damping_n_s_m=0.0 if rng.random() < 0.5 else log(1.0, 1e3),
+        skin_creep_n_m=0.0 if rng.random() < 0.5 else log(1e3, 3e4),
+        skin_creep_s=log(1e-3, 1e3),
+    )
+    return Scene(number=number, spec=spec, config=config, speed_m_s=speed)
+
+
+def controller_is_stable(setting: Setting) -> bool:
+    """Return whether the sampled velocity loop is, on the free mass and on the stiffest contact of the scene.
+
+    Eigenvalues within the unit circle, of closure, speed and integral from tick to tick, the effort held between.
+    """
+    assert setting.choice is not None
+    loop = create("controller", "hybrid").config
+    dt, damping = setting.dt_s, setting.plant.drive.damping_n_s_m
+    mass = setting.plant.drive.inertia / setting.body.rate_m_rev**2
+    gain, integral = loop.velocity_gain_n_s_m, loop.integral_gain_n_m * setting.dt_s
+    for stiffness in (0.0, mass * (setting.choice.contact.number / dt) ** 2):
+        rates = np.array([[0.0, 1.0, 0.0], [-stiffness / mass, -damping / mass, 1.0 / mass], [0.0, 0.0, 0.0]])
+        ahead = np.eye(3)
+        for k in range(30, 0, -1):
+            ahead = np.eye(3) + rates @ ahead * (dt / k)
+        # The effort is -gain v + I, with I already less what this tick adds to it.
+        given = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -gain - integral, 1.0]])
+        onward = ahead @ given
+        onward[2] = [0.0, -integral, 1.0]
+        if np.max(np.abs(np.linalg.eigvals(onward))) > 1.0 + 1e-9:
+            return False
+    return True
+
+
+def in_full(setting: Setting) -> Setting:
+    """Return the setting as a composition of all kinds, of which it keeps its own."""
+    places = {kind: i + 1 for i, kind in enumerate(setting.kinds)}
+    terms, states = [setting.plant.thing.terms[0]], [setting.body.squeezed.states[0]]
+    for kind in KINDS:
+        if kind in places:
+            terms.append(setting.plant.thing.terms[places[kind]])
+            states.append(setting.body.squeezed.states[places[kind]])
+        else:
+            term = find_term(kind)[1]
+            terms.append(Kept(0, term.params(*DUMMIES[kind])))
+            states.append(term.at_rest)
+    thing = setting.plant.thing._replace(terms=tuple(terms))
+    object_ = setting.body.squeezed._replace(states=tuple(states))
+    body: PlantState = setting.body._replace(squeezed=object_, right=object_)
+    return evolve(setting, kinds=KINDS, plant=setting.plant._replace(thing=thing), body=body)
+
+
+def course_of(done: Done, dt_s: float) -> Course:
+    """Return what a grasp is compared by."""
+    trace = done.kept
+    assert trace is not None
+    return Course(
+        outcome=int(done.outcome),
+        dt_s=dt_s,
+        gap_m=trace.gap_m,
+        speed_m_s=trace.velocity_m_s,
+        left_n=trace.force_left_n,
+        right_n=trace.force_right_n,
+        ended=int(np.sum(trace.phase <= HOLD)),
+        peak_n=done.body.peak_n,
+    )
+
+
+def error_of(done: Done, reference: Done) -> tuple[float, str]:
+    """Return the largest error of all quantities, and whose it is."""
+    dt = 1.0 / SimConfig().rate_hz
+    return deviation(course_of(done, dt), course_of(reference, dt))
+
+
+class Bench:
+    """The compiled loop, and what runs scenes in it."""
+
+    def __init__(self) -> None:
+        step = type(create("controller", "hybrid")).step
+        began = time.process_time()
+        self.compiled = kernel.compiled(kernel.grasp_of(laws_of(KINDS), step), {})
+        self.loop_s = self.choice_s = 0.0
+        self.grasp(scene_of(0), SimConfig().accuracy, "scene")
+        self.compile_s = time.process_time() - began
+
+    def grasp(
+        self, scene: Scene, accuracy: float, fidelity: str, repeats: int = 1
+    ) -> tuple[Done, float, Setting]:
+        """Return the grasp, the seconds it took, and its setting. Raises ConfigError for a refusal."""
+        controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
+        config = evolve(scene.config, accuracy=accuracy, fidelity=fidelity)
+        run = RunConfig(grasp_timeout_s=20.0)
+        chooser = partial(checked_choice, control=Control(controller, run), loops=self.loops)
+        began = time.thread_time()
+        setting = setting_of(config, scene.spec, 0, chooser=chooser)
+        self.choice_s = time.thread_time() - began
+        job = Job(config=config, controller=controller, run=run, draw=None, traces=True)
+        whole, best = in_full(setting), math.inf
+        for _ in range(repeats):
+            self.loop_s = 0.0
+            done = grasp_once(job, whole, self.loop, Storage(), on_arrays=True)
+            best = min(best, self.loop_s)
+        return done, best, setting
+
+    def loops(self, setting: Setting, step: Any) -> tuple[Any, Setting]:
+        """Return the loop for a trial grasp, and the setting as it takes it."""
+        del step
+        return self.compiled, in_full(setting)
+
+    def loop(self, *given: Any) -> Any:
+        """Run the compiled loop, and count its time alone."""
+        began = time.thread_time()
+        result = self.compiled(*given)
+        self.loop_s += time.thread_time() - began
+        return result
+
+
+def measure(bench: Bench, numbers: range) -> dict[str, Any]:
+    """Return what came of these scenes."""
+    rows: list[dict[str, Any]] = []
+    unstable = 0
+    for number in numbers:
+        scene = scene_of(number)
+        reference, seconds, setting = bench.grasp(scene, REFERENCE, "reference")
+        if not controller_is_stable(setting):
+            unstable += 1
+            continue
+        row: dict[str, Any] = {"scene": number, "outcome": reference.outcome.name, "reference_s": seconds}
+        for name, accuracy, fidelity in CASES:
+            one: dict[str, Any] = {"error": math.inf}
+            row[name] = one
+            try:
+                done, one["s"], chosen = bench.grasp(scene, accuracy, fidelity, 3 if accuracy == 0.01 else 1)
+            except ConfigError as error:
+                one["refused"] = str(error)
+                continue
+            one["error"], one["whose"] = error_of(done, reference)
+            one["steps"], one["choice_s"] = done.body.steps, bench.choice_s
+            choice = chosen.choice
+            if choice is not None:
+                one["rung"], one["made"] = choice.rung, {d.term: d.decision for d in choice.decisions}
+                one["checked"] = None if choice.check is None else choice.check.error
+        rows.append(row)
+        print(f"\r{len(rows)} scenes", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    return {**summary(rows), "left_out_unstable": unstable, "rows": rows}
+
+
+def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the figures that count, by accuracy where they have one."""
+    within, worst, middle, refused, rungs, choice = {}, {}, {}, {}, {}, {}
+    for name, accuracy, fidelity in CASES:
+        if fidelity != "scene":
+            continue
+        cases = [row[name] for row in rows]
+        run = [case["error"] / accuracy for case in cases if "refused" not in case]
+        within[accuracy] = sum(case["error"] <= accuracy for case in cases) / len(rows)
+        worst[accuracy] = max(run, default=math.inf)
+        middle[accuracy] = float(np.median(run)) * accuracy if run else math.inf
+        refused[accuracy] = sum("refused" in case for case in cases)
+        rungs[accuracy] = dict(Counter(case.get("rung", "refused") for case in cases))
+        choice[accuracy] = float(np.median([case["choice_s"] for case in cases if "choice_s" in case]) * 1e3)
+    both = [(row["0.01"], row["full"]) for row in rows if "s" in row["0.01"] and "s" in row["full"]]
+    costs = np.array([[case["s"] for case in pair] for pair in both])
+    steps = np.array([[case["steps"] for case in pair] for pair in both])
+    return {
+        "scenes": len(rows),
+        "within": within,
+        "worst": worst,
+        "median_error": middle,
+        "refused": refused,
+        "rungs": rungs,
+        "choice_ms": choice,
+        "cost_ratio": float(np.median(costs[:, 0]) / np.median(costs[:, 1])),
+        "cost_ratio_a_scene": float(np.median(costs[:, 0] / costs[:, 1])),
+        "cost_ms": float(np.median(costs[:, 0]) * 1e3),
+        "full_cost_ms": float(np.median(costs[:, 1]) * 1e3),
+        "steps": float(np.median(steps[:, 0])),
+        "full_steps": float(np.median(steps[:, 1])),
+    }
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return the figures in Markdown."""
+    lines = [
+        f"{result['scenes']} scenes, seeds {result['seeds'][0]} to {result['seeds'][1]}, "
+        f"{result['left_out_unstable']} more left out for a controller that is itself unstable; {result['date']}, "
+        f"{result['machine']}, Python {result['python']}.",
+        "",
+        "| accuracy asked for | within | median error | largest, over what was asked for | refused | rungs |",
+        "|---|---|---|---|---|---|",
+    ]
+    for accuracy in ACCURACIES:
+        within = round(result["within"][accuracy] * result["scenes"])
+        rungs = ", ".join(f"{name} {n}" for name, n in sorted(result["rungs"][accuracy].items()))
+        lines.append(
+            f"| {accuracy:g} | {within} of {result['scenes']} | {result['median_error'][accuracy]:.1e} "
+            f"| {result['worst'][accuracy]:.2f} | {result['refused'][accuracy]} | {rungs} |"
+        )
+    lines += [
+        "",
+        f"At 1 % a grasp in the chosen model takes {result['cost_ms']:.2f} ms of the compiled loop "
+        f"({result['steps']:.0f} steps), one with every term kept {result['full_cost_ms']:.2f} ms "
+        f"({result['full_steps']:.0f} steps): {result['cost_ratio']:.0%} (medians; "
+        f"{result['cost_ratio_a_scene']:.0%} scene by scene). Choosing took {result['choice_ms'][0.01]:.0f} ms.",
+    ]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--scenes", type=int, default=500)
+    parser.add_argument("--first", type=int, default=0)
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument("--json", action="store_true")
+    form.add_argument("--table", action="store_true", help="Markdown, as in docs/simulator.md")
+    given = parser.parse_args()
+    bench = Bench()
+    result = {
+        "date": date.today().isoformat(),
+        "machine": f"{platform.machine()}, {platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        "graspsense-sim-gripper": version("graspsense-sim-gripper"),
+        "compile_s": bench.compile_s,
+        "seeds": [given.first, given.first + given.scenes - 1],
+        **measure(bench, range(given.first, given.first + given.scenes)),
+    }
+    if given.json:
+        print(json.dumps(result, indent=2, default=str))
+        return
+    if given.table:
+        print(table(result))
+        return
+    rows = result.pop("rows")
+    for key, value in result.items():
+        print(f"{key:<28}{value}")
+    print("\nmisses")
+    for row in rows:
+        for name, accuracy, _ in CASES:
+            one = row[name]
+            if one["error"] > accuracy:
+                what = (
+                    one.get("refused")
+                    or f"{one['error']:<10.3g} {one['whose']:<10} {one['checked']} {one['rung']} {one['made']}"
+                )
+                print(f"{row['scene']:>6} {name:<8}{what}")
+
+
+if __name__ == "__main__":
+    main()

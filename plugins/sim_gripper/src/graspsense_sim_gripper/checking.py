@@ -1,0 +1,350 @@
+"""Whether a chosen model keeps its word: a trial grasp in it, beside one in the full model with finer steps.
+
+The nominal object is grasped with ideal sensors, from the open fingers to the release, under the controller that is to
+grasp it. The first such grasp, in the full model, also tells how fast it touches and what force comes
+of it. Then the model that the boldest rung of the ladder proposes is tried; where the two differ by too much, the next
+rung's. Where even the last does not hold there is no model of this scene at that accuracy, and that is said.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from attrs import define, evolve, field, fields
+
+from graspsense.plugin_api import (
+    CELLS,
+    HOLD,
+    ConfigError,
+    Controller,
+    RunConfig,
+    create,
+    first_state,
+    gap_and_rate,
+    revolutions_at,
+    tick_params,
+)
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.deviation import Course, deviation
+from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, NotCompilable, grasp_of
+from graspsense_sim_gripper.linear import linear_of
+from graspsense_sim_gripper.plant import PlantState, Steps
+from graspsense_sim_gripper.scene import ObjectSpec
+from graspsense_sim_gripper.selection import DROPPED, FINE, FULL_LADDER, LADDER, Check, Choice, Rung
+from graspsense_sim_gripper.sensing import SensorState
+from graspsense_sim_gripper.setting import (
+    EFFORT_LIMIT_N,
+    FORCE_N,
+    SPEED_M_S,
+    Setting,
+    choice_of,
+    device_info,
+    setting_of,
+)
+from graspsense_sim_gripper.terms.registry import laws_of
+
+HELD: Final = 0.5
+"""A model holds where the trial grasps differ by less than this part of the accuracy; its instances have the rest."""
+BESIDE: Final = {
+    1.0: Rung("to check", 0.0, 30.0, 2),
+    10.0: Rung("to check", 0.0, 100.0, 8),
+    100.0: Rung("to check", 0.0, 1000.0, 32),
+}
+"""Beside which grasp a rung's is laid, by how fine its own steps are."""
+TELLING: Final = 0.2
+"""A term without which no more than this part of an error is left is what made it."""
+STRICT: Final = 0.003
+"""From this accuracy on that is cut into twice as many steps: a touch that one step sees and another does not."""
+LONGEST_S: Final = 40.0
+"""No trial grasp takes longer, and no approach in one."""
+NEAR_M: Final = 3e-3
+"""Where a slow approach has not come by then, it is taken up again this near to the object."""
+MOST_HOLD_S: Final = 0.3
+LEAP: Final = 50
+"""Most ticks at once on the way to the object."""
+ROOM: Final = 4096
+
+
+@define(eq=False)
+class Control:
+    """What is to grasp: a controller with the settings of its runs."""
+
+    controller: Controller[Any]
+    run: RunConfig
+
+    def key(self) -> tuple[Any, ...]:
+        """Return what a grasp follows from."""
+        law = self.controller
+        # As text, for NaN is not equal to itself.
+        return type(law).step, repr((law.params(), law.init(), self.run.hold_s, self.run.grasp_timeout_s))
+
+
+def standard(config: SimConfig) -> Control:
+    """Return the paper's controller, at the speed and the force that are expected."""
+    force = min(config.expected_force_n or FORCE_N, EFFORT_LIMIT_N)
+    speed = config.expected_speed_m_s or SPEED_M_S
+    return Control(
+        create("controller", "hybrid", probing_force_n=force, closing_speed_m_s=speed), RunConfig()
+    )
+
+
+Loops = Callable[[Setting, Callable[..., Any]], tuple[Callable[..., Any], Setting] | None]
+"""Gives the compiled loop for a setting under this step of a controller, and the setting as that takes it.
+
+None: it is to run plain."""
+_WITHOUT: Final[dict[str, Any]] = {
+    one.name: one.default
+    for one in fields(SimConfig)
+    if one.name in ("object", "explain", "compile") or one.name.startswith(("pad_", "noise_"))
+} | {"sensor": "ideal", "spread": False}
+"""What a trial grasp does without, and no choice hangs on."""
+_CHECKED: dict[tuple[Any, ...], tuple[ObjectSpec, Choice]] = {}
+
+
+def checked_choice(
+    config: SimConfig, spec: ObjectSpec, control: Control, loops: Loops | None = None
+) -> Choice:
+    """Return the model of an object that a trial grasp has found to be as exact as asked for.
+
+    One whose steps are forced, a reference, and one whose peak cannot be resolved (which it says) are not checked.
+    Raises ConfigError where no model is as exact as asked for.
+    """
+    bare = evolve(config, **_WITHOUT)
+    key = (bare, id(spec), control.key())
+    if key not in _CHECKED:
+        _CHECKED[key] = spec, _check(bare, spec, control, loops)
+    return _CHECKED[key][1]
+
+
+@define(eq=False)
+class Checking:
+    """Chooses for many grasps of one config, looking up by the object alone what was chosen before."""
+
+    control: Control
+    loops: Loops | None = None
+    _known: dict[int, tuple[SimConfig, ObjectSpec, Choice]] = field(factory=dict, init=False)
+
+    def __call__(self, config: SimConfig, spec: ObjectSpec) -> Choice:
+        """Return `checked_choice` of these."""
+        known = self._known.get(id(spec))
+        if known is None or known[0] is not config:
+            known = config, spec, checked_choice(config, spec, self.control, self.loops)
+            self._known[id(spec)] = known
+        return known[2]
+
+
+def _check(bare: SimConfig, spec: ObjectSpec, control: Control, loops: Loops | None) -> Choice:
+    forced = bare.scheme != "auto" or bare.step_s is not None
+    if forced or bare.fidelity == "reference":
+        return choice_of(bare, spec)
+    trial = _Trial(config=bare, spec=spec, control=control, loops=loops)
+    strict = 2 if bare.accuracy <= STRICT else 1
+    beside = {finer: rung._replace(least_steps=strict * rung.least_steps) for finer, rung in BESIDE.items()}
+    finest = choice_of(bare, spec, rung=beside[1.0])
+    if math.isinf(finest.contact.error):
+        return choice_of(bare, spec)
+    try:
+        first = trial.course(finest)
+    except Exception:
+        # A controller of anybody's may fail; in the grasp itself that is an outcome, and said.
+        return choice_of(bare, spec)
+    chosen = partial(choice_of, force_n=_about(first.peak_n), speed_m_s=_about(first.touched_at_m_s()))
+    if math.isinf(chosen(bare, spec, rung=beside[1.0]).contact.error):
+        return chosen(bare, spec)
+    least, whose, made = math.inf, "", 1
+    tried: set[Any] = set()
+    for rung in LADDER if bare.fidelity == "scene" else FULL_LADDER:
+        choice = chosen(bare, spec, rung=rung)
+        if (choice.made, choice.steps) in tried:
+            continue
+        tried.add((choice.made, choice.steps))
+        expected = trial.course(chosen(bare, spec, rung=beside[rung.finer]))
+        error, quantity = deviation(trial.course(choice), expected)
+        made += 1
+        if error <= HELD * bare.accuracy:
+            return evolve(choice, check=Check(error=error, quantity=quantity, grasps=made))
+        if error < least:
+            least, whose = error, quantity
+    term = _culprit(trial, *(chosen(bare, spec, rung=rung) for rung in (FINE, beside[FINE.finer])))
+    raise ConfigError(_refusal(bare, spec, least, whose, term))
+
+
+def _about(value: float) -> float:
+    """Return it to two digits: no choice hangs on more, and what is chosen of like grasps is then looked at once."""
+    return float(f"{value:.1e}")
+
+
+def _culprit(trial: _Trial, fine: Choice, finer: Choice) -> str:
+    """Return the term without which the grasp hangs least on its steps, or nothing where all of them matter alike."""
+    errors = {}
+    for i, (kind, _) in enumerate(trial.spec.terms):
+        made = (*fine.made[:i], DROPPED, *fine.made[i + 1 :])
+        errors[kind] = deviation(*(trial.course(evolve(one, made=made)) for one in (fine, finer)))[0]
+    whole, _ = deviation(trial.course(fine), trial.course(finer))
+    least = min(errors, key=errors.__getitem__, default="")
+    return least if least and errors[least] < TELLING * whole else ""
+
+
+def _refusal(config: SimConfig, spec: ObjectSpec, least: float, whose: str, term: str) -> str:
+    where = spec.file or f"object {spec.name!r}"
+    found = f"{whose} differs by {least:.2g}" if math.isfinite(least) else "not even the outcome is the same"
+    blamed = f"steps through the term {term!r}" if term else "steps, and not through any one term"
+    can = 2.0 * least / HELD
+    advice = f"ask for {can:.1g} (gripper.accuracy), or " if can <= 0.5 else ""
+    return (
+        f"{where}: no model of it is as exact as gripper.accuracy = {config.accuracy:g} asks for: with every term kept "
+        f"and in the finest steps, between two of them {found}. The grasp hangs on its {blamed}; {advice}"
+        'take what comes out unchecked with gripper.fidelity = "reference"'
+    )
+
+
+class _Stand(NamedTuple):
+    """Where a trial grasp stands: the loop, the plant, its sensors and the controller, and what was recorded."""
+
+    loop: Loop
+    body: PlantState
+    sensed: SensorState
+    state: Any
+    rows: tuple[Any, ...]
+    """The columns of `COLUMNS`, piece by piece."""
+    far: bool
+    """Whether it began with the fingers open."""
+
+
+Drive = Callable[[Steps, _Stand, int], _Stand]
+"""Takes a grasp on from where it stands, in such steps, until this tick."""
+
+
+@define(eq=False)
+class _Trial:
+    """The grasp of one object under one controller, in one model after the other."""
+
+    config: SimConfig
+    spec: ObjectSpec
+    control: Control
+    loops: Loops | None
+    _courses: dict[Any, Course] = field(factory=dict, init=False)
+    _before: _Stand | None = field(default=None, init=False)
+    """Shortly before the first touch, until when all models are alike."""
+
+    def course(self, choice: Choice) -> Course:
+        """Return how the grasp goes in this model."""
+        key = (choice.made, choice.steps)
+        if key not in self._courses:
+            try:
+                self._courses[key] = self._grasp(choice)
+            except NotCompilable:
+                self.loops = None
+                self._courses[key] = self._grasp(choice)
+        return self._courses[key]
+
+    def _grasp(self, choice: Choice) -> Course:
+        setting = setting_of(self.config, self.spec, 0, chooser=lambda config, spec: choice)
+        if self._before is None:
+            self._before = self._approach(setting)
+        before = self._before
+        at_end = self._driven(setting, before.far)(
+            setting.plant.steps, before, before.loop.ticks + self._ticks(setting)
+        )
+        columns = np.concatenate(at_end.rows, axis=1)
+        return Course(
+            outcome=int(at_end.state.law.outcome) if at_end.state.guard.stopped == 0 else -1,
+            dt_s=setting.dt_s,
+            gap_m=columns[COLUMNS.index("gap_m")],
+            speed_m_s=columns[COLUMNS.index("velocity_m_s")],
+            left_n=columns[COLUMNS.index("force_left_n")],
+            right_n=columns[COLUMNS.index("force_right_n")],
+            ended=int(np.sum(columns[COLUMNS.index("phase")] <= HOLD)),
+            peak_n=at_end.body.peak_n,
+        )
+
+    def _ticks(self, setting: Setting) -> int:
+        return math.ceil(min(LONGEST_S, self.control.run.grasp_timeout_s) / setting.dt_s)
+
+    def _approach(self, setting: Setting) -> _Stand:
+        """Return the grasp as it stands shortly before the first touch."""
+        # Not cut into short steps, as nothing happens.
+        steps = setting.plant.steps._replace(stiff=0, longest_s=math.inf)
+        reach = setting.plant.thing.width_m + 2.0 * abs(setting.body.offset_m)
+        link = setting.plant.drive.link
+        law = self.control.controller
+        for far in (True, False):
+            body = setting.body
+            if not far:
+                near = revolutions_at(link, min(body.gap_m, reach + NEAR_M))
+                gap, rate = gap_and_rate(link, near)
+                body = body._replace(revolutions=near, gap_m=gap, rate_m_rev=rate)
+            drive = self._driven(setting, far)
+            now = _Stand(NOT_BEGUN, body, setting.sensed, first_state(law.init()), (), far)
+            while not _ended(now.state) and now.loop.ticks < self._ticks(setting):
+                closing = max(-now.body.speed_rev_s * now.body.rate_m_rev, SPEED_M_S)
+                ahead = 0.5 * (now.body.gap_m - reach) / (closing * setting.dt_s)
+                if ahead < 2.0:
+                    return now
+                after = drive(steps, now, now.loop.ticks + min(int(ahead), LEAP))
+                if after.body.touched == 1:
+                    return now
+                now = after
+            if _ended(now.state):
+                break
+        return now
+
+    def _driven(self, setting: Setting, far: bool) -> Drive:
+        law, run = self.control.controller, self.control.run
+        info = device_info(self.config)
+        if not far:
+            # Neither opened nor let go: it begins where it would open.
+            info = evolve(info, opening=None)
+        params = tick_params(info, law, evolve(run, hold_s=min(run.hold_s, MOST_HOLD_S)))
+        step = type(law).step
+        compiled = None if self.loops is None else self.loops(setting, step)
+        on_arrays = compiled is not None
+        by_maps = linear_of(self.config, setting, on_arrays=on_arrays)
+        # What a loop never looks at while its sensors are ideal, but of its own types.
+        parts: tuple[Any, ...] = (
+            *np.zeros((2, CELLS)),
+            np.zeros((1, 2 * CELLS)),
+            np.full((1, 2, CELLS), math.nan),
+            np.zeros(1),
+        )
+        if compiled is not None:
+            loop, made = compiled
+        else:
+            shape = None if by_maps is None else (setting.kinds, by_maps[1])
+            loop, made = grasp_of(laws_of(setting.kinds), step, by_maps=shape), setting
+            parts = tuple(part.tolist() for part in parts)
+
+        def drive(steps: Steps, at: _Stand, until: int) -> _Stand:
+            stands, body, sensed, state, rows, _ = at
+            if stands.ticks == 0:
+                body = body._replace(squeezed=made.body.squeezed, right=made.body.right)
+            plant: Any = made.plant._replace(steps=steps) if by_maps is None else by_maps[0]
+            while not _ended(state) and stands.ticks < until:
+                table = np.zeros((len(COLUMNS), min(until - stands.ticks, ROOM)))
+                given = table if on_arrays else table.tolist()
+                stands, body, sensed, state = loop(
+                    plant,
+                    made.sensor,
+                    setting.dt_s,
+                    params,
+                    until,
+                    stands._replace(recorded=0),
+                    body,
+                    sensed,
+                    state,
+                    *parts,
+                    given,
+                )
+                rows = (*rows, np.asarray(given)[:, : stands.recorded])
+            return _Stand(stands, body, sensed, state, rows, at.far)
+
+        return drive
+
+
+def _ended(state: Any) -> bool:
+    """Return whether the controller or the guard has ended the grasp."""
+    return bool(state.done == 1 or state.guard.stopped == 1)

@@ -1,0 +1,508 @@
+"""Where a scene is piecewise linear: exact maps over a tick, one a mode, and what ends a mode located inside the tick.
+
+A straight drive, with Coulomb friction or none, on an object of linear terms is linear as long as it is free or
+pressed, slides one way or is stuck, and the terms' own contacts touch or are parted. Its motion over a piece of a tick
+is then a matrix, whatever the stiffness (exponential integration, as for stiff contacts in Del Prete et al., consim).
+The matrices of a tick and of its halves, quarters and so on are made once a scene (`linear_modes`). A tick in which
+nothing can happen, by a bound on what changes inside it, is one of them; where something may, it is looked for with
+pieces short against the fastest swing, and then between them by halving. What is no such motion (ends of travel, an
+object that is pushed across its table) is left to the plant.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from graspsense.plugin_api import bind
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.linear_modes import (
+    APART_M,
+    FORCE,
+    GUARDS,
+    HALVINGS,
+    RISING,
+    Scene,
+    Shape,
+    listed,
+    modes_of,
+)
+from graspsense_sim_gripper.plant import IN_SHAPE_M, PlantParams, PlantState, Squeezed
+from graspsense_sim_gripper.terms.registry import find_term
+from graspsense_sim_gripper.terms.remainder import linear as remainder_form
+from graspsense_sim_gripper.terms.term import NO_STATE, LinearForm, OwnContact
+
+if TYPE_CHECKING:
+    from graspsense_sim_gripper.setting import Setting
+
+MOST_NUMBERS: Final = 0x3FFFFFFF
+WHOLE: Final = 1 << HALVINGS
+MOST_EVENTS: Final = 64
+"""A tick in which more modes end than this is taken on without looking."""
+PEAK_SHARE: Final = 2e-3
+"""A swing inside a tick that goes beyond the greatest force by less than this share of it may be missed."""
+
+
+class Linear(NamedTuple):
+    """A plant with its modes, and room for the state before and after a piece of a tick and for what is watched."""
+
+    plant: PlantParams
+    look: int
+    """How often a tick is halved to look for what ends a mode."""
+    maps: Any
+    watched: Any
+    simple: Any
+    ways: Any
+    bounds: Any
+    begin: Any
+    slack: Any
+    now: Any
+    then: Any
+    """The state, and what is watched, after a piece."""
+    was: Any
+    """What is watched before it."""
+    change: Any
+    most: Any
+    by: Any
+
+
+def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -> tuple[Linear, Shape] | None:
+    """Return the plant of a setting with its maps, and their shape; None where it is not linear, or is not to be.
+
+    `on_arrays`: as compiled code takes them; plain Python is quicker with lists. Raises TypeError for a term whose
+    linear form has other states than its law.
+    """
+    plant = setting.plant
+    drive, thing, steps = plant.drive, plant.thing, plant.steps
+    forced = config.scheme != "auto" or steps.longest_s < math.inf or steps.settle > 0.0
+    # What rubs more at rest is not linear; held off the centre, each half would need a mode of its own.
+    if (
+        forced
+        or config.transmission != "straight"
+        or drive.breakaway_n != drive.coulomb_n
+        or (thing.held == 1 and setting.body.offset_m != 0.0)
+    ):
+        return None
+    forms: list[LinearForm | OwnContact] = []
+    rest = thing.terms[0]
+    if rest.kept == 1:
+        forms.append(remainder_form(rest.params))
+    for kind, one in zip(setting.kinds, thing.terms[1:], strict=True):
+        if one.kept == 0:
+            continue
+        form = _form(kind, one.params)
+        if form is None:
+            return None
+        forms.append(form)
+    rate = setting.body.rate_m_rev
+    scene = Scene(
+        drive.inertia / rate**2,
+        drive.damping_n_s_m,
+        drive.coulomb_n > 0.0,
+        drive.load_share,
+        drive.lag_s,
+        thing.skins_n_m,
+        thing.skin,
+        tuple(forms),
+    )
+    modes = modes_of(scene, setting.dt_s) if on_arrays else listed(scene, setting.dt_s)
+    if modes is None:
+        return None
+    shape, look, *numbers = modes
+    room = max(shape.columns, GUARDS + shape.ends + shape.states, 2 * shape.states)
+    rooms: list[Any] = [np.zeros(room) for _ in range(6)]
+    if not on_arrays:
+        rooms = [room.tolist() for room in rooms]
+    return Linear(plant, look, *numbers, *rooms), shape
+
+
+def _form(kind: str, params: Any) -> LinearForm | OwnContact | None:
+    """Return a term's linear form. Raises TypeError where it has other states than the law."""
+    term = find_term(kind)[1]
+    form = term.linear(params)
+    if form is None:
+        return None
+    for one in (form.touching, form.parted) if isinstance(form, OwnContact) else (form,):
+        if len(one.rates) not in (0, _numbers(term.at_rest)):
+            raise TypeError(
+                f"term {kind!r}: its linear form has {len(one.rates)} states, the law's are "
+                f"{len(term.at_rest)}, {term.at_rest!r}: as many as it has fields, all of them floats"
+            )
+    return form
+
+
+def _numbers(state: Any) -> int:
+    """Return how many numbers of the maps' state a term's own state is."""
+    return len(state) if all(isinstance(one, float) for one in state) and len(state) <= 4 else 0
+
+
+# --------------------------------------------------------------- the terms' states, into the maps' state and back
+
+
+def _put0(state: Any, now: Any, at: int) -> int:
+    return at
+
+
+def _put1(state: Any, now: Any, at: int) -> int:
+    now[at] = state[0]
+    return at + 1
+
+
+def _put2(state: Any, now: Any, at: int) -> int:
+    now[at], now[at + 1] = state[0], state[1]
+    return at + 2
+
+
+def _put3(state: Any, now: Any, at: int) -> int:
+    now[at], now[at + 1], now[at + 2] = state[0], state[1], state[2]
+    return at + 3
+
+
+def _put4(state: Any, now: Any, at: int) -> int:
+    now[at], now[at + 1], now[at + 2], now[at + 3] = state[0], state[1], state[2], state[3]
+    return at + 4
+
+
+made: Any = tuple
+
+
+def _take0(state: Any, now: Any, at: int) -> tuple[Any, int]:
+    return state, at
+
+
+def _take1(state: Any, now: Any, at: int) -> tuple[Any, int]:
+    return made(now[at]), at + 1
+
+
+def _take2(state: Any, now: Any, at: int) -> tuple[Any, int]:
+    return made(now[at], now[at + 1]), at + 2
+
+
+def _take3(state: Any, now: Any, at: int) -> tuple[Any, int]:
+    return made(now[at], now[at + 1], now[at + 2]), at + 3
+
+
+def _take4(state: Any, now: Any, at: int) -> tuple[Any, int]:
+    return made(now[at], now[at + 1], now[at + 2], now[at + 3]), at + 4
+
+
+PUT: Final = (_put0, _put1, _put2, _put3, _put4)
+TAKE: Final = (_take0, _take1, _take2, _take3, _take4)
+put: Any = _put0
+take: Any = _take0
+
+
+def _put_none(terms: Any, states: Any, now: Any, at: int) -> int:
+    return at
+
+
+def _take_none(terms: Any, states: Any, now: Any, at: int) -> tuple[Any, int]:
+    return (), at
+
+
+put_rest: Any = _put_none
+take_rest: Any = _take_none
+
+
+def _put_all(terms: Any, states: Any, now: Any, at: int) -> int:
+    if terms[0].kept == 1:
+        at = put(states[0], now, at)
+    return put_rest(terms[1:], states[1:], now, at)  # type: ignore[no-any-return]
+
+
+def _take_all(terms: Any, states: Any, now: Any, at: int) -> tuple[Any, int]:
+    state = states[0]
+    if terms[0].kept == 1:
+        state, at = take(states[0], now, at)
+    others, at = take_rest(terms[1:], states[1:], now, at)
+    return (state, *others), at
+
+
+def move_of(
+    kinds: Sequence[str], shape: Shape, plant_move: Callable[..., PlantState], **tuples: Any
+) -> Callable[[Any, PlantState, float, float], PlantState]:
+    """Return `move` for an object of these terms and maps of this shape; it leaves to `plant_move` the rest.
+
+    The shape's numbers are parts of the code: loops over three or four of them then are none.
+    """
+    puts: Any = _put_none
+    takes: Any = _take_none
+    for state in reversed((NO_STATE, *(find_term(kind)[1].at_rest for kind in kinds))):
+        count = _numbers(state)
+        puts = bind(_put_all, put=PUT[count], put_rest=puts)
+        takes = bind(_take_all, take=bind(TAKE[count], made=type(state)), take_rest=takes)
+    laid_out = {name.upper(): number for name, number in shape._asdict().items()}
+    return bind(
+        move,
+        plant_move=plant_move,
+        put_states=puts,
+        take_states=takes,
+        _moved=bind(_product, ROWS=shape.states + GUARDS + shape.ends, COLUMNS=shape.columns),
+        _seen=bind(_product, ROWS=GUARDS + shape.ends, COLUMNS=shape.columns),
+        _simply=bind(_product, ROWS=GUARDS + shape.ends, COLUMNS=shape.states),
+        _parted=bind(_product, ROWS=2 * shape.states, COLUMNS=shape.states),
+        _bounded=bind(_product, ROWS=GUARDS + shape.ends, COLUMNS=2 * shape.states),
+        _row=bind(_row, **laid_out),
+        **laid_out,
+        **tuples,
+    )
+
+
+# ---------------------------------------------------------------------------------------------------- a tick
+
+
+def _no_plant(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
+    raise TypeError("there is no plant to leave a tick to: move_of(kinds, plant_of(laws))")
+
+
+plant_move: Any = _no_plant
+put_states: Any = _put_none
+take_states: Any = _take_none
+STATES = COLUMNS = PARTS = CREEPS = LAGS = MOTIONS = CONTACTS = ENDS = ROWS = 0
+
+
+def _product(table: Any, at: int, vector: Any, product: Any) -> None:
+    """Write the matrix that begins at this place of the table, times the vector, into `product`."""
+    # Known not to be negative, which compiled code else asks at each number.
+    at &= MOST_NUMBERS
+    for i in range(ROWS):
+        found = 0.0
+        for j in range(COLUMNS):
+            found += table[at + j] * vector[j]
+        product[i] = found
+        at += COLUMNS
+
+
+_moved = _seen = _simply = _parted = _bounded = _product
+
+
+def _row(rows: Any, at: int, vector: Any) -> float:
+    at &= MOST_NUMBERS
+    found = 0.0
+    for j in range(COLUMNS):
+        found += rows[at + j] * vector[j]
+    return found
+
+
+def _top(before: float, rising: float, after: float, falling: float, h: float) -> float:
+    """Return the greatest force of a piece at whose ends it and its rate are these, by the cubic through them."""
+    step = after - before
+    m0, m1 = rising * h, falling * h
+    a, b = 3.0 * (m0 + m1 - 2.0 * step), 2.0 * (3.0 * step - 2.0 * m0 - m1)
+    s = 2.0 * m0 / (math.sqrt(max(b * b - 4.0 * a * m0, 0.0)) - b)
+    return before + s * (m0 + s * (3.0 * step - 2.0 * m0 - m1 + s * (m0 + m1 - 2.0 * step)))
+
+
+def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> PlantState:
+    """Return the plant after `dt`, the tick that the maps are for, in which this effort was asked for."""
+    plant, look, maps, watched, simple, ways, bounds, begin, slack = params[:9]
+    now, then, was, change, most, by = params[9:]
+    (
+        revolutions,
+        speed,
+        gap,
+        rate,
+        felt_left,
+        felt_right,
+        offset,
+        touched,
+        squeezed,
+        peak,
+        given,
+        other,
+        step,
+        n,
+        lost,
+        alone,
+    ) = state
+    drive, thing = plant.drive, plant.thing
+    leaves = (revolutions >= drive.open_rev and effort_n <= 0.0) or offset != 0.0 or felt_left != felt_right
+    # What the plant has yet to bring up to date is the plant's.
+    leaves = leaves or alone > 0.0
+    lines = GUARDS + ENDS
+    stride = (STATES + lines) * COLUMNS
+
+    closure = thing.width_m - gap
+    now[0] = closure
+    now[1] = -speed * rate
+    at = 2
+    pressed = 1
+    d = cover = 0.0
+    if PARTS == 1:
+        d = squeezed.compression_m
+        if CREEPS == 1:
+            cover = squeezed.cover_m
+            now[3], now[4] = cover, squeezed.arm_n
+            at = 5
+        else:
+            at = 3
+        if squeezed.force_n <= 0.0 and closure - d - cover < -APART_M:
+            pressed = 0
+        elif thing.skins_n_m == math.inf:
+            d = closure
+        now[2] = d
+    own = at
+    at = put_states(thing.terms, squeezed.states, now, own)
+    if LAGS == 1:
+        now[at] = given
+    now[STATES] = effort_n
+    if MOTIONS == 3:
+        now[STATES + 1] = drive.coulomb_n
+    motion = mode = allowed = 0
+    standing = now[1] == 0.0
+    if MOTIONS == 3 and not standing:
+        motion = 1 if now[1] > 0.0 else 2
+    # Which of the terms' own contacts touch is guessed, and put right below.
+    touching = (1 << CONTACTS) - 1 if squeezed.force_n > 0.0 else 0
+    left, least, events, until = 0 if leaves else WHOLE, 0, 0, 0
+    top = peak
+    begins = True
+    while left > 0:
+        while begins:
+            begins = False
+            mode = ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
+            allowed = mode * ENDS
+            _seen(watched, mode * lines * COLUMNS, now, was)
+            if events == 0:
+                for k in range(CONTACTS):
+                    if was[GUARDS + k] < -slack[allowed + k]:
+                        touching ^= 1 << k
+                        begins = True
+            if MOTIONS == 3 and standing and not begins:
+                # What stands is stuck, unless what holds it less what closes it, or less what opens it, says otherwise.
+                standing = False
+                if was[GUARDS + ENDS - 2] < -slack[allowed + ENDS - 2]:
+                    motion, begins = 1, True
+                elif was[GUARDS + ENDS - 1] < -slack[allowed + ENDS - 1]:
+                    motion, begins = 2, True
+        while (WHOLE >> least) > left:
+            least += 1
+        _moved(maps, (mode * (HALVINGS + 1) + least) * stride, now, then)
+        ends = False
+        for k in range(ENDS):
+            if then[STATES + GUARDS + k] < -slack[allowed + k]:
+                ends = True
+        if events >= MOST_EVENTS:
+            ends = False
+        elif least == 0 and look > 0:
+            may, beyond = ends, 0.0
+            if not may:
+                for j in range(STATES):
+                    change[j] = abs(then[j] - now[j])
+                _simply(simple, mode * lines * STATES, change, most)
+                beyond = (1.0 + PEAK_SHARE) * max(top, then[STATES + FORCE])
+                may = not was[FORCE] + most[FORCE] <= beyond
+                for k in range(ENDS):
+                    if not most[GUARDS + k] <= was[GUARDS + k]:
+                        may = True
+            if may and not ends:
+                for j in range(STATES):
+                    change[j] = then[j] - now[j]
+                _parted(ways, 2 * mode * STATES * STATES, change, by)
+                for j in range(2 * STATES):
+                    by[j] = abs(by[j])
+                _bounded(bounds, 2 * mode * lines * STATES, by, most)
+                may = False
+                for k in range(ENDS):
+                    if not most[GUARDS + k] <= was[GUARDS + k]:
+                        may = True
+                if not may and not was[FORCE] + most[FORCE] <= beyond:
+                    # Where it rises as evenly as its ends say there is no swing inside, either.
+                    rise = then[STATES + FORCE] - was[FORCE]
+                    uneven = max(abs(was[RISING] * dt - rise), abs(then[STATES + RISING] * dt - rise))
+                    may = not max(was[FORCE], then[STATES + FORCE]) + uneven <= beyond
+            if may:
+                least = look
+                continue
+        if ends and least < HALVINGS:
+            until = left - (WHOLE >> least)
+            least += 1
+            continue
+        if then[STATES + FORCE] > top:
+            top = then[STATES + FORCE]
+        if was[RISING] > 0.0 and then[STATES + RISING] < 0.0 and least >= look:
+            h = math.ldexp(dt, -least)
+            after = then[STATES + FORCE]
+            top = max(top, _top(was[FORCE], was[RISING], after, then[STATES + RISING], h))
+        left -= WHOLE >> least
+        for j in range(STATES):
+            now[j] = then[j]
+        if ends:
+            events += 1
+            least = look
+            begins = True
+            parted = False
+            for k in range(ENDS):
+                if then[STATES + GUARDS + k] < -slack[allowed + k]:
+                    if k < CONTACTS:
+                        touching ^= 1 << k
+                    elif PARTS == 1 and k == CONTACTS:
+                        parted = True
+                    else:
+                        # What slid stands, for now; what was stuck does, too.
+                        now[1] = 0.0
+                        standing, motion = True, 0
+            if parted:
+                pressed = 1 - pressed
+                at = 2 * (((pressed * MOTIONS + motion) << CONTACTS) + touching) * COLUMNS
+                cover = _row(begin, at + COLUMNS, now)
+                now[2] = _row(begin, at, now)
+                if CREEPS == 1:
+                    now[3] = cover
+                if pressed == 1:
+                    touched = 1
+        else:
+            for j in range(GUARDS + ENDS):
+                was[j] = then[STATES + j]
+            if least > look and events < MOST_EVENTS:
+                # What was seen to happen lies in the second half of what was looked at.
+                least = min(least + 1, HALVINGS) if left > until else look
+
+    came = now[0] - closure
+    gap1 = gap - came
+    revolutions1 = revolutions - came / rate
+    if leaves or not drive.closed_rev < revolutions1 < drive.open_rev:
+        return plant_move(plant, state, effort_n, dt)  # type: ignore[no-any-return]
+    # A mode that begins at the very end of the tick has yet to act.
+    force = max(then[STATES + FORCE], 0.0) if pressed == 1 else 0.0
+    cover, arm = squeezed.cover_m, squeezed.arm_n
+    if CREEPS == 1:
+        cover, arm = now[3], now[4]
+    if PARTS == 1:
+        d = now[2]
+        if pressed == 1:
+            touched = 1
+        elif now[0] < 0.0 and abs(d) + abs(cover) <= IN_SHAPE_M:
+            touched = 0
+    else:
+        if now[0] >= 0.0:
+            touched = 1
+        d = now[0] if touched == 1 else 0.0
+    if LAGS == 1:
+        given = now[STATES - 1]
+    after_states, _ = take_states(thing.terms, squeezed.states, now, own)
+    felt = Squeezed(d, force, squeezed.slope_n_m, after_states, cover, arm, squeezed.rate_m_s, math.inf)
+    if thing.held == 1:
+        # Centred: the other half does the same.
+        other = felt
+    return PlantState(
+        revolutions1,
+        -now[1] / rate,
+        gap1,
+        rate,
+        force,
+        force,
+        offset,
+        touched,
+        felt,
+        top,
+        given,
+        other,
+        step,
+        n + 1,
+        lost + (1 if events >= MOST_EVENTS else 0),
+        0.0,
+    )

@@ -1,0 +1,67 @@
+"""The ways in which the simulator trades accuracy for time, as `graspsense tradeoff simulation` measures them."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import Final
+
+from attrs import evolve
+
+from graspsense.plugin_api import Variant
+
+ACCURACIES: Final = (0.3, 0.1, 0.03, 0.01, 0.001, 1e-4)
+STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)
+FINE_S: Final = 2e-5
+"""Steps so short that what is left is the model's own error."""
+
+_FORMS: Final = (
+    Variant(
+        method="halved steps",
+        fidelity="full",
+        step="until all stands still",
+        settings={"fidelity": "reference", "accuracy": 1e-4},
+        role="reference",
+    ),
+    *(
+        Variant(
+            method="steps by their error",
+            fidelity=fidelity,
+            step=f"{accuracy:g}",
+            settings={"fidelity": fidelity, "accuracy": accuracy},
+        )
+        for fidelity in ("scene", "full")
+        for accuracy in ACCURACIES
+    ),
+    *(
+        Variant(
+            method=f"even steps, {scheme}",
+            fidelity="full",
+            step=f"{step_s * 1e3:g} ms",
+            settings={"fidelity": "full", "scheme": scheme, "step_s": step_s},
+        )
+        for scheme in ("explicit", "implicit")
+        for step_s in STEPS_S
+    ),
+    Variant(
+        method="in the interpreter",
+        fidelity="scene",
+        step="0.01",
+        settings={"fidelity": "scene", "accuracy": 0.01, "compile": "never"},
+    ),
+    *(
+        Variant(
+            method="even steps, explicit",
+            fidelity=f"scene at {accuracy:g}",
+            step=f"{FINE_S * 1e3:g} ms",
+            settings={"fidelity": "scene", "accuracy": accuracy, "scheme": "explicit", "step_s": FINE_S},
+            role="floor",
+        )
+        for accuracy in (0.1, 0.01)
+    ),
+)
+
+
+def variants() -> tuple[Variant, ...]:
+    """Return each scheme at each fidelity, from coarse to fine; compiled where that can be done."""
+    compiled = "always" if find_spec("numba") is not None else "never"
+    return tuple(evolve(one, settings={"compile": compiled, **one.settings}) for one in _FORMS)

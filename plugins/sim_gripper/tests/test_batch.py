@@ -1,0 +1,301 @@
+"""Many grasps at once: the same for any number of workers, whoever runs them, with the user's settings."""
+
+import io
+import math
+import sys
+import tracemalloc
+
+import numpy as np
+import pytest
+from attrs import fields
+
+from graspsense.core.errors import UnknownName
+from graspsense.core.plugins import IsolatedPlugins
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
+from graspsense.plugin_api import EFFORT, Command, ControllerEntry, Outcome, Trace, create, hookimpl
+from graspsense_sim_gripper import batch, one_of_many, plain_process
+from graspsense_sim_gripper.backend import SimBackend
+from graspsense_sim_gripper.batch import SLICE, WORTH_A_PROCESS, run_many
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.one_of_many import Job, plainly
+from graspsense_sim_gripper.plain_process import NotHandedOver, PlainProcess
+from graspsense_sim_gripper.scene import catalogue, shipped_scenes
+
+HYBRID = create("controller", "hybrid")
+FEATURES = create("feature-set", "chitta")
+SCENES = ["block", "can:empty_open", "toy", "none"]
+
+
+def bits(trace):
+    columns = (getattr(trace, f.name) for f in fields(Trace) if f.name != "units")
+    return b"".join(np.ascontiguousarray(column).tobytes() for column in columns)
+
+
+def mixed(n):
+    return [SCENES[k % len(SCENES)] for k in range(n)], range(100, 100 + n)
+
+
+@pytest.mark.slow
+def test_the_number_of_workers_decides_nothing_to_the_bit():
+    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+    scenes, seeds = mixed(3 * SLICE + 1)
+    one, two, five = (
+        run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True, workers=w, draw=FEATURES.extract)
+        for w in (1, 2, 5)
+    )
+    for a, b, c in zip(one, two, five, strict=True):
+        assert bits(a.trace) == bits(b.trace) == bits(c.trace)
+        assert a.drawn == b.drawn == c.drawn or any(np.isnan(a.drawn.values))
+        assert a.body == b.body == c.body
+    # What stands in the common composition for terms that an object lacks changes no bit, and is not handed back.
+    odd = ["odwalla:full_open", "egg", "none"]
+    alone = run_many(SimConfig(), HYBRID, odd, range(3), compiled=False)
+    common = run_many(SimConfig(), HYBRID, odd, range(3), compiled=True)
+    for a, b in zip(alone, common, strict=True):
+        np.testing.assert_allclose(b.trace.force_left_n, a.trace.force_left_n, rtol=1e-9, atol=1e-12)
+        assert [type(state) for state in b.body.squeezed.states] == [
+            type(state) for state in a.body.squeezed.states
+        ]
+
+
+def test_what_is_drawn_may_keep_a_column_of_the_trace():
+    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+    scenes, seeds = mixed(SLICE)
+    kept = run_many(
+        SimConfig(), HYBRID, scenes, seeds, compiled=True, draw=lambda trace: trace.gap_m, traces=False
+    )
+    whole = run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True)
+
+    for one, other in zip(kept, whole, strict=True):
+        assert one.kept is None
+        assert one.drawn.tobytes() == other.trace.gap_m.tobytes()
+
+
+@pytest.mark.slow
+def test_plain_grasps_in_processes_are_those_of_this_one_to_the_bit():
+    n = 2 * WORTH_A_PROCESS
+    scenes, seeds = mixed(n)
+    told = []
+    apart = run_many(
+        SimConfig(),
+        HYBRID,
+        scenes,
+        seeds,
+        compiled=False,
+        workers=2,
+        # A closure, which no other process could be handed.
+        draw=lambda trace: (len(told) >= 0, FEATURES.extract(trace)),
+        progress=lambda done, total: told.append((done, total)),
+    )
+    here = run_many(SimConfig(), HYBRID, scenes[:3], seeds[:3], compiled=False, draw=FEATURES.extract)
+    for a, b in zip(apart[:3], here, strict=True):
+        assert bits(a.trace) == bits(b.trace)
+        assert a.drawn == (True, b.drawn)
+    assert told[0] == (0, n)
+    assert told[-1] == (n, n)
+
+
+def test_a_batch_takes_the_run_settings_as_the_runner_does():
+    # Held ten times as long as by default, which a batch once did not notice.
+    run = RunConfig(seed=4, hold_s=2.5)
+    config = SimConfig(object="toy")
+    alone = run_grasp(SimBackend(config), HYBRID, run).trace
+    among = run_many(config, HYBRID, ["toy"], [4], run=run)[0].trace
+    assert bits(alone) == bits(among)
+    short = run_many(config, HYBRID, ["toy"], [4])[0].trace
+    assert alone.t_s[-1] - short.t_s[-1] == pytest.approx(2.25, abs=0.02)
+
+
+def test_a_law_that_never_ends_a_grasp_is_ended_as_by_the_runner():
+    law, run = Endless(HYBRID.config), RunConfig(seed=1, grasp_timeout_s=0.2, opening_timeout_s=0.2)
+    alone = run_grasp(SimBackend(SimConfig(object="none")), law, run)
+    among = run_many(SimConfig(), law, ["none"], [1], run=run)[0]
+    assert among.outcome == alone.outcome == Outcome.ABORTED
+    assert among.reason == alone.reason
+    assert "grasp_timeout_s" in among.reason
+    assert bits(alone.trace) == bits(among.trace)
+
+
+def test_a_command_that_is_no_number_ends_a_grasp_of_many_as_one_alone():
+    law = Lost(HYBRID.config)
+    alone = run_grasp(SimBackend(SimConfig(object="none")), law, RunConfig(seed=1))
+    among = run_many(SimConfig(), law, ["none"], [1])[0]
+    assert among.outcome == alone.outcome == Outcome.ABORTED
+    assert among.reason == alone.reason
+
+
+def test_a_law_no_other_process_can_find_runs_here_and_the_warning_says_so(monkeypatch):
+    class Local(type(HYBRID)):
+        step = staticmethod(endless)
+
+    monkeypatch.setattr(batch, "WORTH_A_PROCESS", 1)
+    law = Local(HYBRID.config)
+    run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
+    n = SLICE + 1
+    with pytest.warns(UserWarning, match="on one core"):
+        done = run_many(SimConfig(), law, ["none"] * n, range(n), run=run, compiled=False, workers=2)
+    assert [one.outcome for one in done] == [Outcome.ABORTED] * n
+
+
+def job(controller=HYBRID, **more):
+    return Job(
+        controller=controller,
+        **{"config": SimConfig(), "run": RunConfig(), "draw": None, "traces": True, **more},
+    )
+
+
+def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit():
+    run = RunConfig(hold_s=math.inf, grasp_timeout_s=0.01, opening_timeout_s=0.1)
+    odd = job(config=SimConfig(skin_n_m=math.inf, noise_counts=0.0, step_s=1e-4), run=run)
+    names = [*catalogue(), *shipped_scenes(), "none"]
+    with PlainProcess(odd) as process:
+        apart = process.run(names, np.arange(len(names)))
+    # Nothing is there: channels that were never felt are NaN, and so are the features drawn.
+    assert {one.outcome for one in apart} == {Outcome.ABORTED}
+    for name, seed, one in zip(names, range(len(names)), apart, strict=True):
+        here = plainly(odd, name, seed)
+        assert (one.outcome, one.reason) == (here.outcome, here.reason)
+        assert repr(one.body) == repr(here.body)
+        assert [type(part) for part in one.body.squeezed.states] == [
+            type(part) for part in here.body.squeezed.states
+        ]
+        assert bits(one.trace) == bits(here.trace)
+
+
+def test_no_trace_is_handed_over_where_nobody_wants_one():
+    run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
+    with PlainProcess(job(run=run, traces=False)) as process:
+        (one,) = process.run(["none"], [0])
+    assert one.kept is None
+    assert one.drawn is None
+    told = []
+    # A closure, which no other process could be handed: it is called here.
+    with PlainProcess(
+        job(run=run, traces=False, draw=lambda trace: told.append(len(trace)) or "felt")
+    ) as process:
+        (one,) = process.run(["none"], [0])
+    assert (one.kept, one.drawn) == (None, "felt")
+    assert told == [len(plainly(job(run=run), "none", 0).trace)]
+
+
+def test_a_process_that_is_killed_leaves_its_grasps_to_this_one(monkeypatch):
+    class Doomed(PlainProcess):
+        def __enter__(self):
+            found = super().__enter__()
+            self._process.kill()
+            return found
+
+    monkeypatch.setattr(batch, "PlainProcess", Doomed)
+    monkeypatch.setattr(batch, "WORTH_A_PROCESS", 1)
+    run, n = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1), SLICE + 1
+    with pytest.warns(UserWarning, match="on one core: the process for plain grasps has ended"):
+        done = run_many(SimConfig(), HYBRID, ["none"] * n, range(n), run=run, compiled=False, workers=2)
+    assert [bits(one.trace) for one in done[:2]] == [
+        bits(plainly(job(run=run), "none", k).trace) for k in (0, 1)
+    ]
+    assert len(done) == n
+
+
+def test_an_answer_that_breaks_off_is_no_answer():
+    with pytest.raises(EOFError):
+        plain_process._read_line(io.BytesIO(b'{"done": []'))
+    with pytest.raises(EOFError):
+        plain_process._read(io.BytesIO(b"abc"), 4)
+
+
+def test_what_is_not_all_in_names_and_values_is_not_handed_over():
+    altered = create("controller", "hybrid")
+    numbers = altered.params()
+    altered.params = lambda: numbers._replace(ramp_s=numbers.ramp_s + 1.0)
+    with pytest.raises(NotHandedOver, match="hybrid made of its settings has other numbers"):
+        PlainProcess(job(altered))
+    with pytest.raises(NotHandedOver, match="Endless is no controller that a plugin declares"):
+        PlainProcess(job(Endless(HYBRID.config)))
+
+
+def test_what_fails_in_another_process_is_said():
+    class Here:
+        GRASPSENSE_API = (1, 0)
+
+        @staticmethod
+        @hookimpl
+        def graspsense_controllers():
+            yield ControllerEntry(
+                name="endless",
+                target=f"{__name__}:Endless",
+                config="graspsense.plugins.controllers.hybrid:HybridConfig",
+                summary="",
+                requires=(),
+                commands=("effort",),
+            )
+
+    with IsolatedPlugins(Here), PlainProcess(job(Endless(HYBRID.config))) as process:
+        for _ in range(2):
+            with pytest.raises(NotHandedOver, match="no controller named 'graspsense-test/endless'"):
+                process.run(["none"], [0])
+    with (
+        PlainProcess(job()) as process,
+        pytest.raises(NotHandedOver, match="UnknownName: no object named 'blok'"),
+    ):
+        process.run(["blok"], [0])
+
+
+def test_without_numba_the_plain_loop_runs_and_says_so(monkeypatch):
+    monkeypatch.setitem(sys.modules, "numba", None)
+    monkeypatch.setattr(batch, "WORTH_COMPILING", 2)
+    run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
+    with pytest.warns(UserWarning, match=r"plain Python on one core.*numba is not installed"):
+        done = run_many(SimConfig(), HYBRID, ["none"] * 2, [1, 2], run=run)
+    assert len(done) == 2
+
+
+def test_room_is_made_on_the_way_without_beginning_again(monkeypatch):
+    whole = run_many(SimConfig(), HYBRID, ["toy"], [3])[0].trace
+    monkeypatch.setattr(one_of_many, "TICKS", 100)
+    monkeypatch.setattr(one_of_many, "IMAGES", 64)
+    # Storage reads its sizes when it is made.
+    assert bits(run_many(SimConfig(), HYBRID, ["toy"], [3])[0].trace) == bits(whole)
+
+
+def test_traces_are_kept_only_where_they_are_asked_for():
+    backend = SimBackend(SimConfig(sensor="ideal"))
+    run = RunConfig(grasp_timeout_s=0.5, opening_timeout_s=0.1)
+    tracemalloc.start()
+    done = backend.run_many(HYBRID, ["none"] * 40, range(40), run=run, draw=len)
+    kept, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert {one.trace for one in done} == {None}
+    assert all(one.drawn > 400 for one in done)
+    # Forty traces of half a second would be 2 MB.
+    assert kept < 1e6
+
+
+def test_an_option_nobody_knows_is_refused():
+    with pytest.raises(TypeError, match=r"no \['wokers'\]; it has .*'workers'"):
+        SimBackend(SimConfig()).run_many(HYBRID, ["none"], [0], wokers=2)
+
+
+def test_a_name_nobody_knows_is_refused_before_anything_runs():
+    told = []
+    with pytest.raises(UnknownName, match="no object named 'blok'"):
+        run_many(
+            SimConfig(), HYBRID, ["block"] * 3 + ["blok"], range(4), progress=lambda *of: told.append(of)
+        )
+    assert told == []
+
+
+def endless(params, state, frame, pads):
+    return Command(EFFORT, 0.0, 1.0, 1.0), state
+
+
+def lost(params, state, frame, pads):
+    return Command(EFFORT, float("nan"), 1.0, 1.0), state
+
+
+class Endless(type(HYBRID)):
+    step = staticmethod(endless)
+
+
+class Lost(type(HYBRID)):
+    step = staticmethod(lost)

@@ -1,0 +1,137 @@
+"""The choice of a model is tried before it is taken: a ladder from bold to careful, and a refusal at its end."""
+
+import math
+from typing import NamedTuple
+
+import pytest
+from attrs import evolve
+
+from graspsense.core.runner import run_grasp
+from graspsense.plugin_api import ConfigError, Controller, Outcome, RunConfig, create
+from graspsense_sim_gripper import checking
+from graspsense_sim_gripper.backend import SimBackend
+from graspsense_sim_gripper.checking import Control, checked_choice, standard
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.scene import ObjectSpec, find
+from graspsense_sim_gripper.selection import BOLD, CAREFUL
+from graspsense_sim_gripper.setting import choice_of
+from graspsense_sim_gripper.terms import Term
+from graspsense_sim_gripper.terms.registry import TERMS
+
+CONFIG = SimConfig(sensor="ideal", spread=False)
+SHELL = ("elastic", {"k1_n_m": 2000.0, "k3_n_m3": 2e6})
+
+
+def hybrid(**settings):
+    return Control(create("controller", "hybrid", **settings), RunConfig())
+
+
+def thing(*terms):
+    return ObjectSpec(name="made up", width_m=0.05, terms=terms)
+
+
+@pytest.mark.parametrize("accuracy", [0.1, 0.001])
+def test_a_checked_choice_says_what_a_trial_grasp_found(accuracy):
+    choice = checked_choice(evolve(CONFIG, accuracy=accuracy), find("naked:full_open"), hybrid())
+    assert choice.check.error <= 0.5 * accuracy
+    assert choice.check.grasps >= 2
+    assert choice.plain()["checked"].keys() == {"error", "quantity", "grasps"}
+
+
+def test_what_the_paths_say_too_boldly_the_trial_grasp_takes_back(monkeypatch):
+    # Without its creep the shell is at rest much sooner.
+    spec, config = thing(SHELL, ("maxwell", {"k_n_m": 2000.0, "tau_s": 0.2})), evolve(CONFIG, accuracy=0.1)
+    rash = BOLD._replace(model_share=5.0)
+    monkeypatch.setattr(checking, "LADDER", (rash, CAREFUL))
+    assert choice_of(config, spec, rung=rash).decisions[-1].decision != "kept"
+    choice = checked_choice(config, spec, hybrid())
+    assert (choice.rung, choice.check.grasps) == ("careful", 3)
+
+
+def test_force_and_speed_are_those_of_the_controller_unless_the_settings_say_others():
+    spec = thing(SHELL)
+    slow, fast = (
+        checked_choice(CONFIG, spec, hybrid(closing_speed_m_s=v, probing_force_n=f)).point
+        for v, f in ((0.01, 10.0), (0.04, 40.0))
+    )
+    assert (slow.speed_m_s, fast.speed_m_s) == (pytest.approx(0.01, rel=0.05), pytest.approx(0.04, rel=0.05))
+    assert fast.force_n > 2.0 * slow.force_n
+    told = evolve(CONFIG, expected_force_n=55.0, expected_speed_m_s=0.002)
+    point = checked_choice(told, spec, hybrid()).point
+    assert (point.force_n, point.speed_m_s) == (55.0, 0.002)
+    assert standard(told).controller.config.closing_speed_m_s == 0.002
+
+
+def test_a_slow_approach_is_taken_up_near_the_object(monkeypatch):
+    monkeypatch.setattr(checking, "LONGEST_S", 4.0)
+    choice = checked_choice(CONFIG, thing(SHELL), hybrid(closing_speed_m_s=0.002))
+    assert choice.check is not None
+    assert choice.point.speed_m_s == pytest.approx(0.002, rel=0.05)
+
+
+class Ragged(NamedTuple):
+    k_n_m: float
+
+
+def ragged(params, state, d0, d1, h, v1):
+    return params.k_n_m * d1 * (1.0 + 0.03 * math.log(1e-3 / h) if h > 0.0 else 1.0), state
+
+
+def test_a_law_that_hangs_on_its_steps_is_refused_by_name(monkeypatch):
+    term = Term(name="ragged", summary="", params=Ragged, law=ragged)
+    monkeypatch.setitem(TERMS, "ragged", term)
+    spec = thing(SHELL, ("ragged", {"k_n_m": 1000.0}))
+    # The finest rungs would find the same, and take seconds in the interpreter.
+    monkeypatch.setattr(checking, "LADDER", (CAREFUL,))
+    with pytest.raises(ConfigError) as refused:
+        checked_choice(CONFIG, spec, hybrid())
+    said = str(refused.value)
+    assert "'made up'" in said
+    assert "'ragged'" in said
+    assert "gripper.accuracy" in said
+    assert 'gripper.fidelity = "reference"' in said
+    # As a reference it is what it is, and says that nothing was checked.
+    assert checked_choice(evolve(CONFIG, fidelity="reference"), spec, hybrid()).check is None
+
+
+def test_forced_steps_and_contacts_beyond_the_tick_are_not_checked():
+    for config in (evolve(CONFIG, step_s=1e-4), evolve(CONFIG, scheme="implicit")):
+        assert checked_choice(config, thing(SHELL), hybrid()).check is None
+    hard = checked_choice(evolve(CONFIG, skin_n_m=math.inf), thing(("elastic", {"k1_n_m": 1e9})), hybrid())
+    assert (hard.contact.decision, hard.check) == ("peak not resolved", None)
+
+
+def failing(params, state, frame, pads):
+    raise RuntimeError("out of order")
+
+
+class Failing(Controller):
+    step = staticmethod(failing)
+
+    def params(self):
+        return create("controller", "hybrid").params()
+
+    def init(self):
+        return create("controller", "hybrid").init()
+
+
+def test_a_controller_that_fails_is_still_an_outcome():
+    grasp = run_grasp(SimBackend(CONFIG), Failing(None), RunConfig())
+    assert grasp.outcome == Outcome.ABORTED
+    assert "out of order" in grasp.reason
+
+
+def test_gas_that_is_spent_is_reported(tmp_path):
+    scene = tmp_path / "spent.toml"
+    scene.write_text(
+        'width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 500.0\n[[terms]]\ntype = "gas"\narea_m2 = 1e-3\n'
+        "area_slope_m = 0.0\nvolume_m3 = 2e-6\npressure_pa = 101325.0\nexponent = 1.4\nbulge_m3_pa = 2e-9\n"
+        "vent_m2 = 1e-5\n"
+    )
+    found = []
+    for force in (2.0, 20.0):
+        config = evolve(CONFIG, object=str(scene), open_gap_m=0.055, step_s=1e-3)
+        law = create("controller", "hybrid", probing_force_n=force)
+        found.append(run_grasp(SimBackend(config), law, RunConfig()).report["beyond"])
+    assert found[0] == ""
+    assert found[1].startswith("gas: pressed by more than it holds")

@@ -1,0 +1,98 @@
+"""How far one grasp is from another: instants inside the tick, scales below which nothing counts, kinds that differ."""
+
+import math
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from graspsense.core.runner import run_grasp
+from graspsense.plugin_api import HOLD, STEADY, RunConfig, create
+from graspsense_sim_gripper.backend import SimBackend
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.deviation import Course, deviation
+
+SPEED, TAU, STIFFNESS = 0.01, 0.05, 2000.0
+
+
+def squeeze(dt=1e-3, late=0.0, stiffness=STIFFNESS, outcome=STEADY):
+    """A face that moves at 10 mm/s until 0.1 s, then comes to rest over 50 ms; it touches at 45 mm."""
+    t = np.arange(0.0, 1.0, dt) + late
+    after = np.maximum(t - 0.1, 0.0)
+    travel = np.where(t < 0.1, SPEED * t, SPEED * (0.1 + TAU * (1.0 - np.exp(-after / TAU))))
+    speed = np.where(t < 0.1, SPEED, SPEED * np.exp(-after / TAU))
+    gap = 0.0455 - travel
+    force = stiffness * np.maximum(0.045 - gap, 0.0)
+    return Course(
+        outcome=outcome,
+        dt_s=dt,
+        gap_m=gap,
+        speed_m_s=-speed,
+        left_n=force,
+        right_n=force,
+        ended=len(t),
+        peak_n=float(force.max()),
+    )
+
+
+def test_the_quantities_are_those_of_the_motion_whatever_the_clock():
+    touches = (0.0005 + 0.625 / STIFFNESS) / SPEED
+    rests = 0.1 + TAU * math.log(SPEED / 1e-4)
+    for dt in (1e-3, 2e-4):
+        found = squeeze(dt).quantities()
+        assert found["delta_t"] == pytest.approx(rests - touches, abs=1e-5)
+        assert found["p_first"] == pytest.approx(0.045 - 0.625 / STIFFNESS, abs=1e-9)
+
+
+@pytest.mark.parametrize("late", [1e-4, 3.7e-4, 9e-4])
+def test_when_the_clock_ticks_hardly_matters(late):
+    one, other = squeeze(late=late).quantities(), squeeze().quantities()
+    for name, value in one.items():
+        assert value == pytest.approx(other[name], rel=2e-4), name
+
+
+def test_a_grasp_is_not_far_from_itself_and_a_stiffer_one_by_so_much():
+    assert deviation(squeeze(), squeeze())[0] == 0.0
+    error, whose = deviation(squeeze(stiffness=1.01 * STIFFNESS), squeeze())
+    assert 0.009 < error < 0.03
+    assert whose
+
+
+def test_below_its_scale_a_quantity_counts_as_if_it_were_that():
+    soft = squeeze(stiffness=1e-3)
+    assert deviation(evolve(soft, peak_n=soft.peak_n + 0.001), soft) == (pytest.approx(0.001), "peak")
+
+
+def test_grasps_of_two_kinds_are_without_bound_from_each_other():
+    assert deviation(squeeze(outcome=7), squeeze()) == (math.inf, "outcome")
+    never = evolve(squeeze(), speed_m_s=np.full(1000, -SPEED))
+    assert deviation(never, squeeze())[0] == math.inf
+    assert deviation(squeeze(), never)[0] == math.inf
+
+
+def test_at_rest_from_the_very_contact_on_there_is_no_rate():
+    creeping = evolve(squeeze(), speed_m_s=np.full(1000, -5e-5))
+    found = creeping.quantities()
+    assert found["delta_t"] == 0.0
+    assert math.isnan(found["dp_dt"])
+    assert math.isnan(found["df_dt"])
+
+
+def test_they_are_the_feature_sets_own_to_a_tick():
+    backend = SimBackend(SimConfig(sensor="ideal", spread=False))
+    trace = run_grasp(backend, create("controller", "hybrid"), RunConfig()).trace
+    drawn = create("feature-set", "chitta").extract(trace).as_dict()
+    found = Course(
+        outcome=STEADY,
+        dt_s=1e-3,
+        gap_m=trace.gap_m,
+        speed_m_s=trace.velocity_m_s,
+        left_n=trace.force_left_n,
+        right_n=trace.force_right_n,
+        ended=int(np.sum(trace.phase <= HOLD)),
+        peak_n=0.0,
+    ).quantities()
+    # The feature set's rest is told from the way in 50 ms, which begins a little before the speed is as low.
+    assert found["delta_t"] == pytest.approx(drawn["delta_t"], abs=0.05)
+    assert found["p_first"] == pytest.approx(drawn["p_first"], abs=1.5e-5)
+    assert found["f_steady"] == pytest.approx(drawn["f_steady"], rel=0.01)

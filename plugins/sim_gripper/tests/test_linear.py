@@ -1,0 +1,441 @@
+"""Exact maps of piecewise linear scenes: the right motion however stiff, and the plant where they do not apply."""
+
+import math
+
+import numpy as np
+import pytest
+from attrs import evolve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+from simulation_scene import CONFIG as PEERS
+
+from graspsense.core.runner import RunConfig, run_grasp
+from graspsense.plugin_api import create
+from graspsense_sim_gripper.backend import SimBackend
+from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.kernel import plant_of
+from graspsense_sim_gripper.linear import linear_of, move_of
+from graspsense_sim_gripper.linear_modes import HALVINGS, _exponentials
+from graspsense_sim_gripper.scene import ObjectSpec
+from graspsense_sim_gripper.setting import set_scene, setting_of
+from graspsense_sim_gripper.terms.registry import TERMS, laws_of
+from graspsense_sim_gripper.terms.term import OwnContact
+
+RUBS = SimConfig(
+    spread=False,
+    sensor="ideal",
+    transmission="straight",
+    moving_mass_kg=100.0,
+    coulomb_n=7.0,
+    breakaway_n=7.0,
+    load_share=0.5,
+    damping_n_s_m=10.0,
+    open_gap_m=0.0505,
+    fidelity="full",
+)
+FREE = {"coulomb_n": 0.0, "breakaway_n": 0.0, "load_share": 0.0}
+RIGID = {"skin_n_m": math.inf}
+
+ELASTIC = ("elastic", {"k1_n_m": 1e4})
+MAXWELL = ("maxwell", {"k_n_m": 3e3, "tau_s": 0.05})
+LOSS = ("loss", {"damping_n_s_m": 300.0})
+SLOSH = ("slosh", {"mass_kg": 0.3, "frequency_hz": 8.0, "damping_ratio": 0.05})
+LIQUID = ("liquid", {"area_m2": 1e-3, "neck_m2": 3e-4, "column_m": 0.03, "bulge_m3_pa": 1e-9})
+SURFACE = ("surface", {"mass_kg": 0.02, "k_n_m": 2e3, "damping_n_s_m": 5.0, "contact_n_m": 2e4})
+FOAM = ("foam", {"force_n": 20.0, "at_m": 0.01, "exponent": 1.0})
+
+
+def thing(*terms, **more):
+    return ObjectSpec(name="thing", width_m=0.05, **{"friction": 0.0, "terms": terms, **more})
+
+
+def ready(config, spec, *, maps=True, on_arrays=False):
+    """Return what moves the fingers, its parameters, and the setting."""
+    setting = set_scene(config, spec, 0) if isinstance(spec, str) else setting_of(config, spec, 0)
+    move, params = plant_of(laws_of(setting.kinds)), setting.plant
+    if maps:
+        found = linear_of(config, setting, on_arrays=on_arrays)
+        assert found is not None
+        params, shape = found
+        move = move_of(setting.kinds, shape, move)
+    return move, params, setting
+
+
+def along(config, spec, efforts, *, maps=True, speed_m_s=0.0):
+    """Return closure, force and closing speed at each tick under these efforts, and the last state."""
+    move, params, setting = ready(config, spec, maps=maps)
+    state = setting.body._replace(speed_rev_s=-speed_m_s / setting.body.rate_m_rev)
+    found = []
+    for effort in efforts:
+        state = move(params, state, effort, setting.dt_s)
+        speed = -state.speed_rev_s * state.rate_m_rev
+        found.append((setting.plant.thing.width_m - state.gap_m, state.left_n, speed))
+    return *np.array(found).T, state
+
+
+def squeeze_and_let_go(ticks):
+    """Yield efforts that press, swing, let go and press again."""
+    for i in range(ticks):
+        x = i / ticks
+        swings = 25.0 + 12.0 * math.sin(0.05 * i)
+        yield 25.0 if x < 0.35 else swings if x < 0.5 else 10.0 if x < 0.6 else -12.0 if x < 0.75 else 30.0
+
+
+@pytest.mark.parametrize("halvings", [0, 3, 20, HALVINGS])
+def test_the_maps_and_their_integrals_are_those_of_scipy(halvings):
+    rates = np.array([[0.0, 1.0, 0.0], [-1e6, -250.0, 1e6], [0.0, 0.0, 0.0]])
+    maps, integrals = _exponentials(rates[None], 1e-3)
+    h = math.ldexp(1e-3, -halvings)
+    np.testing.assert_allclose(maps[0, halvings], expm(rates * h), rtol=1e-11, atol=1e-13)
+    both = np.block([[rates, np.eye(3)], [np.zeros((3, 6))]])
+    np.testing.assert_allclose(integrals[0, halvings], expm(both * h)[:3, 3:], rtol=1e-10, atol=1e-16)
+
+
+# ------------------------------------------------------------------------------------- forms and laws
+
+NUMBER = st.floats(0.05, 20.0)
+
+
+@pytest.mark.parametrize("name", [name for name in TERMS if name not in ("rigid", "gas", "snap", "worn")])
+@settings(max_examples=30, deadline=None)
+@given(data=st.data())
+def test_a_terms_linear_form_is_its_law(name, data):
+    term = TERMS[name]
+    fields = {field: data.draw(NUMBER) for field in term.params._fields}
+    for field in ("k3_n_m3", "arm1_n_m", "arm2_n_m"):
+        fields.update({field: 0.0} if field in fields else {})
+    fields.update({"exponent": 1.0} if name == "foam" else {})
+    params = term.params(**fields)
+    form, state = term.linear(params), term.at_rest
+    touching = data.draw(st.booleans())
+    d0, way, h = data.draw(NUMBER), data.draw(st.floats(-0.2, 0.2)), data.draw(st.floats(1e-4, 2e-2))
+    numbers = [data.draw(st.floats(-1.0, 1.0)) for _ in state] if name != "foam" else []
+    if isinstance(form, OwnContact):
+        # So far on either side that it stays there.
+        numbers[0] = d0 - 5.0 if touching else d0 + 5.0
+        form = form.touching if touching else form.parted
+    if numbers:
+        state = type(state)(*numbers)
+    force, after = term.law(params, state, d0, d0 + way, h, way / h)
+    n = len(form.rates)
+    assert n == len(numbers)
+    # (s, d) along a straight path, d' beside them.
+    rates = np.zeros((n + 2, n + 2))
+    rates[n, n + 1] = 1.0
+    if n:
+        rates[:n, :n], rates[:n, n], rates[:n, n + 1] = form.rates, form.by_compression, form.by_speed
+    end = expm(rates * h) @ [*numbers, d0, way / h]
+    expected = form.spring_n_m * end[n] + form.damper_n_s_m * end[n + 1] + np.dot(form.force, end[:n])
+    assert force == pytest.approx(expected, rel=1e-7, abs=1e-7 * (1.0 + abs(form.spring_n_m * d0)))
+    if n:
+        np.testing.assert_allclose(after, end[:n], rtol=1e-7, atol=1e-7)
+
+
+def test_what_is_not_linear_is_the_plants():
+    for change in (
+        {"breakaway_n": 8.0},
+        {"transmission": "pr2"},
+        {"fidelity": "reference"},
+        {"scheme": "explicit"},
+        {"step_s": 1e-4},
+    ):
+        config = evolve(RUBS, **change)
+        assert linear_of(config, setting_of(config, thing(ELASTIC), 0)) is None, change
+    for spec in (
+        thing(("elastic", {"k1_n_m": 1e4, "k3_n_m3": 1.0})),
+        thing(ELASTIC, ("rigid", {"hertz_n_m15": 1e7})),
+        thing(ELASTIC, held=True, offset_m=1e-4),
+    ):
+        assert linear_of(RUBS, setting_of(RUBS, spec, 0)) is None, spec
+
+
+# ------------------------------------------------------------------------------------- against steps
+
+QUICK = ("covers", "rigid", "surface", "table")
+SCENES = {
+    "covers": ({}, thing(ELASTIC, MAXWELL, SLOSH)),
+    "rigid": (RIGID, thing(ELASTIC, LOSS)),
+    "surface": ({}, thing(SURFACE, ELASTIC)),
+    "elastic": (RIGID, thing(ELASTIC)),
+    "arm alone": ({}, thing(MAXWELL)),
+    "liquid": ({}, thing(ELASTIC, LOSS, LIQUID)),
+    "foam": ({}, thing(FOAM)),
+    "bare surface": (RIGID, thing(SURFACE)),
+    "damped covers": ({"skin_damping_n_s_m": 50.0}, thing(ELASTIC, MAXWELL)),
+    "creeping covers": ({"skin_creep_n_m": 2e4, "skin_creep_s": 0.1}, thing(ELASTIC, MAXWELL)),
+    "both": ({"skin_creep_n_m": 2e4, "skin_damping_n_s_m": 50.0}, thing(ELASTIC, SLOSH)),
+    "lag": ({"drive_lag_s": 0.02}, thing(ELASTIC, MAXWELL)),
+    "constant friction": ({"load_share": 0.0}, thing(ELASTIC)),
+    "friction of the load": ({"coulomb_n": 0.0, "breakaway_n": 0.0}, thing(ELASTIC, MAXWELL)),
+    "no friction": (FREE, thing(ELASTIC, MAXWELL)),
+    "held": ({}, thing(ELASTIC, MAXWELL, held=True)),
+    "table": ({}, thing(ELASTIC, MAXWELL, friction=0.3, mass_kg=0.5)),
+    "off centre": ({}, thing(ELASTIC, MAXWELL, offset_m=2e-4, friction=0.3, mass_kg=0.5)),
+    "nothing": ({}, thing()),
+}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in SCENES]
+)
+def test_maps_agree_with_the_steps_at_a_tight_tolerance(name):
+    change, spec = SCENES[name]
+    config = evolve(RUBS, **change)
+    efforts = list(squeeze_and_let_go(1200))
+    closure, force, _, state = along(config, spec, efforts, speed_m_s=0.02)
+    fine = evolve(config, accuracy=1e-4)
+    closure1, force1, _, state1 = along(fine, spec, efforts, maps=False, speed_m_s=0.02)
+    if name != "nothing":
+        assert force.max() > 5.0
+        assert (force == 0.0).any()
+    np.testing.assert_allclose(closure, closure1, atol=5e-7)
+    np.testing.assert_allclose(force, force1, atol=1e-3 * max(force.max(), 1.0))
+    assert state.peak_n == pytest.approx(state1.peak_n, rel=2e-4)
+    assert state.touched == state1.touched
+    assert state.unresolved == 0
+
+
+@pytest.mark.parametrize("covers", [True, False])
+def test_maps_agree_with_an_integrator_while_it_slides_and_while_it_is_stuck(covers):
+    """A shell with an arm and a swinging column: written down once more, as a differential equation."""
+    spec = thing(ELASTIC, MAXWELL, LIQUID)
+    config = evolve(RUBS, open_gap_m=0.0501, **({} if covers else RIGID))
+    _, force, speed, _ = along(config, spec, [25.0] * 600, speed_m_s=0.02)
+    stuck = int(np.argmax(speed == 0.0))
+    assert 50 < stuck < 500
+    assert np.all(speed[stuck:] == 0.0)
+    skins = 0.5 * config.skin_n_m if covers else 0.0
+    k, (k_m, tau) = 1e4, (3e3, 0.05)
+    mass, weight, damping = 1e3 * 0.03 * 1e-6 / 3e-4, 1e3 * 9.80665 * 1e-6 / 3e-4, None
+    damping = 8.0 * math.pi * 1e-3 * 0.03 * (1e-6 / 3e-4) / 3e-4
+    wall = 1e-6 / 1e-9
+
+    def compression(c, q, y):
+        return (skins * c - q + wall * y) / (skins + k + wall) if covers else c
+
+    def own(d, q, y):
+        return k * d + q + wall * (d - y)
+
+    def side(t, s):
+        c, v, q, y, w = s
+        d = compression(c, q, y)
+        n = own(d, q, y)
+        # Of the balance, differentiated; q' = k_m d' - q / tau.
+        rate = (skins * v + q / tau + wall * w) / (skins + k + wall + k_m) if covers else v
+        speeding = (25.0 - 7.0 - 1.5 * n - 10.0 * v) / 100.0 if v > 0.0 else 0.0
+        return [v, speeding, k_m * rate - q / tau, w, (wall * (d - y) - weight * y - damping * w) / mass]
+
+    def stops(t, s):
+        return s[1]
+
+    stops.terminal, stops.direction = True, -1.0
+    start = [-1e-4, 0.02, 0.0, 0.0, 0.0]
+    # Free to the contact: a mass under a constant force.
+    pushed, b = 18.0 / 100.0, 10.0 / 100.0
+
+    def free(t, s):
+        return [s[1], pushed - b * s[1]]
+
+    def touches(t, s):
+        return s[0]
+
+    touches.terminal = True
+    begun = solve_ivp(free, (0.0, 0.1), start[:2], "DOP853", events=touches, rtol=1e-11, atol=1e-15)
+    at, (_, v) = begun.t[-1], begun.y[:, -1]
+    slid = solve_ivp(
+        side,
+        (at, 0.6),
+        [0.0, v, 0.0, 0.0, 0.0],
+        "DOP853",
+        events=stops,
+        rtol=1e-11,
+        atol=1e-14,
+        dense_output=True,
+    )
+    end, last = slid.t[-1], slid.y[:, -1].copy()
+    last[1] = 0.0
+    stood = solve_ivp(side, (end, 0.6), last, "DOP853", rtol=1e-11, atol=1e-14, dense_output=True)
+    times = 1e-3 * np.arange(1, 601)
+    later = times > at
+    s = np.where(times <= end, slid.sol(times), stood.sol(times))
+    expected = own(compression(s[0], s[2], s[3]), s[2], s[3])
+    assert stuck == int(np.argmax(times >= end))
+    np.testing.assert_allclose(force[later], expected[later], rtol=1e-7, atol=1e-6)
+
+
+# ------------------------------------------------------------------------------------- closed forms
+
+
+@pytest.mark.parametrize("stiffness", [1e3, 1e5, 1e9])
+def test_a_damped_oscillator_after_the_contact(stiffness):
+    config = evolve(RUBS, **FREE, **RIGID, damping_n_s_m=200.0, open_gap_m=0.05001)
+    times = 1e-3 * np.arange(1, 61)
+    _, force, _, state = along(config, thing(("elastic", {"k1_n_m": stiffness})), [0.0] * 60, speed_m_s=0.01)
+    a = 1.0
+    # The way to the contact, 10 um, under the drive's damper; then half a swing.
+    came = 1e-5
+    at = -math.log(1.0 - came * 2.0 * a / 0.01) / (2.0 * a)
+    v = 0.01 - 2.0 * a * came
+    w = math.sqrt(stiffness / 100.0 - a * a)
+    t = times - at
+    exact = np.where((t > 0.0) & (w * t < math.pi), stiffness * v / w * np.exp(-a * t) * np.sin(w * t), 0.0)
+    np.testing.assert_allclose(force, exact, rtol=1e-6, atol=1e-7 * stiffness * v / w)
+    top = math.atan2(w, a) / w
+    peak = stiffness * v / w * math.exp(-a * top) * math.sin(w * top)
+    if w * 0.06 > math.pi:
+        assert state.peak_n == pytest.approx(peak, rel=1e-3)
+
+
+def test_it_slides_as_far_as_its_speed_and_friction_say_and_stands():
+    config = evolve(RUBS, load_share=0.0, damping_n_s_m=0.0, open_gap_m=0.08)
+    closure, _, speed, _ = along(config, thing(ELASTIC), [0.0] * 600, speed_m_s=0.03)
+    # v^2 m / (2 c), and exactly no further.
+    assert closure[-1] - (0.05 - 0.08) == pytest.approx(0.03**2 * 100.0 / (2.0 * 7.0), rel=1e-9)
+    stands = int(np.argmax(speed == 0.0))
+    assert stands == math.ceil(0.03 * 100.0 / 7.0 / 1e-3) - 1
+    assert np.all(closure[stands:] == closure[-1])
+
+
+def test_below_breakaway_it_never_moves():
+    spec = thing(ELASTIC, MAXWELL)
+    move, params, setting = ready(RUBS, spec)
+    state = setting.body._replace(speed_rev_s=-0.02 / setting.body.rate_m_rev)
+    for _ in range(500):
+        state = move(params, state, 25.0, 1e-3)
+    assert state.speed_rev_s == 0.0
+    before = state
+    setting = evolve(setting, dt_s=1e3)
+    params, shape = linear_of(RUBS, setting)
+    move = move_of(setting.kinds, shape, plant_of(laws_of(setting.kinds)))
+    for _ in range(1000):
+        state = move(params, state, 25.0, 1e3)
+    # The arm gives way, and the fingers hold.
+    assert (state.gap_m, state.revolutions, state.speed_rev_s) == (before.gap_m, before.revolutions, 0.0)
+    covers = 0.5 * RUBS.skin_n_m
+    assert state.left_n == pytest.approx((0.05 - state.gap_m) / (1.0 / covers + 1.0 / 1e4), rel=1e-9)
+
+
+def test_what_relaxes_is_followed_up_to_the_edge_of_friction():
+    """An arm gives way under fingers whose drive comes up slowly: they stick and slip until nothing moves any more."""
+    spec = thing(ELASTIC, ("maxwell", {"k_n_m": 1e4, "tau_s": 0.2}))
+    config = evolve(RUBS, load_share=0.0, moving_mass_kg=1.0, drive_lag_s=0.1)
+    closure, force, speed, state = along(config, spec, [60.0] * 8000, speed_m_s=0.02)
+    assert force[-1] == pytest.approx(60.0 - 7.0, rel=1e-6)
+    assert closure[-1] == pytest.approx(53.0 / (0.5 * RUBS.skin_n_m) + 53.0 / 1e4, rel=1e-6)
+    assert (speed == 0.0).any()
+    assert state.unresolved == 0
+
+
+# ------------------------------------------------------------------------------------- energy, stiffness
+
+
+@pytest.mark.parametrize(
+    ("change", "terms"),
+    [
+        (RIGID, (ELASTIC, MAXWELL)),
+        ({}, (ELASTIC, MAXWELL)),
+        ({"skin_damping_n_s_m": 50.0}, (ELASTIC, LOSS)),
+        ({"skin_n_m": 2e4}, (("elastic", {"k1_n_m": 1e8}), ("loss", {"damping_n_s_m": 1e6}))),
+    ],
+)
+def test_with_the_drive_off_stored_energy_never_rises(change, terms):
+    config = evolve(RUBS, **{**FREE, **change})
+    move, params, setting = ready(config, thing(*terms))
+    state = setting.body._replace(speed_rev_s=-0.05 / setting.body.rate_m_rev)
+    k, arm = terms[0][1]["k1_n_m"], dict(terms).get("maxwell", {}).get("k_n_m", 1.0)
+
+    def energy():
+        v, d = state.speed_rev_s * state.rate_m_rev, state.squeezed.compression_m
+        q = state.squeezed.states[2][0] if "maxwell" in dict(terms) else 0.0
+        cover = (
+            0.05 - state.gap_m - d if setting.plant.thing.skins_n_m < math.inf and state.left_n > 0 else 0.0
+        )
+        stored = k * d * d + q * q / arm + (0.5 * config.skin_n_m * cover * cover if cover else 0.0)
+        return 0.5 * (100.0 * v * v + stored)
+
+    before, first = energy(), energy()
+    for _ in range(400):
+        state = move(params, state, 0.0, 1e-3)
+        assert energy() <= before + 1e-9 * first
+        before = energy()
+    assert before < first
+
+
+class Counting(list):
+    """Maps that count how many numbers of them were looked at."""
+
+    looked = 0
+
+    def __getitem__(self, at):
+        Counting.looked += 1
+        return super().__getitem__(at)
+
+
+def test_a_stiff_contact_costs_no_more_than_a_soft_one():
+    costs = {}
+    for stiffness in (1e4, 1e6, 1e9):
+        move, params, setting = ready(
+            evolve(RUBS, **RIGID), thing(("elastic", {"k1_n_m": stiffness}), LOSS, MAXWELL)
+        )
+        params = params._replace(maps=Counting(params.maps))
+        state = setting.body._replace(speed_rev_s=-0.02 / setting.body.rate_m_rev)
+        Counting.looked = 0
+        for effort in squeeze_and_let_go(3000):
+            state = move(params, state, effort, 1e-3)
+        costs[stiffness] = Counting.looked
+        assert math.isfinite(state.left_n)
+    # Steps would be a thousand times shorter; what there is of it are more rebounds, each of which is located.
+    assert costs[1e6] <= 1.5 * costs[1e4], costs
+    assert costs[1e9] <= 2.5 * costs[1e4], costs
+
+
+def surface_of(contact_n_m, mass_kg=0.02):
+    return thing(("surface", {**SURFACE[1], "contact_n_m": contact_n_m, "mass_kg": mass_kg}), friction=0.0)
+
+
+@pytest.mark.parametrize("contact_n_m", [1e3, 1e4, 1e6, 1e9])
+def test_however_stiff_it_comes_to_rest_at_the_same_force(contact_n_m):
+    closure, force, _, state = along(PEERS, surface_of(contact_n_m), [2.0] * 3000)
+    assert np.all(np.isfinite(force))
+    assert force[-1] == pytest.approx(2.0, rel=1e-3)
+    assert state.left_n == state.right_n
+    # At rest the surface's spring has the force, and the contact has it again.
+    assert closure[-1] == pytest.approx(2.0 / 2e3 + 2.0 / contact_n_m, rel=1e-3)
+
+
+def test_a_surface_as_light_as_dust_is_not_tunnelled_through():
+    closure, force, _, _ = along(PEERS, surface_of(2e4, 1e-6), [2.0] * 2000)
+    assert closure.max() < 4e-3
+    assert np.all(np.isfinite(force))
+
+
+# ------------------------------------------------------------------------------------- as a whole grasp
+
+
+def test_the_report_says_that_maps_take_the_ticks(tmp_path):
+    """And that steps do where there is friction that is greater at rest."""
+    law = create("controller", "hybrid", probing_force_n=5.0)
+    for breakaway, scheme in ((0.0, "exact maps"), (1.0, "Verlet")):
+        config = evolve(PEERS, breakaway_n=breakaway)
+        report = run_grasp(SimBackend(config), law, RunConfig(seed=1)).report
+        rows = [row for row in report["selection"]["decisions"] if row["term"] == "steps"]
+        assert [row["decision"] for row in rows] == [scheme]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config", [PEERS, evolve(RUBS, spread=True, drive_lag_s=0.01, open_gap_m=0.07)])
+def test_the_runner_and_many_grasps_give_one_trace(config):
+    law = create("controller", "hybrid", probing_force_n=5.0)
+    config = evolve(config, object="peers_surface")
+    alone = run_grasp(SimBackend(config), law, RunConfig(seed=1))
+    plain, fast = (
+        run_many(config, law, [config.object], [1], compiled=compiled)[0] for compiled in (False, True)
+    )
+    assert plain.outcome == alone.outcome
+    assert plain.body == fast.body
+    for name in ("force_left_n", "gap_m", "velocity_m_s", "command"):
+        assert np.array_equal(getattr(plain.trace, name), getattr(fast.trace, name)), name
+        assert np.array_equal(getattr(plain.trace, name), getattr(alone.trace, name)), name

@@ -1,0 +1,34 @@
+"""The scene on which other engines are measured: a constant mass on a light surface, against an exact solution."""
+
+import numpy as np
+import pytest
+from simulation_scene import CONFIG, OPEN_M, TICK, exact
+
+from graspsense_sim_gripper.kernel import plant_of
+from graspsense_sim_gripper.setting import set_scene
+from graspsense_sim_gripper.terms.registry import laws_of
+
+
+def profile(t):
+    """Return the force that is asked for: 1 N to find the surface, up to 15 N, down to 5 N."""
+    up = min(1.0 + max(10.0 * (t - 0.6), 0.0), 15.0)
+    return up if t <= 5.0 else max(15.0 - 10.0 * (t - 5.0), 5.0)
+
+
+@pytest.mark.parametrize("ticks", [600, pytest.param(7000, marks=pytest.mark.long)])
+def test_the_open_loop_profile_gives_the_exact_trace(ticks):
+    setting = set_scene(CONFIG, CONFIG.object, 0)
+    move, state = plant_of(laws_of(setting.kinds)), setting.body
+    gaps, forces = [], []
+    for tick in range(ticks):
+        state = move(setting.plant, state, profile(tick * TICK), TICK)
+        gaps.append(state.gap_m)
+        forces.append(state.left_n)
+    # Its columns are of the beginning of each tick, the plant's of the end.
+    run = exact(lambda tick, x, v, f: profile(tick * TICK), ticks + 1)
+    gap, force = OPEN_M - run.x[1:], run.force[1:]
+    peak = force.max()
+    assert peak > 1.0
+    assert np.max(np.abs(np.array(gaps) - gap)) < 1e-5
+    assert np.sqrt(np.mean((np.array(forces) - force) ** 2)) < 1e-2 * peak
+    assert state.left_n == pytest.approx(state.right_n)
