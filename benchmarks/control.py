@@ -22,7 +22,8 @@ from datetime import date
 from importlib.metadata import version
 from typing import Any
 
-from graspsense.core.runner import RunConfig, run_grasp
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import create
 from graspsense_pr2_gripper import backend as driver
 from graspsense_pr2_gripper import opening

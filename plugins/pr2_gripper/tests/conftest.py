@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import math
+import sys
 import threading
+from collections import deque
 from collections.abc import Iterator
+from types import ModuleType
 from typing import Any
 
 import pytest
 
 from graspsense.plugin_api import create
+from graspsense_pr2_gripper import link, opening
 from graspsense_pr2_gripper.config import FaultConfig
+from graspsense_pr2_gripper.discovery import LIBRARY
 from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.firmware import Firmware
 from graspsense_pr2_gripper.protocol import Identity
@@ -56,3 +62,102 @@ def no_thread_is_left() -> Iterator[None]:
 def calibrations_apart(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     """No test reads or writes the calibrations of whoever runs it."""
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+
+
+class Machine:
+    """A computer with HID sockets: a board in one of them reports when `tick` is called, or by the clock."""
+
+    def __init__(self) -> None:
+        self.plugged: dict[str, tuple[Wire, str]] = {}
+        self.open_handles: list[Any] = []
+        self.changed = threading.Condition()
+        self.zero_timeouts = 0
+        self.appear: list[tuple[int, str, Wire, str]] = []
+        self.listings = 0
+        self.at_endpoint: list[bytes] = []
+
+    def plug(self, path: str, wire: Wire, serial: str = "L7") -> None:
+        self.plugged[path] = (wire, serial)
+
+    def unplug(self, path: str) -> None:
+        with self.changed:
+            del self.plugged[path]
+            self.changed.notify_all()
+
+    def enumerate(self) -> list[dict[str, Any]]:
+        self.listings += 1
+        for at, path, wire, serial in list(self.appear):
+            if self.listings >= at:
+                self.plugged[path] = (wire, serial)
+        return [
+            {"vendor_id": 0x1209, "product_id": 1, "serial_number": serial, "path": path.encode()}
+            for path, (_, serial) in self.plugged.items()
+        ]
+
+    def tick(self, count: int = 1) -> None:
+        with self.changed:
+            for _ in range(count):
+                for handle in self.open_handles:
+                    if handle.path in self.plugged:
+                        for report in self.plugged[handle.path][0].step():
+                            if len(handle.queue) < 64:  # the kernel keeps the oldest
+                                handle.queue.append(report)
+            self.changed.notify_all()
+
+
+class Device:
+    """`hidraw.device()`."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        self.queue: deque[bytes] = deque()
+        self.path = ""
+
+    def open_path(self, path: bytes) -> None:
+        if path.decode() not in self.machine.plugged:
+            raise OSError("open failed")
+        self.path = path.decode()
+        self.queue.extend(self.machine.at_endpoint)
+        self.machine.open_handles.append(self)
+
+    def read(self, size: int, timeout_ms: int = 0) -> list[int]:
+        if timeout_ms == 0:
+            self.machine.zero_timeouts += 1  # this one blocks for good
+        with self.machine.changed:
+            self.machine.changed.wait_for(
+                lambda: self.queue or self.path not in self.machine.plugged, timeout_ms / 1e3
+            )
+            if self.queue:
+                return list(self.queue.popleft()[:size])
+            if self.path not in self.machine.plugged:
+                raise OSError("read error")
+            return []
+
+    def write(self, data: bytes) -> int:
+        with self.machine.changed:
+            if self.path not in self.machine.plugged:
+                return -1
+            self.machine.plugged[self.path][0].output(bytes(data))
+            return len(data)
+
+    def get_feature_report(self, report_id: int, size: int) -> list[int]:
+        if self.path not in self.machine.plugged:
+            raise OSError("read error")
+        return list(self.machine.plugged[self.path][0].firmware.feature()[:size])
+
+    def close(self) -> None:
+        if self in self.machine.open_handles:
+            self.machine.open_handles.remove(self)
+
+
+@pytest.fixture
+def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
+    made = Machine()
+    module = ModuleType(LIBRARY)
+    module.enumerate = made.enumerate  # type: ignore[attr-defined]
+    module.device = lambda: Device(made)  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, LIBRARY, module)
+    monkeypatch.setattr(opening, "POLL_S", 0.001)
+    # Its time stands still between two ticks, so on a machine that is busy every report looks old.
+    monkeypatch.setattr(link, "OLDEST_S", math.inf)
+    return made

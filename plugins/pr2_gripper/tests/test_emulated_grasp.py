@@ -132,7 +132,7 @@ def commanded_safely(monkeypatch: pytest.MonkeyPatch, grasps: int, seed: int) ->
         wires.append(made)
         return made
 
-    monkeypatch.setattr("graspsense_pr2_gripper.opening.Wire", wire)
+    monkeypatch.setattr("graspsense_pr2_gripper.emulation.Wire", wire)
     outcomes: dict[str, int] = {}
     for i in range(grasps):
         probing_n = chance.choice([17.0, 20.0, 23.0, 90.0, 500.0])

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from glob import glob
 from importlib import import_module
+from pathlib import Path
 
 from attrs import frozen
 
@@ -71,6 +72,19 @@ def search(config: Pr2Config) -> Search:
     return Search(config, matching, len(listed))
 
 
+def on_the_bus(config: Pr2Config) -> list[str]:
+    """Return the places on the bus that have a device of these numbers, as Linux lists them without any library."""
+    found = []
+    for folder in glob("/sys/bus/usb/devices/*"):
+        try:
+            numbers = tuple(int((Path(folder) / one).read_text(), 16) for one in ("idVendor", "idProduct"))
+        except (OSError, ValueError):
+            continue
+        if numbers == (config.vendor_id, config.product_id):
+            found.append(os.path.basename(folder))
+    return sorted(found)
+
+
 def found_devices() -> Sequence[FoundDevice]:
     """Return the devices under the default numbers, as `graspsense devices` lists them."""
     return [
@@ -79,7 +93,9 @@ def found_devices() -> Sequence[FoundDevice]:
             serial=one.serial,
             where=one.path,
             ready=one.readable,
-            advice="" if one.readable else f"no permission on {one.path}: the udev rule in the README",
+            advice=""
+            if one.readable
+            else f"no permission on {one.path}: `graspsense doctor` gives the udev rule",
         )
         for one in search(Pr2Config()).matching
     ]

@@ -5,34 +5,19 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
-from graspsense.plugin_api import ConfigError, DeviceInfo, NoDevice, SensorBackend, create
+from graspsense.plugin_api import NoDevice
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.discovery import search
-from graspsense_pr2_gripper.faults import Wire
-from graspsense_pr2_gripper.firmware import Firmware
-from graspsense_pr2_gripper.link import JOIN_S, Link, LockStepLink, ThreadedLink, close_within
+from graspsense_pr2_gripper.emulation import Emulation, emulated_board
+from graspsense_pr2_gripper.link import JOIN_S, READ_S, Link, LockStepLink, ThreadedLink, close_within
 from graspsense_pr2_gripper.protocol import FEATURE_ID, Identity, ProtocolError, decode_identity
 from graspsense_pr2_gripper.transports.emulated import LockStepTransport, PacedTransport
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
 
 POLL_S: Final = 0.25
 """A device that went away is looked for this often."""
-EMULATED_SERIAL: Final = "EMULATED"
-EFFORT_LIMIT_UN: Final = 100_000_000
-SPEED_LIMIT_UM_S: Final = 200_000
-"""Software limits of the PR2 gripper at the time of the paper (pr2_defs, gripper_defs.urdf.xacro, August 2009)."""
-IMAGE_PERIOD_US: Final = 41_000
-WATCHDOG_MS: Final = 100
-
-
-class Emulation(NamedTuple):
-    """The software board behind an emulated transport: its wire, its body and what the body says of itself."""
-
-    wire: Wire
-    body: SensorBackend[Any]
-    body_info: DeviceInfo
 
 
 class Opened(NamedTuple):
@@ -53,6 +38,8 @@ def open_board(config: Pr2Config, seed: int, wait_s: float) -> Opened:
     transport = _open_transport(config, wait_s)
     try:
         identity = decode_identity(transport.feature(FEATURE_ID))
+        # One report may have waited in the device since long before: it would count all after it as lost.
+        transport.read(READ_S)
         if config.serial and identity.serial != config.serial:
             raise ProtocolError(
                 f"its feature report says serial {identity.serial!r}, asked for is {config.serial!r}"
@@ -67,39 +54,15 @@ def open_board(config: Pr2Config, seed: int, wait_s: float) -> Opened:
 
 
 def _emulated(config: Pr2Config, seed: int) -> Opened:
-    values = dict(config.body_config)
-    if config.object is not None:
-        values["object"] = config.object
-    body: SensorBackend[Any] = create("sensor-backend", config.body, **values)
-    info = body.open(seed)
-    if info.clock != "virtual":
-        raise ConfigError(
-            f"gripper.body {config.body!r} has a clock of its own, so no board can be emulated over it: name a gripper "
-            "with a virtual clock, such as sim"
-        )
-    identity = Identity(
-        firmware=(1, 0, 0),
-        serial=config.serial or EMULATED_SERIAL,
-        transmission=config.transmission,
-        pad_counts_per_n=1600,
-        side_counts_per_n=400,
-        edge_counts_per_n=600,
-        effort_limit_un=EFFORT_LIMIT_UN,
-        speed_limit_um_s=SPEED_LIMIT_UM_S,
-        report_rate_hz=round(info.rate_hz),
-        image_period_us=IMAGE_PERIOD_US,
-        watchdog_ms=WATCHDOG_MS,
-        encoder_ticks_rev=1200,
-        accelerometer_g=0,
-    )
-    wire = Wire(Firmware(body, identity), config.faults, seed)
+    emulation = emulated_board(config, seed)
+    wire = emulation.wire
     identity = decode_identity(wire.firmware.feature())
     link: Link
     if config.pace == "lock-step":
         link = LockStepLink(LockStepTransport(wire), 1.0 / identity.report_rate_hz)
     else:
         link = ThreadedLink(PacedTransport(wire))
-    return Opened(link, identity, Emulation(wire, body, info))
+    return Opened(link, identity, emulation)
 
 
 def _open_transport(config: Pr2Config, wait_s: float) -> Transport:
@@ -114,7 +77,7 @@ def _open_transport(config: Pr2Config, wait_s: float) -> Transport:
                 # Just plugged in, a node may not be ours yet: udev is still at it.
                 missing = NoDevice(
                     f"the PR2 gripper is there but cannot be opened: {error}\n"
-                    "  try: the udev rule in the README of graspsense-pr2-gripper, then plug it in again;\n"
+                    "  try: the udev rule that `graspsense doctor` prints, then plug it in again;\n"
                     "       or close the other program that has it"
                 )
         elif openers:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.plugin_api import Channel, FoundDevice, SensorBackendEntry, hookimpl
+from graspsense.plugin_api import Channel, EmulatorEntry, Finding, FoundDevice, SensorBackendEntry, hookimpl
 
 GRASPSENSE_API = (1, 0)
 
@@ -31,7 +31,20 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
             Channel("pads", "counts", _PADS_RATE_HZ),
         ),
         accepts=("effort",),
-        needs='pip install "graspsense[pr2]"; on Linux also a udev rule (README of graspsense-pr2-gripper)',
+        needs='pip install "graspsense[pr2]"; on Linux also a udev rule (graspsense doctor)',
+    )
+
+
+@hookimpl
+def graspsense_emulators() -> Iterable[EmulatorEntry]:
+    """Return the software board as a device of this machine."""
+    yield EmulatorEntry(
+        name="pr2",
+        target="graspsense_pr2_gripper.emulator.board:emulate",
+        summary="the PR2 gripper's board, over a simulated gripper",
+        wires=("uhid", "usb"),
+        options=("gripper.transport=emulated",),
+        needs='pip install "graspsense[pr2]"',
     )
 
 
@@ -41,3 +54,11 @@ def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:
     from graspsense_pr2_gripper.discovery import found_devices
 
     return found_devices()
+
+
+@hookimpl
+def graspsense_diagnose(config: object, timeout_s: float) -> Iterable[Finding]:
+    """Look into the gripper of these settings, or the one under the default numbers."""
+    from graspsense_pr2_gripper.diagnosis import diagnose
+
+    return diagnose(config, timeout_s)

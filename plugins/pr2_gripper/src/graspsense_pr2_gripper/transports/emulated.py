@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections import deque
 from typing import Final, final
 
 from graspsense_pr2_gripper.faults import Wire
+from graspsense_pr2_gripper.pacing import on_time
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
 
 _GONE: Final = "the emulated cable was pulled"
@@ -95,18 +95,15 @@ class PacedTransport(Transport):
         return bool(self._wire.unplugged or self._failed)
 
     def _run(self) -> None:
-        due = time.monotonic()
         try:
-            while not self._stop:
+            for _ in on_time(self._period_s):
+                if self._stop:
+                    return
                 with self._arrived:
                     for report in self._wire.step():
                         if len(self._waiting) < QUEUE:
                             self._waiting.append(report)
                     self._arrived.notify()
-                due += self._period_s
-                wait = due - time.monotonic()
-                if wait > 0.0:
-                    time.sleep(wait)
         except Exception as error:
             # A body of anybody's may fail; to the host that is a device that went away.
             with self._arrived:

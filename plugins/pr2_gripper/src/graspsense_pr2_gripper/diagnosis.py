@@ -1,0 +1,221 @@
+"""Why a gripper does not work: what is plugged in, who may open it, what each transport measures."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Generator, Iterator
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from typing import Final, Literal, NamedTuple
+
+from attrs import evolve
+
+from graspsense.plugin_api import DeviceLost, Finding, GraspsenseError, calibrations_of
+from graspsense_pr2_gripper.backend import TEST_NUMBER, UNCALIBRATED, device_numbers
+from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.discovery import Search, on_the_bus, search
+from graspsense_pr2_gripper.emulator.reasons import why_no_uhid, why_no_vhci
+from graspsense_pr2_gripper.opening import open_board
+from graspsense_pr2_gripper.protocol import Identity
+from graspsense_pr2_gripper.udev import RELOAD, RULES_FILE, hidraw_rule, usb_rule
+from graspsense_pr2_gripper.watching import Watched, share_of, watch_link
+
+TRANSPORTS: Final[tuple[Literal["hidraw", "pyusb"], ...]] = ("hidraw", "pyusb")
+LOST_SHARE: Final = 0.001
+"""A cable and a hub that are well lose nothing."""
+SLOW_SHARE: Final = 0.95
+
+
+class _Tried(NamedTuple):
+    """A transport that worked, and what the device says it is."""
+
+    identity: Identity
+    watched: Watched
+
+
+def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
+    """Return the findings on the gripper of these settings, or on the one under the default numbers."""
+    named = isinstance(config, Pr2Config)
+    if config is not None and not named:
+        return
+    wanted = config if isinstance(config, Pr2Config) else Pr2Config()
+    yield from _libraries()
+    if wanted.transport == "emulated":
+        yield Finding("device", "note", "gripper.transport is emulated: no device is looked for")
+        return
+    found = search(wanted)
+    yield from _plugged(found, named)
+    serials: dict[str, Identity] = {}
+    in_use = False
+    for transport in TRANSPORTS:
+        if in_use:
+            yield Finding(f"transport {transport}", "note", "not tried: another program commands the gripper")
+        elif not found.matching and not on_the_bus(wanted):
+            continue
+        else:
+            tried = yield from _transport(evolve(wanted, transport=transport), timeout_s / len(TRANSPORTS))
+            if tried is not None:
+                serials[tried.identity.serial] = tried.identity
+                in_use = tried.watched.in_use
+    for identity in serials.values():
+        yield from _calibrations(wanted, identity)
+    if sys.platform == "linux":
+        for wire, reason in (("uhid", why_no_uhid()), ("usb", why_no_vhci())):
+            lines = reason.split("\n", 1)
+            yield Finding(
+                f"emulate pr2 --wire {wire}",
+                "note" if reason else "ok",
+                lines[0] or "can be had",
+                _rest(lines),
+            )
+
+
+def _libraries() -> Iterator[Finding]:
+    for name in ("hidapi", "pyusb"):
+        try:
+            yield Finding(f"library {name}", "ok", version(name), numbers={"version": version(name)})
+        except PackageNotFoundError:
+            yield Finding(f"library {name}", "problem", "not installed", f"pip install {name}")
+
+
+def _plugged(found: Search, named: bool) -> Iterator[Finding]:
+    config = found.config
+    on_bus = on_the_bus(config)
+    if not found.matching:
+        if on_bus:
+            yield Finding(
+                "device",
+                "problem",
+                f"{found.wanted} is on the bus ({', '.join(on_bus)}), but has no HID node",
+                "another program may have it through libusb, or the module usbhid is missing: `sudo modprobe usbhid`",
+            )
+        else:
+            yield Finding(
+                "device",
+                "problem" if named else "note",
+                f"no {found.wanted}",
+                f"plug it in and switch it on; {found.looked}. Other numbers: -o gripper.vendor_id=0x1209 "
+                "-o gripper.product_id=0x0001",
+            )
+        return
+    for one in found.matching:
+        where = f"serial {one.serial or 'none'} at {one.path}, " + (
+            f"USB {', '.join(on_bus)}" if on_bus else "not on USB (through uhid?)"
+        )
+        yield Finding("device", "ok", where, numbers={"serial": one.serial, "path": one.path})
+        if not one.readable:
+            yield Finding(
+                "permission",
+                "problem",
+                f"you may not open {one.path}",
+                f"put this line in {RULES_FILE}:\n  {hidraw_rule(config)}\nthen `{RELOAD}`, and plug it in again",
+            )
+        else:
+            yield Finding(
+                "permission",
+                "ok",
+                f"you may open {one.path}",
+                f"the rule for it, if another may not:\n  {hidraw_rule(config)}",
+            )
+    if (config.vendor_id, config.product_id) == TEST_NUMBER:
+        yield Finding("number", "note", "1209:0001 is for private tests: do not pass on a device that has it")
+
+
+def _transport(config: Pr2Config, seconds: float) -> Generator[Finding, None, _Tried | None]:
+    """Yield what this transport does; return what it told of the device, or None where it did not work."""
+    subject = f"transport {config.transport}"
+    # The one that the user has not chosen may well be missing.
+    bad: Literal["note", "problem"] = "problem" if config.transport == "hidraw" else "note"
+    try:
+        opened = open_board(config, 0, 0.0)
+    except GraspsenseError as error:
+        lines = str(error).split("\n", 1)
+        rule = (
+            f"\nthe rule for it, in {RULES_FILE}:\n  {usb_rule(config)}"
+            if config.transport == "pyusb"
+            else ""
+        )
+        yield Finding(subject, bad, lines[0], _rest(lines) + rule)
+        return None
+    identity, link = opened.identity, opened.link
+    try:
+        watched = watch_link(link, seconds)
+    except DeviceLost as error:
+        yield Finding(subject, "problem", str(error), "its cable, a hub, its power")
+        return None
+    finally:
+        clean = link.close()
+    yield _measured(subject, identity, watched, clean)
+    return _Tried(identity, watched)
+
+
+def _measured(subject: str, identity: Identity, watched: Watched, clean: bool) -> Finding:
+    wanted_hz = float(identity.report_rate_hz)
+    numbers: dict[str, float | int | str | bool] = {
+        "serial": identity.serial,
+        "firmware": ".".join(map(str, identity.firmware)),
+        "rate_hz": round(watched.rate_hz, 2),
+        "rate_wanted_hz": wanted_hz,
+        **watched.counts,
+        "jitter_median_ms": round(share_of(watched.delays_s, 0.5) * 1e3, 3),
+        "jitter_99_ms": round(share_of(watched.delays_s, 0.99) * 1e3, 3),
+        "jitter_most_ms": round(share_of(watched.delays_s, 1.0) * 1e3, 3),
+        "latency_median_ms": round(share_of(watched.trips_s, 0.5) * 1e3, 3),
+        "latency_99_ms": round(share_of(watched.trips_s, 0.99) * 1e3, 3),
+        "echoes": len(watched.trips_s),
+        "in_use": watched.in_use,
+        "closed_cleanly": clean,
+    }
+    found = (
+        f"{watched.rate_hz:.1f} of {wanted_hz:g} Hz, {watched.lost} lost, {watched.corrupt} damaged, jitter "
+        f"{numbers['jitter_median_ms']} ms ({numbers['jitter_99_ms']} ms at 99 %)"
+    )
+    if watched.in_use:
+        found += ", another program commands it: nothing was sent"
+    elif watched.trips_s:
+        found += (
+            f", command to echo {numbers['latency_median_ms']} ms ({numbers['latency_99_ms']} ms at 99 %)"
+        )
+    wrong = []
+    if not watched.reports:
+        wrong.append("it is silent: reports should flow from power-on; check its power and firmware")
+    elif watched.rate_hz < SLOW_SHARE * wanted_hz:
+        wrong.append("reports are missing or slow: another port, no hub, less load on this machine")
+    if watched.lost > LOST_SHARE * max(watched.reports, 1):
+        wrong.append(
+            "reports are lost: another cable or port, or the usual scheduler kept the reader waiting"
+        )
+    if watched.corrupt:
+        wrong.append("reports are damaged though USB checks them too: that is the firmware's doing")
+    if watched.reports and not watched.in_use and not watched.trips_s:
+        wrong.append("no command was echoed: it reports but does not listen")
+    return Finding(subject, "problem" if wrong else "ok", found, "\n".join(wrong), numbers)
+
+
+def _calibrations(config: Pr2Config, identity: Identity) -> Iterator[Finding]:
+    if config.calibration == UNCALIBRATED:
+        yield Finding("calibration", "note", "gripper.calibration is none")
+        return
+    try:
+        stored = calibrations_of(config.calibration, identity.serial, device_numbers(identity))
+    except GraspsenseError as error:
+        lines = str(error).split("\n", 1)
+        yield Finding("calibration", "problem", lines[0], _rest(lines))
+        return
+    for kind in ("tare", "load-cell", "friction"):
+        subject = f"calibration {kind}"
+        if kind not in stored:
+            yield Finding(
+                subject, "note", f"none of {identity.serial}", f"graspsense calibrate {kind} --gripper pr2"
+            )
+            continue
+        made = datetime.fromisoformat(stored[kind].made)
+        days = (datetime.now(UTC) - made).total_seconds() / 86400.0
+        yield Finding(
+            subject, "ok", f"of {identity.serial}, {days:.1f} days old ({stored[kind].made})",
+            numbers={"age_days": round(days, 3), "made": stored[kind].made, "sha256": stored[kind].sha256},
+        )  # fmt: skip
+
+
+def _rest(lines: list[str]) -> str:
+    return "\n".join(line.strip().removeprefix("try: ") for line in lines[1].split("\n")) if lines[1:] else ""

@@ -1,0 +1,56 @@
+"""The software board: firmware over a body, behind a wire that may misbehave, as the settings ask for it."""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+from graspsense.plugin_api import ConfigError, DeviceInfo, SensorBackend, create
+from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.faults import Wire
+from graspsense_pr2_gripper.firmware import Firmware
+from graspsense_pr2_gripper.protocol import Identity
+
+EMULATED_SERIAL: Final = "EMULATED"
+EFFORT_LIMIT_UN: Final = 100_000_000
+SPEED_LIMIT_UM_S: Final = 200_000
+"""Software limits of the PR2 gripper at the time of the paper (pr2_defs, gripper_defs.urdf.xacro, August 2009)."""
+IMAGE_PERIOD_US: Final = 41_000
+WATCHDOG_MS: Final = 100
+
+
+class Emulation(NamedTuple):
+    """The software board behind an emulated transport: its wire, its body and what the body says of itself."""
+
+    wire: Wire
+    body: SensorBackend[Any]
+    body_info: DeviceInfo
+
+
+def emulated_board(config: Pr2Config, seed: int) -> Emulation:
+    """Return a board over the body that the settings name, which is opened. Raises ConfigError."""
+    values = dict(config.body_config)
+    if config.object is not None:
+        values["object"] = config.object
+    body: SensorBackend[Any] = create("sensor-backend", config.body, **values)
+    info = body.open(seed)
+    if info.clock != "virtual":
+        raise ConfigError(
+            f"gripper.body {config.body!r} has a clock of its own, so no board can be emulated over it: name a gripper "
+            "with a virtual clock, such as sim"
+        )
+    identity = Identity(
+        firmware=(1, 0, 0),
+        serial=config.serial or EMULATED_SERIAL,
+        transmission=config.transmission,
+        pad_counts_per_n=1600,
+        side_counts_per_n=400,
+        edge_counts_per_n=600,
+        effort_limit_un=EFFORT_LIMIT_UN,
+        speed_limit_um_s=SPEED_LIMIT_UM_S,
+        report_rate_hz=round(info.rate_hz),
+        image_period_us=IMAGE_PERIOD_US,
+        watchdog_ms=WATCHDOG_MS,
+        encoder_ticks_rev=1200,
+        accelerometer_g=0,
+    )
+    return Emulation(Wire(Firmware(body, identity), config.faults, seed), body, info)

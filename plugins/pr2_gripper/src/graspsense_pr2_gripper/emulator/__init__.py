@@ -1,0 +1,1 @@
+"""The software board as a device of the operating system: real nodes, real kernel, no hardware."""

@@ -1,0 +1,216 @@
+"""A software board plugged into this machine: it runs by the clock, and does what somebody tells it to do wrong."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Final, Literal, final
+
+from graspsense.plugin_api import EmulatedDevice, NoDevice
+from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.emulation import emulated_board
+from graspsense_pr2_gripper.emulator.port import Plug, Port
+from graspsense_pr2_gripper.emulator.reasons import why_no_uhid, why_no_vhci
+from graspsense_pr2_gripper.pacing import on_time
+from graspsense_pr2_gripper.protocol import FEATURE_ID, INPUT_LAYOUT, OUTPUT_ID
+
+PRODUCT: Final = "graspsense emulated PR2 gripper"
+APPEARS_S: Final = 5.0
+"""A node that is to appear is waited for this long."""
+JOIN_S: Final = 2.0
+
+Mood = Literal["well", "silent", "stalled"]
+
+
+def emulate(config: object, wire: str, seed: int) -> EmulatedBoard:
+    """Return the board of these settings on `uhid` or `usb`, or on the first that can be had; not plugged in yet.
+
+    Raises NoDevice where there is no way in, ConfigError.
+    """
+    assert isinstance(config, Pr2Config)
+    return EmulatedBoard(config, _way_in(wire), seed)
+
+
+@final
+class EmulatedBoard(EmulatedDevice):
+    """Steps the firmware in a thread of its own, whether or not it is plugged in: a pulled plug takes no power away."""
+
+    def __init__(self, config: Pr2Config, wire: str, seed: int) -> None:
+        self._board = emulated_board(config, seed).wire
+        identity = self._board.firmware.identity
+        self.wire = wire
+        self.rate_hz = float(identity.report_rate_hz)
+        self._serial = identity.serial
+        plug = Plug(config.vendor_id, config.product_id, identity.serial, PRODUCT)
+        self._port = _PORTS[wire](self, plug)
+        self._lock = threading.Lock()
+        self._mood: Mood = "well"
+        self._plugged = self._stop = False
+        self._failed = ""
+        self._sent = self._lost = self._sequence = self._commands = 0
+        self._late_s = 0.0
+        self._known = nodes(identity.serial)
+        self._thread = threading.Thread(target=self._run, name="emulated PR2 board", daemon=True)
+        self._thread.start()
+
+    @property
+    def stalled(self) -> bool:
+        """Whether nothing completes, in either direction."""
+        return self._mood == "stalled"
+
+    @property
+    def words(self) -> Mapping[str, str]:
+        """What it can be told."""
+        return {
+            "unplug": "pull the plug; the board keeps its power",
+            "plug": "plug it in again",
+            "silent": "send no reports, but take commands",
+            "stalled": "complete nothing, in either direction",
+            "halt": "stall the reading endpoint until the host clears it (usb)",
+            "well": "behave again",
+        }
+
+    def tell(self, word: str) -> None:
+        """Do one of `words`. Raises KeyError for any other, NoDevice where it cannot be plugged in."""
+        self._told()[word]()
+
+    def state(self) -> Mapping[str, float | int | str | bool]:
+        """Return how it is: what the fingers do, and what has been sent, lost and taken since it was started."""
+        with self._lock:
+            firmware = self._board.firmware
+            return {
+                "plugged": self._plugged,
+                "mood": self._mood,
+                "node": self.node(),
+                "sequence": self._sequence,
+                "sent": self._sent,
+                "lost": self._lost,
+                "commands": self._commands,
+                "effort_n": firmware.effort_un / 1e6,
+                "late_s": round(self._late_s, 4),
+                "failed": self._failed,
+            }
+
+    def node(self) -> str:
+        """Return the hidraw node of this device, or an empty string where it has none, as while libusb has it."""
+        return next(iter(sorted(nodes(self._serial) - self._known)), "")
+
+    def close(self) -> None:
+        """Unplug it and stop it."""
+        self._stop = True
+        self._thread.join(JOIN_S)
+        self._plugged = False
+        self._port.close()
+
+    def output(self, report: bytes) -> None:
+        """Take a command from the host."""
+        if report[:1] != bytes((OUTPUT_ID,)):
+            return
+        with self._lock:
+            if not self.stalled:
+                self._commands += 1
+                self._board.output(report)
+
+    def feature(self, report_id: int) -> bytes | None:
+        """Return the feature report."""
+        if report_id != FEATURE_ID or self.stalled:
+            return None
+        with self._lock:
+            return self._board.firmware.feature()
+
+    def _told(self) -> Mapping[str, Callable[[], object]]:
+        return {
+            "unplug": self._unplug,
+            "plug": self._plug,
+            "silent": lambda: self._be("silent"),
+            "stalled": lambda: self._be("stalled"),
+            "halt": self._port.halt,
+            "well": lambda: self._be("well"),
+        }
+
+    def _plug(self) -> None:
+        self._port.plug()
+        self._plugged = True
+        give_up = time.monotonic() + APPEARS_S
+        while not self.node() and time.monotonic() < give_up:
+            time.sleep(0.01)
+        if not self.node():
+            raise NoDevice(f"the kernel took the device, but no node of it appeared within {APPEARS_S:.0f} s")
+
+    def _unplug(self) -> None:
+        self._plugged = False
+        self._port.unplug()
+
+    def _be(self, mood: Mood) -> None:
+        self._mood = mood
+
+    def _run(self) -> None:
+        try:
+            for late_s in on_time(1.0 / self.rate_hz):
+                if self._stop:
+                    return
+                with self._lock:
+                    reports = self._board.step()
+                    self._late_s = late_s
+                # Without the lock: the port has one of its own, and calls `output` with it held.
+                for report in reports:
+                    self._hand_over(report)
+                if self._board.unplugged and self._plugged:
+                    self._unplug()
+        except Exception as error:
+            # A body of anybody's may fail; to the host that is a device that went away.
+            self._failed = f"{type(error).__name__}: {error}"
+            self._unplug()
+
+    def _hand_over(self, report: bytes) -> None:
+        if self._mood != "well" or not self._plugged:
+            return
+        self._lost += self._port.send(report)
+        self._sent += 1
+        self._sequence = INPUT_LAYOUT.unpack_from(report)[1]
+
+
+def nodes(serial: str) -> set[str]:
+    """Return the hidraw nodes of devices with this serial number, as the kernel lists them."""
+    found = set()
+    for entry in Path("/sys/class/hidraw").glob("*"):
+        try:
+            about = (entry / "device" / "uevent").read_text()
+        except OSError:
+            continue  # gone meanwhile
+        if f"HID_UNIQ={serial}\n" in about:
+            found.add(f"/dev/{entry.name}")
+    return found
+
+
+def _uhid(board: EmulatedBoard, plug: Plug) -> Port:
+    from graspsense_pr2_gripper.emulator.uhid import UhidPort
+
+    return UhidPort(board, plug)
+
+
+def _vhci(board: EmulatedBoard, plug: Plug) -> Port:
+    from graspsense_pr2_gripper.emulator.vhci import VhciPort
+
+    return VhciPort(board, plug)
+
+
+_PORTS: Final = {"uhid": _uhid, "usb": _vhci}
+_WHY_NOT: Final = {"uhid": why_no_uhid, "usb": why_no_vhci}
+
+
+def _way_in(wire: str) -> str:
+    """Return the wire asked for, or the first that can be had. Raises NoDevice, with what each one lacks."""
+    wires = (wire,) if wire else tuple(_PORTS)
+    reasons = {one: _WHY_NOT[one]() for one in wires}
+    for one, reason in reasons.items():
+        if not reason:
+            return one
+    told = "\n".join(f"{one}: {reason}" for one, reason in reasons.items())
+    raise NoDevice(
+        f"the emulated gripper cannot be a device of this machine\n{told}\n"
+        "without any device of the system, in one process:\n"
+        "  graspsense run --gripper pr2 -o gripper.transport=emulated -o gripper.pace=device"
+    )

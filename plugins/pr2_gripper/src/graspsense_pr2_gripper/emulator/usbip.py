@@ -1,0 +1,145 @@
+"""A USB device by USB/IP: the protocol of Documentation/usb/usbip_protocol.rst of the kernel, over any stream socket.
+
+An unlink is always answered, whatever else is not: a host that waits for one hangs for good.
+"""
+
+from __future__ import annotations
+
+import errno
+import socket
+import struct
+import threading
+from contextlib import suppress
+from typing import Final, NamedTuple
+
+from graspsense_pr2_gripper.emulator.port import Device, Plug
+from graspsense_pr2_gripper.emulator.usb_device import UsbDevice
+
+HEADER: Final = struct.Struct(">5I28s")
+"""Command, sequence number, device, direction, endpoint; what the command asks."""
+SUBMITTED: Final = struct.Struct(">Iiiii8s")
+"""Flags, length, and what interrupt transfers have no use for; the setup packet."""
+RETURN: Final = struct.Struct(">5Iiiiii8x")
+"""The header's first five; status, length, and what interrupt transfers have no use for."""
+SUBMIT, UNLINK = 1, 2
+RET_SUBMIT, RET_UNLINK = 3, 4
+IN: Final = 1
+_VICTIM: Final = struct.Struct(">I")
+_RETURN_UNLINK: Final = struct.Struct(">5Ii24x")
+
+
+class _Waiting(NamedTuple):
+    """A transfer of the host's that is not complete yet."""
+
+    number: int
+    endpoint: int
+    length: int
+    is_in: bool
+    setup: bytes
+    data: bytes
+
+
+class UsbipServer:
+    """Serves one host at a time, with one interrupt endpoint in each direction."""
+
+    def __init__(self, device: Device, plug: Plug) -> None:
+        self._device = device
+        self._usb = UsbDevice(device, plug)
+        self._lock = threading.RLock()
+        self._connection: socket.socket | None = None
+        self._waiting: list[_Waiting] = []
+        self._armed = b""
+
+    def connect(self, connection: socket.socket) -> None:
+        """Take a host's connection; `serve` then answers it."""
+        with self._lock:
+            self._connection = connection
+            self._waiting.clear()
+            self._armed, self._usb.halted = b"", False
+
+    def serve(self) -> None:
+        """Answer the host until it hangs up, or `hang_up` does."""
+        connection = self._connection
+        if connection is None:
+            return
+        with suppress(OSError), connection.makefile("rb") as stream:
+            while len(head := stream.read(HEADER.size)) == HEADER.size:
+                command, number, _, direction, endpoint, asked = HEADER.unpack(head)
+                if command == SUBMIT:
+                    _, length, _, _, _, setup = SUBMITTED.unpack(asked)
+                    is_in = direction == IN
+                    data = b"" if is_in else stream.read(length)
+                    with self._lock:
+                        self._waiting.append(_Waiting(number, endpoint, length, is_in, setup, data))
+                        self._complete()
+                elif command == UNLINK:
+                    self._unlink(number, *_VICTIM.unpack_from(asked))
+
+    def hang_up(self) -> None:
+        """End `serve`, at once."""
+        with self._lock:
+            connection, self._connection = self._connection, None
+        if connection is not None:
+            with suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+
+    def send(self, report: bytes) -> bool:
+        """Complete the host's read with this report, or arm the endpoint with it; return whether it was lost.
+
+        Like the endpoint of a microcontroller it holds one report; one that comes while it is full is lost.
+        """
+        with self._lock:
+            if self._connection is None:
+                return False
+            self._complete()
+            if self._armed:
+                return True
+            self._armed = report
+            self._complete()
+            return False
+
+    def halt(self) -> None:
+        """Stall the interrupt IN endpoint until the host clears it."""
+        with self._lock:
+            self._usb.halted = True
+            self._complete()
+
+    def _unlink(self, number: int, victim: int) -> None:
+        with self._lock:
+            left = [one for one in self._waiting if one.number != victim]
+            status = -errno.ECONNRESET if len(left) < len(self._waiting) else 0
+            self._waiting = left
+            self._write(_RETURN_UNLINK.pack(RET_UNLINK, number, 0, 0, 0, status))
+
+    def _complete(self) -> None:
+        """Complete every transfer that can be; with the lock held."""
+        if self._device.stalled:
+            return
+        waiting, self._waiting = self._waiting, []
+        for one in waiting:
+            if one.endpoint == 0:
+                answer = self._usb.control(one.setup, one.data)
+                if answer is None:
+                    self._return(one, -errno.EPIPE, 0, b"")
+                else:
+                    self._return(
+                        one, 0, len(answer) if one.is_in else one.length, answer if one.is_in else b""
+                    )
+            elif not one.is_in:
+                self._device.output(one.data)
+                self._return(one, 0, one.length, b"")
+            elif self._usb.halted:
+                self._return(one, -errno.EPIPE, 0, b"")
+            elif self._armed:
+                report, self._armed = self._armed[: one.length], b""
+                self._return(one, 0, len(report), report)
+            else:
+                self._waiting.append(one)
+
+    def _return(self, one: _Waiting, status: int, length: int, data: bytes) -> None:
+        self._write(RETURN.pack(RET_SUBMIT, one.number, 0, 0, 0, status, length, 0, 0, 0) + data)
+
+    def _write(self, data: bytes) -> None:
+        if self._connection is not None:
+            with suppress(OSError):  # unplugged at this moment
+                self._connection.sendall(data)

@@ -1,0 +1,84 @@
+"""What a link does, measured without moving anything: rate, loss, delay, and the way there and back."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from attrs import asdict
+
+from graspsense_pr2_gripper.link import Link
+from graspsense_pr2_gripper.protocol import RELEASE_KIND, OutputReport, encode_output
+
+TRIPS: Final = 50
+TRIP_S: Final = 0.5
+"""An echo that takes longer than this does not come."""
+MISSES: Final = 3
+"""After so many that did not come no further one is waited for."""
+FIRST_COUNTER: Final = 0x8000
+"""Far from the counters that a driver begins with."""
+
+
+class Watched(NamedTuple):
+    """What was seen of a link. Delays are over the fastest report's, as no clock tells of that one's own.
+
+    `in_use` says that another program commands the device: then nothing was sent to it, and no trip was timed.
+    """
+
+    reports: int
+    rate_hz: float
+    lost: int
+    corrupt: int
+    delays_s: Sequence[float]
+    trips_s: Sequence[float]
+    in_use: bool
+    counts: dict[str, int]
+
+
+def watch_link(link: Link, seconds: float) -> Watched:
+    """Listen for `seconds`, then time commands that let go until their echo. Raises DeviceLost."""
+    began = time.monotonic()
+    arrivals: list[tuple[float, float]] = []
+    echoes: set[int] = set()
+    while time.monotonic() - began < seconds:
+        arrival = link.next(TRIP_S)
+        if arrival is None:
+            continue
+        arrivals.append((arrival.host_s, arrival.host_s - arrival.report.time_us * 1e-6))
+        echoes.add(arrival.report.echo)
+    took_s = time.monotonic() - began
+    fastest_s = min((offset for _, offset in arrivals), default=0.0)
+    counts = asdict(link.stream.counts)
+    in_use = len(echoes) > 1
+    return Watched(
+        reports=counts["reports"],
+        rate_hz=counts["reports"] / took_s,
+        lost=counts["lost"],
+        corrupt=counts["corrupt"],
+        delays_s=sorted(offset - fastest_s for _, offset in arrivals),
+        trips_s=() if in_use or not arrivals else sorted(_trips(link)),
+        in_use=in_use,
+        counts=counts,
+    )
+
+
+def share_of(values: Sequence[float], share: float) -> float:
+    """Return the value that this share of the sorted values does not exceed; NaN where there are none."""
+    return values[min(int(len(values) * share), len(values) - 1)] if values else float("nan")
+
+
+def _trips(link: Link) -> list[float]:
+    trips: list[float] = []
+    for trip in range(TRIPS):
+        counter = FIRST_COUNTER + trip
+        sent = time.monotonic()
+        link.send(encode_output(OutputReport(counter, RELEASE_KIND, 0, 0, 0)))
+        while time.monotonic() - sent < TRIP_S:
+            arrival = link.next(TRIP_S)
+            if arrival is not None and arrival.report.echo == counter:
+                trips.append(arrival.host_s - sent)
+                break
+        if trip - len(trips) >= MISSES:
+            break
+    return trips

@@ -1,0 +1,198 @@
+"""What the doctor says of a gripper, with hidapi's module at the outermost edge and the emulated board behind it."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import pytest
+
+import graspsense_pr2_gripper.plugin
+from graspsense.cli.main import main
+from graspsense.core import plugins as loader
+from graspsense.core.calibration_files import Calibration, calibration_path, write_calibration
+from graspsense.core.plugins import IsolatedPlugins
+from graspsense.plugin_api import NoDevice
+from graspsense_pr2_gripper import diagnosis
+from graspsense_pr2_gripper.backend import device_numbers
+from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
+from graspsense_pr2_gripper.emulator import reasons
+from graspsense_pr2_gripper.emulator.board import emulate
+from graspsense_pr2_gripper.pacing import on_time
+from graspsense_pr2_gripper.protocol import EFFORT_KIND, OWN_LIMIT, OutputReport, encode_output
+from graspsense_pr2_gripper.udev import hidraw_rule
+
+Doctor = Callable[..., tuple[int, dict[str, dict[str, Any]]]]
+
+
+@pytest.fixture
+def doctor(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Doctor:
+    """Runs `graspsense doctor --json`; returns the exit code and the PR2 plugin's findings by subject."""
+    monkeypatch.setattr(diagnosis, "TRANSPORTS", ("hidraw",))
+
+    def run(*arguments: str) -> tuple[int, dict[str, dict[str, Any]]]:
+        with pytest.raises(SystemExit) as ended:
+            main(["doctor", "--json", "--timeout", "0.2", *arguments])
+        said = json.loads(capsys.readouterr().out)
+        (ours,) = (one for one in said["diagnoses"] if one["distribution"] == "graspsense-pr2-gripper")
+        assert ours["error"] == ""
+        return int(ended.value.code or 0), {one["subject"]: one for one in ours["findings"]}
+
+    return run
+
+
+@contextmanager
+def powered(machine: Any) -> Iterator[None]:
+    """The boards of this machine report by the clock."""
+    stop = threading.Event()
+
+    def tick() -> None:
+        for _ in on_time(0.001):
+            if stop.is_set():
+                return
+            machine.tick()
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+
+
+def test_no_gripper_is_a_problem_only_where_one_was_asked_for(doctor: Doctor, machine: Any) -> None:
+    assert doctor()[1]["device"]["state"] == "note"
+    code, said = doctor("--gripper", "pr2", "-o", "gripper.serial=R2")
+    assert (code, said["device"]["state"]) == (1, "problem")
+    assert "1209:0001 with serial number 'R2'" in said["device"]["found"]
+    assert "transport hidraw" not in said
+
+
+def test_the_doctor_comes_also_where_a_part_of_the_pipeline_is_missing(
+    doctor: Doctor, machine: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alone = IsolatedPlugins(graspsense_pr2_gripper.plugin)  # without the default pipeline's classifier
+    monkeypatch.setattr(loader, "_current", alone)
+    with pytest.raises(SystemExit) as ended:
+        main(["doctor", "--json", "--gripper", "pr2"])
+    assert ended.value.code == 1, "there is no gripper"
+
+
+def test_a_gripper_is_measured_and_not_moved(doctor: Doctor, machine: Any, board: Any) -> None:
+    wire = board()
+    machine.plug("/dev/hidraw3", wire)
+    with powered(machine):
+        _, said = doctor("--gripper", "pr2")
+    numbers = said["transport hidraw"]["numbers"]
+    assert (numbers["serial"], numbers["firmware"], numbers["rate_wanted_hz"]) == ("L7", "1.2.3", 1000.0)
+    assert numbers["reports"] > 0
+    assert (numbers["lost"], numbers["corrupt"], numbers["in_use"]) == (0, 0, False)
+    assert numbers["echoes"] > 0
+    assert 0.0 < numbers["latency_median_ms"] <= numbers["latency_99_ms"]
+    assert 0.0 <= numbers["jitter_median_ms"] <= numbers["jitter_99_ms"] <= numbers["jitter_most_ms"]
+    assert wire.firmware.effort_un == 0
+    assert said["calibration tare"]["state"] == "note"
+
+
+def test_lost_and_damaged_reports_are_a_problem_with_a_remedy(
+    doctor: Doctor, machine: Any, board: Any
+) -> None:
+    machine.plug("/dev/hidraw3", board(faults=FaultConfig(drop=0.2, corrupt=0.2)))
+    with powered(machine):
+        code, said = doctor("--gripper", "pr2")
+    found = said["transport hidraw"]
+    assert (code, found["state"]) == (1, "problem")
+    assert found["numbers"]["lost"] > 0
+    assert found["numbers"]["corrupt"] > 0
+    assert "another cable or port" in found["advice"]
+    assert "firmware's doing" in found["advice"]
+
+
+def test_a_silent_gripper_is_a_problem(doctor: Doctor, machine: Any, board: Any) -> None:
+    machine.plug("/dev/hidraw3", board())
+    code, said = doctor("--gripper", "pr2")
+    assert (code, said["transport hidraw"]["state"]) == (1, "problem")
+    assert "it is silent" in said["transport hidraw"]["advice"]
+
+
+def test_a_gripper_that_somebody_else_commands_is_left_alone(
+    doctor: Doctor, machine: Any, board: Any
+) -> None:
+    """A hidraw node is open to two programs at once: letting go here would drop what the other one holds."""
+    wire = board()
+    machine.plug("/dev/hidraw3", wire)
+    counter = 0
+    plain = machine.tick
+
+    def tick() -> None:
+        nonlocal counter
+        counter += 1
+        wire.output(
+            encode_output(OutputReport(counter & 0xFFFF, EFFORT_KIND, 9_000_000, OWN_LIMIT, OWN_LIMIT))
+        )
+        plain()
+
+    machine.tick = tick
+    with powered(machine):
+        _, said = doctor("--gripper", "pr2")
+    assert said["transport hidraw"]["numbers"]["in_use"] is True
+    assert said["transport hidraw"]["numbers"]["echoes"] == 0
+    assert wire.firmware.effort_un == 9_000_000
+
+
+def test_who_may_not_open_it_is_given_the_rule(
+    doctor: Doctor, machine: Any, board: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine.plug("/dev/hidraw3", board())
+    monkeypatch.setattr("graspsense_pr2_gripper.discovery.sys.platform", "linux")
+    monkeypatch.setattr("graspsense_pr2_gripper.discovery.os.access", lambda path, mode: False)
+    code, said = doctor()
+    assert (code, said["permission"]["state"]) == (1, "problem")
+    rule = hidraw_rule(Pr2Config())
+    assert rule in said["permission"]["advice"]
+    assert rule == 'KERNEL=="hidraw*", KERNELS=="0003:1209:0001.*", TAG+="uaccess"'
+
+
+def test_calibrations_are_told_with_their_age(
+    doctor: Doctor, machine: Any, board: Any, device_identity: Any
+) -> None:
+    machine.plug("/dev/hidraw3", board())
+    made = datetime.now(UTC) - timedelta(days=3)
+    zero = {"left": [3000.0] * 22, "right": [3000.0] * 22, "images": 24}
+    numbers = device_numbers(device_identity())
+    tare = Calibration(kind="tare", serial="L7", device=numbers, made=made.isoformat(), data=zero)
+    write_calibration(calibration_path("", "L7", "tare"), tare)
+    with powered(machine):
+        _, said = doctor("--gripper", "pr2")
+    assert said["calibration tare"]["state"] == "ok"
+    assert said["calibration tare"]["numbers"]["age_days"] == pytest.approx(3.0, abs=0.01)
+    assert said["calibration friction"]["advice"] == "graspsense calibrate friction --gripper pr2"
+
+
+@pytest.mark.parametrize(
+    ("platform", "container", "says"),
+    [
+        ("darwin", "", "uhid is of the Linux kernel, and this is macOS"),
+        ("win32", "", "vhci-hcd is of the Linux kernel, and this is Windows"),
+        ("linux", "docker", "this is a container (docker)"),
+        ("linux", "", "modprobe"),
+    ],
+)
+def test_where_no_device_can_be_emulated_it_says_why_and_offers_another(
+    monkeypatch: pytest.MonkeyPatch, platform: str, container: str, says: str, tmp_path: Any
+) -> None:
+    monkeypatch.setattr(reasons.sys, "platform", platform)
+    monkeypatch.setattr(reasons, "UHID_NODE", str(tmp_path / "uhid"))
+    monkeypatch.setattr(reasons, "VHCI", tmp_path / "vhci")
+    monkeypatch.setattr(reasons, "MODULES", tmp_path)
+    monkeypatch.setattr(reasons, "container", lambda: container)
+    (tmp_path / reasons.release()).mkdir()
+    with pytest.raises(NoDevice) as caught:
+        emulate(Pr2Config(transport="emulated"), "", 0)
+    assert says in str(caught.value)
+    assert "-o gripper.transport=emulated" in str(caught.value)
