@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import echo_json, echo_table, talk
+from graspsense.cli.output import echo_json, echo_table, file_to_write, talk
 from graspsense.cli.sources import SOURCES, classifier_option, learner_of, source_options, trials_of
 
 if TYPE_CHECKING:
@@ -32,8 +32,10 @@ if TYPE_CHECKING:
     help="Labels as they are; what is before the colon; or what is behind it, in each class apart.",
 )
 @click.option("--folds", type=int, default=10, show_default=True, help="Number of folds.")
-@click.option("--png", metavar="FILE", help="Draw the confusion matrix, too.")
-@click.option("--keep", metavar="FILE", help="Keep the trials' features as a CSV, too.")
+@click.option("--png", metavar="FILE", callback=file_to_write, help="Draw the confusion matrix, too.")
+@click.option(
+    "--keep", metavar="FILE", callback=file_to_write, help="Keep the trials' features as a CSV, too."
+)
 @classifier_option
 @source_options
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")

@@ -77,5 +77,7 @@ def import_(
             trial, number = import_recording(store, settings, installed(), labels)
             kept.append({"source": source, "trial": number, "outcome": trial.outcome.words})
             talk(f"{source}: trial {number}, {trial.outcome.words}")
+            for note in trial.device.notes:
+                talk(f"  {note}")
     if as_json:
         echo_json({"store": save, "trials": kept})

@@ -33,10 +33,15 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "train": ("graspsense.cli.train:train", "Make a model from labelled trials."),
     "predict": ("graspsense.cli.predict:predict", "Ask a model what trials are of."),
     "evaluate": ("graspsense.cli.evaluate:evaluate", "Measure an honest recognition rate."),
+    "experiment": ("graspsense.cli.experiment:experiment", "Run an experiment from a file; resume it."),
+    "tradeoff": ("graspsense.cli.tradeoff:tradeoff", "Measure speed against accuracy."),
+    "report": ("graspsense.cli.report:report", "Write the page of a store or an experiment."),
     "calibrate": ("graspsense.cli.calibrate:calibrate", "Keep a gripper's zero, load table and friction."),
     "config": ("graspsense.cli.config:config", "Show or check the settings of a pipeline."),
     "plugins": ("graspsense.cli.plugins:plugins", "Show what is installed and whether it works."),
     "devices": ("graspsense.cli.devices:devices", "Look for grippers that are plugged in."),
+    "doctor": ("graspsense.cli.doctor:doctor", "Say what is plugged in, and why it does not work."),
+    "emulate": ("graspsense.cli.emulate:emulate", "Stand in for a gripper as a device of this machine."),
     "completion": ("graspsense.cli.completion:completion", "Print the completion script for a shell."),
 }
 """Name to import string and summary of each command of our own."""
@@ -135,6 +140,11 @@ def _exit_code(arguments: list[str]) -> int:
         return 0
     except click.exceptions.Exit as ended:
         return ended.exit_code
+    except (
+        click.exceptions.NoArgsIsHelpError
+    ) as error:  # a group without a subcommand: the message is its help
+        click.echo(error.format_message(), err=True)
+        return EXIT_USAGE
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)
         return EXIT_INTERRUPTED

@@ -30,6 +30,26 @@ def print_model(model: Mapping[str, Any]) -> None:
         )
 
 
+def print_selection(selection: Mapping[str, Any]) -> None:
+    """Print what a simulated gripper reports as `selection`: what became of each term, why, and what it may cost."""
+    click.echo()
+    click.echo(
+        f"accuracy    {selection['accuracy']:.3g} asked for, {selection['error']:.2g} given away by estimate "
+        f"(rung: {selection['rung']}); {selection['steps']} steps"
+    )
+    checked = selection["checked"]
+    click.echo(
+        "checked     not by a trial grasp"
+        if checked is None
+        else f"checked     {checked['error']:.2g} in {checked['quantity']}, of {checked['grasps']} trial grasps, at "
+        f"{selection['expected_force_n']:.3g} N and {selection['expected_speed_m_s'] * 1e3:.3g} mm/s"
+    )
+    for row in selection["decisions"]:
+        click.echo(
+            f"{row['term']:<16}{row['decision']:<28}{row['error']:>9.2g}  {row['number']:.3g} ({row['what']})"
+        )
+
+
 def _times(rates: Iterable[Mapping[str, Any]]) -> str:
     return (
         ", ".join(f"{rate['what']} in {1.0 / rate['per_s']:.3g} s" for rate in rates if rate["per_s"] > 0.0)

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 
 DEFAULT_PIPELINE: Final = "default"
+GRIPPER_ALONE: Final = ("classifier.type=none",)
+"""Before the options of a command that is about the gripper: a classifier that is missing must not stop it."""
 
 _OPTIONS: Final = (
     click.option(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
@@ -16,6 +17,17 @@ def echo_json(value: object, long: bool = False) -> None:
     A long one comes in one line, which takes a fifth of the time.
     """
     click.echo(json.dumps(_finite(value), indent=None if long else 2, ensure_ascii=False, allow_nan=False))
+
+
+def file_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """Callback of an option that names a file: its folder is there, found out before minutes of work and not after."""
+    if value is not None and Path(value).is_dir():
+        raise click.BadParameter(f"{value} is a folder: name a file in it", ctx, param)
+    if value is not None and not Path(value).parent.is_dir():
+        raise click.BadParameter(
+            f"{value} cannot be written: there is no folder {Path(value).parent}", ctx, param
+        )
+    return value
 
 
 def talk(text: str) -> None:

@@ -1,13 +1,15 @@
-"""`graspsense plugins`: what is installed, what does not work and why."""
+"""`graspsense plugins`: what is installed, what does not work and why, whether it conforms, and a new one."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import click
 
-from graspsense.cli.output import echo_json, echo_table
+from graspsense.cli.output import echo_json, echo_table, talk
 
 if TYPE_CHECKING:
     from graspsense.core.plugins import Component, Plugins, PluginStatus
@@ -15,22 +17,28 @@ if TYPE_CHECKING:
 
 @click.group()
 def plugins() -> None:
-    """Show what is installed and whether it works."""
+    """Show what is installed and whether it works; check it, switch it off, begin a new one."""
 
 
 @plugins.command("list")
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout: a list, one object a component.")
 def list_plugins(as_json: bool) -> None:
-    """List every component, and every plugin that brings none or does not work."""
+    """List every component and every other plugin, and say what is broken, too old, slow or there twice."""
     from graspsense.core.plugins import installed
 
-    rows = _rows(installed())
+    loaded = installed()
+    rows = _rows(loaded)
     if as_json:
         echo_json(rows)
         return
     columns = ("role", "name", "distribution", "version", "state")
     table = [[*(row[key] or "-" for key in columns), row["reason"] or row["summary"]] for row in rows]
     echo_table([*(key.upper() for key in columns), "WHAT"], [[_line(cell) for cell in row] for row in table])
+    advice = list(dict.fromkeys(f"{row['distribution']}: {one}" for row in rows for one in row["advice"]))
+    if advice:
+        click.echo("\nTo be done:")
+        for one in advice:
+            click.echo(f"  {one}")
 
 
 @plugins.command()
@@ -38,7 +46,6 @@ def list_plugins(as_json: bool) -> None:
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
 def show(name: str, as_json: bool) -> None:
     """Show a distribution or a component (NAME or DISTRIBUTION/NAME): hooks, keys, and why it fails."""
-    from graspsense.core.errors import UnknownName, suggestion
     from graspsense.core.plugins import canonical, installed
 
     loaded = installed()
@@ -49,15 +56,7 @@ def show(name: str, as_json: bool) -> None:
         if name in (one.name, one.qualified) or one.distribution == canonical(name)
     ]
     if not statuses and not components:
-        known = sorted(
-            {
-                *(status.distribution for status in loaded.statuses),
-                *(one.name for one in loaded.components()),
-            }
-        )
-        raise UnknownName(
-            f"no plugin or component named {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}"
-        )
+        raise loaded.unknown(name)
     if as_json:
         echo_json(
             {
@@ -70,12 +69,145 @@ def show(name: str, as_json: bool) -> None:
     click.echo("\n\n".join(texts))
 
 
+@plugins.command()
+@click.argument("name")
+@click.option("-o", "keys", metavar="KEY=VALUE", multiple=True, help="A setting to check a component with.")
+@click.option(
+    "--unplugged", metavar="KEY=VALUE", multiple=True, help="A setting with which a gripper vanishes in use."
+)
+@click.option("--absent", metavar="KEY=VALUE", multiple=True, help="A setting with which it is not there.")
+@click.option(
+    "--wheel/--no-wheel", default=True, help="Build a wheel of an editable installation and look inside."
+)
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout: counts and every result.")
+@click.pass_context
+def check(
+    ctx: click.Context,
+    name: str,
+    keys: Sequence[str],
+    unplugged: Sequence[str],
+    absent: Sequence[str],
+    wheel: bool,
+    as_json: bool,
+) -> None:
+    """Check a component (NAME or DISTRIBUTION/NAME), or a distribution with all its components.
+
+    Ends with 1 where something does not hold, or where too few checks could be run. A gripper is opened and moved:
+    with real hardware stand by it.
+    """
+    from graspsense.testing.conformance import examine
+
+    examined = examine(
+        name,
+        keys=_settings(keys),
+        unplugged=_settings(unplugged) if unplugged else None,
+        absent=_settings(absent) if absent else None,
+        wheel=wheel,
+    )
+
+    def told(result: Any) -> None:
+        text = f": {result.text}" if result.text else ""
+        talk(f"{result.state:<8} {result.subject}  {result.check}{text}")
+
+    report = examined.report(told)
+    if as_json:
+        echo_json(
+            {
+                "conforms": not report.failures,
+                "failures": report.failures,
+                "results": [attrs.asdict(one) for one in report.results],
+            }
+        )
+    else:
+        click.echo(report.counts())
+        click.echo("conforms" if not report.failures else "does not conform:")
+        for failure in report.failures:
+            click.echo(f"  {failure}")
+    ctx.exit(1 if report.failures else 0)
+
+
+@plugins.command()
+@click.argument("name")
+@click.option(
+    "--role", required=True, metavar="ROLE", help="What it is to be; a wrong one lists all there are."
+)
+@click.option("--folder", type=click.Path(path_type=Path), help="Where to make it.  [default: ./NAME]")
+def new(name: str, role: str, folder: Path | None) -> None:
+    """Make the package of a new plugin: it installs, passes its own tests, and conforms."""
+    from graspsense.scaffold.make import make
+
+    for line in make(name, role, folder if folder is not None else Path(name)):
+        click.echo(line)
+
+
+@plugins.command()
+@click.argument("distribution")
+def disable(distribution: str) -> None:
+    """Switch a distribution's plugins off: they are not imported any more."""
+    from graspsense.core.disabling import disabled_in_config, write_disabled
+    from graspsense.core.errors import UnknownName, suggestion
+    from graspsense.core.firstparty import DISTRIBUTION
+    from graspsense.core.plugins import canonical, installed_sources
+
+    name = canonical(distribution)
+    known = {source.distribution for source in installed_sources()} - {DISTRIBUTION}
+    if name not in known:
+        raise UnknownName(
+            f"no installed plugin of a distribution {distribution!r}. Known: {', '.join(sorted(known)) or 'none'}."
+            f"{suggestion(name, known)}"
+        )
+    path = write_disabled({*map(canonical, disabled_in_config()), name})
+    click.echo(f"{name} is disabled, in {path}; `graspsense plugins enable {name}` takes it back")
+
+
+@plugins.command()
+@click.argument("distribution")
+def enable(distribution: str) -> None:
+    """Take back `disable`."""
+    from graspsense.core.disabling import disabled_in_config, write_disabled
+    from graspsense.core.errors import UnknownName
+    from graspsense.core.plugins import canonical
+
+    name, names = canonical(distribution), {canonical(one) for one in disabled_in_config()}
+    if name not in names:
+        raise UnknownName(f"{name} is not disabled. Disabled are: {', '.join(sorted(names)) or 'none'}")
+    path = write_disabled(names - {name})
+    click.echo(f"{name} is enabled again, in {path}")
+
+
+def _settings(options: Sequence[str]) -> dict[str, Any]:
+    """Return the keys that options like `-o port=/dev/ttyUSB0` set. Raises ConfigError."""
+    from graspsense.core.errors import ConfigError
+    from graspsense.core.layers import Merged, option_layers
+
+    layers, complaints = option_layers(options)
+    if complaints:
+        raise ConfigError(
+            "\n".join(one.replace("TABLE.KEY=VALUE, as in -o run.seed=3", "KEY=VALUE") for one in complaints)
+        )
+    merged = Merged()
+    for layer in layers:
+        merged.add((), layer.values, layer)
+    return merged.values
+
+
 def _rows(loaded: Plugins) -> list[dict[str, Any]]:
     """Return one row a component; one for a plugin without any; one for a component that is not installed."""
     from graspsense.core.firstparty import SHIPPED
 
+    advice: dict[str, tuple[str, ...]] = {}
+    for status in loaded.statuses:
+        advice[status.distribution] = (*advice.get(status.distribution, ()), *_advice(status))
     rows = [
-        _row(one.role, one.name, one.distribution, one.version, "loaded", one.entry.summary)
+        _row(
+            one.role,
+            one.name,
+            one.distribution,
+            one.version,
+            "loaded",
+            one.entry.summary,
+            advice=(*_clash(one, loaded), *advice[one.distribution]),
+        )
         for one in loaded.components()
     ]
     bringing = {one.distribution for one in loaded.components()}
@@ -88,6 +220,7 @@ def _rows(loaded: Plugins) -> list[dict[str, Any]]:
             status.state,
             ", ".join(status.hooks),
             status.reason,
+            advice[status.distribution],
         )
         for status in loaded.statuses
         if status.state != "loaded" or status.distribution not in bringing
@@ -109,6 +242,7 @@ def _row(
     state: str,
     summary: str,
     reason: str = "",
+    advice: tuple[str, ...] = (),
 ) -> dict[str, Any]:
     return {
         "role": role,
@@ -118,7 +252,33 @@ def _row(
         "state": state,
         "summary": summary,
         "reason": reason,
+        "advice": list(advice),
     }
+
+
+def _advice(status: PluginStatus) -> tuple[str, ...]:
+    """Return what is to be done about a plugin, broken or not."""
+    if status.state != "broken":
+        return status.advice
+    way_out = f"`graspsense plugins show {status.distribution}` has the whole of it"
+    if status.distribution != "graspsense":
+        way_out += f", `graspsense plugins disable {status.distribution}` leaves it out"
+    return (f"broken: {_line(status.reason)}; {way_out}",)
+
+
+def _clash(component: Component, loaded: Plugins) -> tuple[str, ...]:
+    """Return what is to be done where others use the name of this component."""
+    others = [
+        one.qualified
+        for one in loaded.components(component.role)
+        if one.name == component.name and one.distribution != component.distribution
+    ]
+    if not others:
+        return ()
+    return (
+        f"the {component.role.replace('-', ' ')} name {component.name!r} is also that of {', '.join(others)}: write "
+        f'{component.table}.type = "{component.qualified}", or disable one of them',
+    )
 
 
 def _line(text: str) -> str:
@@ -133,6 +293,7 @@ def _status_text(status: PluginStatus) -> str:
     ]
     if status.hooks:
         lines.append(f"  hooks        {', '.join(status.hooks)}")
+    lines += [f"  to be done   {one}" for one in status.advice]
     if status.traceback:
         lines += ["", status.traceback.rstrip()]
     return "\n".join(lines)

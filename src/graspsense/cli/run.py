@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.model_table import print_model
+from graspsense.cli.live_rows import LiveRows
+from graspsense.cli.model_table import print_model, print_selection
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json, echo_table, talk
 
@@ -15,12 +16,10 @@ if TYPE_CHECKING:
 
     from graspsense.core.config import Settings
     from graspsense.core.runner import Sink
-    from graspsense.core.signals import Command, Frame, Pads
     from graspsense.core.trial import Trial
 
 EXIT_ABORTED: Final = 4
 EXIT_NOT_KEPT: Final = 2
-BAR: Final = 24
 
 
 @click.command(short_help="Grasp once, live in the terminal.")
@@ -77,6 +76,8 @@ def run(
         print_trial(trial)
         if "model" in trial.report:
             print_model(trial.report["model"])
+            if "selection" in trial.report:
+                print_selection(trial.report["selection"])
     if kept is not None and kept["problem"]:
         talk(f"graspsense: {kept['problem']}")
         raise click.exceptions.Exit(EXIT_NOT_KEPT)
@@ -108,54 +109,15 @@ def _kept(
     }
 
 
-class LiveRows:
-    """Prints a row of gap, force and phase whenever one of them has changed enough to be worth a line."""
-
-    def __init__(self) -> None:
-        self._phase = -1
-        self._t_s = self._gap_m = self._force_n = 0.0
-        self._widest_m = 0.0
-        self._quiet_s = 0.5
-
-    def take(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
-        """Take one tick."""
-        del pads, command
-        force = frame.force_left_n + frame.force_right_n
-        if (
-            phase == self._phase
-            and frame.t_s - self._t_s < self._quiet_s
-            and abs(force - self._force_n) < 4.0
-            and abs(frame.gap_m - self._gap_m) < 0.01
-        ):
-            return
-        if self._phase == -1:
-            self._widest_m = max(frame.gap_m, 1e-9)
-            # On a clock of frames, not seconds, every frame is worth a line.
-            self._quiet_s = max(0.5, frame.dt_s) if frame.dt_s < 0.5 else 0.0
-            talk("      t  phase       gap                                    left     right")
-        self._phase, self._t_s, self._gap_m, self._force_n = phase, frame.t_s, frame.gap_m, force
-        share = min(max(frame.gap_m / self._widest_m, 0.0), 1.0)
-        bar = "█" * round(BAR * share)
-        talk(
-            f"{frame.t_s:7.3f}  {_phase_name(phase):<10}{frame.gap_m * 1e3:6.1f} mm  {bar:<{BAR}}"
-            f"{frame.force_left_n:7.2f} N {frame.force_right_n:7.2f} N"
-        )
-
-
-def _phase_name(phase: int) -> str:
-    from graspsense.core.signals import Phase
-
-    return Phase(phase).name.lower()
-
-
 def print_trial(trial: Trial) -> None:
     """Print outcome, features, prediction and what has to be said of them."""
     click.echo()
     reason = f": {trial.reason}" if trial.reason else ""
     click.echo(f"outcome     {trial.outcome.words}{reason}")
     features = trial.features
+    wide = max([12, *(len(name) + 1 for name in features.names)])
     for name, value, unit in zip(features.names, features.values, features.units, strict=True):
-        click.echo(f"{name:<12}{_shown(value, unit, features.reasons.get(name, ''))}")
+        click.echo(f"{name:<{wide}}{_shown(value, unit, features.reasons.get(name, ''))}")
     if trial.prediction is not None:
         prediction = trial.prediction
         probability = prediction.probabilities.get(prediction.label)
@@ -168,6 +130,12 @@ def print_trial(trial: Trial) -> None:
             talk(f"warning: {warning}")
     for note in trial.device.notes:
         click.echo(f"note        {note}")
+    if trial.counts.get("guarded"):
+        click.echo(
+            f"note        the guard limited {trial.counts['guarded']} of {trial.counts['ticks']} ticks"
+        )
+    if trial.counts.get("late"):
+        click.echo(f"note        {trial.counts['late']} of {trial.counts['ticks']} frames came late")
     if trial.seconds_simulated is not None:
         length = (
             f"{trial.seconds_simulated:.2f} {trial.trace.units['t']} of grasp in {trial.seconds_wall:.2f} s"
@@ -180,7 +148,7 @@ def _shown(value: float, unit: str, reason: str) -> str:
         return f"{'-':>9}  ({reason})"
     if unit == "m" or unit.startswith("m/"):
         return f"{value * 1e3:9.3f} m{unit}"
-    return f"{value:9.3f} {unit}"
+    return f"{value:9.3f} {unit if unit != '1' else ''}".rstrip()
 
 
 def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
@@ -202,13 +170,15 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
         }
         echo_json(plan)
         return
+    from graspsense.core.config import toml_value
+
     click.echo("would open, tare, close, hold and release with:")
     for table, component in settings.components.items():
         click.echo(f"  {table:<11}{component}")
     for table, values in settings.values.items():
         for key, value in values.items():
             if key != "type":
-                click.echo(f"    {table}.{key} = {value}")
+                click.echo(f"    {table}.{key} = {'not set' if value is None else toml_value(value)}")
     if rehearsal is None:
         click.echo(f"commands: not rehearsed, {why_not}")
     else:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
@@ -88,7 +87,9 @@ def classifier_option(command: CommandT) -> CommandT:
 
 def is_csv(source: str) -> bool:
     """Whether this source is a file of features."""
-    return _kind(source) == "CSV"
+    from graspsense.trials.source import kind_of
+
+    return kind_of(source) == "CSV"
 
 
 def trials_of(source: str, progress: Progress, given: Mapping[str, Any]) -> Labelled:
@@ -96,20 +97,46 @@ def trials_of(source: str, progress: Progress, given: Mapping[str, Any]) -> Labe
 
     Raises ConfigError, DataDamaged.
     """
-    kind = _kind(source)
+    from graspsense.cli.output import talk
+    from graspsense.core.errors import ConfigError
+    from graspsense.core.strict import Misfit, structured
+    from graspsense.trials.source import Source, kind_of, labelled_trials
+
+    kind = kind_of(source)
     _refuse_misplaced(kind)
+    values = {
+        "source": source,
+        "only": given["only"],
+        "label": given["label"],
+        "instance": given["instance"],
+        "order": given["order"],
+        "columns": _names(given["features"]),
+        "before": _names(given["before"]),
+        "unreliable": given["unreliable"],
+        "objects": _names(given["objects"]),
+        "instances": given["instances"],
+        "trials": given["trials"],
+    }
+    try:
+        described = structured(values, Source, source)
+    except Misfit as misfit:
+        raise ConfigError("\n".join(f"--{one.path[0]}: {one.text}" for one in misfit.problems)) from None
     if kind == SIMULATED:
-        found = _simulated(progress, given)
-    elif kind == "CSV":
-        found = _csv(source, given)
-    else:
-        found = _data_set(source, given)
-    return found.of_class(given["only"]) if given["only"] else found
+        talk("grasping; where the simulator can be compiled, the first seconds go into that")
+    return labelled_trials(
+        described,
+        settings=lambda: _settings(given, None),
+        features=lambda: _alone("features", "chitta", given).create(),
+        seed=given["seed"],
+        progress=lambda done, total: progress("grasping", done, total),
+    )
 
 
 def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) -> Chosen:
     """Return the classifier that is to learn: by its name, or that of the pipeline where there is one."""
-    if _kind(source) == SIMULATED:
+    from graspsense.trials.source import kind_of
+
+    if kind_of(source) == SIMULATED:
         chosen = _settings(given, classifier).classifier
         assert chosen is not None
         return chosen
@@ -136,20 +163,6 @@ def command_line(without: Sequence[str], command: str = "") -> str:
     return shlex.join(words)
 
 
-def _kind(source: str) -> str:
-    from graspsense.core.errors import ConfigError
-
-    if source == SIMULATED:
-        return SIMULATED
-    if source.lower().endswith((".csv", ".tsv", ".txt")) or Path(source).is_file():
-        return "CSV"
-    if ":" in source:
-        return "data set"
-    raise ConfigError(
-        f"{source!r} is no source of trials: name a FILE.csv, a data set as icub:FOLDER, or `{SIMULATED}`"
-    )
-
-
 def _refuse_misplaced(kind: str) -> None:
     """Refuse options that say nothing about this kind of source. Raises UsageError."""
     context = click.get_current_context()
@@ -171,56 +184,6 @@ def _settings(given: Mapping[str, Any], classifier: str | None) -> Settings:
         flags.append(Flag("--classifier", "classifier.type", DEFAULT_CLASSIFIER))
         settings = resolve(given["pipeline"], options=given["options"], flags=flags)
     return settings
-
-
-def _simulated(progress: Progress, given: Mapping[str, Any]) -> Labelled:
-    from graspsense.cli.output import talk
-    from graspsense.trials.simulated import simulated
-
-    settings = _settings(given, None)
-    talk("grasping; where the simulator can be compiled, the first seconds go into that")
-    return simulated(
-        settings,
-        objects=_names(given["objects"]),
-        instances=given["instances"],
-        trials=given["trials"],
-        seed=given["seed"],
-        progress=lambda done, total: progress("grasping", done, total),
-    )
-
-
-def _csv(source: str, given: Mapping[str, Any]) -> Labelled:
-    from graspsense.core.errors import ConfigError
-    from graspsense.trials.features_csv import read_labelled
-
-    if not given["label"]:
-        raise ConfigError(f"which column of {source} holds the label? Name it: --label COLUMN")
-    return read_labelled(
-        Path(source),
-        given["label"],
-        instance=given["instance"],
-        order=given["order"],
-        features=_names(given["features"]),
-        before=_names(given["before"]),
-    )
-
-
-def _data_set(source: str, given: Mapping[str, Any]) -> Labelled:
-    from graspsense.core.errors import ConfigError, PluginUnavailable
-    from graspsense.core.labelled import Labelled
-    from graspsense.core.plugins import installed
-
-    name, _, folder = source.partition(":")
-    if not folder:
-        raise ConfigError(f"{source!r} names no folder: write it after the colon")
-    reader = installed().dataset(name).load()
-    features = _alone("features", "chitta", given).create()
-    found = reader(folder, features, unreliable=given["unreliable"])
-    if not isinstance(found, Labelled):
-        raise PluginUnavailable(
-            f"data set {name!r} cannot be used here: its reader gave {type(found).__name__}, not Labelled"
-        )
-    return found
 
 
 def _alone(table: str, name: str, given: Mapping[str, Any]) -> Chosen:

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from graspsense.cli.output import echo_json, talk
+from graspsense.cli.output import echo_json, file_to_write, talk
 from graspsense.cli.sources import (
     SOURCES,
     classifier_option,
@@ -28,8 +28,12 @@ from graspsense.cli.sources import (
     {SOURCES}""",
 )
 @click.argument("source")
-@click.option("--out", metavar="FILE", required=True, help="Where the model goes, a .json file.")
-@click.option("--keep", metavar="FILE", help="Keep the trials' features as a CSV, too.")
+@click.option(
+    "--out", metavar="FILE", callback=file_to_write, required=True, help="Where the model goes, a .json file."
+)
+@click.option(
+    "--keep", metavar="FILE", callback=file_to_write, help="Keep the trials' features as a CSV, too."
+)
 @click.option(
     "--target",
     type=click.Choice(["both", "class", "state"]),

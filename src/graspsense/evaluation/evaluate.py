@@ -88,6 +88,8 @@ class Evaluation:
     folds: int
     seed: int
     settings: Mapping[str, Any] = field(factory=dict)
+    confusions: Mapping[str, Confusion] = field(factory=dict)
+    """The confusion matrix of each protocol that could be followed; `confusion` is that of the headline."""
 
     def as_json(self) -> dict[str, Any]:
         """Return what `graspsense evaluate --json` prints."""
@@ -130,15 +132,18 @@ def evaluate(
     folds: int = 10,
     seed: int = 0,
     settings: Mapping[str, Any] | None = None,
+    controls: bool = True,
+    learning_curve: bool = True,
     progress: Progress | None = None,
 ) -> Evaluation:
-    """Judge a classifier on labelled trials.
+    """Judge a classifier on labelled trials, with the controls and the learning curve unless these are left out.
 
     `target` is what is recognised: the label as it is (`both`), the class, or the state among trials of one
     class, each class apart from the others. Raises ConfigError where there is nothing to tell apart, or too
     few trials.
     """
-    return _Judge(learner, labelled, classifier, target, folds, seed, settings or {}, progress).judge()
+    judge = _Judge(learner, labelled, classifier, target, folds, seed, settings or {}, progress)
+    return judge.judge(controls, learning_curve)
 
 
 class _Judge:
@@ -164,8 +169,8 @@ class _Judge:
         self.groups: Groups = self._groups()
         self._note_small_labels()
 
-    def judge(self) -> Evaluation:
-        """Measure everything."""
+    def judge(self, with_controls: bool, with_curve: bool) -> Evaluation:
+        """Measure everything that is asked for."""
         labelled, table = self.labelled, self.labelled.table
         plain_name = f"stratified_{self.k}_fold"
         plain_what = f"{self.k} folds, stratified by label; predictions of all folds pooled"
@@ -195,20 +200,23 @@ class _Judge:
                 )
             return Judged(control.what, self._rate(found), difference=against, of=protocol)
 
-        controls = {
-            "before_contact": beside(
-                "before_contact",
-                labelled.before_contact,
-                labelled.no_before_contact,
-                "features from before the contact only",
-            ),
-            "width_only": beside("width_only", labelled.width, labelled.no_width, "p_first alone"),
-            INSTANCE_HELD_OUT: protocols[INSTANCE_HELD_OUT],
-            "recording_order": self._in_order(plain, plain_name),
-            "majority_class": majority,
-        }
-        controls.update((name, beside(name, one)) for name, one in labelled.variants.items())
-        self._warn_of_leaks(controls)
+        controls: dict[str, Judged] = {}
+        if with_controls:
+            controls = {
+                "before_contact": beside(
+                    "before_contact",
+                    labelled.before_contact,
+                    labelled.no_before_contact,
+                    "features from before the contact only",
+                ),
+                "width_only": beside("width_only", labelled.width, labelled.no_width, "p_first alone"),
+                INSTANCE_HELD_OUT: protocols[INSTANCE_HELD_OUT],
+                "recording_order": self._in_order(plain, plain_name),
+                "majority_class": majority,
+                "shuffled_labels": self._shuffled(),
+            }
+            controls.update((name, beside(name, one)) for name, one in labelled.variants.items())
+            self._warn_of_leaks(controls)
         return Evaluation(
             source=labelled.source,
             classifier=self.classifier,
@@ -221,12 +229,17 @@ class _Judge:
             controls=controls,
             by_class=self._by_class(head),
             unlike=Rate(int(head.unlike.sum()), len(self.labels)),
-            learning_curve=self._curve(head_folds, head),
+            learning_curve=self._curve(head_folds, head) if with_curve else (),
             warnings=tuple(self.warnings),
             notes=tuple(self.notes),
             folds=self.k,
             seed=self.seed,
             settings=self.settings,
+            confusions={
+                name: confusion(self.labels, one.predicted)
+                for name, one in ((INSTANCE_HELD_OUT, held), (plain_name, plain))
+                if one is not None
+            },
         )
 
     def _chosen(self, labelled: Labelled) -> Labelled:
@@ -271,7 +284,15 @@ class _Judge:
     def _folds(self, deal: Callable[[Sequence[str], Any], Folds]) -> list[Folds]:
         return [deal([self.labels[i] for i in rows], rows) for rows in self.groups]
 
-    def _pooled(self, name: str, table: FeatureTable, folds: Sequence[Folds], share: float = 1.0) -> Pooled:
+    def _pooled(
+        self,
+        name: str,
+        table: FeatureTable,
+        folds: Sequence[Folds],
+        share: float = 1.0,
+        labels: Sequence[str] | None = None,
+    ) -> Pooled:
+        labels = self.labels if labels is None else labels
         total = sum(int(of.max()) + 1 for of in folds)
         done = 0
 
@@ -282,7 +303,7 @@ class _Judge:
                 self.progress(name, done, total)
 
         return cross_validate(
-            self.learner, table, self.labels, self.groups, folds, seed=self.seed, share=share, progress=step
+            self.learner, table, labels, self.groups, folds, seed=self.seed, share=share, progress=step
         )
 
     def _rate(self, pooled: Pooled) -> Rate:
@@ -342,6 +363,18 @@ class _Judge:
         judged = Judged(what, Rate(int(right.sum()), len(right)), difference=against, of=protocol)
         return right.tolist(), judged
 
+    def _shuffled(self) -> Judged:
+        """Judge by labels that say nothing: dealt anew to the trials, within each class where it is known."""
+        rng = np.random.default_rng(self.seed)
+        labels = np.array(self.labels)
+        for rows in self.groups:
+            labels[rows] = rng.permutation(labels[rows])
+        shuffled = labels.tolist()
+        folds = [stratified([shuffled[i] for i in rows], self.k, self.seed) for rows in self.groups]
+        found = self._pooled("shuffled_labels", self.labelled.table, folds, labels=shuffled)
+        rate = Rate(sum(found.right(shuffled)), len(shuffled))
+        return Judged("the same trials with their labels shuffled, in stratified folds", rate)
+
     def _by_class(self, head: Pooled) -> dict[str, Rate]:
         right: dict[str, list[bool]] = {}
         for label, one in zip(self.labels, head.right(self.labels), strict=True):
@@ -349,10 +382,12 @@ class _Judge:
         return {name: Rate(sum(of), len(of)) for name, of in sorted(right.items())}
 
     def _curve(self, folds: Sequence[Folds], head: Pooled) -> tuple[CurvePoint, ...]:
-        points = []
+        points: list[CurvePoint] = []
         for share in SHARES:
             one = head
             if share < 1.0:
                 one = self._pooled(f"learning curve {share:.0%}", self.labelled.table, folds, share)
-            points.append(CurvePoint(one.trained_on, self._rate(one)))
+            # Of few trials of a label at least one is kept, so that small shares may come to the same trials.
+            if not points or one.trained_on > points[-1].trained_on:
+                points.append(CurvePoint(one.trained_on, self._rate(one)))
         return tuple(points)

@@ -57,8 +57,8 @@ class Difference:
         return f"{self.value:+.3f} ({self.interval[0]:+.3f} to {self.interval[1]:+.3f})"
 
 
-def wilson(correct: int, n: int) -> tuple[float, float]:
-    """Return the 95 % Wilson interval of `correct` out of `n`."""
+def wilson(correct: float, n: int) -> tuple[float, float]:
+    """Return the 95 % Wilson interval of `correct` out of `n`; a mean of several counts need not be whole."""
     p, zz = correct / n, Z * Z
     middle = (p + zz / (2 * n)) / (1 + zz / n)
     half = Z / (1 + zz / n) * math.sqrt(p * (1 - p) / n + zz / (4 * n * n))

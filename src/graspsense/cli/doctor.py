@@ -1,0 +1,110 @@
+"""`graspsense doctor`: what is plugged in, which way to it works, and what to do where none does."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import attrs
+import click
+
+from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
+from graspsense.cli.output import echo_json, talk
+
+if TYPE_CHECKING:
+    from graspsense.core.entries import Finding
+    from graspsense.core.plugins import Diagnosis, Plugins
+
+EXIT_PROBLEM: Final = 1
+MARKS: Final = {"ok": "ok", "note": "note", "problem": "PROBLEM"}
+
+
+@click.command(short_help="Say what is plugged in, and why it does not work.")
+@pipeline_options
+@click.option(
+    "--timeout",
+    "timeout_s",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=4.0,
+    show_default=True,
+    help="How long each plugin may measure, in seconds.",
+)
+@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+def doctor(timeout_s: float, as_json: bool, **asked: Any) -> None:
+    """Look at plugins, libraries, permissions and devices; measure rate, loss and delay. Nothing is moved.
+
+    With --gripper and -o it looks for that gripper (-o gripper.vendor_id=..., -o gripper.serial=...), and its absence
+    is a problem. Exit code 0 means no problem, 1 that there is one.
+    """
+    from graspsense.core.plugins import Diagnosis, installed
+
+    plugins = installed()
+    config = None
+    if any(asked.values()):
+        config = settings_of(**{**asked, "options": (*GRIPPER_ALONE, *asked["options"])}).gripper.config
+    diagnoses = [Diagnosis("graspsense", _ourselves(plugins)), *plugins.diagnose(config, timeout_s)]
+    problems = sum(one.error != "" for one in diagnoses) + sum(
+        finding.state == "problem" for one in diagnoses for finding in one.findings
+    )
+    if as_json:
+        echo_json({"problems": problems, "diagnoses": [_as_json(one) for one in diagnoses]})
+    else:
+        for one in diagnoses:
+            _print(one)
+        talk(f"{problems} problem(s)" if problems else "no problem found")
+    if problems:
+        raise click.exceptions.Exit(EXIT_PROBLEM)
+
+
+def _ourselves(plugins: Plugins) -> tuple[Finding, ...]:
+    """Return what holds for every gripper: versions, and plugins that do not work."""
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    from graspsense.core.entries import Finding
+
+    found = [
+        Finding("system", "ok", f"Python {platform.python_version()} on {platform.platform()}",
+                numbers={"python": platform.python_version(), "platform": platform.platform()}),
+    ]  # fmt: skip
+    for name in ("numpy", "scipy", "scikit-learn", "numba"):
+        try:
+            found.append(Finding(f"library {name}", "ok", version(name), numbers={"version": version(name)}))
+        except PackageNotFoundError:
+            found.append(Finding(f"library {name}", "note", "not installed"))
+    for status in plugins.statuses:
+        subject = f"plugin {status.distribution}"
+        numbers = {"version": status.version, "state": status.state}
+        if status.state == "broken":
+            found.append(
+                Finding(subject, "problem", f"{status.version} does not load: {status.reason}",
+                        f"graspsense plugins show {status.distribution}", numbers)
+            )  # fmt: skip
+        else:
+            found.append(
+                Finding(
+                    subject,
+                    "ok" if status.state == "loaded" else "note",
+                    f"{status.version} {status.reason}".rstrip(),
+                    numbers=numbers,
+                )
+            )
+    return tuple(found)
+
+
+def _as_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    return {
+        "distribution": diagnosis.distribution,
+        "error": diagnosis.error,
+        "findings": [attrs.asdict(one) for one in diagnosis.findings],
+    }
+
+
+def _print(diagnosis: Diagnosis) -> None:
+    click.echo(diagnosis.distribution)
+    if diagnosis.error:
+        click.echo(f"  PROBLEM  could not look: {diagnosis.error}")
+    for one in diagnosis.findings:
+        click.echo(f"  {MARKS[one.state]:<8} {one.subject}: {one.found}")
+        if one.state != "ok":
+            for line in filter(None, one.advice.split("\n")):
+                click.echo(f"             {line}")

@@ -1,0 +1,154 @@
+"""`graspsense emulate`: a gripper in software, as a device of this machine."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
+from graspsense.cli.output import echo_json, talk
+
+if TYPE_CHECKING:
+    from graspsense.core.emulated import EmulatedDevice
+
+LOOK_S: Final = 0.5
+"""How often it is looked whether the device still runs."""
+EXIT_FAILED: Final = 4
+
+
+@click.command()
+@click.argument("name")
+@click.option(
+    "--wire",
+    default="",
+    help="How it gets into the system, as in uhid or usb.  [default: the first that works]",
+)
+@pipeline_options
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="JSON on stdout: one object in a line, at the start and for each word.",
+)
+def emulate(
+    name: str,
+    wire: str,
+    pipeline: str | None,
+    gripper: str | None,
+    object_name: str | None,
+    options: tuple[str, ...],
+    seed: int | None,
+    as_json: bool,
+) -> None:
+    """Stand in for the gripper NAME (as in pr2) until Ctrl-C: drivers find it as they would find a real one.
+
+    It takes words on its standard input, a line each, such as unplug and plug; `help` lists them. However it ends, the
+    device goes with it.
+    """
+    from graspsense.core.errors import ConfigError, suggestion
+    from graspsense.core.plugins import installed
+
+    if gripper is not None:
+        raise click.UsageError("the gripper is the argument: graspsense emulate NAME, without --gripper")
+    offer = installed().emulator(name)
+    if wire and wire not in offer.entry.wires:
+        raise ConfigError(
+            f"emulator {name} has no wire {wire!r}. Known: {', '.join(offer.entry.wires)}."
+            + suggestion(wire, offer.entry.wires)
+        )
+    backend = f"{offer.distribution}/{offer.name}"
+    settings = settings_of(
+        pipeline, backend, object_name, (*GRIPPER_ALONE, *offer.entry.options, *options), seed
+    )
+    device: EmulatedDevice = offer.load()(settings.gripper.config, wire, settings.run.seed)
+    try:
+        with _ended_by_signals():
+            device.tell("plug")
+            _tell_state(device, "plug", as_json)
+            talk(f"emulated {name} over {device.wire} at {device.rate_hz:g} Hz: no gripper is touched")
+            talk("Ctrl-C ends it; other words, each with Enter: help, state, " + ", ".join(device.words))
+            _serve(device, as_json)
+    except _Ended:
+        pass
+    finally:
+        device.close()
+    failed = str(device.state().get("failed", ""))
+    if failed:
+        talk(f"graspsense: the emulated {name} failed: {failed}")
+        raise click.exceptions.Exit(EXIT_FAILED)
+
+
+class _Ended(Exception):
+    """A signal asked for the end."""
+
+
+@contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    def end(number: int, frame: FrameType | None) -> None:
+        raise _Ended
+
+    before = {one: signal.signal(one, end) for one in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+
+
+def _serve(device: EmulatedDevice, as_json: bool) -> None:
+    """Do what is asked on standard input, until a signal or `quit`; its end is none, as of a service without one."""
+    for line in _lines():
+        if device.state().get("failed") or line == "quit":
+            return
+        if line:
+            _do(device, line, as_json)
+
+
+def _lines() -> Iterator[str]:
+    """Yield lines of standard input as they come, and every `LOOK_S` an empty one."""
+    # Not through sys.stdin: of two lines that come at once it would keep the second where select sees none.
+    source = None if sys.stdin is None else sys.stdin.fileno()
+    text = b""
+    while True:
+        if source is None:
+            time.sleep(LOOK_S)
+        elif select.select([source], [], [], LOOK_S)[0]:
+            more = os.read(source, 4096)
+            text += more
+            source = source if more else None
+        *lines, text = text.split(b"\n")
+        yield from (line.decode(errors="replace").strip() for line in lines)
+        yield ""
+
+
+def _do(device: EmulatedDevice, word: str, as_json: bool) -> None:
+    from graspsense.core.errors import suggestion
+
+    if word == "help":
+        for one, what in device.words.items():
+            talk(f"  {one:<10}{what}")
+    elif word == "state" or word in device.words:
+        if word != "state":
+            device.tell(word)
+        _tell_state(device, word, as_json)
+    else:
+        known = ("help", "quit", "state", *device.words)
+        talk(f"no word {word!r}. Known: {', '.join(known)}.{suggestion(word, known)}")
+
+
+def _tell_state(device: EmulatedDevice, word: str, as_json: bool) -> None:
+    state = {"did": word, **device.state()}
+    if as_json:
+        echo_json(state, long=True)
+        sys.stdout.flush()
+    else:
+        talk(", ".join(f"{key} {value}" for key, value in state.items() if value != ""))

@@ -1,0 +1,170 @@
+"""`graspsense experiment`: a file of sweeps and seeds, run to the end, whatever comes between."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from graspsense.cli.output import echo_json, echo_table, talk
+
+if TYPE_CHECKING:
+    from graspsense.experiments.findings import Findings
+    from graspsense.experiments.run import Account
+    from graspsense.experiments.summary import Summary
+
+EXIT_INCOMPLETE = 1
+EXIT_INTERRUPTED = 130
+
+
+@click.command(short_help="Run an experiment from a file; resume it.")
+@click.argument("experiment", required=False, metavar="NAME|FILE")
+@click.option("--out", metavar="DIR", help="Where everything goes.  [NAME]")
+@click.option("--resume", is_flag=True, help="Do only what has no result in --out yet.")
+@click.option(
+    "--executor",
+    metavar="HOW",
+    help="serial, processes, dask, or dask:ADDRESS of a scheduler.  [processes, or serial on one core]",
+)
+@click.option("--workers", type=int, help="Processes, or workers of a local cluster.  [cores]")
+@click.option(
+    "-o",
+    "options",
+    metavar="KEY=VALUE",
+    multiple=True,
+    help="A key of the file, as in -o seeds=3 or -o data.trials=2. May be given again.",
+)
+@click.option("--dry-run", is_flag=True, help="Say what would be done.")
+@click.option("--json", "as_json", is_flag=True, help="Print what came out as JSON.")
+def experiment(
+    experiment: str | None,
+    out: str | None,
+    resume: bool,
+    executor: str | None,
+    workers: int | None,
+    options: tuple[str, ...],
+    dry_run: bool,
+    as_json: bool,
+) -> None:
+    """Run NAME, or FILE.toml: every case with every seed; the page is report.html in --out.
+
+    Each finished task is kept at once: after Ctrl-C, a crash or a lost machine, --resume does only the rest.
+    Without NAME it lists what there is. docs/experiments.md describes the file.
+    """
+    from graspsense.experiments.experiment import read_experiment, shipped
+
+    if experiment is None:
+        _list(shipped(), as_json)
+        return
+    from graspsense.cli.progress import Progress
+    from graspsense.experiments.executors.choose import chosen
+    from graspsense.experiments.page import found_in, write_page
+    from graspsense.experiments.results import Results
+    from graspsense.experiments.run import run_experiment
+    from graspsense.experiments.summary import summarise
+    from graspsense.trials.recorder import NotKept
+
+    planned = read_experiment(experiment, options)
+    results = Results(Path(out or planned.name))
+    make = chosen(executor, workers)
+    if dry_run:
+        _plan([task.name for task in planned.tasks()], as_json)
+        return
+    with Progress() as progress:
+        account = run_experiment(
+            planned,
+            results,
+            make,
+            resume=resume,
+            command=shlex.join(["graspsense", *sys.argv[1:]]),
+            progress=progress,
+            said=talk,
+        )
+    found = summarise(planned, results)
+    page: Path | None = None
+    problem = ""
+    try:
+        page = write_page(found, results)
+    except NotKept as error:
+        problem = str(error)
+    more = found_in(found)
+    if as_json:
+        told = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
+        where = None if page is None else str(page)
+        echo_json({**found.as_json(), **told, "page": where, **_counts(account, problem)})
+    else:
+        _print(found, more, account, f"none: {problem}" if problem else str(page))
+    if account.stopped == "interrupted":
+        sys.exit(EXIT_INTERRUPTED)
+    if problem or not account.complete:
+        sys.exit(EXIT_INCOMPLETE)
+
+
+def _counts(account: Account, problem: str) -> dict[str, object]:
+    return {
+        "tasks": account.total,
+        "kept": account.kept,
+        "done": account.done,
+        "complete": account.complete,
+        "stopped": account.stopped or problem or None,
+    }
+
+
+def _list(known: dict[str, object], as_json: bool) -> None:
+    from graspsense.experiments.experiment import read_experiment
+
+    rows = [(name, read_experiment(name).experiment.title) for name in known]
+    if as_json:
+        echo_json([{"name": name, "title": title} for name, title in rows])
+    else:
+        echo_table(("EXPERIMENT", "WHAT"), rows)
+
+
+def _plan(names: list[str], as_json: bool) -> None:
+    if as_json:
+        echo_json(names)
+    else:
+        click.echo("\n".join(names))
+        click.echo(f"{len(names)} tasks")
+
+
+def _print(found: Summary, more: Findings | None, account: Account, page: str) -> None:
+    from graspsense.experiments.answer import answer
+
+    click.echo(answer(found) if more is None else more.answer)
+    click.echo()
+    if more is None:
+        _print_rates(found)
+    else:
+        for one in more.tables:
+            click.echo(one.title)
+            echo_table(tuple(name.upper() for name in one.header), list(one.rows))
+            click.echo()
+    for note in account.notes:
+        click.echo(f"note: {note}")
+    click.echo(account.words)
+    reasons: dict[str, int] = {}
+    for failure in account.failed:
+        reasons[failure.reason] = reasons.get(failure.reason, 0) + 1
+    for reason, times in reasons.items():
+        click.echo(f"  failed {times} times: {reason}")
+    if account.stopped:
+        click.echo(f"  stopped: {account.stopped}")
+    if not account.complete:
+        click.echo("  go on with the same command and --resume: it does what is missing and what failed")
+    click.echo(f"page        {page}")
+
+
+def _print_rates(found: Summary) -> None:
+    rows = []
+    for one in found.arms:
+        low, high = one.rate.interval
+        rows.append(
+            (one.name or "-", one.target, f"{one.rate.mean:.3f}", f"{low:.3f} to {high:.3f}", one.protocol)
+        )
+    if rows:
+        echo_table(("CASE", "TARGET", "RATE", "95 %", "PROTOCOL"), rows)
+        click.echo()

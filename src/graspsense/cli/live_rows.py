@@ -1,0 +1,57 @@
+"""A grasp in the terminal while it goes on: gap, force and phase."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from graspsense.cli.output import talk
+
+if TYPE_CHECKING:
+    from graspsense.core.signals import Command, Frame, Pads
+
+BAR: Final = 24
+"""Characters of a gap that is widest."""
+
+
+class LiveRows:
+    """Prints a row of gap, force and phase whenever one of them has changed enough to be worth a line."""
+
+    def __init__(self) -> None:
+        self._phase = -1
+        self._t_s = self._gap_m = self._force_n = 0.0
+        self._widest_m = 0.0
+        self._quiet_s = 0.5
+
+    def take(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
+        """Take one tick."""
+        del pads, command
+        force = frame.force_left_n + frame.force_right_n
+        if (
+            phase == self._phase
+            and frame.t_s - self._t_s < self._quiet_s
+            and not abs(force - self._force_n) >= 4.0  # of a gripper without pads it is NaN
+            and abs(frame.gap_m - self._gap_m) < 0.01
+        ):
+            return
+        if self._phase == -1:
+            self._widest_m = max(frame.gap_m, 1e-9)
+            # On a clock of frames, not seconds, every frame is worth a line.
+            self._quiet_s = max(0.5, frame.dt_s) if frame.dt_s < 0.5 else 0.0
+            talk("      t  phase       gap                                    left     right")
+        self._phase, self._t_s, self._gap_m, self._force_n = phase, frame.t_s, frame.gap_m, force
+        share = min(max(frame.gap_m / self._widest_m, 0.0), 1.0)
+        bar = "█" * round(BAR * share)
+        talk(
+            f"{frame.t_s:7.3f}  {_phase_name(phase):<10}{frame.gap_m * 1e3:6.1f} mm  {bar:<{BAR}}"
+            f"{_newtons(frame.force_left_n)} {_newtons(frame.force_right_n)}"
+        )
+
+
+def _newtons(force_n: float) -> str:
+    return f"{force_n:7.2f} N" if force_n == force_n else f"{'-':>7}  "
+
+
+def _phase_name(phase: int) -> str:
+    from graspsense.core.signals import Phase
+
+    return Phase(phase).name.lower()

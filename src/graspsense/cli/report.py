@@ -1,0 +1,72 @@
+"""`graspsense report`: the page of a store, or that of an experiment once more."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from graspsense.cli.output import echo_json
+
+
+@click.command(short_help="Write the page of a store or an experiment.")
+@click.argument("folder", metavar="DIR")
+@click.option("--out", metavar="DIR", help="Where report.html goes.  [DIR itself]")
+@click.option(
+    "--classifier", metavar="NAME", default="c45", show_default=True, help="Store: which one is judged."
+)
+@click.option(
+    "--target",
+    type=click.Choice(["both", "class", "state"]),
+    default="both",
+    show_default=True,
+    help="Store: what is recognised, as in `evaluate`.",
+)
+@click.option("--folds", type=int, default=10, show_default=True, help="Store: number of folds.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Store: of the folds.")
+@click.option("--grasp", type=int, metavar="NUMBER", help="Store: the trial shown over time.  [the newest]")
+@click.option("--json", "as_json", is_flag=True, help="Print where the page is as JSON.")
+def report(
+    folder: str,
+    out: str | None,
+    classifier: str,
+    target: str,
+    folds: int,
+    seed: int,
+    grasp: int | None,
+    as_json: bool,
+) -> None:
+    """Write report.html for the store, or for the results of an experiment, in DIR.
+
+    The page is one file that loads nothing: it can be mailed, printed, and read without a network.
+    """
+    from graspsense.cli.progress import Progress
+    from graspsense.experiments.page import NAME, experiment_page
+    from graspsense.experiments.results import EXPERIMENT, Results
+    from graspsense.report.store_page import store_page
+    from graspsense.report.write import write_html
+
+    path = Path(out or folder) / NAME
+    if (Path(folder) / EXPERIMENT).is_file():
+        from graspsense.experiments.experiment import read_experiment
+        from graspsense.experiments.summary import summarise
+
+        results = Results(Path(folder))
+        page = experiment_page(summarise(read_experiment(str(results.folder / EXPERIMENT)), results), results)
+    else:
+        with Progress() as progress:
+            page = store_page(
+                folder,
+                classifier=classifier,
+                target=target,  # type: ignore[arg-type]
+                folds=folds,
+                seed=seed,
+                grasp=grasp,
+                progress=progress,
+            )
+    write_html(path, page)
+    if as_json:
+        echo_json({"page": str(path), "answer": page.answer})
+    else:
+        click.echo(page.answer)
+        click.echo(f"page        {path}")

@@ -1,0 +1,113 @@
+"""`graspsense tradeoff`: speed against accuracy, measured."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from graspsense.cli.options import pipeline_options, settings_of
+from graspsense.cli.output import echo_json, echo_table, file_to_write, talk
+from graspsense.cli.tradeoff_recognition import commands
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+@click.group(short_help="Measure speed against accuracy.")
+def tradeoff() -> None:
+    """Measure what accuracy costs, and draw it."""
+
+
+for _one in commands():
+    tradeoff.add_command(_one)
+
+
+@tradeoff.command(short_help="The simulator's accuracy against its time.")
+@pipeline_options
+@click.option(
+    "--scene",
+    "scenes",
+    metavar="NAME:STATE",
+    multiple=True,
+    help="What is grasped; may be given again.  [six of the catalogue]",
+)
+@click.option(
+    "--seeds", type=click.IntRange(min=1), default=2, show_default=True, help="Grasps of each scene."
+)
+@click.option(
+    "--peers", metavar="FILE", help="What `benchmarks/simulation.py --json` printed, to stand beside."
+)
+@click.option("--png", metavar="FILE", callback=file_to_write, help="Draw it.")
+@click.option("--markdown", metavar="FILE", callback=file_to_write, help="Write the tables as a page.")
+@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+def simulation(
+    scenes: tuple[str, ...],
+    seeds: int,
+    peers: str | None,
+    png: str | None,
+    markdown: str | None,
+    as_json: bool,
+    pipeline: str | None,
+    gripper: str | None,
+    object_name: str | None,
+    options: tuple[str, ...],
+    seed: int | None,
+) -> None:
+    """Run the same grasps in every scheme and fidelity of the simulator.
+
+    The error of each feature, of the peak force and of the force trace is against a reference in which everything
+    is modelled and steps are halved until nothing changes; the time is that of the very same grasps.
+    """
+    from graspsense.cli.progress import Progress
+    from graspsense.experiments.simulation import SCENES, trade_simulation
+    from graspsense.report.simulation import simulation_markdown, simulation_png, simulation_rows
+
+    beside = _peers(peers) if peers else None
+    settings = settings_of(pipeline, gripper, object_name, options, seed)
+    wanted = scenes or ((object_name,) if object_name else SCENES)
+    first = settings.run.seed
+    with Progress() as progress:
+        found = trade_simulation(
+            settings, scenes=wanted, seeds=range(first, first + seeds), progress=progress
+        )
+    if png:
+        simulation_png(found, beside, Path(png))
+        talk(f"drawn in {png}")
+    if markdown:
+        picture = os.path.relpath(png, Path(markdown).parent) if png else None
+        try:
+            Path(markdown).write_text(simulation_markdown(found, beside, picture), encoding="utf-8")
+        except OSError as error:
+            raise click.ClickException(f"{markdown} cannot be written: {error.strerror}") from error
+        talk(f"written to {markdown}")
+    if as_json:
+        echo_json({**found.as_json(), "peers": beside})
+        return
+    made = ", ".join(f"{key} {value}" for key, value in found.made.items())
+    click.echo(
+        f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each\n{made}\n"
+    )
+    echo_table(*simulation_rows(found))
+
+
+def _peers(file: str) -> Mapping[str, Any]:
+    try:
+        found = json.loads(Path(file).read_text(encoding="utf-8"))
+        # Read here, so that a wrong file is told before minutes of measuring.
+        runs = [
+            (run["what"], run["engine"], run["seconds"], run["rms"], run["peak"]) for run in found["runs"]
+        ]
+    except OSError as error:
+        raise click.BadParameter(f"{file}: {error.strerror}", param_hint="--peers") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise click.BadParameter(
+            f"{file} is not what benchmarks/simulation.py --json prints ({type(error).__name__}: {error})",
+            param_hint="--peers",
+        ) from error
+    if not runs:
+        raise click.BadParameter(f"{file} has no runs", param_hint="--peers")
+    return found  # type: ignore[no-any-return]

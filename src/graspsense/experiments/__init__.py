@@ -1,0 +1,1 @@
+"""Experiments from a file: sweeps over settings and seeds, on one machine or many, resumable."""

@@ -1,0 +1,39 @@
+"""An executor by what a user types."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+from graspsense.core.errors import ConfigError, suggestion
+from graspsense.experiments.executors.base import Executor
+
+NAMES = ("serial", "processes", "dask")
+
+
+def chosen(asked: str | None, workers: int | None = None) -> Callable[[], Executor]:
+    """Return what makes the executor that is asked for; None asks for processes, or serial on one core.
+
+    Raises ConfigError for what is none.
+    """
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if workers is not None and workers < 1:
+        raise ConfigError(f"--workers {workers}: give at least 1")
+    number = workers or cores
+    name, _, address = (asked or ("processes" if number > 1 else "serial")).partition(":")
+    if name not in NAMES or (address and name != "dask"):
+        raise ConfigError(
+            f"there is no executor {asked!r}.{suggestion(name, NAMES)} There are {', '.join(NAMES)}, and "
+            "dask:ADDRESS, as in dask:tcp://10.0.0.1:8786"
+        )
+    if name == "serial":
+        from graspsense.experiments.executors.serial import Serial
+
+        return Serial
+    if name == "processes":
+        from graspsense.experiments.executors.processes import Processes
+
+        return lambda: Processes(number)
+    from graspsense.experiments.executors.dask import DaskCluster
+
+    return lambda: DaskCluster(address or None, number)

@@ -1,0 +1,200 @@
+"""Tasks on a Dask cluster: one that is there already, by its scheduler's address, or a local one made for the run."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from importlib import import_module
+from typing import Any, Final, Literal
+
+from graspsense.core.errors import ConfigError, PluginUnavailable, named
+from graspsense.experiments.executors.base import ExecutorLost
+from graspsense.experiments.task import Done, Task, run_task
+from graspsense.experiments.versions import differences, versions
+
+HINT: Final = 'the executor dask needs Dask: pip install "graspsense[dask]", or pip install dask distributed'
+CONNECTING_S: Final = 10.0
+WORKERS_COMING_S: Final = 30.0
+LOOKING_S: Final = 2.0
+"""How often a run looks whether its scheduler and its workers are still there."""
+SETTLING_S: Final = 1.0
+WITHOUT_WORKERS_S: Final = 60.0
+"""Workers that died are started again within seconds, where somebody does so."""
+
+
+class DaskCluster:
+    """The executor `dask`."""
+
+    def __init__(self, address: str | None, workers: int) -> None:
+        try:
+            dask, self._distributed = _parts()
+        except ImportError as error:
+            raise PluginUnavailable(f"{HINT} ({error})") from error
+        self._cluster: Any = None
+        self._wanted = workers
+        if address is None:
+            # One more try at once: a task may have been sent to a worker that was dying of another one.
+            dask.config.set({"distributed.scheduler.allowed-failures": 1})
+            self._cluster = self._distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
+            )
+        try:
+            self._client = self._distributed.Client(address or self._cluster, timeout=CONNECTING_S)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise ConfigError(
+                f"no Dask scheduler answers at {address} within {CONNECTING_S:g} s ({error}). Start one with "
+                "`dask scheduler`, and workers with `dask worker ADDRESS`"
+            ) from error
+        self._futures: list[Any] = []
+        self._seen = time.monotonic()
+
+    @property
+    def workers(self) -> int:
+        """How many tasks its workers do at once."""
+        return max(int(sum(self._client.nthreads().values())), 1)
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[Done]:
+        """Do them, a task whose worker died once more at the end and alone.
+
+        Raises ExecutorLost where the scheduler goes, ConfigError where versions differ.
+        """
+        self._compare()
+        self._seen = time.monotonic()
+        victims: list[Task] = []
+        for task, text in self._answers(tasks, "first"):
+            if text is None:
+                victims.append(task)
+            else:
+                yield _done(task, text)
+        # Alone, so that only the task itself can be what ends its worker.
+        for task, text in self._answers(victims, "alone"):
+            reason = "it ended its worker, also when it was tried again alone"
+            yield Done.failed(task, reason) if text is None else _done(task, text)
+
+    def _answers(
+        self, tasks: Sequence[Task], turn: Literal["first", "alone"]
+    ) -> Iterator[tuple[Task, str | Exception | None]]:
+        """Yield each task with its answer, with what went wrong on the way, or None where its worker died.
+
+        No more are handed in than are done at once: a worker that dies takes only those along, and answers are
+        fetched before it does.
+        """
+        distributed = self._distributed
+        waiting = deque(tasks)
+        running: dict[Any, Task] = {}
+        try:
+            while waiting or running:
+                # Workers may come and go meanwhile.
+                at_once = 1 if turn == "alone" else self.workers
+                while waiting and len(running) < at_once:
+                    if turn == "alone":
+                        self._settle()
+                    task = waiting.popleft()
+                    # Plain text both ways: nothing that would have to be pickled passes.
+                    future = self._client.submit(
+                        run_task,
+                        task.to_text(),
+                        key=f"graspsense-{turn}-{task.key}",
+                        pure=False,
+                    )
+                    running[future] = task
+                    self._futures = list(running)
+                done = self._first(list(running))
+                try:
+                    answer: str | Exception | None = done.result(timeout=LOOKING_S)
+                except distributed.KilledWorker:
+                    answer = None
+                except TimeoutError:
+                    # Its worker died before the answer was fetched: it is being done once more.
+                    self._watch()
+                    continue
+                except (OSError, distributed.CancelledError):
+                    raise
+                except Exception as error:
+                    answer = error
+                task = running.pop(done)
+                done.release()
+                yield task, answer
+        except (OSError, distributed.CancelledError, RuntimeError) as error:
+            raise ExecutorLost(f"{_GONE} ({named(error)})") from error
+
+    def _settle(self) -> None:
+        """Wait until the workers have been the same for a while: none is dying of the task before.
+
+        Raises ExecutorLost where there are none for long.
+        """
+        before: set[str] = set()
+        while True:
+            now = set(self._client.nthreads())
+            if now and now == before:
+                return
+            before = now
+            self._watch()
+            time.sleep(SETTLING_S)
+
+    def _first(self, futures: Sequence[Any]) -> Any:
+        """Wait for one of these to be done and return it. Raises ExecutorLost where nobody is left to do it."""
+        distributed = self._distributed
+        while True:
+            with suppress(TimeoutError, distributed.TimeoutError):
+                found = distributed.wait(list(futures), timeout=LOOKING_S, return_when="FIRST_COMPLETED")
+                return next(iter(found.done))
+            self._watch()
+
+    def _watch(self) -> None:
+        """Look after scheduler and workers. Raises ExecutorLost where nobody is left to do anything."""
+        if self._client.status != "running":
+            raise ExecutorLost(_GONE)
+        if self._cluster is not None and len(self._cluster.workers) < self._wanted:
+            # Whoever watches over a worker gives up after some deaths of it.
+            self._cluster.scale(self._wanted)
+        if self._client.nthreads():
+            self._seen = time.monotonic()
+        elif time.monotonic() - self._seen > WITHOUT_WORKERS_S:
+            raise ExecutorLost(f"the Dask cluster has had no worker for {WITHOUT_WORKERS_S:g} s")
+
+    def close(self) -> None:
+        """Take back what is not done, and end the cluster where it was made here."""
+        with suppress(Exception):
+            self._client.cancel(self._futures, force=True)
+        with suppress(Exception):
+            self._client.close(timeout=5)
+        if self._cluster is not None:
+            with suppress(Exception):
+                self._cluster.close(timeout=5)
+
+    def _compare(self) -> None:
+        """Refuse workers with other versions than this process has."""
+        try:
+            self._client.wait_for_workers(1, timeout=WORKERS_COMING_S)
+        except TimeoutError as error:
+            raise ConfigError(
+                f"the Dask scheduler has had no worker for {WORKERS_COMING_S:g} s: start some with "
+                "`dask worker ADDRESS`"
+            ) from error
+        there = self._client.run(versions)
+        differs = [
+            f"{worker}: {line}" for worker, found in there.items() for line in differences(versions(), found)
+        ]
+        if differs:
+            raise ConfigError(
+                "workers have other versions than this process, so that their results would not be comparable:\n  "
+                + "\n  ".join(differs)
+            )
+
+
+def _done(task: Task, answer: str | Exception) -> Done:
+    """Return what came of a task, from its answer or from what kept the answer from coming."""
+    if isinstance(answer, Exception):
+        return Done.failed(task, f"its worker could not do it: {named(answer)}")
+    return Done.from_text(answer)
+
+
+def _parts() -> tuple[Any, Any]:
+    """Return Dask's modules, imported here only: they take a second."""
+    return import_module("dask"), import_module("distributed")
+
+
+_GONE: Final = "the Dask scheduler, or the connection to it, is gone"

@@ -1,0 +1,35 @@
+"""A worker process: tasks as lines on standard input, what came of them as lines on what was standard output.
+
+It ends when whoever started it is gone.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+
+def main() -> None:
+    """Work until there is no further line."""
+    # Whatever else prints to standard output, here or in a library below, goes to standard error.
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+
+    from graspsense.experiments.task import run_task
+    from graspsense.experiments.versions import versions
+    from graspsense.trials.provenance import json_text
+
+    def answer(text: str) -> None:
+        try:
+            answers.write(text + "\n")
+            answers.flush()
+        except BrokenPipeError:
+            os._exit(0)
+
+    answer(json_text(versions()))
+    for line in sys.stdin:
+        answer(run_task(line))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,474 @@
+"""An experiment as a file has it, and the tasks that it stands for. docs/experiments.md describes the file."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Final
+
+from attrs import evolve, field, frozen
+
+from graspsense.core.config import Settings, build, resolve
+from graspsense.core.entries import TABLE_OF_ROLE
+from graspsense.core.errors import ConfigError, GraspsenseError, UnknownName, suggestion
+from graspsense.core.layers import Layer, Merged, dotted, option_layers, read_toml
+from graspsense.core.model import worded
+from graspsense.core.plugins import installed
+from graspsense.core.strict import Misfit, Problem, plain, structured
+from graspsense.experiments.kinds import kind_of
+from graspsense.experiments.task import Task
+from graspsense.trials.source import Source
+
+PIPELINE_TABLES: Final = (*(one for one in TABLE_OF_ROLE.values() if one != "classifier"), "run")
+SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
+DEFAULT_CLASSIFIER: Final = "c45"
+
+
+def _seeds(experiment: object, attribute: object, value: int | tuple[int, ...]) -> None:
+    if isinstance(value, int) and value < 1:
+        raise ValueError(f"{value} seeds: give at least 1, or a list of seeds")
+    if not isinstance(value, int) and (not value or len(set(value)) < len(value) or min(value) < 0):
+        raise ValueError("seeds: give a number of them, or a list of different ones from 0 on")
+
+
+@frozen(kw_only=True)
+class PipelineOf:
+    """A pipeline under a name of its own."""
+
+    name: str
+    pipeline: str
+    """The name of a pipeline, or its file."""
+
+
+@frozen(kw_only=True)
+class Variant:
+    """A case that differs from the others in several keys at once."""
+
+    name: str
+    gripper: Mapping[str, Any] = field(factory=dict)
+    controller: Mapping[str, Any] = field(factory=dict)
+    features: Mapping[str, Any] = field(factory=dict)
+    run: Mapping[str, Any] = field(factory=dict)
+    classifier: Mapping[str, Any] = field(factory=dict)
+    data: Mapping[str, Any] = field(factory=dict)
+    test: Mapping[str, Any] = field(factory=dict)
+    judge: Mapping[str, Any] = field(factory=dict)
+
+
+@frozen(kw_only=True)
+class Experiment:
+    """The keys of an experiment file."""
+
+    title: str
+    question: str = ""
+    kind: str = "recognise"
+    parts: tuple[str, ...] = ()
+    """Experiments that this one consists of, names or files, each with this one's seeds. It has no other cases."""
+    seeds: int | tuple[int, ...] = field(default=1, validator=_seeds)
+    """How many, from 0 on, or which. Each seed makes its own trials, where they are simulated, and its own folds."""
+    pipelines: tuple[str | PipelineOf, ...] = ("default",)
+    gripper: Mapping[str, Any] = field(factory=dict)
+    """Keys of pipelines that are laid over every one of them. Likewise the next three."""
+    controller: Mapping[str, Any] = field(factory=dict)
+    features: Mapping[str, Any] = field(factory=dict)
+    run: Mapping[str, Any] = field(factory=dict)
+    classifiers: tuple[str | Mapping[str, Any], ...] = ()
+    """Names, or tables with `type`, a `name` to call it, and keys; none: the pipeline's, or c45."""
+    variants: tuple[Variant, ...] = ()
+    sweep: Mapping[str, Any] = field(factory=dict)
+    """Keys, as `controller.probing_force_n`, each with a list of values: every combination is a case."""
+    data: Mapping[str, Any] = field(factory=dict)
+    """Keys of `graspsense.trials.source.Source`."""
+    test: Mapping[str, Any] = field(factory=dict)
+    """Other trials to judge on, in place of a cross validation."""
+    judge: Mapping[str, Any] = field(factory=dict)
+    """Keys of the kind, as `graspsense.experiments.recognise.Judging`."""
+
+
+@frozen(kw_only=True, eq=False)
+class Learner:
+    """A classifier to be judged: how it is called, its qualified name, its keys."""
+
+    name: str
+    type: str
+    config: Mapping[str, Any]
+
+
+@frozen(kw_only=True, eq=False)
+class Case:
+    """One of the things compared: its name, what it differs in, and everything that its tasks follow from."""
+
+    name: str
+    at: Mapping[str, Any]
+    """`pipeline`, `variant` and swept keys (but the classifier's) with the values of this case."""
+    settings: Settings
+    data: Source
+    test: Source | None
+    learners: tuple[Learner, ...]
+    judge: Any
+    kind: str = "recognise"
+    part: str = ""
+    """The name of the experiment that it is of, where it is part of another one."""
+
+
+@frozen(kw_only=True, eq=False)
+class Planned:
+    """An experiment that was read and checked: its cases and its tasks.
+
+    `values` is the experiment itself with everything filled in, `pipelines` the resolved pipelines that it names.
+    """
+
+    name: str
+    experiment: Experiment
+    cases: tuple[Case, ...]
+    seeds: tuple[int, ...]
+    pipelines: Mapping[str, Settings]
+    parts: tuple[Planned, ...] = ()
+
+    def tasks(self) -> list[Task]:
+        """Return every task, the seeds of a case one after the other, all cases for one seed first."""
+        return [self.task(case, seed) for seed in self.seeds for case in self.cases]
+
+    def task(self, case: Case, seed: int) -> Task:
+        """Return the task of this case with this seed."""
+        params = {
+            "settings": {
+                table: {key: one for key, one in case.settings.values[table].items() if one is not None}
+                for table in PIPELINE_TABLES
+            },
+            "data": plain(case.data),
+            "test": None if case.test is None else plain(case.test),
+            "learners": [
+                {"name": one.name, "type": one.type, "config": dict(one.config)} for one in case.learners
+            ],
+            "judge": plain(case.judge),
+            "first": seed == self.seeds[0],
+        }
+        return Task(kind=case.kind, params=params, seed=seed, name=f"{case.name}, seed {seed}".lstrip(", "))
+
+
+def shipped() -> dict[str, Any]:
+    """Return the experiments that come with graspsense: name to file."""
+    folder = files("graspsense.experiments").joinpath("shipped")
+    return {
+        one.name.removesuffix(".toml"): one
+        for one in sorted(folder.iterdir(), key=lambda one: one.name)
+        if one.name.endswith(".toml")
+    }
+
+
+def read_experiment(asked: str, options: Sequence[str] = ()) -> Planned:
+    """Return a shipped experiment by name, or that of a `.toml` file, with options as after `-o` laid over it.
+
+    Raises ConfigError with every error that can be told, each with its file and line.
+    """
+    layer, base, name = _found(asked)
+    layers, complaints = option_layers(options)
+    merged = Merged()
+    merged.add((), _located(layer.values, base), layer)
+    for one in layers:
+        merged.add((), one.values, one)
+    values = merged.values
+    try:
+        experiment = structured(values, Experiment, "an experiment")
+    except Misfit as misfit:
+        for problem in misfit.problems:
+            owner = merged.owner_of(problem.path) or layer
+            complaints.append(owner.complain(problem))
+        experiment = None
+    if experiment is None or complaints:
+        raise ConfigError("\n".join(complaints))
+    if experiment.parts:
+        return _of_parts(name, experiment, layer)
+    return _Plan(name, experiment, layer).planned()
+
+
+def _of_parts(name: str, experiment: Experiment, layer: Layer) -> Planned:
+    """Return the cases of all parts, each under its part's name."""
+    kind_of(experiment.kind)
+    seeds = _listed(experiment.seeds)
+    parts = [read_experiment(part, [f"seeds={list(seeds)}"]) for part in experiment.parts]
+    pipelines: dict[str, Settings] = {}
+    cases: list[Case] = []
+    for part in parts:
+        for called, settings in part.pipelines.items():
+            if called in pipelines and pipelines[called].values != settings.values:
+                raise ConfigError(
+                    f"{layer.where(('parts',))}: two parts have different pipelines called {called!r}: rename one"
+                )
+            pipelines[called] = settings
+        for case in part.cases:
+            where = f"{part.name}: {case.name}" if case.name else part.name
+            cases.append(evolve(case, name=where, at={"part": part.name, **case.at}, part=part.name))
+    if len({part.name for part in parts}) < len(parts):
+        raise ConfigError(
+            f"{layer.where(('parts',))}: two parts have one name: {', '.join(experiment.parts)}"
+        )
+    return Planned(
+        name=name,
+        experiment=experiment,
+        cases=tuple(cases),
+        seeds=seeds,
+        pipelines=pipelines,
+        parts=tuple(parts),
+    )
+
+
+def _listed(seeds: int | tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(range(seeds)) if isinstance(seeds, int) else seeds
+
+
+class _Plan:
+    """What the steps from an experiment to its cases share."""
+
+    def __init__(self, name: str, experiment: Experiment, layer: Layer) -> None:
+        self.name, self.experiment, self.layer = name, experiment, layer
+        self.complaints: list[str] = []
+
+    def planned(self) -> Planned:
+        """Return the cases."""
+        one = self.experiment
+        kind_of(one.kind)
+        seeds = _listed(one.seeds)
+        pipelines = {}
+        for asked in one.pipelines:
+            of = asked if isinstance(asked, PipelineOf) else PipelineOf(name=Path(asked).stem, pipeline=asked)
+            if of.name in pipelines:
+                raise ConfigError(
+                    f"{self.layer.where(('pipelines',))}: two pipelines are called {of.name!r}: give one a name "
+                    'of its own, { name = "...", pipeline = "..." }'
+                )
+            pipelines[of.name] = resolve(of.pipeline)
+        if not pipelines:
+            raise ConfigError(f"{self.layer.where(('pipelines',))}: pipelines: name at least one")
+        sweep = self._sweep()
+        cases = []
+        for pipeline, settings in pipelines.items():
+            for variant in one.variants or (Variant(name=""),):
+                for point in _points(sweep, "classifier", within=False):
+                    at: dict[str, Any] = {}
+                    if len(pipelines) > 1:
+                        at["pipeline"] = pipeline
+                    if one.variants:
+                        at["variant"] = variant.name
+                    at.update((dotted(path), value) for path, value in point)
+                    cases.append(self._case(settings, variant, point, sweep, at))
+        if self.complaints:
+            raise ConfigError("\n".join(dict.fromkeys(self.complaints)))
+        return Planned(name=self.name, experiment=one, cases=tuple(cases), seeds=seeds, pipelines=pipelines)
+
+    def _sweep(self) -> dict[tuple[str, ...], Sequence[Any]]:
+        """Return the swept keys, as paths, with their values."""
+        found: dict[tuple[str, ...], Sequence[Any]] = {}
+
+        def take(path: tuple[str, ...], value: Any, where: tuple[str, ...]) -> None:
+            if isinstance(value, Mapping):
+                for key, inner in value.items():
+                    take((*path, *key.split(".")), inner, (*where, key))
+                return
+            place = f"{self.layer.where(('sweep', *where))}: sweep.{dotted(path)}"
+            if path[0] not in SWEPT_TABLES or len(path) < 2:
+                near = suggestion(path[0], SWEPT_TABLES)
+                self.complaints.append(
+                    f"{place}: no such table.{near} A sweep is over keys of {', '.join(SWEPT_TABLES)}"
+                )
+            elif not isinstance(value, list) or not value:
+                self.complaints.append(f"{place}: give a list of values, as [17.0, 20.0, 23.0]")
+            else:
+                found[path] = value
+
+        for key, value in self.experiment.sweep.items():
+            take(tuple(key.split(".")), value, (key,))
+        return found
+
+    def _case(
+        self,
+        pipeline: Settings,
+        variant: Variant,
+        point: Sequence[tuple[tuple[str, ...], Any]],
+        sweep: Mapping[tuple[str, ...], Sequence[Any]],
+        at: dict[str, Any],
+    ) -> Case:
+        one = self.experiment
+        values = _laid(_tables(one), _tables(variant))
+        for path, value in point:
+            _put(values, path, value)
+        over = {table: values[table] for table in PIPELINE_TABLES if values.get(table)}
+        settings = resolve(
+            pipeline.pipeline,
+            experiment=Layer(label=self.layer.label, values=over, lines=self.layer.lines),
+        )
+        name = ", ".join(
+            str(value) if key in ("pipeline", "variant") else in_a_name(key, value)
+            for key, value in at.items()
+        )
+        data = self._keys(values.get("data", {}), Source, "data")
+        test = self._keys(values["test"], Source, "test") if values.get("test") else None
+        judge = self._keys(values.get("judge", {}), kind_of(one.kind).keys_class(), "judge")
+        return Case(
+            name=name,
+            at=at,
+            settings=settings,
+            data=data,
+            test=test,
+            learners=tuple(self._learners(pipeline, values.get("classifier", {}), sweep)),
+            judge=judge,
+            kind=one.kind,
+        )
+
+    def _keys(self, values: Mapping[str, Any], cls: type, table: str) -> Any:
+        try:
+            return structured(values, cls, f"[{table}]")
+        except Misfit as misfit:
+            self.complaints += [self.layer.complain(problem) for problem in misfit.under(table)]
+            return None
+
+    def _learners(
+        self,
+        pipeline: Settings,
+        variant: Mapping[str, Any],
+        sweep: Mapping[tuple[str, ...], Sequence[Any]],
+    ) -> Iterator[Learner]:
+        """Yield every classifier at every point of the sweep over its keys."""
+        given = self.experiment.classifiers
+        if not given:
+            chosen = pipeline.classifier
+            given = (
+                (DEFAULT_CLASSIFIER,)
+                if chosen is None
+                else (
+                    {
+                        "name": chosen.component.name,
+                        "type": chosen.component.qualified,
+                        **_fresh(chosen.config),
+                    },
+                )
+            )
+        seen: set[str] = set()
+        for index, spec in enumerate(given):
+            table = {"type": spec} if isinstance(spec, str) else dict(spec)
+            called = str(table.pop("name", table.get("type", "")).rpartition("/")[2])
+            for point in _points(sweep, "classifier", within=True):
+                keys = {**table, **variant}
+                for path, value in point:
+                    _put(keys, path[1:], value)
+                try:
+                    component = installed().find("classifier", str(keys.pop("type")))
+                    config = _fresh(build(component, keys))
+                except KeyError:
+                    self.complaints.append(
+                        self.layer.complain(Problem(("classifiers", index), "a classifier needs a `type`"))
+                    )
+                    return
+                except GraspsenseError as error:
+                    self.complaints.append(self.layer.complain(Problem(("classifiers", index), str(error))))
+                    return
+                name = ", ".join([called, *(in_a_name(path[-1], value) for path, value in point)])
+                if name in seen:
+                    text = f"two classifiers are called {name!r}: give one a `name`"
+                    self.complaints.append(self.layer.complain(Problem(("classifiers", index), text)))
+                seen.add(name)
+                yield Learner(name=name, type=component.qualified, config=config)
+
+
+def in_a_name(key: str, value: Any) -> str:
+    """Return a key with its value as a person says them: `probing force 20 N`."""
+    return " ".join(
+        worded(key.rpartition(".")[2], shown(value) if isinstance(value, list | tuple) else value)
+    )
+
+
+def shown(value: Any) -> str:
+    """Return a value as it stands in a case's name."""
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, list | tuple):
+        return "+".join(map(shown, value))
+    return str(value)
+
+
+def _fresh(config: Any) -> dict[str, Any]:
+    """Return a classifier's keys without those that are not set, and without a trained model."""
+    return {key: one for key, one in plain(config).items() if one is not None and key != "model"}
+
+
+def _tables(one: Experiment | Variant) -> dict[str, Mapping[str, Any]]:
+    return {table: dict(getattr(one, table)) for table in SWEPT_TABLES if getattr(one, table, None)}
+
+
+def _laid(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Return tables laid over others: keys replace keys, tables merge."""
+    both = dict(below)
+    for key, value in above.items():
+        inner = both.get(key)
+        both[key] = (
+            _laid(inner, value) if isinstance(value, Mapping) and isinstance(inner, Mapping) else value
+        )
+    return both
+
+
+def _points(
+    sweep: Mapping[tuple[str, ...], Sequence[Any]], table: str, *, within: bool
+) -> list[tuple[tuple[tuple[str, ...], Any], ...]]:
+    """Return every combination of the swept keys within this table, or of all others."""
+    chosen = {path: values for path, values in sweep.items() if (path[0] == table) is within}
+    return [tuple(zip(chosen, values, strict=True)) for values in itertools.product(*chosen.values())]
+
+
+def _put(values: dict[str, Any], path: Sequence[str], value: Any) -> None:
+    for part in path[:-1]:
+        inner = values.get(part)
+        values[part] = dict(inner) if isinstance(inner, Mapping) else {}
+        values = values[part]
+    values[path[-1]] = value
+
+
+def _found(asked: str) -> tuple[Layer, Path | None, str]:
+    """Return the file of an experiment, the folder that its paths count from, and its name."""
+    if asked.endswith(".toml"):
+        path = Path(asked).expanduser()
+        return read_toml(path, asked, "experiment file"), path.parent, path.stem
+    known = shipped()
+    if asked not in known:
+        hint = (
+            f"; there is a file {asked}.toml: give it with its ending"
+            if Path(f"{asked}.toml").is_file()
+            else ""
+        )
+        raise UnknownName(
+            f"no experiment named {asked!r}. Known: {', '.join(known)}.{suggestion(asked, known)}"
+            f"\n  One of your own is a file: write its name with .toml{hint}"
+        )
+    return read_toml(known[asked], f"experiment {asked}", "experiment file"), None, asked
+
+
+def _located(values: Mapping[str, Any], base: Path | None) -> dict[str, Any]:
+    """Return the values with the files that they name found from the folder of the experiment file."""
+    if base is None:
+        return dict(values)
+
+    def path(text: Any) -> Any:
+        if not isinstance(text, str):
+            return text
+        if text.endswith((".toml", ".csv", ".tsv", ".txt")) and (base / text).exists():
+            return str((base / text).absolute())
+        name, colon, folder = text.partition(":")
+        if colon and folder and (base / folder).is_dir():
+            return f"{name}:{(base / folder).absolute()}"
+        return text
+
+    def inside(value: Any) -> Any:
+        if isinstance(value, Mapping):
+            return {key: inside(one) for key, one in value.items()}
+        if isinstance(value, list):
+            return [inside(one) for one in value]
+        return path(value)
+
+    located = {
+        key: inside(one)
+        for key, one in values.items()
+        if key in ("parts", "pipelines", "gripper", "variants", "sweep", "data", "test")
+    }
+    return {**values, **located}

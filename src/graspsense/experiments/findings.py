@@ -1,0 +1,111 @@
+"""What came out of an experiment beyond its rates: an answer, tables, and what is drawn of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any, Final
+
+from attrs import field, frozen
+
+from graspsense.report.html import Section, bullets, paragraph, table
+
+MARKDOWN: Final = "report.md"
+
+
+@frozen(kw_only=True)
+class FoundTable:
+    """A table of plain texts; columns from `numbers` on are numbers."""
+
+    id: str
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+    numbers: int = 99
+
+    def section(self, drawn: str = "") -> Section:
+        """Return it as a part of a page, below what is drawn of it."""
+        body = (paragraph(self.note) if self.note else "") + drawn
+        return Section(
+            id=self.id, title=self.title, body=body + table(self.title, self.header, self.rows, self.numbers)
+        )
+
+    @property
+    def markdown(self) -> list[str]:
+        """Return it as lines of Markdown."""
+        lines = [f"## {self.title}", ""]
+        if self.note:
+            lines += [self.note, ""]
+        lines.append(f"| {' | '.join(self.header)} |")
+        lines.append("|---" * len(self.header) + "|")
+        for row in self.rows:
+            lines.append(f"| {' | '.join(_cell(one) for one in row)} |")
+        return [*lines, ""]
+
+
+@frozen(kw_only=True)
+class Findings:
+    """What came out. `drawn` are pictures by the id of the table above which they stand; `values` go into the JSON."""
+
+    answer: str
+    tables: tuple[FoundTable, ...] = ()
+    notes: tuple[str, ...] = ()
+    """What a reader has to know beside the answer."""
+    drawn: Mapping[str, str] = field(factory=dict)
+    sections: tuple[Section, ...] = ()
+    values: Mapping[str, Any] = field(factory=dict)
+
+    def page_sections(self) -> list[Section]:
+        """Return the tables with what is drawn of them, then the further parts."""
+        found = [one.section(self.drawn.get(one.id, "")) for one in self.tables]
+        if self.notes:
+            found.append(Section(id="notes", title="What has to be known", body=bullets(self.notes)))
+        return [*found, *self.sections]
+
+    def markdown(self, title: str, made: Mapping[str, Any], cpu_seconds: float) -> str:
+        """Return it as Markdown, with the command, date and machine that made it."""
+        git = (made.get("git") or {}).get("graspsense") or {}
+        commit = str(git.get("commit", "unknown"))[:12] + (" with changes" if git.get("dirty") else "")
+        lines = [
+            f"# {title}",
+            "",
+            "Simulated, every figure of ours: the things grasped are models.",
+            f"Made by `{made.get('command', '')}`, begun {made.get('begun_at', '?')}, written "
+            f"{time.strftime('%Y-%m-%d', time.gmtime())}, on {made.get('system', '?')}, commit {commit}; "
+            f"{cpu_seconds:.0f} s of processor time in all tasks together.",
+            "",
+            self.answer,
+            "",
+        ]
+        for one in self.tables:
+            lines += one.markdown
+        if self.notes:
+            lines += ["## What has to be known", "", *(f"- {_cell(one)}" for one in self.notes), ""]
+        return "\n".join(lines)
+
+
+def write_markdown(path: Path, text: str) -> None:
+    """Write the Markdown beside the page."""
+    path.write_text(text, encoding="utf-8")
+
+
+def percent(rate: float) -> str:
+    """Return a rate in per cent."""
+    return f"{100 * rate:.1f} %"
+
+
+def span(interval: Sequence[float]) -> str:
+    """Return an interval of rates in per cent."""
+    return f"{100 * interval[0]:.1f} to {100 * interval[1]:.1f}"
+
+
+def code(text: str) -> str:
+    """Return text as it stands, for a page."""
+    return f'<pre tabindex="0" role="region" aria-label="text">{escape(text)}</pre>'
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ")

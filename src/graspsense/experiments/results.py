@@ -1,0 +1,185 @@
+"""Results on the disk: a folder with one file a task, each whole or not there.
+
+OUT/experiment.toml   the experiment with every value filled in; it runs again by itself
+OUT/pipelines/*.toml  the resolved pipelines that it names
+OUT/parts/*.toml      the experiments that it consists of, likewise
+OUT/provenance.json   versions, commit, machine, hashes of the files that were read
+OUT/results/KEY.json  what came of a task, written and flushed when it was done
+OUT/report.html       the page
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Final
+
+from attrs import frozen
+
+from graspsense.core.config import to_toml, toml_key, toml_value
+from graspsense.core.errors import ConfigError
+from graspsense.core.strict import plain
+from graspsense.experiments.experiment import PipelineOf, Planned
+from graspsense.experiments.task import Done
+from graspsense.experiments.versions import versions
+from graspsense.trials.provenance import of_this_process
+from graspsense.trials.recorder import NotKept
+
+EXPERIMENT: Final = "experiment.toml"
+PIPELINES: Final = "pipelines"
+PARTS: Final = "parts"
+PROVENANCE: Final = "provenance.json"
+RESULTS: Final = "results"
+LOCK: Final = ".lock"
+
+
+@frozen
+class Results:
+    """The results in a folder."""
+
+    folder: Path
+
+    def path(self, key: str) -> Path:
+        """Return where what came of a task lies."""
+        return self.folder / RESULTS / f"{key}.json"
+
+    def add(self, done: Done) -> None:
+        """Keep what came of a task; when this returns the disk has it. Raises NotKept."""
+        _write(self.path(done.key), done.to_text() + "\n")
+
+    def get(self, key: str) -> Done | None:
+        """Return what came of a task; None where nothing did, or where its file is not whole."""
+        try:
+            done = Done.from_text(self.path(key).read_text(encoding="utf-8"))
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+        return done if done.key == key else None
+
+    def of(self, keys: Sequence[str]) -> dict[str, Done]:
+        """Return what came of these tasks, in their order, without those of which nothing did."""
+        found = ((key, self.get(key)) for key in keys)
+        return {key: done for key, done in found if done is not None}
+
+    def any(self) -> bool:
+        """Whether there are results here already."""
+        return next((self.folder / RESULTS).glob("*.json"), None) is not None
+
+    def begin(self, planned: Planned, command: str) -> None:
+        """Write what the results follow from beside them. Raises NotKept."""
+        texts = {f"{name}.toml": to_toml(one) for name, one in planned.pipelines.items()}
+        for name, text in texts.items():
+            _write(self.folder / PIPELINES / name, text)
+        _write(self.folder / EXPERIMENT, resolved(planned))
+        for part in planned.parts:
+            for name, text in texts.items():
+                _write(self.folder / PARTS / PIPELINES / name, text)
+            _write(self.folder / PARTS / f"{part.name}.toml", resolved(part))
+        provenance = {
+            "experiment": planned.name,
+            "command": command,
+            "begun_at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+            "versions": dict(versions()),
+            "files": _hashes(planned),
+            **of_this_process(),
+        }
+        _write(self.folder / PROVENANCE, json.dumps(provenance, indent=2, ensure_ascii=False) + "\n")
+
+    def provenance(self) -> dict[str, Any]:
+        """Return what `begin` wrote, nothing where it cannot be read."""
+        try:
+            found = json.loads((self.folder / PROVENANCE).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return found if isinstance(found, dict) else {}
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Hold the folder: no other run writes here meanwhile. Raises ConfigError, NotKept."""
+        try:
+            (self.folder / RESULTS).mkdir(parents=True, exist_ok=True)
+            (self.folder / PIPELINES).mkdir(exist_ok=True)
+            lock = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+        except OSError as error:
+            raise NotKept(f"cannot write to {self.folder}: {error.strerror}. Name another --out") from error
+        try:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise ConfigError(
+                    f"another run is writing to {self.folder}: wait for it, or name another --out"
+                ) from None
+            yield
+        finally:
+            os.close(lock)
+
+
+def resolved(planned: Planned) -> str:
+    """Return the experiment as a file with every value filled in."""
+    values: dict[str, Any] = plain(planned.experiment)
+    values["seeds"] = list(planned.seeds)
+    if planned.parts:
+        values["parts"] = [f"{PARTS}/{part.name}.toml" for part in planned.parts]
+    values["pipelines"] = [
+        plain(PipelineOf(name=name, pipeline=f"{PIPELINES}/{name}.toml")) for name in planned.pipelines
+    ]
+    if not planned.experiment.classifiers and planned.cases and not planned.parts:
+        values["classifiers"] = [
+            {"name": one.name, "type": one.type, **one.config} for one in _unswept(planned)
+        ]
+    lines = [
+        f"# {planned.name}, with everything filled in: `graspsense experiment FILE` gives the same again."
+    ]
+    tables = {key: one for key, one in values.items() if isinstance(one, Mapping)}
+    lines += [
+        f"{toml_key(key)} = {toml_value(one)}"
+        for key, one in values.items()
+        if key not in tables and one is not None
+    ]
+    for table, keys in tables.items():
+        if keys:
+            lines += ["", f"[{table}]", *(f"{toml_key(k)} = {toml_value(one)}" for k, one in keys.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _unswept(planned: Planned) -> list[Any]:
+    """Return the classifiers that the pipelines brought, where the sweep does not change them."""
+    swept = any(key.split(".")[0] == "classifier" for key in planned.experiment.sweep)
+    varied = any(one.classifier for one in planned.experiment.variants)
+    return [] if swept or varied else list(planned.cases[0].learners)
+
+
+def _hashes(planned: Planned) -> dict[str, str]:
+    """Return the hash of each file that trials are read from."""
+    found = {}
+    for case in planned.cases:
+        for source in (case.data, case.test):
+            if source is not None and source.kind == "CSV":
+                with suppress(OSError):
+                    found[source.source] = hashlib.sha256(Path(source.source).read_bytes()).hexdigest()
+    return found
+
+
+def _write(path: Path, text: str) -> None:
+    part = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with part.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+        # The name, too, must outlive a loss of power.
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise NotKept(f"{path} cannot be written: {error.strerror}") from error

@@ -1,0 +1,198 @@
+"""What a simulator's accuracy costs: the error of features and force trace against the time of the same grasps."""
+
+from __future__ import annotations
+
+import math
+import os
+import platform
+import time
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from datetime import date
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from attrs import evolve, fields_dict, frozen
+
+from graspsense.core.errors import ConfigError
+from graspsense.core.roles import BatchBackend, Grasped, Variant
+from graspsense.experiments.versions import versions
+from graspsense.report.simulation import PEAK, TRACE, Point, SimulationTrade
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.config import Settings
+    from graspsense.core.features import Features
+    from graspsense.core.trace import Trace
+
+SCENES: Final = (
+    "odwalla:full_open",
+    "odwalla:full_closed",
+    "can:empty_open",
+    "water:empty_closed",
+    "toy",
+    "block",
+)
+SCALES: Final[Mapping[str, float]] = {"m": 1e-3, "N": 1.0, "s": 0.05, "m/s": 1e-3, "N/s": 1.0}
+"""Below these an error counts as if the quantity were this."""
+LEAST_S: Final = 0.2
+"""A variant is run again until so much processor time is measured, so that the clock's grain counts for nothing."""
+
+
+def trade_simulation(
+    settings: Settings,
+    *,
+    scenes: Sequence[str] = SCENES,
+    seeds: Sequence[int] = (1, 2),
+    progress: Callable[[str, int, int], None] | None = None,
+) -> SimulationTrade:
+    """Grasp each scene with each seed in every variant that the gripper offers.
+
+    Raises ConfigError where the gripper cannot trade accuracy for time, UnknownName for a scene it does not know.
+    """
+    backend = settings.gripper.create()
+    variants = backend.variants() if isinstance(backend, BatchBackend) else ()
+    if not variants:
+        raise ConfigError(
+            f"gripper {settings.gripper.component.qualified} has no accuracy to trade for time: choose a simulated "
+            "one, as in --gripper sim"
+        )
+    names = [scene for scene in scenes for _ in seeds]
+    all_seeds = [seed for _ in scenes for seed in seeds]
+    reference: list[_Felt] | None = None
+    quantities: tuple[str, ...] = ()
+    points: list[Point] = []
+    in_turn = sorted(variants, key=lambda one: one.role != "reference")
+    for k, variant in enumerate(in_turn):
+        what = f"{variant.method}, {variant.fidelity}, {variant.step}"
+        tick = None if progress is None else partial(progress, what, k, len(in_turn))
+        if tick is not None:
+            tick()
+        try:
+            felt, seconds, setup = _measured(settings, variant, names, all_seeds, tick)
+        except (ArithmeticError, ValueError, ConfigError) as error:
+            # A name that nobody knows is one in the reference, too, which comes first.
+            if reference is None:
+                raise
+            points.append(_failed(variant, f"{type(error).__name__}: {error}"))
+            continue
+        if reference is None:
+            reference = felt
+            quantities = (*felt[0].features.names, PEAK, TRACE)
+        points.append(_point(variant, felt, reference, seconds, setup))
+    return SimulationTrade(
+        gripper=settings.gripper.component.qualified,
+        scenes=tuple(scenes),
+        seeds=tuple(seeds),
+        quantities=quantities,
+        points=tuple(points),
+        made={
+            "date": date.today().isoformat(),
+            "processor": platform.processor() or platform.machine(),
+            "system": f"{platform.system()} {platform.release()}",
+            "load": f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores",
+            **versions(),
+        },
+    )
+
+
+@frozen(kw_only=True, eq=False)
+class _Felt:
+    features: Features
+    force: NDArray[np.float64]
+
+
+@frozen
+class _Drawing:
+    feature_set: Any
+
+    def __call__(self, trace: Trace) -> _Felt:
+        force = 0.5 * (trace.force_left_n + trace.force_right_n)
+        return _Felt(features=self.feature_set.extract(trace), force=force)
+
+
+def _measured(
+    settings: Settings,
+    variant: Variant,
+    scenes: Sequence[str],
+    seeds: Sequence[int],
+    tick: Callable[[], None] | None,
+) -> tuple[list[_Felt], float, float]:
+    """Return what every grasp felt, the processor time of one, and what the first ones took beyond that."""
+    ideal = {"sensor": "ideal"} if "sensor" in fields_dict(type(settings.gripper.config)) else {}
+    config = evolve(settings.gripper.config, **{**ideal, **variant.settings})
+    backend = settings.gripper.component.create(config)
+    controller, draw = settings.controller.create(), _Drawing(settings.features.create())
+
+    def run(which: slice) -> tuple[Sequence[Grasped], float]:
+        began = time.process_time()
+        done = backend.run_many(
+            controller,
+            scenes[which],
+            seeds[which],
+            run=settings.run,
+            draw=draw,
+            workers=1,
+            progress=None if tick is None else lambda *_: tick(),
+        )
+        return done, time.process_time() - began
+
+    with warnings.catch_warnings():
+        # That a variant runs in the interpreter is what it is here for.
+        warnings.simplefilter("ignore")
+        _, first = run(slice(None))
+        done, spent = run(slice(None))
+        least, total = spent, spent
+        while total < LEAST_S:
+            done, spent = run(slice(None))
+            least, total = min(least, spent), total + spent
+    return [one.drawn for one in done], least / len(scenes), max(first - least, 0.0)
+
+
+def _point(
+    variant: Variant, felt: Sequence[_Felt], reference: Sequence[_Felt], seconds: float, setup: float
+) -> Point:
+    worst: dict[str, float] = {}
+    missing = ""
+    for one, true in zip(felt, reference, strict=True):
+        features = true.features
+        for name, unit in zip(features.names, features.units, strict=True):
+            expected, value = features[name], one.features[name]
+            if math.isnan(expected):
+                continue
+            error = abs(value - expected) / max(abs(expected), SCALES.get(unit, 1.0))
+            if math.isnan(error):
+                missing, error = f"{name} is missing: {one.features.reasons.get(name, '')}", math.inf
+            worst[name] = max(worst.get(name, 0.0), error)
+        n = min(len(one.force), len(true.force))
+        peak = max(float(np.max(true.force, initial=0.0)), SCALES["N"])
+        found = float(np.max(one.force, initial=0.0))
+        off = float(np.sqrt(np.mean((one.force[:n] - true.force[:n]) ** 2))) if n else math.inf
+        worst[PEAK] = max(worst.get(PEAK, 0.0), abs(found - float(np.max(true.force, initial=0.0))) / peak)
+        worst[TRACE] = max(worst.get(TRACE, 0.0), off / peak)
+    failure = missing or ("" if all(map(math.isfinite, worst.values())) else "no number in the force trace")
+    return Point(
+        method=variant.method,
+        fidelity=variant.fidelity,
+        step=variant.step,
+        role=variant.role,
+        seconds=seconds,
+        setup_s=setup,
+        errors=worst,
+        failure=failure,
+    )
+
+
+def _failed(variant: Variant, why: str) -> Point:
+    return Point(
+        method=variant.method,
+        fidelity=variant.fidelity,
+        step=variant.step,
+        role=variant.role,
+        seconds=math.nan,
+        setup_s=math.nan,
+        errors={},
+        failure=why,
+    )

@@ -1,0 +1,55 @@
+"""How long the rest will take, said no more exactly than is known."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+
+class TimeLeft:
+    """The time that is left for the rest of `total` tasks, from how long those that are done have taken.
+
+    The first task of each worker is left out where others are known: it imports and compiles.
+    """
+
+    def __init__(self, total: int, workers: int = 1, clock: Callable[[], float] = time.monotonic) -> None:
+        self.total, self.workers = total, workers
+        self._seconds: list[float] = []
+        self._clock = clock
+        self._begun = clock()
+
+    def add(self, seconds: float) -> None:
+        """Take in that a task is done."""
+        self._seconds.append(seconds)
+
+    @property
+    def bounds_s(self) -> tuple[float, float] | None:
+        """Two standard errors below and above the estimate; None where nothing can be said yet."""
+        rest = self.total - len(self._seconds)
+        known = self._seconds[self.workers :]
+        if len(known) < 2:
+            return None
+        n = len(known)
+        mean = sum(known) / n
+        spread = math.sqrt(sum((one - mean) ** 2 for one in known) / (n - 1))
+        # Both the mean itself and the tasks to come are uncertain.
+        error = spread * math.sqrt(rest * rest / n + rest)
+        return max(rest * mean - 2 * error, 0.0) / self.workers, (rest * mean + 2 * error) / self.workers
+
+    @property
+    def words(self) -> str:
+        """Return it as a person reads it."""
+        bounds = self.bounds_s
+        if bounds is None:
+            return f"time left not known yet ({_short(self._clock() - self._begun)} so far)"
+        low, high = map(_short, bounds)
+        return f"about {low} left" if low == high else f"{low} to {high} left"
+
+
+def _short(seconds: float) -> str:
+    if seconds < 60:
+        return f"{math.ceil(seconds)} s"
+    if seconds < 5400:
+        return f"{round(seconds / 60)} min"
+    return f"{seconds / 3600:.1f} h"

@@ -1,0 +1,1 @@
+"""Recognition against what it costs: seconds, force, speed, squeezes, sensing, the physics' accuracy."""

@@ -1,0 +1,39 @@
+"""Which versions a process works with, and how two processes differ."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from typing import Final
+
+from graspsense import __version__
+from graspsense.core.plugins import installed
+
+_LIBRARIES: Final = ("numpy", "scipy", "scikit-learn", "numba")
+
+
+@cache
+def versions() -> Mapping[str, str]:
+    """Return the version of everything that a result may follow from: Python, libraries, plugins, processor."""
+    found = {"python": platform.python_version(), "graspsense": __version__, "machine": platform.machine()}
+    for name in _LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    for status in installed().statuses:
+        found[status.distribution] = (
+            status.version if status.state == "loaded" else f"{status.version} ({status.state})"
+        )
+    return found
+
+
+def differences(here: Mapping[str, str], there: Mapping[str, str]) -> list[str]:
+    """Return in words what differs between two processes."""
+    return [
+        f"{name}: {here.get(name, 'not installed')} here, {there.get(name, 'not installed')} there"
+        for name in sorted(here.keys() | there.keys())
+        if here.get(name, "not installed") != there.get(name, "not installed")
+    ]

@@ -1,0 +1,102 @@
+"""Rates with their intervals, as pictures and as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from attrs import frozen
+
+from graspsense.report.html import facts, figure, table
+from graspsense.report.svg import DASHES, GRID, INKS, QUIET, Picture, Scale, number, reaching
+
+
+@frozen(kw_only=True)
+class RateRow:
+    """A rate to be shown: its name, its value and interval as shares, and what it is in words."""
+
+    name: str
+    rate: float
+    interval: tuple[float, float]
+    what: str = ""
+    strong: bool = False
+    """Whether it is what the others are held against."""
+
+    @property
+    def words(self) -> str:
+        """Return it in per cent with its interval."""
+        low, high = self.interval
+        return f"{100 * self.rate:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+
+
+ROW: Final = 34
+
+
+def rates_picture(rows: Sequence[RateRow], caption: str) -> str:
+    """Return a figure with a row for each rate: its name, a mark, and a bar for its interval."""
+    bottom = 6.0 + ROW * len(rows)
+    picture = Picture(bottom + 34)
+    scale = Scale(0.0, 100.0, 8.0, picture.width - 14)
+    picture.x_axis(scale, 4, bottom, "recognised, in %")
+    for k, row in enumerate(rows):
+        y = 22.0 + ROW * k
+        ink = INKS[0] if row.strong else INKS[7]
+        picture.text(8, y - 5, f"{row.name}: {100 * row.rate:.1f} %", bold=row.strong)
+        low, high = (scale(100 * one) for one in row.interval)
+        picture.line([(low, y + 5), (high, y + 5)], ink, width=3)
+        picture.mark(scale(100 * row.rate), y + 5, ink, 0 if row.strong else 3, 4.5)
+    words = "; ".join(f"{row.name} {row.words}" for row in rows)
+    return figure(picture.svg(f"Recognition rates with 95 % intervals: {words}"), caption)
+
+
+def rates_over(
+    series: Mapping[str, Sequence[tuple[float, RateRow]]], axis: str, caption: str, guess: float | None = None
+) -> str:
+    """Return a figure of rates against a number, one line a series; `guess` is the rate of guessing."""
+    picture = Picture(262 + 15 * len(series))
+    xs = [x for points in series.values() for x, _ in points]
+    x_scale = reaching(xs, 40, picture.width - 14)
+    y_scale = Scale(0.0, 100.0, 215, 24)
+    picture.y_axis(y_scale, 36, picture.width - 8, "recognised, in %")
+    for x in dict.fromkeys(xs):
+        picture.line([(x_scale(x), 24), (x_scale(x), 215)], GRID, width=1)
+        picture.text(x_scale(x), 229, number(x), at="middle", ink=QUIET)
+    picture.text((x_scale.start + x_scale.end) / 2, 245, axis, at="middle", ink=QUIET)
+    if guess is not None:
+        y = y_scale(100 * guess)
+        picture.line([(36, y), (picture.width - 8, y)], QUIET, dash="3 3")
+        picture.text(picture.width - 8, y - 4, "always the commonest label", at="end", ink=QUIET)
+    told = []
+    for k, (name, points) in enumerate(series.items()):
+        ink, dash = INKS[k % len(INKS)], DASHES[k % len(DASHES)]
+        drawn = sorted(points, key=lambda point: point[0])
+        # Intervals of series at the same place stand beside each other.
+        shift = 5.0 * (k - (len(series) - 1) / 2)
+        places = [(x_scale(x) + shift, y_scale(100 * row.rate)) for x, row in drawn]
+        picture.line(places, ink, width=2, dash=dash)
+        for (x, y), (_, row) in zip(places, drawn, strict=True):
+            low, high = (y_scale(100 * one) for one in row.interval)
+            picture.line([(x, low), (x, high)], ink, width=2)
+            picture.mark(x, y, ink, k)
+        y = 262.0 + 15 * k
+        picture.line([(40, y - 4), (66, y - 4)], ink, width=2, dash=dash)
+        picture.mark(53, y - 4, ink, k)
+        picture.text(72, y, name)
+        told.append(f"{name}: " + ", ".join(f"{number(x)}: {row.words}" for x, row in drawn))
+    return figure(
+        picture.svg(f"Recognition rate against {axis}, with 95 % intervals. {'; '.join(told)}"), caption
+    )
+
+
+def rates_table(caption: str, rows: Sequence[RateRow]) -> str:
+    """Return the rates as a table."""
+    cells = [
+        (row.name, f"{100 * row.rate:.1f} %", f"{100 * row.interval[0]:.1f} to {100 * row.interval[1]:.1f} %")
+        for row in rows
+    ]
+    return table(caption, ("case", "recognised", "95 % interval"), cells, 1)
+
+
+def rates_list(rows: Sequence[RateRow]) -> str:
+    """Return the rates with what each is in words."""
+    return facts([(row.name, f"{row.words}: {row.what}" if row.what else row.words) for row in rows])

@@ -1,0 +1,225 @@
+"""What a simulator's accuracy costs, as a table and as a picture; peers, measured on a scene of their own, beside."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from attrs import asdict, frozen
+
+from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.report.confusion import MATPLOTLIB_HINT
+
+HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
+PEAK: Final = "peak force"
+TRACE: Final = "force trace, rms"
+NOUGHT: Final = 1e-9
+"""What is smaller is drawn here: an error of nothing has no place on a logarithmic axis."""
+
+
+@frozen(kw_only=True)
+class Point:
+    """One variant as measured: its errors and the processor time of one grasp, which are of the same runs.
+
+    `errors` are the greatest of all grasps, by quantity; infinite where a feature is missing that should be there.
+    `setup_s` is what the first grasps took beyond that: compiling, or loading what was compiled. `failure` says why
+    there are no figures, or that grasps ended otherwise than in the reference.
+    """
+
+    method: str
+    fidelity: str
+    step: str
+    role: str
+    seconds: float
+    setup_s: float
+    errors: Mapping[str, float]
+    failure: str = ""
+
+    @property
+    def curve(self) -> str:
+        """The curve that it lies on."""
+        return f"{self.method}, {self.fidelity}"
+
+
+@frozen(kw_only=True)
+class SimulationTrade:
+    """Every variant of a simulated gripper on the same grasps."""
+
+    gripper: str
+    scenes: tuple[str, ...]
+    seeds: tuple[int, ...]
+    quantities: tuple[str, ...]
+    points: tuple[Point, ...]
+    made: Mapping[str, str]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return all of it as values for JSON."""
+        return asdict(self)
+
+
+def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return the table's header and rows: time, set-up and the greatest error of each quantity."""
+    header = (*HEADER, *(name.upper() for name in trade.quantities), "")
+    rows = []
+    for one in trade.points:
+        errors = [_short(one.errors.get(name, math.nan)) for name in trade.quantities]
+        note = one.failure or {"reference": "the reference", "floor": "what is left is the model's"}.get(
+            one.role, ""
+        )
+        seconds, setup = (f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * one.seconds, one.setup_s))
+        rows.append((one.method, one.fidelity, one.step, seconds, setup, *errors, note))
+    return header, rows
+
+
+def simulation_markdown(
+    trade: SimulationTrade, peers: Mapping[str, Any] | None, picture: str | None = None
+) -> str:
+    """Return the page of both tables, and of the picture where there is one."""
+    made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
+    lines = [
+        "# What the simulator's accuracy costs",
+        "",
+        "Written by `graspsense tradeoff simulation`. Everything here is simulated.",
+        "",
+        f"{len(trade.scenes)} scenes ({', '.join(trade.scenes)}), {len(trade.seeds)} seeds each, ideal sensor, one "
+        "thread, processor time of the very grasps that the errors are of. An error is the greatest of all grasps, "
+        "relative to the reference's value (to 1 mm, 1 N, 50 ms, 1 mm/s or 1 N/s where that is less).",
+        f"Made with: {made}.",
+        "",
+        *([f"![Error against time]({picture})", ""] if picture else []),
+        *_markdown(*simulation_rows(trade)),
+    ]
+    if peers is not None:
+        lines += ["", "## Beside other engines", "", *peers_markdown(peers)]
+    return "\n".join(lines) + "\n"
+
+
+def peers_markdown(peers: Mapping[str, Any]) -> list[str]:
+    """Return the table of `benchmarks/simulation.py`."""
+    made = ", ".join(f"{key} {value}" for key, value in peers.get("made", {}).items())
+    rows = [
+        (
+            str(run["what"]),
+            f"{1e3 * run['seconds']:.3g}",
+            _short(_number(run["rms"])),
+            _short(_number(run["peak"])),
+        )
+        for run in peers["runs"]
+    ]
+    return [
+        str(peers.get("scene", "")),
+        f"From `benchmarks/simulation.py`: {made}.",
+        "",
+        *_markdown(("ENGINE", "MS A GRASP", "FORCE TRACE, RMS", "PEAK FORCE"), rows),
+    ]
+
+
+def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    lines = [f"| {' | '.join(header)} |", f"|{'---|' * len(header)}"]
+    return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
+
+
+def simulation_png(trade: SimulationTrade, peers: Mapping[str, Any] | None, path: Path) -> None:
+    """Draw a panel a quantity. Raises PluginUnavailable without matplotlib, ConfigError for a path it cannot write."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
+    names = trade.quantities
+    panels = len(names) + (1 if peers is not None else 0)
+    columns = 3
+    rows = -(-panels // columns)
+    figure = Figure(figsize=(4.6 * columns, 3.5 * rows + 1.3), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes: Any = figure.subplots(rows, columns, squeeze=False).ravel()
+    curves = list(dict.fromkeys(p.curve for p in trade.points if p.role == "curve"))
+    floors = [p for p in trade.points if p.role == "floor"]
+    handles: dict[str, Any] = {}
+    for ax, name in zip(axes, names, strict=False):
+        for k, curve in enumerate(curves):
+            points = [p for p in trade.points if p.curve == curve and p.role == "curve" and p.seconds > 0.0]
+            good = [p for p in points if math.isfinite(p.errors.get(name, math.nan))]
+            (line,) = ax.plot(
+                [1e3 * p.seconds for p in good],
+                [max(p.errors[name], NOUGHT) for p in good],
+                marker="os^vDP*X"[k % 8],
+                color=f"C{k}",
+                ms=4,
+                lw=1.2,
+            )
+            handles[curve] = line
+            for p in points:
+                if p not in good:
+                    # On the upper edge: no error is large enough for a run that gave no number.
+                    ax.plot(
+                        1e3 * p.seconds,
+                        1.0,
+                        marker="x",
+                        color=f"C{k}",
+                        ms=9,
+                        transform=ax.get_xaxis_transform(),
+                    )
+        for k, floor in enumerate(floors):
+            level = floor.errors.get(name, math.nan)
+            if math.isfinite(level):
+                style = ("--", ":", "-.")[k % 3]
+                line = ax.axhline(max(level, NOUGHT), color="0.45", lw=1.0, ls=style)
+                handles[f"the model's own error, {floor.fidelity}"] = line
+        _axes(ax, name, "error, relative")
+    if peers is not None:
+        _draw_peers(axes[len(names)], peers)
+    for ax in axes[panels:]:
+        ax.set_axis_off()
+    failed = [p for p in trade.points if p.failure]
+    setup = max((p.setup_s for p in trade.points if math.isfinite(p.setup_s)), default=0.0)
+    figure.suptitle(
+        f"Simulated grasps ({', '.join(trade.scenes)}): error against processor time, one thread\n"
+        f"set-up and compiling apart, at most {setup:.3g} s; {len(failed)} of {len(trade.points)} failed"
+        + (" (crosses)" if failed else ""),
+        fontsize=10,
+    )
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, fontsize=8)
+    try:
+        figure.savefig(path, format="png")
+    except OSError as error:
+        raise ConfigError(f"the picture cannot be written to {path}: {error.strerror}") from error
+
+
+def _draw_peers(ax: Any, peers: Mapping[str, Any]) -> None:
+    """Draw one curve an engine and method, each on the scene of the benchmark."""
+    groups: dict[str, list[tuple[float, float]]] = {}
+    for run in peers["runs"]:
+        rms = _number(run["rms"])
+        if math.isfinite(rms):
+            groups.setdefault(str(run["engine"]), []).append((1e3 * run["seconds"], max(rms, NOUGHT)))
+    for k, (engine, points) in enumerate(groups.items()):
+        points.sort()
+        style = (
+            {"color": "black", "lw": 1.8}
+            if engine.startswith("graspsense")
+            else {"color": f"C{k}", "lw": 1.0}
+        )
+        ax.plot(*zip(*points, strict=True), marker="os^vDP*X"[k % 8], ms=3.5, label=engine, **style)
+    _axes(ax, "peers, on the benchmark's scene", "force trace, rms")
+    ax.legend(fontsize=6)
+
+
+def _axes(ax: Any, title: str, y: str) -> None:
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_title(title, fontsize=9)
+    ax.set_xlabel("ms a grasp", fontsize=8)
+    ax.set_ylabel(y, fontsize=8)
+    ax.tick_params(labelsize=7, which="both")
+    ax.grid(True, which="major", lw=0.3)
+
+
+def _number(value: Any) -> float:
+    return math.nan if value is None or isinstance(value, str) else float(value)
+
+
+def _short(error: float) -> str:
+    return "-" if math.isnan(error) else ("inf" if math.isinf(error) else f"{error:.1e}")

@@ -1,0 +1,149 @@
+"""Pictures as SVG inside a page: scales, axes and marks, each picture with words for who cannot see it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+from typing import Final
+
+from attrs import define, field, frozen
+
+WIDTH: Final = 360.0
+"""Of a picture, in units of which a page on a telephone shows about one a pixel: text stays readable there."""
+SIZE: Final = 11.0
+"""Of text."""
+INKS: Final = ("#0b5fa5", "#b3400a", "#1b7a3d", "#7b2d8b", "#00707a", "#a8174f", "#7a5c00", "#3d3d3d")
+"""Colours that stand out from white by 4.5 to 1 and more."""
+DASHES: Final = ("", "7 3", "2 2.5", "9 3 2 3", "4 2", "1 3", "12 3", "6 2 2 2")
+"""Lines differ in these as well as in colour."""
+QUIET: Final = "#5c5c5c"
+GRID: Final = "#dcdcdc"
+
+
+@frozen
+class Scale:
+    """A linear map from values to places in a picture."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def __call__(self, value: float) -> float:
+        """Return the place of a value, kept within the picture's range."""
+        share = (value - self.low) / ((self.high - self.low) or 1.0)
+        return self.start + (self.end - self.start) * min(max(share, -0.02), 1.02)
+
+    def ticks(self, about: int = 5) -> list[float]:
+        """Return round values within, about so many."""
+        span = (self.high - self.low) or 1.0
+        power = 10.0 ** math.floor(math.log10(span / about))
+        step = next(one * power for one in (1, 2, 5, 10) if span / (one * power) <= about)
+        first = math.ceil(self.low / step - 1e-9)
+        last = math.floor(self.high / step + 1e-9)
+        return [k * step for k in range(first, last + 1)]
+
+
+def reaching(values: Sequence[float], start: float, end: float, *, zero: bool = False) -> Scale:
+    """Return the scale that shows all of these values, and zero where it is to be seen."""
+    known = [one for one in values if math.isfinite(one)] or [0.0, 1.0]
+    low, high = min(known), max(known)
+    if zero:
+        low, high = min(low, 0.0), max(high, 0.0)
+    room = 0.04 * (high - low) or 0.5 * abs(high) or 1.0
+    return Scale(low if zero and low == 0.0 else low - room, high + room, start, end)
+
+
+def number(value: float) -> str:
+    """Return a number as an axis has it."""
+    text = f"{value:.4g}"
+    return text.replace("-", "−") if text != "-0" else "0"
+
+
+@define
+class Picture:
+    """A picture that grows by what is drawn into it."""
+
+    height: float
+    width: float = WIDTH
+    parts: list[str] = field(factory=list, init=False)
+
+    def line(
+        self, points: Sequence[tuple[float, float]], ink: str, *, width: float = 1.5, dash: str = ""
+    ) -> None:
+        """Draw a line through these points."""
+        path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+        dashes = f' stroke-dasharray="{dash}"' if dash else ""
+        self.parts.append(
+            f'<polyline points="{path}" fill="none" stroke="{ink}" stroke-width="{width:g}"{dashes}/>'
+        )
+
+    def box(self, x: float, y: float, width: float, height: float, fill: str, edge: str = "none") -> None:
+        """Draw a rectangle."""
+        self.parts.append(
+            f'<rect x="{x:.1f}" y="{y:.1f}" width="{max(width, 0):.1f}" height="{max(height, 0):.1f}" '
+            f'fill="{fill}" stroke="{edge}"/>'
+        )
+
+    def mark(self, x: float, y: float, ink: str, shape: int = 0, size: float = 4.0) -> None:
+        """Draw a mark, one of four shapes."""
+        if shape % 4 == 0:
+            self.parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{size:g}" fill="{ink}"/>')
+            return
+        corners = {
+            1: ((-1, -1), (1, -1), (1, 1), (-1, 1)),
+            2: ((0, -1.3), (1.2, 1), (-1.2, 1)),
+            3: ((0, -1.4), (1.4, 0), (0, 1.4), (-1.4, 0)),
+        }[shape % 4]
+        path = " ".join(f"{x + size * dx:.1f},{y + size * dy:.1f}" for dx, dy in corners)
+        self.parts.append(f'<polygon points="{path}" fill="{ink}"/>')
+
+    def dots(self, points: Sequence[tuple[float, float]], ink: str) -> None:
+        """Draw many small dots as one path."""
+        path = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in points)
+        self.parts.append(
+            f'<path d="{path}" stroke="{ink}" stroke-width="3" stroke-linecap="round" stroke-opacity="0.6"/>'
+        )
+
+    def text(
+        self,
+        x: float,
+        y: float,
+        words: str,
+        *,
+        at: str = "start",
+        ink: str = "#1a1a1a",
+        bold: bool = False,
+        size: float = SIZE,
+    ) -> None:
+        """Write words; `at` is `start`, `middle` or `end`."""
+        weight = ' font-weight="600"' if bold else ""
+        self.parts.append(
+            f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{at}" fill="{ink}" font-size="{size:g}"{weight} '
+            'paint-order="stroke" stroke="#fff" stroke-width="2.5" stroke-opacity="0.8">'
+            f"{escape(words)}</text>"
+        )
+
+    def x_axis(self, scale: Scale, top: float, bottom: float, title: str) -> None:
+        """Draw the ticks of a horizontal axis, with lines up to `top`, and its title below."""
+        for value in scale.ticks():
+            x = scale(value)
+            self.line([(x, top), (x, bottom)], GRID, width=1)
+            self.text(x, bottom + 13, number(value), at="middle", ink=QUIET)
+        self.text((scale.start + scale.end) / 2, bottom + 28, title, at="middle", ink=QUIET)
+
+    def y_axis(self, scale: Scale, left: float, right: float, title: str) -> None:
+        """Draw the ticks of a vertical axis, and its title above."""
+        for value in scale.ticks(4):
+            y = scale(value)
+            self.line([(left, y), (right, y)], GRID, width=1)
+            self.text(left - 4, y + 4, number(value), at="end", ink=QUIET)
+        self.text(2, min(scale.start, scale.end) - 8, title, ink=QUIET)
+
+    def svg(self, words: str) -> str:
+        """Return the picture; `words` say what it shows."""
+        return (
+            f'<svg viewBox="0 0 {self.width:g} {self.height:g}" role="img" aria-label="{escape(words)}" '
+            f'xmlns="http://www.w3.org/2000/svg">{"".join(self.parts)}</svg>'
+        )
