@@ -1,0 +1,1 @@
+"""Features of a grasp beyond the six of Table I."""

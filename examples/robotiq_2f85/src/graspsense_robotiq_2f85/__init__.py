@@ -1,0 +1,1 @@
+"""A Robotiq 2F-85 gripper for graspsense."""

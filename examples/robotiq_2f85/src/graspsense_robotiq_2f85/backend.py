@@ -1,0 +1,216 @@
+"""A Robotiq 2F-85 as a sensor backend."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+from math import inf, nan
+from typing import Final, final
+
+from attrs import field, frozen
+from attrs.validators import and_, ge, gt, le
+
+from graspsense.plugin_api import (
+    FORCE,
+    NO_PADS,
+    POSITION,
+    VELOCITY,
+    Command,
+    DeviceInfo,
+    DeviceLost,
+    Frame,
+    NoDevice,
+    Pads,
+    Reading,
+    SensorBackend,
+)
+from graspsense_robotiq_2f85.fake import Fake
+from graspsense_robotiq_2f85.modbus import Client, NoReply, opened
+from graspsense_robotiq_2f85.plugin import RATE_HZ
+from graspsense_robotiq_2f85.registers import (
+    ACTIVE,
+    AMPERES_A_STEP,
+    COUNT,
+    FORCES_N,
+    INPUT,
+    OPEN_M,
+    OUTPUT,
+    SPEEDS_M_S,
+    Request,
+    Status,
+    byte_of,
+    gap_of,
+    position_of,
+    status_of,
+)
+
+ACTIVATION_S: Final = 5.0
+ATTEMPTS: Final = 3
+SLOPE_FRAMES: Final = 6
+FASTEST_RAMP_M_S: Final = 0.02
+
+
+@frozen(kw_only=True)
+class Robotiq2F85Config:
+    """The keys of [gripper]."""
+
+    port: str = "/dev/ttyUSB0"
+    """A serial port, `rtu-tcp:HOST:PORT` (a UR's tool connector), `tcp:HOST:PORT` (Modbus TCP), or `fake`."""
+    address: int = field(default=9, validator=and_(ge(1), le(247)))
+    reply_timeout_s: float = field(default=0.1, validator=gt(0.0))
+    newtons_per_ampere: float = field(default=150.0, validator=gt(0.0))
+    """Grip force over motor current. An assumption: the manual gives none, so measure yours."""
+    vanishes_s: float = field(default=inf, validator=gt(0.0))
+    """When the cable of the fake one is pulled, for tests."""
+
+
+@final
+class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
+    """Commands become a position that moves, with a speed and a force; each read is one exchange with the gripper."""
+
+    _client: Client | None = None
+    _fake: Fake | None = None
+
+    def open(self, seed: int) -> DeviceInfo:
+        """Open and activate the gripper, which opens and closes once. Raises NoDevice."""
+        del seed
+        self.close()
+        config = self.config
+        port = config.port
+        if port == "fake":
+            self._fake = Fake(vanishes_s=config.vanishes_s)
+            port = self._fake.serial
+        self._asked = Request(active=True, go=False, position=0, speed=0, force=0)
+        try:
+            self._client = opened(port, config.address, config.reply_timeout_s)
+            self._exchange(self._asked._replace(active=False))
+            until = time.monotonic() + ACTIVATION_S
+            while (status := self._exchange(self._asked)).state != ACTIVE:
+                if time.monotonic() > until:
+                    raise NoReply(f"not activated after {ACTIVATION_S:g} s, fault {status.fault}")
+        except (OSError, ValueError, NoReply) as error:
+            self.close()
+            raise NoDevice(
+                f"no 2F-85 at {config.port}, unit {config.address}: {error}. Look at its power and cable, at "
+                "gripper.port and gripper.address; on Linux be in the group dialout"
+            ) from error
+        self._began_s = self._last_s = time.monotonic()
+        self._target_m = gap_of(status.position)
+        self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
+        self._frames = self._retries = 0
+        return DeviceInfo(
+            name="Robotiq 2F-85" if self._fake is None else "fake Robotiq 2F-85",
+            clock="device",
+            rate_hz=RATE_HZ,
+            effort_limit_n=FORCES_N[1],
+            speed_limit_m_s=SPEEDS_M_S[1],
+            opening=Command(POSITION, OPEN_M, inf, 0.05),
+            relaxed=Command(VELOCITY, 0.0, inf, inf),
+            numbers={"newtons_per_ampere": self.config.newtons_per_ampere},
+            notes=(
+                "effort is the motor's current times gripper.newtons_per_ampere, an assumption unless you measured it",
+                *(() if self._fake is None else ("a fake: no gripper was touched",)),
+            ),
+        )
+
+    def read(self, timeout_s: float) -> Reading | None:
+        """Wait for the next hundredth of a second, then ask the gripper. Raises DeviceLost."""
+        wait_s = self._last_s + 1.0 / RATE_HZ - time.monotonic()
+        if wait_s > timeout_s:
+            time.sleep(timeout_s)
+            return None
+        if wait_s > 0.0:
+            time.sleep(wait_s)
+        status = self._exchanged()
+        now_s = time.monotonic()
+        t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s
+        gap_m = gap_of(status.position)
+        self._recent.append((t_s, gap_m))
+        (first_s, first_m), span = self._recent[0], len(self._recent)
+        velocity = (gap_m - first_m) / (t_s - first_s) if span > 1 else 0.0
+        effort = status.current * AMPERES_A_STEP * self.config.newtons_per_ampere
+        self._frames += 1
+        return Reading(
+            Frame(t_s, dt_s, gap_m, velocity, effort, nan, nan, nan, nan, status.fault | status.objects << 4),
+            NO_PADS,
+        )
+
+    def apply(self, command: Command) -> None:
+        """Take a command for the next exchange. The gripper cannot be told less than 20 N."""
+        kind, value, effort_limit, speed_limit = command
+        gap_m = self._recent[-1][1] if self._recent else self._target_m
+        force = effort_limit
+        if kind == VELOCITY:
+            speed, goal = min(abs(value), speed_limit), OPEN_M if value > 0.0 else 0.0
+        elif kind == POSITION:
+            speed, goal = speed_limit, value
+        elif kind == FORCE:
+            speed, goal, force = min(FASTEST_RAMP_M_S, speed_limit), 0.0, min(value, effort_limit)
+        else:
+            speed, goal = 0.0, gap_m
+        if speed <= SPEEDS_M_S[0]:
+            # Slower than it can go: a goal that moves on by as much as the time since the last frame allows.
+            if speed == 0.0:
+                self._target_m = gap_m
+            step = speed / RATE_HZ
+            self._target_m += min(max(goal - self._target_m, -step), step)
+            if goal < gap_m:
+                self._target_m = max(self._target_m, gap_m - 0.004)
+        else:
+            self._target_m = goal
+        self._asked = Request(
+            active=True,
+            go=True,
+            position=position_of(self._target_m),
+            speed=byte_of(speed, SPEEDS_M_S),
+            force=byte_of(force, FORCES_N),
+        )
+
+    def tare(self, images: Sequence[Pads]) -> None:
+        """Nothing to zero: there are no pads."""
+
+    def close(self) -> None:
+        """Tell it to stay where it is, as far as it can be told, and let go of the line."""
+        client, self._client = self._client, None
+        if client is not None:
+            with suppress(OSError, NoReply):
+                client.exchange(OUTPUT, self._asked._replace(go=False).registers(), INPUT, COUNT)
+            with suppress(OSError):
+                client.close()
+        fake, self._fake = self._fake, None
+        if fake is not None:
+            fake.close()
+
+    def report(self) -> dict[str, float | int | str | bool]:
+        """Return how many frames came, and how many exchanges had to be repeated."""
+        return {"frames": getattr(self, "_frames", 0), "repeated": getattr(self, "_retries", 0)}
+
+    def stand_in(self) -> Robotiq2F85:
+        """Return the fake one."""
+        return Robotiq2F85(Robotiq2F85Config(port="fake", newtons_per_ampere=self.config.newtons_per_ampere))
+
+    def _exchange(self, request: Request) -> Status:
+        assert self._client is not None
+        return status_of(self._client.exchange(OUTPUT, request.registers(), INPUT, COUNT))
+
+    def _exchanged(self) -> Status:
+        if self._client is None:
+            raise DeviceLost("the 2F-85 is not open")
+        for attempt in range(ATTEMPTS):
+            try:
+                status = self._exchange(self._asked)
+            except NoReply as error:
+                said = str(error)
+                self._retries += attempt < ATTEMPTS - 1
+                continue
+            except OSError as error:
+                said = str(error)
+                break
+            if not status.active:
+                raise DeviceLost("the 2F-85 was switched off and on again: open it anew")
+            return status
+        raise DeviceLost(
+            f"the 2F-85 at {self.config.port} does not answer ({said}): look at its cable and power"
+        )

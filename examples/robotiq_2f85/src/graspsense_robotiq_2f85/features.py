@@ -1,0 +1,46 @@
+"""The features of Table I that need no force: the paper's own, with contact taken from the effort."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from attrs import evolve, field, frozen
+from attrs.validators import gt
+
+from graspsense.plugin_api import Features, FeatureSet, create
+from graspsense_robotiq_2f85.plugin import FEATURES
+
+if TYPE_CHECKING:
+    from graspsense.plugin_api import Trace
+
+
+@frozen(kw_only=True)
+class WithoutPadsConfig:
+    """When contact and rest are."""
+
+    contact_effort_n: float = field(default=10.5, validator=gt(0.0))
+    """More than the motor needs to move the fingers freely."""
+    rest_speed_m_s: float = field(default=1e-3, validator=gt(0.0))
+    rest_window_s: float = field(default=0.15, validator=gt(0.0))
+
+
+class WithoutPads(FeatureSet[WithoutPadsConfig]):
+    """Draws p_first, p_steady, delta_t and dp_dt."""
+
+    def extract(self, trace: Trace) -> Features:
+        """Return the four features; a reason that speaks of a pad means the effort."""
+        config = self.config
+        six = create(
+            "feature-set",
+            "graspsense/chitta",
+            contact_force_n=config.contact_effort_n,
+            rest_speed_m_s=config.rest_speed_m_s,
+            rest_window_s=config.rest_window_s,
+        ).extract(evolve(trace, force_left_n=trace.effort_n, force_right_n=trace.effort_n))
+        names = tuple(name for name, _ in FEATURES)
+        return Features(
+            names=names,
+            values=tuple(six[name] for name in names),
+            units=tuple(six.units[six.names.index(name)] for name in names),
+            reasons={name: six.reasons[name] for name in names if name in six.reasons},
+        )

@@ -1,0 +1,74 @@
+"""What this distribution brings; the serial line is imported when a gripper is opened."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from graspsense.plugin_api import (
+    Channel,
+    ControllerEntry,
+    FeatureSetEntry,
+    PipelineEntry,
+    SensorBackendEntry,
+    hookimpl,
+)
+
+GRASPSENSE_API = (1, 0)
+
+RATE_HZ = 100.0
+FEATURES = (("p_first", "m"), ("p_steady", "m"), ("delta_t", "s"), ("dp_dt", "m/s"))
+"""Four of the six features of Table I; for f_steady and df_dt one needs a force, and the 2F-85 has none."""
+
+
+@hookimpl
+def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
+    """Return the gripper. It has no pads: its effort is an estimate from the motor's current."""
+    yield SensorBackendEntry(
+        name="robotiq-2f85",
+        target="graspsense_robotiq_2f85.backend:Robotiq2F85",
+        config="graspsense_robotiq_2f85.backend:Robotiq2F85Config",
+        summary="Robotiq 2F-85 over Modbus (RTU on a serial line or TCP, or TCP); position and motor current",
+        channels=(
+            Channel("gap", "m", RATE_HZ),
+            Channel("velocity", "m/s", RATE_HZ),
+            Channel("effort", "N", RATE_HZ),
+        ),
+        accepts=("velocity", "position", "force"),
+        needs="pip install graspsense-robotiq-2f85; on Linux your user in the group dialout",
+    )
+
+
+@hookimpl
+def graspsense_controllers() -> Iterable[ControllerEntry]:
+    """Return the law for a gripper that feels through its motor."""
+    yield ControllerEntry(
+        name="close-until-stopped",
+        target="graspsense_robotiq_2f85.law:CloseUntilStopped",
+        config="graspsense_robotiq_2f85.law:CloseUntilStoppedConfig",
+        summary="closes at a set speed with a set force until it has stood still",
+        requires=(Channel("gap", "m"), Channel("effort", "N")),
+        commands=("velocity",),
+    )
+
+
+@hookimpl
+def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
+    """Return the features that can be had without pads."""
+    yield FeatureSetEntry(
+        name="chitta-without-pads",
+        target="graspsense_robotiq_2f85.features:WithoutPads",
+        config="graspsense_robotiq_2f85.features:WithoutPadsConfig",
+        summary="the four features of Table I that need no force, with contact from the effort",
+        requires=(Channel("gap", "m"), Channel("effort", "N")),
+        features=FEATURES,
+    )
+
+
+@hookimpl
+def graspsense_pipelines() -> Iterable[PipelineEntry]:
+    """Return the three of them together."""
+    yield PipelineEntry(
+        name="robotiq-2f85",
+        resource="graspsense_robotiq_2f85:pipelines/robotiq-2f85.toml",
+        summary="a Robotiq 2F-85, closed until it is stopped, and the features that need no pads",
+    )

@@ -1,0 +1,164 @@
+"""The package of a new plugin, made from the templates beside this file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Final
+
+from attrs import frozen
+
+from graspsense import __version__
+from graspsense.core.entries import Role
+from graspsense.core.errors import ConfigError, suggestion
+from graspsense.core.hookspecs import API
+from graspsense.core.plugins import installed
+
+
+@frozen
+class Kind:
+    """What is made for one role: the module that holds the part, and what to try first."""
+
+    role: Role | None
+    module: str
+    does: str
+    suffix: str
+    """What the name of the class ends with."""
+    needs: tuple[str, ...]
+    first: str
+
+
+KINDS: Final[Mapping[str, Kind]] = {
+    "sensor-backend": Kind(
+        "sensor-backend",
+        "backend",
+        "a gripper, here a fake one behind the place where its driver goes",
+        "Gripper",
+        (),
+        "graspsense run --gripper $part -o controller.type=YOURS -o features.type=YOURS",
+    ),
+    "controller": Kind(
+        "controller",
+        "law",
+        "a control law that closes until the fingers rest",
+        "Controller",
+        (),
+        "graspsense run -o controller.type=$part",
+    ),
+    "feature-set": Kind(
+        "feature-set",
+        "features",
+        "features of a grasp",
+        "Features",
+        ("numpy>=1.26",),
+        "graspsense run -o features.type=$part -o classifier.type=none",
+    ),
+    "classifier": Kind(
+        "classifier",
+        "classifier",
+        "a classifier",
+        "Classifier",
+        ("numpy>=1.26",),
+        "graspsense evaluate simulated --classifier $part",
+    ),
+    "sim-term": Kind(
+        None,
+        "term",
+        "a term of the simulator: a part of an object's force",
+        "",
+        ("graspsense-sim-gripper>=0.1,<0.2",),
+        "graspsense run --object scene.toml -o classifier.type=none",
+    ),
+    "observer": Kind(
+        None, "observer", "an observer that logs how each grasp ended", "", (), "graspsense run"
+    ),
+}
+"""What `plugins new` can make, by the name of `--role`."""
+
+COMMON: Final = ("pyproject.toml", "README.md", ".gitignore", "tests/test_conformance.py")
+NAME: Final = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+
+
+def make(name: str, role: str, folder: Path) -> list[str]:
+    """Make the package `name` in `folder` and return what to do next, a line each.
+
+    Raises ConfigError where the role or the name will not do, or where the folder is in use.
+    """
+    kind = KINDS.get(role)
+    if kind is None:
+        raise ConfigError(
+            f"no role {role!r}. There are:\n"
+            + "\n".join(f"  {one:<15} {what.does}" for one, what in KINDS.items())
+            + suggestion(role, KINDS)
+        )
+    if not NAME.fullmatch(name):
+        raise ConfigError(
+            f"the name {name!r} will not do: small letters, digits and single hyphens, a letter first, as in lab-hand"
+        )
+    part = name.removeprefix("graspsense-")
+    _check_free(kind, part, name)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ConfigError(f"{folder} is there already: give another name, or --folder")
+    words = {
+        "name": name,
+        "part": part,
+        "package": name.replace("-", "_"),
+        "term": part.replace("-", "_"),
+        "Class": "".join(word.capitalize() for word in part.split("-")) + kind.suffix,
+        "does": kind.does,
+        "api": f"({API[0]}, {API[1]})",
+        "role": role,
+        "needs": "".join(f', "{one}"' for one in kind.needs),
+        "core": _compatible(__version__),
+    }
+    words["first"] = Template(kind.first).substitute(words)
+    templates = files("graspsense.scaffold").joinpath("templates")
+    for target, source in _files(kind, role, words).items():
+        text = templates.joinpath(source).read_text(encoding="utf-8")
+        path = folder / target
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(Template(text).substitute(words), encoding="utf-8")
+    (folder / "src" / words["package"] / "py.typed").touch()
+    return [
+        f"{folder} is {kind.does}: src/{words['package']}/{kind.module}.py",
+        f"  pip install -e {folder if folder.is_absolute() else f'./{folder}'} pytest",
+        "  graspsense plugins list",
+        f"  graspsense plugins check {name}",
+        f"  pytest {folder}",
+        f"  {words['first']}",
+    ]
+
+
+def _files(kind: Kind, role: str, words: Mapping[str, str]) -> dict[str, str]:
+    """Return the path of each file to be made and the template it is made from."""
+    package = f"src/{words['package']}"
+    found = {name: f"{name.rpartition('/')[2].lstrip('.')}.txt" for name in COMMON}
+    found[f"{package}/__init__.py"] = "init.py.txt"
+    found[f"{package}/plugin.py"] = f"{role}/plugin.py.txt"
+    found[f"{package}/{kind.module}.py"] = f"{role}/{kind.module}.py.txt"
+    found[f"tests/test_{kind.module}.py"] = f"{role}/test_{kind.module}.py.txt"
+    if role == "sensor-backend":
+        found["tests/test_conformance.py"] = f"{role}/test_conformance.py.txt"
+    if role == "sim-term":
+        found["scene.toml"] = f"{role}/scene.toml.txt"
+    return found
+
+
+def _check_free(kind: Kind, part: str, name: str) -> None:
+    if kind.role is None:
+        return
+    taken = [one for one in installed().components(kind.role) if one.name == part]
+    for one in taken:
+        if one.distribution != name:
+            raise ConfigError(
+                f"the {kind.role.replace('-', ' ')} name {part!r} is taken by {one.qualified}: choose another name"
+            )
+
+
+def _compatible(version: str) -> str:
+    """Return the requirement on graspsense of a plugin written for this version: no minor version changes."""
+    major, minor, *_ = version.split(".")
+    return f"graspsense>={major}.{minor},<{major}.{int(minor) + 1}"

@@ -1,0 +1,32 @@
+"""The conformance kit: what a part must hold to, for whoever writes one.
+
+    graspsense plugins check NAME                 # on the command line
+
+    from graspsense.testing import parametrize_checks
+
+    @parametrize_checks("NAME")
+    def test_conformance(check):                  # a case for each check
+        check.run()
+
+    class TestMine(Conformance):                  # or a class with a test for each
+        name = "NAME"
+
+pytest is imported by the last two alone.
+"""
+
+from __future__ import annotations
+
+from graspsense.testing.checks import FLOOR, Check, Report, Result
+from graspsense.testing.conformance import CHECKS, Conformance, Examined, examine, parametrize_checks
+
+__all__ = [
+    "CHECKS",
+    "FLOOR",
+    "Check",
+    "Conformance",
+    "Examined",
+    "Report",
+    "Result",
+    "examine",
+    "parametrize_checks",
+]

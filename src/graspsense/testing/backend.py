@@ -1,0 +1,605 @@
+"""What a gripper must hold to, on whatever it is checked: hardware, a fake of it, a simulation, a recording."""
+
+from __future__ import annotations
+
+import json
+import time
+from itertools import pairwise
+from math import inf, isfinite, isnan, nan
+from statistics import fmean, median
+from typing import Any, Final
+
+from graspsense.core.entries import KINDS
+from graspsense.core.errors import DeviceLost, NoDevice, RecordingEnded, TareRefused, named
+from graspsense.core.guard import GuardState, guard
+from graspsense.core.roles import SensorBackend
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
+from graspsense.core.signals import (
+    CELLS,
+    CHANNELS,
+    EFFORT,
+    FORCE,
+    POSITION,
+    VELOCITY,
+    Command,
+    Frame,
+    Outcome,
+    Pads,
+)
+from graspsense.testing import component
+from graspsense.testing.bench import CHANNELS_OF_FIELD
+from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand
+from graspsense.testing.gentle import EFFORT_N, FORCE_N, GentleController, kind_of
+from graspsense.testing.session import TIMEOUT_S, limits_of
+from graspsense.testing.subject import Subject
+
+WIDEST_M: Final = 0.5
+GRACE_S: Final = 1.0
+"""What a busy machine may add to a time-out."""
+FORGIVEN: Final = 0.25
+"""Share by which a measured rate may differ from the declared one."""
+VANISHING_S: Final = 2.0
+
+
+def describes_itself(subject: Subject) -> None:
+    """`open` returns a DeviceInfo with a name, a rate and limits above zero, of the right types."""
+    info = subject.session.info
+    demand(bool(info.name), "DeviceInfo has no name: say what the gripper is")
+    demand(
+        info.clock in ("virtual", "device"),
+        f"clock is {info.clock!r}: 'device' where a read waits for the gripper, 'virtual' where apply-then-read "
+        "advances one tick",
+    )
+    for name in ("rate_hz", "effort_limit_n", "speed_limit_m_s"):
+        value = getattr(info, name)
+        demand(value > 0.0, f"{name} is {value}: it must be above 0")
+    if info.opening is not None:
+        demand(
+            isfinite(info.effort_limit_n) and isfinite(info.speed_limit_m_s),
+            f"a gripper that can be commanded has limits: effort {info.effort_limit_n} N, speed "
+            f"{info.speed_limit_m_s} m/s",
+        )
+        demand(
+            info.speed_limit_m_s <= 5.0,
+            f"speed_limit_m_s is {info.speed_limit_m_s}: that is a speed in mm/s; give m/s",
+        )
+
+
+def opens_and_relaxes_by_kinds_it_takes(subject: Subject) -> None:
+    """The commands that open it and that let go are of kinds it accepts."""
+    info = subject.session.info
+    for name, command in (("opening", info.opening), ("relaxed", info.relaxed)):
+        if command is not None:
+            kind = KINDS[command.kind]
+            demand(
+                kind in subject.entry.accepts,
+                f"its {name} command is of kind {kind}; it accepts {', '.join(subject.entry.accepts) or 'none'}: use "
+                "one of those, or add it to `accepts` of the entry",
+            )
+
+
+def frames_are_numbers(subject: Subject) -> None:
+    """Every field of a frame is a Python float, `status` an int; a cell image has 22 floats a fingertip."""
+    for frame, pads in subject.session.readings:
+        demand(
+            isinstance(frame, Frame) and isinstance(pads, Pads),
+            f"read returned {type(frame).__name__} and {type(pads).__name__}: return Reading(Frame(...), Pads(...)), "
+            "with NO_PADS where there are none",
+        )
+        for name, value in zip(Frame._fields, frame, strict=True):
+            kind = int if name == "status" else float
+            demand(
+                type(value) is kind,
+                f"{name} of a frame is {value!r} of type {type(value).__name__}: write {kind.__name__}(...)",
+            )
+        demand(
+            type(pads.counter) is int and type(pads.t_s) is float,
+            f"an image has counter {pads.counter!r} and t_s {pads.t_s!r}: an int and a float",
+        )
+        for side in (pads.left, pads.right):
+            demand(
+                isinstance(side, tuple) and len(side) == CELLS and all(type(one) is float for one in side),
+                f"an image has the cells {side!r:.80}: give a tuple of {CELLS} floats (NaN where there is no cell)",
+            )
+
+
+def channels_are_those_declared(subject: Subject) -> None:
+    """A declared channel has numbers; a channel that is not declared is NaN throughout."""
+    session = subject.session
+    declared = {one.name for one in subject.entry.channels}
+    recording = session.info.opening is None
+    for name, channel in CHANNELS_OF_FIELD.items():
+        values = [getattr(frame, name) for frame in session.frames]
+        if channel not in declared:
+            demand(
+                all(map(isnan, values)),
+                f"{name} has numbers ({next((one for one in values if not isnan(one)), nan):g}), and "
+                "the entry declares "
+                f"no channel {channel!r}: declare Channel({channel!r}, {CHANNELS[channel]!r}, rate), or give NaN",
+            )
+        elif not recording:
+            demand(
+                not all(map(isnan, values)),
+                f"{name} is NaN in all {len(values)} frames, and the entry declares the channel "
+                f"{channel!r}: fill it, or "
+                "take it out of `channels`",
+            )
+        demand(
+            not any(map(_infinite, values)), f"{name} is infinite in a frame: give NaN for what is not known"
+        )
+    if "pads" not in declared:
+        demand(not session.images, "cell images come, and the entry declares no channel 'pads': declare it")
+    elif not recording:
+        demand(
+            bool(session.images),
+            "no cell image came, and the entry declares the channel 'pads': count images from 1 on, or take it out",
+        )
+
+
+def _infinite(value: float) -> bool:
+    return value in (inf, -inf)
+
+
+def time_runs_forward(subject: Subject) -> None:
+    """`t_s` rises from frame to frame, and `dt_s` is what it rose by."""
+    session = subject.session
+    demand(all(isfinite(frame.t_s) for frame in session.frames), "t_s of a frame is no number")
+    for before, now in pairwise(session.frames):
+        passed = now.t_s - before.t_s
+        demand(
+            passed > 0.0,
+            f"t_s goes from {before.t_s} to {now.t_s} s: a frame is given once, and each is later than the last",
+        )
+        demand(
+            abs(now.dt_s - passed) <= 0.5 * passed + 1e-9,
+            f"dt_s is {now.dt_s:g} s where {passed:g} s passed since the last frame: give the seconds between the two",
+        )
+
+
+def rate_is_what_it_says(subject: Subject) -> None:
+    """Frames come at `rate_hz`, and channels are declared no faster than that."""
+    info, frames = subject.session.info, subject.session.frames
+    passed = [now.t_s - before.t_s for before, now in pairwise(frames)]
+    demand(bool(passed), "only one frame came")
+    rate = 1.0 / median(passed)
+    if info.units.get("t", "s") == "s":
+        demand(
+            abs(rate - info.rate_hz) <= FORGIVEN * info.rate_hz,
+            f"frames come at {rate:.3g} Hz, rate_hz says {info.rate_hz:g}: say what is so (or is t_s not in seconds?)",
+        )
+    for channel in subject.entry.channels:
+        demand(
+            channel.rate_hz <= info.rate_hz * (1.0 + FORGIVEN),
+            f"channel {channel.name!r} is declared at {channel.rate_hz:g} Hz, the gripper gives "
+            f"{info.rate_hz:g} frames "
+            "a second: declare the rate at which its value is new",
+        )
+
+
+def images_count_up(subject: Subject) -> None:
+    """An image's counter rises by one with each new one; images are never of the future."""
+    if not subject.session.images:
+        raise CheckSkipped("this gripper has no cells")
+    for before, now in pairwise(subject.session.images):
+        demand(
+            now.counter == before.counter + 1 and now.t_s > before.t_s,
+            f"after image {before.counter} of {before.t_s} s comes image {now.counter} of {now.t_s} s: count up by one",
+        )
+    shown: dict[int, Pads] = {}
+    for frame, pads in subject.session.readings:
+        demand(
+            pads.counter == 0 or pads.t_s <= frame.t_s + 1e-9,
+            f"the image of {pads.t_s} s comes with the frame of {frame.t_s} s: give the last image",
+        )
+        demand(
+            repr(shown.setdefault(pads.counter, pads)) == repr(pads),
+            f"image {pads.counter} changes while its counter stays: count up with each new image",
+        )
+
+
+def gap_is_in_metres(subject: Subject) -> None:
+    """The gap lies between 0 and half a metre."""
+    gaps = [frame.gap_m for frame in subject.session.frames if not isnan(frame.gap_m)]
+    if not gaps:
+        raise CheckSkipped("this gripper has no gap")
+    if subject.session.info.units.get("gap", "m") != "m":
+        raise CheckSkipped(f"a recording in {subject.session.info.units['gap']}")
+    demand(
+        min(gaps) >= -0.01 and max(gaps) <= WIDEST_M,
+        f"gap_m goes from {min(gaps):g} to {max(gaps):g}: give the distance between the fingertip faces in metres"
+        + (" (this looks like millimetres: divide by 1000)" if max(gaps) > WIDEST_M else ""),
+    )
+
+
+def forces_are_in_newtons(subject: Subject) -> None:
+    """No force of a pad, an edge or the drive is more than the gripper's limit allows for."""
+    info = subject.session.info
+    most = max(3.0 * info.effort_limit_n, 50.0)
+    for name in ("force_left_n", "force_right_n", "edge_left_n", "edge_right_n", "effort_n"):
+        values = [abs(getattr(frame, name)) for frame in subject.session.frames]
+        worst = max((one for one in values if not isnan(one)), default=0.0)
+        demand(
+            worst <= most,
+            f"{name} comes to {worst:g} while the fingers are closed gently on a gripper of {info.effort_limit_n:g} N: "
+            "give newtons, tared (raw counts go into Pads)",
+        )
+
+
+def velocity_is_the_gaps_rate(subject: Subject) -> None:
+    """`velocity_m_s` adds up to what the gap moved by; closing is negative."""
+    closing = [one.frame for one in subject.session.stages.get("closing", [])]
+    if not closing or isnan(closing[0].velocity_m_s) or isnan(closing[0].gap_m):
+        raise CheckSkipped("this gripper has no velocity and gap of its own, or is a recording")
+    moved = closing[-1].gap_m - closing[0].gap_m
+    summed = sum(frame.velocity_m_s * frame.dt_s for frame in closing[1:])
+    if max(abs(moved), abs(summed)) < 2e-3:
+        raise CheckSkipped(f"the gap moved by {abs(moved) * 1e3:.2g} mm only")
+    demand(
+        abs(summed - moved) <= 0.3 * abs(moved),
+        f"velocity_m_s adds up to {summed * 1e3:.3g} mm where the gap moved by {moved * 1e3:.3g} mm: give the rate of "
+        "the gap in m/s, negative while it closes (both fingers together)",
+    )
+
+
+def closing_closes(subject: Subject) -> None:
+    """A gentle closing command makes the gap fall; the opening command makes it rise again."""
+    stages = subject.session.stages
+    if "closing" not in stages:
+        raise CheckSkipped("a recording cannot be commanded")
+    closing = [one.frame.gap_m for one in stages["closing"]]
+    if all(map(isnan, closing)):
+        raise CheckSkipped("this gripper has no gap")
+    kind = KINDS[kind_of(subject.entry.accepts)]
+    demand(
+        closing[0] - closing[-1] > 1e-3,
+        f"under a closing {kind} command the gap goes from {closing[0]:.4g} to {closing[-1]:.4g} m: an "
+        "effort or force above 0, a velocity below 0 and a smaller position close the fingers",
+    )
+    opened = [one.frame.gap_m for one in stages["open again"]]
+    demand(
+        max(opened) - opened[0] > 1e-3,
+        f"under the opening command {subject.session.info.opening} the gap goes from {opened[0] * 1e3:.4g} to "
+        f"{opened[-1] * 1e3:.4g} mm: it must rise",
+    )
+
+
+def stays_within_its_limits(subject: Subject) -> None:
+    """Asked for all it may be asked for, it reports no more effort and speed than its limits say."""
+    if subject.session.info.opening is None:
+        raise CheckSkipped("a recording cannot be commanded")
+    backend = subject.create()
+    try:
+        info = backend.open(0)
+        first = limits_of(info)
+        # The limits of a first use, also after a contact.
+        limits = first._replace(effort_limit_n=first.first_effort_n, speed_limit_m_s=first.first_speed_m_s)
+        watcher = GuardState(0, 0, 0)
+        kind = kind_of(subject.entry.accepts)
+        greatest = {VELOCITY: -1e6, POSITION: 0.0, FORCE: 1e6, EFFORT: 1e6}[kind]
+        command = Command(kind, greatest, inf, inf)
+        for _ in range(max(int(0.5 * info.rate_hz), 20)):
+            reading = backend.read(TIMEOUT_S)
+            if reading is None:
+                continue
+            frame = reading.frame
+            for name, limit, grace in (
+                ("effort_n", limits.first_effort_n, 1.1),
+                ("velocity_m_s", limits.first_speed_m_s, 3.0),
+            ):
+                found = abs(getattr(frame, name))
+                demand(
+                    not found > grace * limit,
+                    f"{name} comes to {found:.3g} under commands limited to {limit:g}: apply `effort_limit_n` and "
+                    "`speed_limit_m_s` of each command",
+                )
+            allowed, watcher = guard(limits, watcher, frame, command)
+            backend.apply(allowed)
+    finally:
+        backend.close()
+
+
+def takes_every_kind_it_declares(subject: Subject) -> None:
+    """Each kind in `accepts` can be applied, and frames go on coming."""
+    backend = subject.create()
+    demand(bool(subject.entry.accepts), "`accepts` is empty: a gripper takes at least one kind of command")
+    try:
+        info = backend.open(0)
+        for name in subject.entry.accepts:
+            kind = KINDS.index(name)
+            value = {
+                EFFORT: min(EFFORT_N, info.effort_limit_n) / 4.0,
+                VELOCITY: 0.001,
+                POSITION: 0.05,
+                FORCE: FORCE_N,
+            }[kind]
+            backend.read(TIMEOUT_S)
+            try:
+                backend.apply(Command(kind, value, min(EFFORT_N, info.effort_limit_n), 0.01))
+            except Exception as error:
+                raise CheckFailed(
+                    f"apply raised {named(error)} on a {name} command, which the entry says it "
+                    "accepts: take it, or take "
+                    f"{name!r} out of `accepts`"
+                ) from error
+            demand(
+                any(backend.read(TIMEOUT_S) is not None for _ in range(10)),
+                f"after a {name} command no frame came",
+            )
+        backend.apply(info.relaxed)
+    finally:
+        backend.close()
+
+
+def read_keeps_its_timeout(subject: Subject) -> None:
+    """`read` returns within the time it is given, with a frame or with None."""
+    longest = subject.session.longest_read_s
+    demand(
+        longest <= TIMEOUT_S + GRACE_S,
+        f"a read with a time-out of {TIMEOUT_S} s took {longest:.2f} s: return None when nothing came in time",
+    )
+
+
+def pads_can_be_zeroed(subject: Subject) -> None:
+    """After a tare of unloaded images the pads feel next to nothing; without enough images a tare is refused."""
+    info, declared = subject.session.info, {one.name for one in subject.entry.channels}
+    if not info.tare_images or not declared & {"force_left", "force_right"}:
+        raise CheckSkipped("this gripper is not tared")
+    backend = subject.create()
+    try:
+        info = backend.open(0)
+        try:
+            backend.tare([])
+        except TareRefused:
+            pass
+        except Exception as error:
+            raise CheckFailed(
+                f"a tare without images raised {named(error)}: raise TareRefused with what to do"
+            ) from error
+        images: list[Pads] = []
+        for _ in range(int(5.0 * info.rate_hz)):
+            reading = backend.read(TIMEOUT_S)
+            newest = images[-1].counter if images else 0
+            if reading is not None and reading.pads.counter > newest:
+                images.append(reading.pads)
+            backend.apply(info.relaxed)
+            if len(images) >= info.tare_images:
+                break
+        demand(
+            len(images) >= info.tare_images,
+            f"{len(images)} images came in 5 s, a tare needs {info.tare_images}",
+        )
+        backend.tare(images)
+        forces = []
+        for _ in range(20):
+            reading = backend.read(TIMEOUT_S)
+            backend.apply(info.relaxed)
+            if reading is not None:
+                forces += [reading.frame.force_left_n, reading.frame.force_right_n]
+        known = [one for one in forces if not isnan(one)]
+        demand(
+            bool(known) and abs(fmean(known)) < 0.6,
+            f"after the tare the unloaded pads feel {fmean(known or [nan]):.3g} N: subtract the zero, "
+            "then divide by the "
+            "counts of a newton",
+        )
+    finally:
+        backend.close()
+
+
+def closes_in_any_state(subject: Subject) -> None:
+    """`close` does no harm before `open`, after it, twice, and in the middle of a command; then it opens again."""
+    backend = subject.create()
+    stage = "before open"
+    try:
+        backend.close()
+        for attempt in ("the first", "the second"):
+            stage = f"after {attempt} opening"
+            info = backend.open(0)
+            _first_frame(backend)
+            backend.apply(info.relaxed)
+            backend.close()
+            stage = "for the second time"
+            backend.close()
+    except CheckFailed:
+        raise
+    except Exception as error:
+        raise CheckFailed(
+            f"{stage} it raised {named(error)}: `close` lets go of what is held, in any state, and `open` begins anew"
+        ) from error
+
+
+def _first_frame(backend: SensorBackend[Any]) -> Frame:
+    for _ in range(20):
+        reading = backend.read(TIMEOUT_S)
+        if reading is not None:
+            return reading.frame
+    raise CheckFailed("no frame came after it was opened again")
+
+
+def same_seed_same_frames(subject: Subject) -> None:
+    """On a virtual clock the same seed gives the same frames."""
+    if subject.session.info.clock != "virtual":
+        raise CheckSkipped("a device's clock: what is measured is never the same twice")
+    texts = []
+    for _ in range(2):
+        backend = subject.create()
+        try:
+            info = backend.open(3)
+            readings: list[str] = []
+            for _ in range(100):
+                readings.append(repr(backend.read(TIMEOUT_S)))
+                backend.apply(info.opening or info.relaxed)
+            texts.append(readings)
+        except RecordingEnded:
+            texts.append(readings)
+        finally:
+            backend.close()
+    demand(
+        texts[0] == texts[1],
+        "two openings with one seed give other frames: draw everything from the seed that `open` is given",
+    )
+
+
+def is_told_what_to_expect(subject: Subject) -> None:
+    """`expect` takes any controller before it is opened, and refuses nothing; it then opens as ever."""
+    controller, run = GentleController(kind_of(subject.entry.accepts)), RunConfig()
+    backend = subject.create(**(subject.absent or {}))
+    try:
+        backend.expect(controller, run)
+    except Exception as error:
+        raise CheckFailed(
+            f"expect raised {named(error)}: keep what it is told, open nothing, and leave refusing to `open`"
+        ) from error
+    finally:
+        backend.close()
+    backend = subject.create()
+    try:
+        backend.expect(controller, run)
+        backend.open(0)
+    finally:
+        backend.close()
+
+
+def does_a_whole_grasp(subject: Subject) -> None:
+    """The runner can do a grasp with it: open, tare, close, hold, open again, let go."""
+    kind = kind_of(subject.entry.accepts)
+    grasp = run_grasp(subject.create(), GentleController(kind), RunConfig(hold_s=0.05))
+    demand(
+        grasp.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RUNNING),
+        f"a gentle grasp with {KINDS[kind]} commands ended as {grasp.outcome.words}: {grasp.reason}",
+    )
+    demand(len(grasp.trace) > 0, "a gentle grasp left no trace")
+
+
+def reports_plain_values(subject: Subject) -> None:
+    """`report` gives numbers and text that JSON holds, while it is open and after it was closed."""
+    backend = subject.create()
+    try:
+        backend.open(0)
+        reports = [backend.report()]
+    finally:
+        backend.close()
+    reports.append(backend.report())
+    for report in reports:
+        try:
+            json.dumps(dict(report))
+        except (TypeError, ValueError) as error:
+            raise CheckFailed(
+                f"report gave {report!r}: numbers, text and truths only ({named(error)})"
+            ) from error
+
+
+def stands_in_with_the_same_commands(subject: Subject) -> None:
+    """What stands in for a dry run is a gripper of its own, or there is none."""
+    other = subject.create().stand_in()
+    if other is None:
+        raise CheckSkipped("nothing stands in for it in a dry run")
+    demand(isinstance(other, SensorBackend), f"stand_in returned {other!r}: return a SensorBackend or None")
+    try:
+        info = other.open(0)
+        demand(
+            info.opening is None or KINDS[info.opening.kind] in subject.entry.accepts,
+            f"what stands in opens with {info.opening}, of a kind that the gripper does not take",
+        )
+        _first_frame(other)
+    finally:
+        other.close()
+
+
+def says_when_it_is_lost(subject: Subject) -> None:
+    """Unplugged, it raises DeviceLost in time, with what to do; a grasp ends as device lost; it can be closed."""
+    if subject.unplugged is None:
+        raise CheckSkipped(
+            "no settings were given under which it vanishes (--unplugged, or `unplugged` in a test)"
+        )
+    backend = subject.create(**subject.unplugged)
+    try:
+        info = backend.open(0)
+        text = _lost(backend, info.relaxed, info.rate_hz)
+    finally:
+        backend.close()
+    demand(len(text) > 10, f"DeviceLost says {text!r}: say which gripper, and what to look at")
+    grasp = run_grasp(
+        subject.create(**subject.unplugged), GentleController(kind_of(subject.entry.accepts)), RunConfig()
+    )
+    demand(
+        grasp.outcome == Outcome.DEVICE_LOST,
+        f"a grasp with a gripper that vanishes ended as {grasp.outcome.words} ({grasp.reason}), not as device lost",
+    )
+
+
+def _lost(backend: SensorBackend[Any], relaxed: Command, rate_hz: float) -> str:
+    until = time.perf_counter() + 3.0 * VANISHING_S + GRACE_S
+    for _ in range(int(4.0 * VANISHING_S * rate_hz) + 50):
+        try:
+            backend.read(TIMEOUT_S)
+            backend.apply(relaxed)
+        except DeviceLost as lost:
+            return str(lost)
+        except Exception as error:
+            raise CheckFailed(
+                f"unplugged, it raised {named(error)}: turn what the driver raises into DeviceLost"
+            ) from error
+        if time.perf_counter() > until:
+            break
+    raise CheckFailed(
+        f"unplugged, it never raised DeviceLost within {VANISHING_S:g} s of its clock: raise it where "
+        "read or apply finds "
+        "the gripper gone"
+    )
+
+
+def says_when_it_is_not_there(subject: Subject) -> None:
+    """Not there, `open` raises NoDevice and says what it looked for and what to try."""
+    if subject.absent is None:
+        raise CheckSkipped(
+            "no settings were given under which it is not there (--absent, or `absent` in a test)"
+        )
+    backend = subject.create(**subject.absent)
+    began = time.perf_counter()
+    try:
+        backend.open(0)
+    except NoDevice as error:
+        text = str(error)
+    except Exception as error:
+        raise CheckFailed(
+            f"not there, open raised {named(error)}: raise NoDevice with what to try"
+        ) from error
+    else:
+        raise CheckFailed("open succeeded where no gripper is: raise NoDevice where nothing answers")
+    finally:
+        backend.close()
+    took = time.perf_counter() - began
+    demand(took < 10.0, f"it took {took:.1f} s to say so: `open` is bounded in time")
+    demand(len(text) > 20, f"NoDevice says {text!r}: say what was looked for, where, and what to try")
+
+
+CHECKS: Final = (
+    *component.CHECKS,
+    *checks_of(
+        describes_itself,
+        opens_and_relaxes_by_kinds_it_takes,
+        frames_are_numbers,
+        channels_are_those_declared,
+        time_runs_forward,
+        rate_is_what_it_says,
+        images_count_up,
+        gap_is_in_metres,
+        forces_are_in_newtons,
+        velocity_is_the_gaps_rate,
+        closing_closes,
+        stays_within_its_limits,
+        takes_every_kind_it_declares,
+        read_keeps_its_timeout,
+        pads_can_be_zeroed,
+        closes_in_any_state,
+        same_seed_same_frames,
+        is_told_what_to_expect,
+        does_a_whole_grasp,
+        reports_plain_values,
+        stands_in_with_the_same_commands,
+        says_when_it_is_lost,
+        says_when_it_is_not_there,
+    ),
+)

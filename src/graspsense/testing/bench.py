@@ -1,0 +1,131 @@
+"""A gripper made of a mass, friction and a spring between the fingers, for checking controllers; nothing real."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf, nan
+from typing import TYPE_CHECKING, Any, Final
+
+from graspsense.core.roles import Controller, DeviceInfo, Reading, SensorBackend
+from graspsense.core.signals import CELLS, EFFORT, FORCE, NO_PADS, POSITION, VELOCITY, Command, Frame, Pads
+
+if TYPE_CHECKING:
+    from graspsense.core.runner import Grasp
+
+DT_S: Final = 1e-3
+OPEN_M: Final = 0.08
+MASS_KG: Final = 80.0
+FRICTION_N: Final = 7.0
+DAMPING_N_S_M: Final = 50.0
+EFFORT_LIMIT_N: Final = 100.0
+SPEED_LIMIT_M_S: Final = 0.2
+FOLLOWING_S: Final = 0.005
+TICKS_OF_AN_IMAGE: Final = 41
+CHANNELS_OF_FIELD: Final = {
+    "gap_m": "gap",
+    "velocity_m_s": "velocity",
+    "effort_n": "effort",
+    "force_left_n": "force_left",
+    "force_right_n": "force_right",
+    "edge_left_n": "edge_left",
+    "edge_right_n": "edge_right",
+}
+
+
+class Bench(SensorBackend[None]):
+    """A 1 kHz gripper of 80 mm that takes every kind of command and has the given channels; the rest is NaN.
+
+    Between its fingers stands a thing `width_m` wide (0: nothing) that pushes back with `stiffness_n_m`.
+    """
+
+    def __init__(self, channels: frozenset[str], width_m: float, stiffness_n_m: float) -> None:
+        super().__init__(None)
+        self._absent = [field for field, name in CHANNELS_OF_FIELD.items() if name not in channels]
+        self._has_pads = "pads" in channels
+        self._width_m, self._stiffness_n_m = width_m, stiffness_n_m
+
+    def open(self, seed: int) -> DeviceInfo:
+        """Stand open."""
+        del seed
+        self._gap, self._speed, self._effort, self._ticks = OPEN_M - 0.002, 0.0, 0.0, 0
+        self._pads = NO_PADS
+        return DeviceInfo(
+            name="bench",
+            clock="virtual",
+            rate_hz=1.0 / DT_S,
+            effort_limit_n=EFFORT_LIMIT_N,
+            speed_limit_m_s=SPEED_LIMIT_M_S,
+            opening=Command(VELOCITY, 0.05, inf, inf),
+            relaxed=Command(EFFORT, 0.0, inf, inf),
+        )
+
+    def read(self, timeout_s: float) -> Reading:
+        """Return the next tick."""
+        del timeout_s
+        force = self._force()
+        frame = Frame(
+            self._ticks * DT_S, DT_S, self._gap, self._speed, self._effort, force, force, 0.0, 0.0, 0
+        )
+        if self._has_pads and self._ticks % TICKS_OF_AN_IMAGE == 0:
+            cells = (3000.0 + 100.0 * force,) * CELLS
+            self._pads = Pads(frame.t_s, 1 + self._ticks // TICKS_OF_AN_IMAGE, cells, cells)
+        self._ticks += 1
+        absent: dict[str, Any] = dict.fromkeys(self._absent, nan)
+        return Reading(frame._replace(**absent), self._pads)
+
+    def apply(self, command: Command) -> None:
+        """Move by one tick under this command."""
+        kind, value, effort_limit, speed_limit = command
+        force = self._force()
+        most = min(effort_limit, EFFORT_LIMIT_N)
+        top = min(speed_limit, SPEED_LIMIT_M_S)
+        if kind == EFFORT:
+            self._effort = min(max(value, -most), most)
+            push = force - self._effort - DAMPING_N_S_M * self._speed
+            moved = self._speed + push * DT_S / MASS_KG
+            slowed = FRICTION_N * DT_S / MASS_KG
+            self._speed = 0.0 if abs(moved) <= slowed else moved - slowed * (1.0 if moved > 0.0 else -1.0)
+        else:
+            if kind == VELOCITY:
+                wanted = value
+            elif kind == POSITION:
+                wanted = (value - self._gap) / 0.02
+            else:
+                assert kind == FORCE, f"{kind} is no kind of command"
+                wanted = (force - value) / 2000.0
+            self._speed += (min(max(wanted, -top), top) - self._speed) * DT_S / FOLLOWING_S
+            self._effort = force
+            if force >= most and self._speed < 0.0:
+                self._speed = 0.0
+        self._gap += self._speed * DT_S
+        if not 0.0 < self._gap < OPEN_M:
+            self._gap, self._speed = min(max(self._gap, 0.0), OPEN_M), 0.0
+
+    def tare(self, images: Sequence[Pads]) -> None:
+        """Nothing to set."""
+
+    def close(self) -> None:
+        """Nothing to let go of."""
+
+    def _force(self) -> float:
+        return self._stiffness_n_m * max(self._width_m - self._gap, 0.0)
+
+
+def bench(channels: Any, thing: str = "a soft thing") -> Bench:
+    """Return the bench with one of `THINGS` between its fingers."""
+    return Bench(frozenset(channels), *THINGS[thing])
+
+
+def drive(controller: Controller[Any], gripper: SensorBackend[Any]) -> Grasp:
+    """Return a whole grasp of this gripper under this controller, as the runner does it."""
+    from graspsense.core.run_config import RunConfig
+    from graspsense.core.runner import run_grasp
+
+    return run_grasp(gripper, controller, RunConfig())
+
+
+THINGS: Final = {
+    "a soft thing": (0.05, 1500.0),
+    "a hard thing": (0.05, 40000.0),
+    "nothing": (0.0, 0.0),
+}

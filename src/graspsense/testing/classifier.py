@@ -1,0 +1,259 @@
+"""What a classifier must hold to."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from attrs import evolve
+
+from graspsense.core.errors import DataDamaged, named
+from graspsense.core.features import FeatureTable, Prediction
+from graspsense.testing import component
+from graspsense.testing.checks import CheckFailed, checks_of, demand
+from graspsense.testing.samples import three_kinds
+from graspsense.testing.subject import Subject
+
+SEED: Final = 11
+LEAST_RIGHT: Final = 0.9
+
+
+def _fitted(subject: Subject, table: FeatureTable, labels: Sequence[str]) -> Any:
+    one = subject.create()
+    try:
+        one.fit(table, labels, SEED)
+    except Exception as error:
+        raise CheckFailed(
+            f"fit raised {named(error)} on {len(labels)} trials of {len(set(labels))} labels: learn "
+            "from them; a NaN in "
+            "the table is missing"
+        ) from error
+    return one
+
+
+def _learned(subject: Subject) -> tuple[Any, FeatureTable, list[str]]:
+    table, labels = three_kinds()
+    return _fitted(subject, table, labels), table, labels
+
+
+def _json(fitted: Any) -> Any:
+    model = fitted.to_json()
+    try:
+        return json.loads(json.dumps(model, allow_nan=False))
+    except (TypeError, ValueError) as error:
+        raise CheckFailed(
+            f"to_json gives what JSON cannot hold ({named(error)}): lists, dicts, text, numbers, "
+            "true, false, None; a NaN "
+            "as None"
+        ) from error
+
+
+def _again(subject: Subject, fitted: Any) -> Any:
+    other = subject.create()
+    other.from_json(_json(fitted))
+    return other
+
+
+def classes_are_the_labels(subject: Subject) -> None:
+    """`classes` gives the labels of the training trials, each once, as text."""
+    fitted, _, labels = _learned(subject)
+    classes = fitted.classes()
+    demand(
+        isinstance(classes, tuple) and all(type(one) is str for one in classes),
+        f"classes gives {classes!r}: a tuple of str (write str(...) around what numpy gives)",
+    )
+    demand(
+        sorted(classes) == sorted(set(labels)),
+        f"classes gives {', '.join(classes)}; it was trained on {', '.join(sorted(set(labels)))}",
+    )
+
+
+def probabilities_are_probabilities(subject: Subject) -> None:
+    """One row a trial, one column a class, finite, from 0 to 1, each row summing to 1."""
+    fitted, table, _ = _learned(subject)
+    found = fitted.probabilities(table)
+    wanted = (len(table), len(fitted.classes()))
+    demand(
+        isinstance(found, np.ndarray) and found.shape == wanted and found.dtype == np.float64,
+        f"probabilities gives {getattr(found, 'dtype', type(found).__name__)} of shape {getattr(found, 'shape', '-')}: "
+        f"float64 of shape {wanted}",
+    )
+    demand(
+        bool(np.isfinite(found).all() and (found >= 0.0).all() and (found <= 1.0 + 1e-9).all()),
+        f"probabilities go from {np.min(found):g} to {np.max(found):g}: from 0 to 1",
+    )
+    worst = float(np.max(np.abs(found.sum(axis=1) - 1.0)))
+    demand(worst <= 1e-6, f"a row of probabilities misses 1 by {worst:.2g}: divide each row by its sum")
+
+
+def tells_apart_what_differs(subject: Subject) -> None:
+    """Of trials that can be told apart it gets nine in ten right, asked for those it was trained on."""
+    fitted, table, labels = _learned(subject)
+    classes = fitted.classes()
+    said = [classes[int(i)] for i in np.argmax(fitted.probabilities(table), axis=1)]
+    right = sum(a == b for a, b in zip(said, labels, strict=True)) / len(labels)
+    demand(
+        right >= LEAST_RIGHT,
+        f"{right:.0%} of the trials it was trained on are named right: is the order of `classes` that of the columns?",
+    )
+
+
+def same_seed_same_model(subject: Subject) -> None:
+    """The same trials and seed give the same model, to the bit."""
+    one, table, _ = _learned(subject)
+    two, _, _ = _learned(subject)
+    demand(
+        _json(one) == _json(two) and bool((one.probabilities(table) == two.probabilities(table)).all()),
+        "two models of one seed differ: draw everything from the seed that fit is given",
+    )
+
+
+def survives_json(subject: Subject) -> None:
+    """Written as JSON and read again it says the same, to the bit, and gives its reasons."""
+    fitted, table, _ = _learned(subject)
+    again = _again(subject, fitted)
+    demand(
+        again.classes() == fitted.classes()
+        and bool((again.probabilities(table) == fitted.probabilities(table)).all()),
+        "read back from its JSON it gives other probabilities: keep every number in full (float, not text of it)",
+    )
+    row = table.row(0)
+    demand(
+        repr(again.explain(row)) == repr(fitted.explain(row)),
+        "read back from its JSON it gives other reasons: keep what they are made of",
+    )
+
+
+def chunks_do_not_matter(subject: Subject) -> None:
+    """Asked for trials one by one it says what it says of all at once."""
+    fitted, table, _ = _learned(subject)
+    whole = fitted.probabilities(table)
+    single = np.concatenate([fitted.probabilities(table.rows(np.array([i]))) for i in range(len(table))])
+    demand(
+        bool(np.allclose(whole, single, rtol=1e-9, atol=1e-12)),
+        "asked one by one it gives other probabilities than asked at once: a trial is judged by itself",
+    )
+
+
+def missing_values_have_an_answer(subject: Subject) -> None:
+    """NaN in training and in asking, a column without any value, a trial without any: an answer to each."""
+    table, labels = three_kinds(missing=True)
+    bare = table.values.copy()
+    bare[:, 1] = math.nan
+    for what, values in (("some values missing", table.values), ("a whole feature missing", bare)):
+        fitted = _fitted(subject, evolve(table, values=values), labels)
+        nothing = evolve(table, values=np.full((1, len(table.names)), math.nan))
+        for asked in (table, nothing):
+            found = fitted.probabilities(asked)
+            demand(
+                bool(np.isfinite(found).all()) and bool(np.allclose(found.sum(axis=1), 1.0, atol=1e-6)),
+                f"with {what} in training it gives {found[0]} for a trial with missing values: fill or skip them",
+            )
+        fitted.explain(nothing.row(0))
+
+
+def one_label_is_refused_or_certain(subject: Subject) -> None:
+    """Trained on one label it raises ValueError, or is certain of it."""
+    table, labels = three_kinds()
+    one = subject.create()
+    try:
+        one.fit(table, ["can:full"] * len(labels), SEED)
+    except ValueError as error:
+        demand(bool(str(error)), "fit on one label raised ValueError without a word: say what is lacking")
+        return
+    except Exception as error:
+        raise CheckFailed(f"fit on one label raised {named(error)}: raise ValueError, or learn it") from error
+    found = one.probabilities(table)
+    demand(
+        one.classes() == ("can:full",) and bool((found == 1.0).all()),
+        f"trained on one label it gives {one.classes()} with {found[0]}",
+    )
+
+
+def explains_what_it_says(subject: Subject) -> None:
+    """`explain` names the most probable class, with floats for probabilities and reasons in words."""
+    fitted, table, _ = _learned(subject)
+    for i in range(6):
+        said = fitted.explain(table.row(i))
+        demand(
+            isinstance(said, Prediction),
+            f"explain returned {said!r}: return graspsense.plugin_api.Prediction",
+        )
+        shares = dict(zip(fitted.classes(), fitted.probabilities(table)[i].tolist(), strict=True))
+        demand(
+            said.label in shares and shares[said.label] >= max(shares.values()) - 1e-9,
+            f"explain says {said.label!r} where the probabilities are {shares}",
+        )
+        for label, share in said.probabilities.items():
+            demand(
+                type(share) is float and abs(share - shares.get(label, math.nan)) <= 1e-9,
+                f"explain gives {label!r} the probability {share!r} of type {type(share).__name__}; "
+                "probabilities gives "
+                f"{shares.get(label)}: write float(...)",
+            )
+        demand(
+            len(said.because) > 0 and all(type(one) is str and one for one in said.because),
+            f"explain gives the reasons {said.because!r}: say in words and units why, one step an item",
+        )
+
+
+def leaves_the_table_alone(subject: Subject) -> None:
+    """Neither fit nor probabilities changes the table."""
+    table, labels = three_kinds(missing=True)
+    before = table.values.copy()
+    fitted = _fitted(subject, table, labels)
+    fitted.probabilities(table)
+    demand(
+        bool(np.array_equal(before, table.values, equal_nan=True)),
+        "the table is another after fit or probabilities: work on a copy (`table.values.copy()`)",
+    )
+
+
+def refuses_what_is_no_model(subject: Subject) -> None:
+    """`from_json` raises KeyError, TypeError, ValueError or DataDamaged on what is no model of its."""
+    good = _json(_learned(subject)[0])
+    demand(isinstance(good, dict) and bool(good), f"to_json gives {good!r:.80}: a dict")
+    bad: list[Mapping[str, Any]] = [{}, {"nonsense": 1}]
+    bad += [{key: one for key, one in good.items() if key != lacking} for lacking in _vital(subject, good)]
+    for model in bad:
+        try:
+            subject.create().from_json(model)
+        except (KeyError, TypeError, ValueError, DataDamaged):
+            continue
+        except Exception as error:
+            raise CheckFailed(
+                f"from_json raised {named(error)} on a model with the keys "
+                f"{', '.join(model) or 'none'}: raise ValueError"
+            ) from error
+        raise CheckFailed(
+            f"from_json takes a model with the keys {', '.join(model) or 'none'}: look at what is given, and raise "
+            "ValueError where it is no model"
+        )
+
+
+def _vital(subject: Subject, good: Mapping[str, Any]) -> list[str]:
+    """Return the key with the largest content: a model without it is none."""
+    del subject
+    return [max(good, key=lambda key: len(json.dumps(good[key])))]
+
+
+CHECKS: Final = (
+    *component.CHECKS,
+    *component.CLASSIFIER_CHECKS,
+    *checks_of(
+        classes_are_the_labels,
+        probabilities_are_probabilities,
+        tells_apart_what_differs,
+        same_seed_same_model,
+        survives_json,
+        chunks_do_not_matter,
+        missing_values_have_an_answer,
+        one_label_is_refused_or_certain,
+        explains_what_it_says,
+        leaves_the_table_alone,
+        refuses_what_is_no_model,
+    ),
+)

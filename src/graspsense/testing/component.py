@@ -1,0 +1,178 @@
+"""What every component must hold to, whatever its role: its classes, its settings, its constructor."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from typing import Any, Final
+
+import attrs
+
+from graspsense.core.config import build, toml_key, toml_value
+from graspsense.core.errors import PluginUnavailable
+from graspsense.core.roles import ClassifierConfig
+from graspsense.core.strict import keys_of, plain
+from graspsense.testing.checks import CheckFailed, checks_of, demand
+from graspsense.testing.subject import Subject
+
+ADVICE_ON_IMPORTS: Final = (
+    "is the name right? what has to be installed goes into `dependencies` of its pyproject.toml, or, "
+    "where that is not for "
+    "everybody, into `needs` of the entry, in words"
+)
+
+
+def classes_can_be_imported(subject: Subject) -> None:
+    """The class and its config class can be imported, and the class implements every method of its role."""
+    try:
+        subject.component.config_class()
+        subject.component.component_class()
+    except PluginUnavailable as error:
+        if isinstance(error.__cause__, ImportError) and not subject.entry.needs:
+            raise CheckFailed(f"{error}\n    {ADVICE_ON_IMPORTS}") from error
+        raise
+
+
+def settings_have_types(subject: Subject) -> None:
+    """Every key of the config class has a type, without which a file's value cannot be checked."""
+    cls: Any = subject.component.config_class()
+    bare = [one.alias for one in attrs.fields(cls) if one.init and one.type is None]
+    demand(
+        not bare,
+        f"{subject.entry.config} has keys without a type: {', '.join(bare)}. Annotate them, as in "
+        f"`{(bare or ['key'])[0]}: float = 1.0`",
+    )
+
+
+def defaults_are_what_their_types_say(subject: Subject) -> None:
+    """Every default is of the type that its key is annotated with: a whole number is no float."""
+    cls: Any = subject.component.config_class()
+    attrs.resolve_types(cls)
+    for one in attrs.fields(cls):
+        default = one.default
+        if one.type is float and type(default) is int:
+            where = f"key {one.alias!r} of {subject.entry.config}"
+            demand(False, f"{where} is a float, its default {default!r} is an int: write {float(default)!r}")
+        if one.type is int and type(default) in (float, bool):
+            demand(
+                False,
+                f"key {one.alias!r} of {subject.entry.config} is an int, its default is {default!r}: write an int, "
+                "or annotate it with what it is",
+            )
+
+
+def settings_survive_a_file(subject: Subject) -> None:
+    """Settings written as TOML and read again are the same settings."""
+    config = subject.config()
+    values = {key: one for key, one in plain(config).items() if one is not None}
+    text = "\n".join(f"{toml_key(key)} = {toml_value(one)}" for key, one in values.items())
+    again = build(subject.component, tomllib.loads(text))
+    demand(
+        plain(again) == plain(config),
+        f"{subject.entry.config} read back from its own TOML is another: {plain(config)} became {plain(again)}. A "
+        "converter or __attrs_post_init__ changes what was given: let it leave alone what it has made",
+    )
+
+
+def settings_cannot_be_changed(subject: Subject) -> None:
+    """A config is frozen: what a run is recorded with is what it ran with."""
+    config, cls = subject.config(), subject.component.config_class()
+    keys = list(keys_of(cls))
+    if not keys:
+        params = getattr(cls, "__attrs_props__", None)
+        demand(
+            params is None or params.is_frozen,
+            f"{subject.entry.config} can be changed: decorate it with @frozen",
+        )
+        return
+    try:
+        setattr(config, attrs.fields(cls)[0].name, getattr(config, attrs.fields(cls)[0].name))
+    except attrs.exceptions.FrozenInstanceError:
+        return
+    demand(
+        False,
+        f"{subject.entry.config} can be changed after it was made: decorate it with @frozen(kw_only=True) of attrs",
+    )
+
+
+def a_classifier_has_a_model_key(subject: Subject) -> None:
+    """The config of a classifier extends ClassifierConfig, which holds the key `model`."""
+    cls = subject.component.config_class()
+    demand(
+        issubclass(cls, ClassifierConfig),
+        f"{subject.entry.config} has no key 'model': let it extend graspsense.plugin_api.ClassifierConfig",
+    )
+
+
+def making_one_does_nothing(subject: Subject) -> None:
+    """A constructor opens no file, no device and no connection, and asks nothing."""
+    subject.component.component_class()
+    config = subject.config()
+    with _Watched() as seen:
+        subject.component.create(config)
+    demand(
+        not seen,
+        f"the constructor of {subject.entry.target} does {', '.join(dict.fromkeys(seen))}: keep the "
+        "config only, and do "
+        "that where it is first needed (a gripper in `open`)",
+    )
+
+
+def summary_is_one_line(subject: Subject) -> None:
+    """The summary is one line of text, as `plugins list` prints it."""
+    summary = subject.entry.summary
+    demand(
+        bool(summary.strip()) and "\n" not in summary and len(summary) <= 120,
+        f"the summary is {summary!r}: say in one line of at most 120 characters what it is",
+    )
+
+
+class _Watched:
+    """Collects what this thread opens or asks for while it is entered; audit hooks cannot be taken away again."""
+
+    _seen: list[str] | None = None
+    _hooked = False
+
+    def __enter__(self) -> list[str]:
+        if not _Watched._hooked:
+            sys.addaudithook(_Watched._heard)
+            _Watched._hooked = True
+        found: list[str] = []
+        _Watched._seen = found
+        return found
+
+    def __exit__(self, *_: object) -> None:
+        _Watched._seen = None
+
+    @staticmethod
+    def _heard(event: str, arguments: tuple[Any, ...]) -> None:
+        seen = _Watched._seen
+        if seen is None or event not in _DEEDS:
+            return
+        path = str(arguments[0]) if arguments else ""
+        # Importing a module reads files, and that is no doing of the constructor's.
+        if event == "open" and path.endswith((".py", ".pyc", ".so", ".pyd", ".pth", ".zip")):
+            return
+        seen.append(_DEEDS[event] + (f" ({path})" if event == "open" else ""))
+
+
+_DEEDS: Final = {
+    "open": "open a file",
+    "socket.connect": "connect to an address",
+    "socket.bind": "bind an address",
+    "builtins.input": "ask at the terminal",
+    "subprocess.Popen": "start a program",
+    "os.mkdir": "make a folder",
+    "os.remove": "remove a file",
+}
+
+CHECKS: Final = checks_of(
+    classes_can_be_imported,
+    settings_have_types,
+    defaults_are_what_their_types_say,
+    settings_survive_a_file,
+    settings_cannot_be_changed,
+    making_one_does_nothing,
+    summary_is_one_line,
+)
+CLASSIFIER_CHECKS: Final = checks_of(a_classifier_has_a_model_key)

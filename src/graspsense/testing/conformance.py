@@ -1,0 +1,208 @@
+"""The checks of a role on a part: all at once, as cases of pytest, or as a class to inherit from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, ClassVar, Final
+
+from attrs import define, field
+
+from graspsense.core.errors import PluginUnavailable, UnknownName
+from graspsense.core.plugins import Component, Plugins, installed
+from graspsense.core.strict import keys_of
+from graspsense.testing import backend, classifier, controller, features, package
+from graspsense.testing.checks import Check, Report, Result, outcome_of
+from graspsense.testing.subject import Package, Subject, package_of
+
+CHECKS: Final[Mapping[str, tuple[Check, ...]]] = {
+    "distribution": package.CHECKS,
+    "sensor-backend": backend.CHECKS,
+    "controller": controller.CHECKS,
+    "feature-set": features.CHECKS,
+    "classifier": classifier.CHECKS,
+}
+"""The checks of each role, and of a distribution as a whole."""
+
+FLOOR_CASE: Final = "enough-checks-ran"
+
+
+@define(eq=False)
+class Case:
+    """One check on one part. `run` raises what a test is to fail or to be skipped with."""
+
+    check: Check
+    subject: Subject | Package
+    examined: Examined
+
+    @property
+    def id(self) -> str:
+        """The part and the check, as pytest shows them."""
+        return f"{self.subject.name}:{self.check.id}"
+
+    def result(self) -> Result:
+        """Return what came of it; it is run once."""
+        return self.examined.result(self.subject, self.check)
+
+    def run(self) -> None:
+        """Fail, or be skipped, under pytest as it should."""
+        import pytest
+
+        result = self.result()
+        if result.state == "failed":
+            pytest.fail(result.text, pytrace=False)
+        if result.state == "expected failure":
+            pytest.xfail(result.text)
+        if result.state == "skipped":
+            pytest.skip(result.text)
+
+
+@define(eq=False)
+class FloorCase:
+    """That enough checks of a part ran."""
+
+    subject: Subject | Package
+    examined: Examined
+
+    @property
+    def id(self) -> str:
+        """The part and the name of this case."""
+        return f"{self.subject.name}:{FLOOR_CASE}"
+
+    def run(self) -> None:
+        """Fail where too few checks of the part ran."""
+        import pytest
+
+        report = Report([self.examined.result(self.subject, one) for one in CHECKS[self.subject.role]])
+        print(report.counts())  # noqa: T201 (pytest shows it beside a failure, and with -rP)
+        text = report.below_floor(self.subject.name, self.subject.role)
+        if text:
+            pytest.fail(text, pytrace=False)
+
+
+@define(eq=False)
+class Examined:
+    """Parts under check, with the results so far."""
+
+    subjects: tuple[Subject | Package, ...]
+    expected: Mapping[str, str] = field(factory=dict)
+    _results: dict[tuple[str, str], Result] = field(factory=dict, init=False)
+
+    def result(self, subject: Subject | Package, check: Check) -> Result:
+        """Return the result of one check, run now where it has not been."""
+        key = (f"{subject.role} {subject.name}", check.id)
+        if key not in self._results:
+            self._results[key] = self._run(subject, check)
+        return self._results[key]
+
+    def _run(self, subject: Subject | Package, check: Check) -> Result:
+        first = CHECKS[subject.role][0]
+        if check is not first and self.result(subject, first).state == "failed":
+            why = f"nothing more can be checked before {first.id} passes"
+            return Result(subject.name, subject.role, check.id, check.title, "skipped", why)
+        return outcome_of(check, subject, self.expected)  # type: ignore[arg-type]
+
+    def cases(self) -> Iterator[Case | FloorCase]:
+        """Yield every check of every part, and after each part's whether enough of them ran."""
+        for subject in self.subjects:
+            for check in CHECKS[subject.role]:
+                yield Case(check, subject, self)
+            yield FloorCase(subject, self)
+
+    def report(self, told: Callable[[Result], None] = lambda _: None) -> Report:
+        """Run every check and return the results; `told` hears each as it comes."""
+        report = Report()
+        for subject in self.subjects:
+            for check in CHECKS[subject.role]:
+                result = self.result(subject, check)
+                report.results.append(result)
+                told(result)
+        return report
+
+
+def examine(
+    name: str,
+    *,
+    keys: Mapping[str, Any] | None = None,
+    unplugged: Mapping[str, Any] | None = None,
+    absent: Mapping[str, Any] | None = None,
+    expected_failures: Mapping[str, str] | None = None,
+    wheel: bool = True,
+    plugins: Plugins | None = None,
+) -> Examined:
+    """Return the part of this name, ready to be checked.
+
+    `name` is a distribution, which means itself and all its components, or a component (`NAME` or
+    `DISTRIBUTION/NAME`). `keys` are settings as in a pipeline file, `expected_failures` maps a check's id to why it
+    fails. Raises UnknownName.
+    """
+    plugins = installed() if plugins is None else plugins
+    whole = package_of(name, plugins, builds=wheel)
+    components = [one for one in plugins.components() if name in (one.name, one.qualified)]
+    if whole is None and not components:
+        raise plugins.unknown(name)
+    expected = dict(expected_failures or {})
+    strangers = set(expected) - {one.id for checks in CHECKS.values() for one in checks}
+    if strangers:
+        raise UnknownName(f"there is no check named {', '.join(sorted(strangers))}")
+
+    def under(component: Component) -> Subject:
+        mine = dict(keys or {})
+        if whole is not None:  # each of several components takes the keys that it has
+            try:
+                known = keys_of(component.config_class())
+            except PluginUnavailable:  # the first check says so
+                known = {}
+            mine = {key: value for key, value in mine.items() if key in known}
+        return Subject(component=component, keys=mine, unplugged=unplugged, absent=absent)
+
+    subjects: list[Subject | Package] = [] if whole is None else [whole]
+    subjects += [under(one) for one in (components if whole is None else whole.components)]
+    return Examined(tuple(subjects), expected)
+
+
+def parametrize_checks(name: str, **options: Any) -> Any:
+    """Return the pytest mark that gives a test every check of a part, as the argument `check`.
+
+    The test is `def test_conformance(check): check.run()`; the options are those of `examine`.
+    """
+    import pytest
+
+    cases = list(examine(name, **options).cases())
+    return pytest.mark.parametrize("check", cases, ids=[one.id for one in cases])
+
+
+class Conformance:
+    """Inherit from this in a class `Test...`: a test for each check of the part `name`.
+
+    `keys`, `unplugged`, `absent`, `expected_failures` and `wheel` are as in `examine`.
+    """
+
+    name: ClassVar[str]
+    keys: ClassVar[Mapping[str, Any]] = {}
+    unplugged: ClassVar[Mapping[str, Any] | None] = None
+    absent: ClassVar[Mapping[str, Any] | None] = None
+    expected_failures: ClassVar[Mapping[str, str]] = {}
+    wheel: ClassVar[bool] = True
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        examined = examine(
+            cls.name,
+            keys=cls.keys,
+            unplugged=cls.unplugged,
+            absent=cls.absent,
+            expected_failures=cls.expected_failures,
+            wheel=cls.wheel,
+        )
+        several = len(examined.subjects) > 1
+        for case in examined.cases():
+            part, _, check = case.id.rpartition(":")
+            test = f"test_{part}_{check}" if several else f"test_{check}"
+            setattr(cls, "".join(c if c.isalnum() else "_" for c in test), _test_of(case))
+
+
+def _test_of(case: Case | FloorCase) -> Callable[[Any], None]:
+    def test(self: Any) -> None:
+        case.run()
+
+    return test

@@ -1,0 +1,355 @@
+"""What a control law must hold to."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from collections.abc import Iterator
+from math import isfinite, isinf, nan
+from typing import Any, Final, NamedTuple, get_type_hints
+
+from graspsense.core.entries import KINDS
+from graspsense.core.errors import named
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
+from graspsense.core.signals import (
+    APPROACH,
+    CELLS,
+    HOLD,
+    RUNNING,
+    Command,
+    Frame,
+    Outcome,
+    Pads,
+    Phase,
+)
+from graspsense.testing import component
+from graspsense.testing.bench import CHANNELS_OF_FIELD, THINGS, bench
+from graspsense.testing.checks import CheckFailed, checks_of, demand
+from graspsense.testing.subject import Subject
+
+TICKS: Final = 4000
+LONGEST_S: Final = 60.0
+
+
+class Tick(NamedTuple):
+    """One tick of a law: what it was given and what it returned."""
+
+    before: Any
+    frame: Frame
+    pads: Pads
+    command: Command
+    after: Any
+
+
+def ticks_of(subject: Subject, thing: str = "a soft thing") -> list[Tick]:
+    """Return the ticks of this law on the bench until it ends the grasp, at most four seconds of them; done once."""
+    kept: dict[str, list[Tick]] = subject.kept.setdefault("ticks", {})
+    if thing not in kept:
+        kept[thing] = fresh_ticks(subject, thing)
+    return kept[thing]
+
+
+def fresh_ticks(
+    subject: Subject, thing: str = "a soft thing", channels: Any = None, first: int = 0
+) -> list[Tick]:
+    """Return such ticks done anew.
+
+    Before tick `first`, where it is given, the state is made anew from plain numbers.
+    """
+    law = subject.create()
+    step, params, state = type(law).step, law.params(), law.init()
+    gripper = bench(_all_channels() if channels is None else channels, thing)
+    gripper.open(0)
+    gripper.tare([])
+    ticks: list[Tick] = []
+    for k in range(TICKS):
+        if first and k == first:
+            state, params = _made_again(state), _made_again(params)
+        frame, pads = gripper.read(0.1)
+        try:
+            command, after = step(params, state, frame, pads)
+        except Exception as error:
+            raise CheckFailed(
+                f"step raised {named(error)} at t = {frame.t_s:.3f} s with {thing} between the fingers: a law answers "
+                "every frame with a command and a state; a channel that the gripper lacks is NaN"
+            ) from error
+        ticks.append(Tick(state, frame, pads, command, after))
+        state = after
+        if getattr(after, "outcome", RUNNING) != RUNNING:
+            break
+        gripper.apply(command)
+    return ticks
+
+
+def _all_channels() -> set[str]:
+    return {*CHANNELS_OF_FIELD.values(), "pads"}
+
+
+def _required(subject: Subject) -> set[str]:
+    return {one.name for one in subject.entry.requires}
+
+
+def _made_again(value: Any) -> Any:
+    """Return the same named tuples around numbers that went through JSON."""
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        return type(value)(*(_made_again(one) for one in value))
+    if isinstance(value, tuple):
+        return tuple(_made_again(one) for one in value)
+    return json.loads(json.dumps(value))
+
+
+def _leaves(value: Any, path: str, annotated: Any = None) -> Iterator[tuple[str, Any, Any]]:
+    if isinstance(value, tuple):
+        names = getattr(value, "_fields", None)
+        hints = get_type_hints(type(value)) if names else {}
+        for i, one in enumerate(value):
+            name = names[i] if names else str(i)
+            yield from _leaves(one, f"{path}.{name}", hints.get(name))
+    else:
+        yield path, value, annotated
+
+
+def _demand_numbers(value: Any, what: str) -> None:
+    demand(
+        isinstance(value, tuple) and hasattr(value, "_fields"),
+        f"{what} is {value!r} of type {type(value).__name__}: make it a typing.NamedTuple of numbers",
+    )
+    for path, one, annotated in _leaves(value, what):
+        demand(
+            type(one) in (float, int),
+            f"{path} is {one!r} of type {type(one).__name__}: hold plain floats and ints only (write float(...), or 0 "
+            "and 1 for a truth)",
+        )
+        demand(
+            annotated not in (float, int) or type(one) is annotated,
+            f"{path} is annotated {getattr(annotated, '__name__', annotated)} and is {one!r}, of type "
+            f"{type(one).__name__}: write {getattr(annotated, '__name__', 'float')}(...). A compiler "
+            "takes another type "
+            "for another law",
+        )
+
+
+def step_is_a_plain_function(subject: Subject) -> None:
+    """`step` is a static function of params, state, frame and pads."""
+    cls: Any = subject.component.component_class()
+    raw = inspect.getattr_static(cls, "step")
+    demand(
+        isinstance(raw, staticmethod),
+        f"step of {cls.__name__} is no static method: write a module function `step(params, state, "
+        "frame, pads)` and in "
+        "the class `step = staticmethod(step)`",
+    )
+    demand(
+        len(inspect.signature(cls.step).parameters) == 4,
+        f"step takes {inspect.signature(cls.step)}: it takes (params, state, frame, pads)",
+    )
+
+
+def params_are_numbers(subject: Subject) -> None:
+    """`params()` is a named tuple of floats and ints, each as it is annotated."""
+    _demand_numbers(subject.create().params(), "params")
+
+
+def state_is_numbers(subject: Subject) -> None:
+    """`init()` is a named tuple of floats and ints, each as it is annotated."""
+    _demand_numbers(subject.create().init(), "state")
+
+
+def begins_in_the_approach(subject: Subject) -> None:
+    """The first state has phase APPROACH and outcome RUNNING."""
+    state = subject.create().init()
+    for name, wanted, word in (("phase", APPROACH, "APPROACH"), ("outcome", RUNNING, "RUNNING")):
+        found = getattr(state, name, None)
+        demand(
+            found == wanted,
+            f"{name} of the first state is {found!r}: give the state a field `{name}: int` that begins as {word}",
+        )
+
+
+def types_stay(subject: Subject) -> None:
+    """No number of the state changes its type, and every state is of the first one's class."""
+    for tick in ticks_of(subject):
+        demand(
+            type(tick.after) is type(tick.before),
+            f"after t = {tick.frame.t_s:.3f} s the state is {type(tick.after).__name__} instead of "
+            f"{type(tick.before).__name__}: return the same named tuple",
+        )
+        for (path, a, _), (_, b, _) in zip(
+            _leaves(tick.before, "state"), _leaves(tick.after, "state"), strict=True
+        ):
+            demand(
+                type(a) is type(b),
+                f"{path} goes from {a!r} ({type(a).__name__}) to {b!r} ({type(b).__name__}) at t = "
+                f"{tick.frame.t_s:.3f} "
+                "s: keep one type throughout",
+            )
+
+
+def commands_are_numbers(subject: Subject) -> None:
+    """Every command is a Command of an int kind and three floats."""
+    for tick in ticks_of(subject):
+        command = tick.command
+        demand(
+            isinstance(command, Command),
+            f"step returned {command!r}: return graspsense.plugin_api.Command(kind, value, effort limit, speed limit)",
+        )
+        demand(
+            type(command.kind) is int,
+            f"the kind of a command is {command.kind!r} ({type(command.kind).__name__}): use the integers EFFORT, "
+            "VELOCITY, POSITION, FORCE of plugin_api",
+        )
+        for name in ("value", "effort_limit_n", "speed_limit_m_s"):
+            found = getattr(command, name)
+            demand(
+                type(found) is float,
+                f"{name} of a command is {found!r} of type {type(found).__name__}: write a float",
+            )
+
+
+def commands_are_of_declared_kinds(subject: Subject) -> None:
+    """Every command is of a kind that the entry lists under `commands`."""
+    for thing in THINGS:
+        for tick in ticks_of(subject, thing):
+            kind = tick.command.kind
+            name = KINDS[kind] if 0 <= kind < len(KINDS) else str(kind)
+            demand(
+                name in subject.entry.commands,
+                f"it commands {name} at t = {tick.frame.t_s:.3f} s with {thing} between the fingers; "
+                "its entry declares "
+                f"{', '.join(subject.entry.commands) or 'none'}: add it to `commands`",
+            )
+
+
+def commands_are_finite(subject: Subject) -> None:
+    """Values are finite, limits are not negative and no NaN, whatever is between the fingers."""
+    for thing in THINGS:
+        for tick in ticks_of(subject, thing):
+            command = tick.command
+            demand(
+                isfinite(command.value),
+                f"it commands {command.value} at t = {tick.frame.t_s:.3f} s with {thing} between the fingers: bound it",
+            )
+            for name in ("effort_limit_n", "speed_limit_m_s"):
+                limit = getattr(command, name)
+                demand(
+                    limit >= 0.0 or isinf(limit),
+                    f"{name} of a command is {limit} at t = {tick.frame.t_s:.3f} s: give a limit of 0 or more, or inf "
+                    "for none",
+                )
+                demand(limit != -float("inf"), f"{name} of a command is -inf: give inf for no limit")
+
+
+def same_tick_same_answer(subject: Subject) -> None:
+    """`step` is pure: each tick asked again, in another order, gives the same command and state."""
+    ticks, law = ticks_of(subject), subject.create()
+    step, params = type(law).step, law.params()
+    for tick in reversed(ticks[::7]):
+        command, after = step(params, tick.before, tick.frame, tick.pads)
+        demand(
+            repr((command, after)) == repr((tick.command, tick.after)),
+            f"asked again for t = {tick.frame.t_s:.3f} s, step gives {command} instead of {tick.command}: it may know "
+            "nothing but its arguments (no clock, no global, no list that lives on)",
+        )
+
+
+def state_is_all_it_remembers(subject: Subject) -> None:
+    """Stopped half way, its state and params written down and read again, it goes on as it would have."""
+    whole = ticks_of(subject)
+    resumed = fresh_ticks(subject, first=max(len(whole) // 2, 1))
+    demand(
+        [repr(one.command) for one in whole] == [repr(one.command) for one in resumed],
+        "going on from a state that was written down it commands something else: keep everything in the state, as "
+        "numbers",
+    )
+
+
+def two_runs_do_not_meet(subject: Subject) -> None:
+    """Two grasps in turn give what each gives alone: no state is shared."""
+    first = ticks_of(subject)
+    fresh_ticks(subject, "nothing")
+    again = fresh_ticks(subject)
+    demand(
+        [repr(one.command) for one in first] == [repr(one.command) for one in again],
+        "a second grasp is not like the first: keep nothing in the class or the module",
+    )
+
+
+def reads_what_it_declares(subject: Subject) -> None:
+    """A gripper with the channels in `requires` is enough: without the others the commands are the same."""
+    full, own = ticks_of(subject), fresh_ticks(subject, channels=_required(subject))
+    demand(
+        [repr(one.command) for one in full] == [repr(one.command) for one in own],
+        "on a gripper that has only the channels it declares "
+        f"({', '.join(sorted(_required(subject))) or 'none'}) it commands something else: add what it "
+        "reads to `requires`",
+    )
+
+
+def survives_a_silent_sensor(subject: Subject) -> None:
+    """A frame of NaN raises nothing, and what follows is a command."""
+    law = subject.create()
+    step, params, state = type(law).step, law.params(), law.init()
+    silent = Frame(0.001, 0.001, *(nan,) * 7, 0)
+    pads = Pads(0.0, 0, (nan,) * CELLS, (nan,) * CELLS)
+    try:
+        command, _ = step(params, state, silent, pads)
+    except Exception as error:
+        raise CheckFailed(
+            f"step raised {named(error)} on a frame without any number: compare so that NaN falls on the safe side"
+        ) from error
+    demand(isinstance(command, Command), f"step returned {command!r} on a frame without any number")
+
+
+def phases_are_a_laws_own(subject: Subject) -> None:
+    """The phases are APPROACH, SQUEEZE and HOLD, and never go back."""
+    for thing in THINGS:
+        latest = APPROACH
+        for tick in ticks_of(subject, thing):
+            phase = tick.after.phase
+            demand(
+                APPROACH <= phase <= HOLD,
+                f"phase is {phase} at t = {tick.frame.t_s:.3f} s: a law reports APPROACH, SQUEEZE and HOLD",
+            )
+            demand(
+                phase >= latest,
+                f"phase goes back from {Phase(latest).name} to {Phase(phase).name} at t = {tick.frame.t_s:.3f} s: a "
+                "grasp goes one way",
+            )
+            latest = phase
+
+
+def ends_every_grasp(subject: Subject) -> None:
+    """On a soft thing, on a hard one and on nothing it ends the grasp by itself, with an outcome there is."""
+    for thing in THINGS:
+        gripper = bench(_all_channels(), thing)
+        # The runner's own end of a controller that never gives up comes after three openings more.
+        grasp = run_grasp(gripper, subject.create(), RunConfig(grasp_timeout_s=LONGEST_S))
+        demand(
+            grasp.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RUNNING),
+            f"with {thing} between the fingers the grasp ended as {grasp.outcome.words}: "
+            f"{grasp.reason}. Let the state's "
+            f"`outcome` leave RUNNING, after {LONGEST_S:g} s at the latest",
+        )
+
+
+CHECKS: Final = (
+    *component.CHECKS,
+    *checks_of(
+        step_is_a_plain_function,
+        params_are_numbers,
+        state_is_numbers,
+        begins_in_the_approach,
+        types_stay,
+        commands_are_numbers,
+        commands_are_of_declared_kinds,
+        commands_are_finite,
+        same_tick_same_answer,
+        state_is_all_it_remembers,
+        two_runs_do_not_meet,
+        reads_what_it_declares,
+        survives_a_silent_sensor,
+        phases_are_a_laws_own,
+        ends_every_grasp,
+    ),
+)

@@ -1,0 +1,187 @@
+"""What a feature set must hold to."""
+
+from __future__ import annotations
+
+import json
+from typing import Final
+
+from graspsense.core.errors import named
+from graspsense.core.features import Features
+from graspsense.core.trace import Trace
+from graspsense.testing import component
+from graspsense.testing.checks import CheckFailed, checks_of, demand
+from graspsense.testing.samples import (
+    COLUMNS_OF_CHANNEL,
+    columns_of,
+    copied,
+    masked,
+    odd_traces,
+    shifted,
+    squeeze,
+)
+from graspsense.testing.subject import Subject
+
+CUTS: Final = 48
+
+
+def _features(subject: Subject, trace: Trace, of: str = "a whole grasp") -> Features:
+    try:
+        features: Features = subject.create().extract(trace)
+    except Exception as error:
+        raise CheckFailed(
+            f"extract raised {named(error)} on {of}: return NaN with a reason in `reasons` where a "
+            "feature is not defined"
+        ) from error
+    demand(
+        isinstance(features, Features),
+        f"extract returned {features!r}: return graspsense.plugin_api.Features",
+    )
+    return features
+
+
+def _own(subject: Subject) -> Trace:
+    """Return the whole grasp, as a gripper with just the channels that the set declares would give it."""
+    return masked(squeeze(), {one.name for one in subject.entry.requires})
+
+
+def _same(a: Features, b: Features) -> bool:
+    return repr(a) == repr(b)
+
+
+def gives_what_it_declares(subject: Subject) -> None:
+    """The names and units are those of the entry, in its order, on every trace."""
+    declared = subject.entry.features
+    for of, trace in {"a whole grasp": squeeze(), **odd_traces()}.items():
+        features = _features(subject, trace, of)
+        given = tuple(zip(features.names, features.units, strict=True))
+        demand(
+            given == declared,
+            f"on {of} it gives {_listed(given)}; its entry declares {_listed(declared)}: make `features` of the entry "
+            "and what extract returns the same",
+        )
+
+
+def _listed(features: tuple[tuple[str, str], ...]) -> str:
+    return ", ".join(f"{name} in {unit}" for name, unit in features) or "nothing"
+
+
+def values_are_floats(subject: Subject) -> None:
+    """Every value is a Python float: no int, no scalar of numpy's."""
+    for of, trace in {"a whole grasp": squeeze(), **odd_traces()}.items():
+        features = _features(subject, trace, of)
+        for name, value in zip(features.names, features.values, strict=True):
+            demand(
+                type(value) is float,
+                f"feature {name!r} is {value!r} of type {type(value).__name__} on {of}: write float(...)",
+            )
+
+
+def something_is_defined_on_a_whole_grasp(subject: Subject) -> None:
+    """On a whole grasp of a springy thing at least one feature is defined."""
+    features = _features(subject, squeeze())
+    demand(
+        any(value == value for value in features.values),
+        f"every feature is missing on a whole grasp: {dict(features.reasons)}. A grasp approaches at 10 mm/s, touches "
+        "at 60 mm, is squeezed by 4 mm to 16 N, held and released",
+    )
+
+
+def answers_every_trace(subject: Subject) -> None:
+    """Empty, short, without contact, without a channel, with holes: defined, or NaN with a reason."""
+    for of, trace in odd_traces().items():
+        _features(subject, trace, of)
+
+
+def answers_a_trace_cut_anywhere(subject: Subject) -> None:
+    """`extract(trace.until(t))` is defined for every t: early recognition asks it."""
+    whole = squeeze()
+    for k in range(CUTS):
+        t = float(whole.t_s[-1]) * k / (CUTS - 1)
+        _features(subject, whole.until(t), f"trace.until({t:.3f})")
+
+
+def same_trace_same_features(subject: Subject) -> None:
+    """The same trace gives the same features, by the same instance and by another."""
+    set_, trace = subject.create(), squeeze()
+    first = set_.extract(trace)
+    set_.extract(squeeze(stiffness_n_m=500.0))
+    for again in (set_.extract(trace), subject.create().extract(trace)):
+        demand(
+            _same(first, again),
+            f"asked again it gives {again.as_dict()} instead of {first.as_dict()}: keep nothing between calls and draw "
+            "nothing at random",
+        )
+
+
+def leaves_the_trace_alone(subject: Subject) -> None:
+    """The trace is as it was afterwards."""
+    trace = copied(squeeze())
+    before = {name: getattr(trace, name).tobytes() for name in columns_of(trace)}
+    _features(subject, trace)
+    changed = [name for name, data in before.items() if getattr(trace, name).tobytes() != data]
+    demand(
+        not changed,
+        f"extract changed {', '.join(changed)} of the trace: work on a copy "
+        f"(`trace.{(changed or ['gap_m'])[0]}.copy()`)",
+    )
+
+
+def reads_what_it_declares(subject: Subject) -> None:
+    """A gripper with the channels in `requires` is enough: without the others the features are the same."""
+    full, own = _features(subject, squeeze()), _features(subject, _own(subject), "a grasp")
+    required = {one.name for one in subject.entry.requires}
+    others = [name for name in COLUMNS_OF_CHANNEL if name not in required]
+    demand(
+        _same(full, own),
+        f"without the channels it does not declare ({', '.join(others)}) it gives {own.as_dict()} instead of "
+        f"{full.as_dict()}: add what it reads to `requires`",
+    )
+
+
+def does_not_hang_on_the_start_of_the_clock(subject: Subject) -> None:
+    """A clock that began earlier changes no feature, beyond rounding."""
+    early, late = _features(subject, squeeze()), _features(subject, shifted(squeeze(), 64.0))
+    for name, a, b in zip(early.names, early.values, late.values, strict=True):
+        demand(
+            (a != a and b != b) or abs(a - b) <= 1e-6 * max(1.0, abs(a)),
+            f"feature {name!r} is {a:g}, and {b:g} for the same grasp with a clock that began 64 s earlier: use "
+            "differences of times",
+        )
+
+
+def chunks_do_not_matter(subject: Subject) -> None:
+    """A view of a longer trace gives what the same ticks give by themselves."""
+    view = squeeze().until(1.7)
+    demand(
+        _same(_features(subject, view), _features(subject, copied(view))),
+        "a trace cut from a longer one gives other features than the same ticks by themselves: read the columns "
+        "as they are, not the memory behind them",
+    )
+
+
+def survives_json(subject: Subject) -> None:
+    """The features are the same after they were written as JSON and read again."""
+    for of, trace in {"a whole grasp": squeeze(), **odd_traces()}.items():
+        features = _features(subject, trace, of)
+        again = json.loads(json.dumps(features.as_dict(), allow_nan=False))
+        demand(again == features.as_dict(), f"on {of} {features.as_dict()} became {again} through JSON")
+        text = json.loads(json.dumps(dict(features.reasons)))
+        demand(text == dict(features.reasons), f"the reasons {features.reasons!r} are no plain text")
+
+
+CHECKS: Final = (
+    *component.CHECKS,
+    *checks_of(
+        gives_what_it_declares,
+        values_are_floats,
+        something_is_defined_on_a_whole_grasp,
+        answers_every_trace,
+        answers_a_trace_cut_anywhere,
+        same_trace_same_features,
+        leaves_the_trace_alone,
+        reads_what_it_declares,
+        does_not_hang_on_the_start_of_the_clock,
+        chunks_do_not_matter,
+        survives_json,
+    ),
+)

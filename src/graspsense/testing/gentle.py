@@ -1,0 +1,108 @@
+"""The law by which a gripper is closed while it is checked: slow, weak, and for every kind of command."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Final, NamedTuple
+
+from graspsense.core.contact import Stillness, at_rest, watch
+from graspsense.core.entries import KINDS
+from graspsense.core.roles import Controller
+from graspsense.core.signals import (
+    APPROACH,
+    EFFORT,
+    FORCE,
+    HOLD,
+    NOTHING_THERE,
+    POSITION,
+    RUNNING,
+    SQUEEZE,
+    STEADY,
+    VELOCITY,
+    Command,
+    Frame,
+    Pads,
+)
+
+SPEED_M_S: Final = 0.01
+EFFORT_N: Final = 12.0
+EFFORT_RATE_N_S: Final = 15.0
+"""An effort is raised until the fingers move: below their breakaway they do not."""
+FORCE_N: Final = 2.0
+REST_SPEED_M_S: Final = 5e-4
+REST_S: Final = 0.5
+LONGEST_S: Final = 6.0
+
+
+class GentleParams(NamedTuple):
+    """Which kind of command to close with."""
+
+    kind: int
+
+
+class GentleState(NamedTuple):
+    """Since when, and since when at rest."""
+
+    phase: int
+    outcome: int
+    begun_t_s: float
+    gap_m: float
+    before_m: float
+    still: Stillness
+
+
+def closing(kind: int, seconds: float, before_m: float, frame: Frame) -> Command:
+    """Return the command of this kind that closes gently, so long after its beginning.
+
+    `before_m` is the gap of the frame before: the gripper's own velocity is still to be checked.
+    """
+    if kind == VELOCITY:
+        return Command(VELOCITY, -SPEED_M_S, EFFORT_N, inf)
+    if kind == POSITION:
+        return Command(POSITION, 0.0, EFFORT_N, SPEED_M_S)
+    if kind == FORCE:
+        return Command(FORCE, FORCE_N, EFFORT_N, SPEED_M_S)
+    effort = min(EFFORT_RATE_N_S * seconds, EFFORT_N)
+    if before_m - frame.gap_m > SPEED_M_S * frame.dt_s:
+        effort = 0.0
+    return Command(EFFORT, effort, inf, inf)
+
+
+def step(params: GentleParams, state: GentleState, frame: Frame, pads: Pads) -> tuple[Command, GentleState]:
+    """Close until the gap has stood still, or for six seconds."""
+    begun, gap, still = state.begun_t_s, state.gap_m, state.still
+    if begun != begun:
+        begun, gap, still = frame.t_s, frame.gap_m, Stillness(frame.t_s, frame.gap_m)
+    still = watch(still, frame.t_s, frame.gap_m, REST_SPEED_M_S, REST_S)
+    phase, outcome = state.phase, state.outcome
+    if phase == APPROACH and gap - frame.gap_m > 1e-3:
+        phase = SQUEEZE
+    if phase == SQUEEZE and at_rest(still, frame.t_s, REST_S):
+        phase, outcome = HOLD, STEADY
+    elif outcome == RUNNING and frame.t_s - begun > LONGEST_S:
+        outcome = NOTHING_THERE
+    return closing(params.kind, frame.t_s - begun, state.before_m, frame), GentleState(
+        phase, outcome, begun, gap, frame.gap_m, still
+    )
+
+
+class GentleController(Controller[int]):
+    """Closes with one kind of command."""
+
+    step = staticmethod(step)
+
+    def params(self) -> GentleParams:
+        """Return the kind."""
+        return GentleParams(self.config)
+
+    def init(self) -> GentleState:
+        """Return the state before the first tick."""
+        return GentleState(APPROACH, RUNNING, float("nan"), float("nan"), float("nan"), Stillness(0.0, 0.0))
+
+
+def kind_of(accepts: tuple[str, ...]) -> int:
+    """Return the kind of command to close a gripper with that takes these."""
+    for kind in (VELOCITY, POSITION, FORCE, EFFORT):
+        if KINDS[kind] in accepts:
+            return kind
+    raise ValueError("a gripper that takes no kind of command cannot be closed: give `accepts` in its entry")

@@ -1,0 +1,403 @@
+"""What a distribution must hold to: its plugins load, and lightly; all they name is there, also in its wheel."""
+
+from __future__ import annotations
+
+import copy
+import importlib.util
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+import zipfile
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, distribution
+from math import isfinite
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import unquote, urlparse
+
+from graspsense.core.config import resolve
+from graspsense.core.entries import CommandEntry, DatasetEntry, ModelEntry, PipelineEntry
+from graspsense.core.errors import GraspsenseError, named
+from graspsense.core.plugins import SLOW_IMPORT_S
+from graspsense.core.wiring import check as check_wiring
+from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand
+from graspsense.testing.component import ADVICE_ON_IMPORTS
+from graspsense.testing.samples import a_trial, an_event
+from graspsense.testing.subject import Package
+
+OBSERVERS: Final = ("graspsense_run_starting", "graspsense_grasp_event", "graspsense_run_finished")
+PROBE_S: Final = 1.0
+TERMS_HOOK: Final = "graspsense_sim_terms"
+"""The hook of graspsense-sim-gripper, whose laws are checked here by their shape alone."""
+
+
+def plugins_load(package: Package) -> None:
+    """Every plugin of the distribution is loaded: it can be imported, is for this API, and breaks no rule."""
+    for status in package.statuses:
+        demand(
+            status.state == "loaded",
+            f"{status.entry_point} = {status.module} is {status.state}: {status.reason}{_place(status.traceback)}"
+            + (f"\n    {ADVICE_ON_IMPORTS}" if "ModuleNotFoundError" in status.reason else ""),
+        )
+
+
+def _place(traceback: str) -> str:
+    """Return where a traceback last was in the plugin's own files, in words."""
+    own = [
+        (path, line)
+        for path, line in re.findall(r'File "([^"<]+)", line (\d+)', traceback)
+        if not {"graspsense", "attr", "pluggy", "importlib"} & set(Path(path).parts)
+    ]
+    return f"\n    in {own[-1][0]}, line {own[-1][1]}" if own else ""
+
+
+def plugin_modules_are_light(package: Package) -> None:
+    """Listing it imports no numpy and no driver, and takes no time one would notice."""
+    code = (
+        "import json, sys\n"
+        "import graspsense.core.plugins as p\n"
+        "found = p.installed()\n"
+        "mine = [s for s in found.statuses if s.distribution == sys.argv[1]]\n"
+        "took = max([s.import_s for s in mine] or [0.0])\n"
+        "print(json.dumps({'heavy': sorted(p.HEAVY & set(sys.modules)), 'took': took}))"
+    )
+    environ = {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
+    environ |= {"GRASPSENSE_PLUGINS": package.distribution}
+    environ.pop("GRASPSENSE_TRACE_PLUGINS", None)
+    ran = subprocess.run(
+        [sys.executable, "-c", code, package.distribution],
+        env=environ,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    demand(ran.returncode == 0, f"listing it in a fresh interpreter failed: {ran.stderr.strip()[-300:]}")
+    found = json.loads(ran.stdout.splitlines()[-1])
+    demand(
+        not found["heavy"],
+        f"listing it imports {', '.join(found['heavy'])}: in the module of the entry point import "
+        "graspsense.plugin_api "
+        "only; name classes by import strings, and import what is heavy inside them",
+    )
+    demand(
+        found["took"] <= 5.0 * SLOW_IMPORT_S,
+        f"importing it takes {found['took'] * 1e3:.0f} ms of processor time: do less in the module of the entry point",
+    )
+
+
+def everything_declared_is_there(package: Package) -> None:
+    """Every class, config, pipeline, model, reader and command that it declares can be had."""
+    for component in package.components:
+        component.config_class()
+        component.component_class()
+    for offer in package.offers:
+        if isinstance(offer.entry, PipelineEntry | ModelEntry):
+            offer.resource()
+        else:
+            offer.load()
+
+
+def names_are_free(package: Package) -> None:
+    """No other distribution here uses the name of one of its parts."""
+    others: list[Any] = [
+        *package.plugins.components(),
+        *package.plugins.pipelines(),
+        *package.plugins.models(),
+        *package.plugins.datasets(),
+        *package.plugins.commands(),
+    ]
+    parts: list[Any] = [*package.components, *package.offers]
+    for mine in parts:
+        for other in others:
+            same_kind = type(other.entry) is type(mine.entry) and other.name == mine.name
+            demand(
+                not same_kind or other.distribution == package.distribution,
+                f"the name {mine.name!r} is taken by {other.qualified}: choose another name in the entry, or its users "
+                f'must write "{mine.qualified}"',
+            )
+
+
+def pipelines_fit_together(package: Package) -> None:
+    """Every pipeline file it ships resolves, and its components fit each other."""
+    names = [one.qualified for one in package.offers if isinstance(one.entry, PipelineEntry)]
+    if not names:
+        raise CheckSkipped("it ships no pipeline")
+    for name in names:
+        try:
+            check_wiring(resolve(name, plugins=package.plugins))
+        except GraspsenseError as error:
+            raise CheckFailed(f"pipeline {name}: {error}") from error
+
+
+def observers_disturb_nobody(package: Package) -> None:
+    """Observers take a whole run without raising, return nothing and leave what they are shown as it is."""
+    mine = [(status, name) for status in package.statuses for name in status.hooks if name in OBSERVERS]
+    if not mine:
+        raise CheckSkipped("it observes nothing")
+    trial = a_trial()
+    run, event = trial.run, an_event()
+    before = copy.deepcopy((run.settings, run.components, run.labels))
+    column = trial.trace.gap_m.tobytes()
+    arguments: dict[str, dict[str, Any]] = {
+        OBSERVERS[0]: {"run": run},
+        OBSERVERS[1]: {"run": run, "event": event},
+        OBSERVERS[2]: {"run": run, "trial": trial},
+    }
+    for status in package.statuses:
+        for hook in OBSERVERS:
+            if hook not in status.hooks:
+                continue
+            try:
+                results = package.plugins.called(status, hook, **arguments[hook])
+            except Exception as error:
+                raise CheckFailed(
+                    f"{hook} of {status.entry_point} raised {named(error)}: an observer that raises "
+                    "is passed over from "
+                    "then on; catch what may go wrong"
+                ) from error
+            demand(not results, f"{hook} returned {results}: an observer returns nothing")
+    demand(
+        (run.settings, run.components, run.labels) == before and trial.trace.gap_m.tobytes() == column,
+        "an observer changed what it was shown: work on a copy",
+    )
+
+
+def probe_keeps_its_time(package: Package) -> None:
+    """Looking for devices ends in time and raises nothing, whatever is plugged in."""
+    if not any("graspsense_probe_devices" in one.hooks for one in package.statuses):
+        raise CheckSkipped("it looks for no devices")
+    began = time.perf_counter()
+    probes = [
+        one for one in package.plugins.probe_devices(PROBE_S) if one.distribution == package.distribution
+    ]
+    took = time.perf_counter() - began
+    for probe in probes:
+        demand(not probe.error, f"graspsense_probe_devices raised {probe.error}: return what was found")
+    demand(
+        took <= 3.0 * PROBE_S,
+        f"graspsense_probe_devices({PROBE_S:g}) took {took:.1f} s: keep to `timeout_s`",
+    )
+
+
+def simulator_terms_are_laws(package: Package) -> None:
+    """A term of the simulator has a pure law of finite forces that keeps its state's types, and is its linear form."""
+    terms = [
+        term
+        for status in package.statuses
+        if TERMS_HOOK in status.hooks
+        for given in package.plugins.called(status, TERMS_HOOK)
+        for term in ([given] if hasattr(given, "law") else given)
+    ]
+    if not terms:
+        raise CheckSkipped("it brings no terms of the simulator")
+    for term in terms:
+        fields = term.params._fields
+        given = {name: term.params._field_defaults.get(name, 0.05) for name in fields}
+        params, state = term.params(**given), term.at_rest
+        for k in range(40):
+            d0, d1 = (0.0001 * abs(20 - abs(20 - one)) for one in (k, k + 1))
+            force, after = _stepped(term, params, state, d0, d1)
+            again = _stepped(term, params, state, d0, d1)
+            demand(
+                type(force) is float and isfinite(force),
+                f"the law of term {term.name!r} gives the force {force!r} ({type(force).__name__}) at a compression of "
+                f"{d1 * 1e3:.2g} mm with {given}: a finite float",
+            )
+            demand(
+                repr(again) == repr((force, after)),
+                f"the law of term {term.name!r} gives another force when asked again: it may know its arguments only",
+            )
+            demand(
+                type(after) is type(state) and [type(one) for one in after] == [type(one) for one in state],
+                f"the law of term {term.name!r} makes {state!r} into {after!r}: return the same named "
+                "tuple, its numbers "
+                "of the same types",
+            )
+            state = after
+        _is_its_linear_form(term, params)
+
+
+def _is_its_linear_form(term: Any, params: Any) -> None:
+    """Hold what a term says of being linear to its law, along straight pieces of path that are short for it."""
+    form = term.linear(params) if hasattr(term, "linear") else None
+    if form is None:
+        return
+    own = hasattr(form, "reach")
+    forms = (form.touching, form.parted) if own else (form,)
+    fields = len(term.at_rest)
+    for one in forms:
+        demand(
+            len(one.rates) in (0, fields),
+            f"the linear form of term {term.name!r} has {len(one.rates)} states and its law {fields}: as many, or none",
+        )
+    fastest = max((sum(map(abs, row)) for one in forms for row in one.rates), default=0.0)
+    h, speed, state = min(1e-3, 0.1 / max(fastest, 1e-9)), 0.1, term.at_rest
+    for k in range(40):
+        d0, d1 = (speed * h * one for one in (k, k + 1))
+        force, after = term.law(params, state, d0, d1, h, speed)
+        one, other = (
+            forms[own and not d + sum(a * b for a, b in zip(form.reach, s, strict=True)) > 0.0]
+            if own
+            else form
+            for d, s in ((d0, state), (d1, after))
+        )
+        said = _along(one, state if one.rates else (), d0, speed, h)
+        scale = max(abs(force), abs(one.spring_n_m) * speed * h, 1e-9)
+        demand(
+            one is not other or abs(said - force) <= 1e-3 * scale,
+            f"the linear form of term {term.name!r} gives {said:.6g} N at {d1 * 1e3:.3g} mm and its law {force:.6g} N "
+            f"with {params}: return None where it is not linear",
+        )
+        state = after
+
+
+def _along(form: Any, state: Any, d0: float, speed: float, h: float) -> float:
+    """Return the force of a linear form at the end of a straight piece of path, by many midpoints."""
+    pieces = 50
+    step, now, d = h / pieces, [float(one) for one in state], d0
+
+    def rates(s: list[float], d: float) -> list[float]:
+        return [
+            sum(a * b for a, b in zip(row, s, strict=True)) + by * d + at * speed
+            for row, by, at in zip(form.rates, form.by_compression, form.by_speed, strict=True)
+        ]
+
+    for _ in range(pieces):
+        half = [s + 0.5 * step * r for s, r in zip(now, rates(now, d), strict=True)]
+        now = [s + step * r for s, r in zip(now, rates(half, d + 0.5 * step * speed), strict=True)]
+        d += step * speed
+    own = sum(a * b for a, b in zip(form.force, now, strict=True)) if now else 0.0
+    return float(form.spring_n_m * d + form.damper_n_s_m * speed + own)
+
+
+def _stepped(term: Any, params: Any, state: Any, d0: float, d1: float) -> tuple[Any, Any]:
+    try:
+        force, after = term.law(params, state, d0, d1, 1e-3, (d1 - d0) * 1e3)
+    except Exception as error:
+        raise CheckFailed(
+            f"the law of term {term.name!r} raised {named(error)} from {d0 * 1e3:.2g} to "
+            f"{d1 * 1e3:.2g} mm with {params}"
+        ) from error
+    return force, after
+
+
+def wheel_is_complete(package: Package) -> None:
+    """What is installed holds all that is needed; of an editable installation a wheel is built to see that."""
+    folder = _editable_folder(package.distribution)
+    if folder is None:
+        return  # installed from a wheel already: the other checks look at what was in it
+    if not package.builds:
+        raise CheckSkipped("no wheel was asked for (--no-wheel)")
+    with tempfile.TemporaryDirectory() as scratch:
+        wheel = _built(folder, Path(scratch))
+        with zipfile.ZipFile(wheel) as archive:
+            inside = set(archive.namelist())
+    for module in sorted(set(_modules_of(package))):
+        path = module.replace(".", "/")
+        if _lies_within(module, folder):
+            demand(
+                bool({f"{path}.py", f"{path}/__init__.py"} & inside),
+                f"the wheel of {folder.name} has no module {module}: {_ADVICE}",
+            )
+    for offer in package.offers:
+        if isinstance(offer.entry, PipelineEntry | ModelEntry):
+            top, _, path = offer.entry.resource.partition(":")
+            name = f"{top.replace('.', '/')}/{path}"
+            demand(name in inside, f"the wheel of {folder.name} has no file {name}: {_ADVICE}")
+    tops = {module.partition(".")[0] for module in _modules_of(package) if _lies_within(module, folder)}
+    for top in sorted(tops):
+        lacking = [name for name in _files_of(top) if name not in inside]
+        demand(
+            not lacking,
+            f"the wheel of {folder.name} lacks {', '.join(lacking[:5])}: {_ADVICE}",
+        )
+
+
+_ADVICE: Final = (
+    "it is in the folder but is not packed; in pyproject.toml, with hatchling, "
+    "[tool.hatch.build.targets.wheel] packages "
+    '= ["src/PACKAGE"] takes every file of it that .gitignore does not leave out'
+)
+
+
+def _modules_of(package: Package) -> Iterator[str]:
+    for status in package.statuses:
+        yield status.module.partition(":")[0]
+    for component in package.components:
+        yield component.entry.target.partition(":")[0]
+        yield component.entry.config.partition(":")[0]
+    for offer in package.offers:
+        if isinstance(offer.entry, DatasetEntry | CommandEntry):
+            yield offer.entry.target.partition(":")[0]
+
+
+def _lies_within(module: str, folder: Path) -> bool:
+    origin = getattr(importlib.util.find_spec(module), "origin", None)
+    return origin is not None and Path(origin).resolve().is_relative_to(folder)
+
+
+def _files_of(top: str) -> list[str]:
+    """Return the files of a package as a wheel names them; a module alone is one file."""
+    spec = importlib.util.find_spec(top)
+    if spec is None or not spec.submodule_search_locations:
+        return [f"{top}.py"]
+    root = Path(next(iter(spec.submodule_search_locations)))
+    return [
+        f"{top}/{path.relative_to(root).as_posix()}"
+        for path in sorted(root.rglob("*"))
+        if path.is_file() and not {"__pycache__", ".mypy_cache"} & set(path.parts) and path.suffix != ".pyc"
+    ]
+
+
+def _editable_folder(name: str) -> Path | None:
+    """Return the folder that an editable installation points at, or None."""
+    try:
+        text = distribution(name).read_text("direct_url.json")
+    except PackageNotFoundError:
+        return None
+    origin = json.loads(text) if text else {}
+    if not origin.get("dir_info", {}).get("editable"):
+        return None
+    return Path(unquote(urlparse(origin["url"]).path)).resolve()
+
+
+def _built(folder: Path, scratch: Path) -> Path:
+    project = tomllib.loads((folder / "pyproject.toml").read_text())
+    backend = (
+        str(project.get("build-system", {}).get("build-backend", "")).partition(":")[0].partition(".")[0]
+    )
+    here = bool(backend) and importlib.util.find_spec(backend) is not None
+    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--disable-pip-version-check"]
+    command += [
+        "--wheel-dir",
+        str(scratch),
+        *(["--no-build-isolation"] if here else []),
+        str(folder),
+    ]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    if "No module named pip" in ran.stderr:
+        raise CheckSkipped(
+            "pip, which builds the wheel, is not installed in this environment (pip install pip)"
+        )
+    wheels = list(scratch.glob("*.whl"))
+    if ran.returncode or not wheels:
+        raise CheckFailed(f"no wheel can be built of {folder.name}: {ran.stderr.strip()[-400:]}")
+    return wheels[0]
+
+
+CHECKS: Final = checks_of(
+    plugins_load,
+    plugin_modules_are_light,
+    everything_declared_is_there,
+    names_are_free,
+    wheel_is_complete,
+    pipelines_fit_together,
+    observers_disturb_nobody,
+    probe_keeps_its_time,
+    simulator_terms_are_laws,
+)

@@ -1,0 +1,174 @@
+"""Traces, tables and runs that parts are checked on: made here, not measured, and the same every time."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import Final
+
+import numpy as np
+from attrs import evolve, fields
+
+from graspsense.core.features import Features, FeatureTable
+from graspsense.core.roles import DeviceInfo
+from graspsense.core.signals import CELLS, EFFORT, FIRST_PAD_CELL, Command, Outcome, Pads, Phase
+from graspsense.core.signals import Frame as _Frame
+from graspsense.core.trace import PAD_COLUMNS, Trace, trace_of
+from graspsense.core.trial import GraspEvent, RunInfo, Trial
+
+RATE_HZ: Final = 500.0
+COLUMNS_OF_CHANNEL: Final = {
+    "gap": ("gap_m",),
+    "velocity": ("velocity_m_s",),
+    "effort": ("effort_n",),
+    "force_left": ("force_left_n",),
+    "force_right": ("force_right_n",),
+    "edge_left": ("edge_left_n",),
+    "edge_right": ("edge_right_n",),
+    "pads": PAD_COLUMNS,
+}
+"""Channel to the columns of a trace that hold it."""
+
+
+def squeeze(stiffness_n_m: float = 4000.0, contacts: tuple[float, float] = (0.06, 0.0598)) -> Trace:
+    """Return a whole grasp: approach at 10 mm/s, squeeze by 4 mm, hold with relaxation, release.
+
+    The pads touch at these gaps (m); one below 0 is never reached.
+    """
+    dt = 1.0 / RATE_HZ
+    times = np.arange(0.0, 2.4, dt)
+    gap = np.interp(times, [0.0, 1.0, 1.5, 1.9, 2.3, 2.4], [0.07, 0.06, 0.056, 0.056, 0.072, 0.072])
+    phase = np.select(
+        [times < 1.02, times < 1.5, times < 1.9], [Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD], Phase.RELEASE
+    )
+    velocity = np.gradient(gap, dt)
+    relaxed = np.where(times > 1.5, 0.85 + 0.15 * np.exp(-(times - 1.5) / 0.1), 1.0)
+    # A ripple stands for noise: small, and the same every time.
+    ripple = 0.004 * np.sin(2.0 * np.pi * 61.0 * times)
+    force = [stiffness_n_m * np.maximum(at - gap, 0.0) * relaxed + ripple for at in contacts]
+    frames = [
+        _Frame(float(t), dt, float(g), float(v), float(2.0 + f), float(f), float(r), 0.01, 0.01, 0)
+        for t, g, v, f, r in zip(times, gap, velocity, force[0], force[1], strict=True)
+    ]
+    images = [_image(frame, 1 + i) for i, frame in enumerate(frames[:: int(0.041 * RATE_HZ)])]
+    commands = (np.where(velocity <= 0.0, 10.0, -20.0)).tolist()
+    return trace_of(frames, phase.tolist(), commands, images)
+
+
+def _image(frame: _Frame, counter: int) -> Pads:
+    """Return the cell image of this frame: the force as a blob on the gripping face."""
+    rows, columns = np.divmod(np.arange(CELLS - FIRST_PAD_CELL), 3)
+    blob = np.exp(-(((rows - 2.0) / 1.2) ** 2) - ((columns - 1.0) / 0.8) ** 2)
+    cells = []
+    for force in (frame.force_left_n, frame.force_right_n):
+        face = 1600.0 * max(force, 0.0) * blob / blob.sum()
+        cells.append((*(0.0,) * FIRST_PAD_CELL, *(float(round(one)) for one in face)))
+    return Pads(frame.t_s, counter, cells[0], cells[1])
+
+
+def masked(trace: Trace, channels: set[str]) -> Trace:
+    """Return the trace of a gripper that has these channels only."""
+    columns = {}
+    for channel, names in COLUMNS_OF_CHANNEL.items():
+        if channel in channels:
+            continue
+        for name in names:
+            old = getattr(trace, name)
+            columns[name] = old[:0].copy() if channel == "pads" else np.full_like(old, np.nan)
+    return evolve(trace, **columns)
+
+
+def shifted(trace: Trace, seconds: float) -> Trace:
+    """Return the trace as it were had its clock begun earlier."""
+    return evolve(trace, t_s=trace.t_s + seconds, pad_t_s=trace.pad_t_s + seconds)
+
+
+def copied(trace: Trace) -> Trace:
+    """Return a trace with arrays of its own."""
+    columns = {name: getattr(trace, name).copy() for name in columns_of(trace)}
+    return evolve(trace, **columns)
+
+
+def columns_of(trace: Trace) -> list[str]:
+    """Return the names of the columns of a trace."""
+    return [one.name for one in fields(Trace) if isinstance(getattr(trace, one.name), np.ndarray)]
+
+
+def odd_traces() -> dict[str, Trace]:
+    """Return the traces that a feature set must have an answer to, by what is odd about them."""
+    whole = squeeze()
+    return {
+        "an empty trace": whole.until(-1.0),
+        "a trace of one tick": whole.until(0.0),
+        "a trace that ends before contact": whole.until(0.5),
+        "a trace that ends at the very contact": whole.until(1.02),
+        "a trace that ends in the squeeze": whole.until(1.3),
+        "a trace in which nothing was there": squeeze(contacts=(-1.0, -1.0)),
+        "a trace in which one pad touched": squeeze(contacts=(0.06, -1.0)),
+        "a trace with contact from the first tick on": squeeze(contacts=(0.08, 0.08)),
+        "a trace of a thing without any stiffness": squeeze(stiffness_n_m=0.0),
+        "a trace without cell images": masked(whole, set(COLUMNS_OF_CHANNEL) - {"pads"}),
+        "a trace without any channel": masked(whole, set()),
+        "a trace with gaps in its numbers": _holed(whole),
+    }
+
+
+def _holed(trace: Trace) -> Trace:
+    holed = copied(trace)
+    for names in COLUMNS_OF_CHANNEL.values():
+        for name in names:
+            if name != "pad_t_s":
+                getattr(holed, name)[::7] = nan
+    return holed
+
+
+def three_kinds(trials: int = 45, missing: bool = False) -> tuple[FeatureTable, list[str]]:
+    """Return a table of trials of three labels that can be told apart, and their labels."""
+    draw = np.random.default_rng(5)
+    labels = [("bottle:full_open", "bottle:empty_open", "can:full")[i % 3] for i in range(trials)]
+    values = draw.normal(size=(trials, 4)) * [1e-3, 1e-3, 0.5, 0.02]
+    values += np.array([[0.06, 0.055, 4.0, 0.2], [0.06, 0.050, 9.0, 0.4], [0.05, 0.049, 15.0, 0.1]])[
+        np.arange(trials) % 3
+    ]
+    if missing:
+        values[draw.random(values.shape) < 0.15] = nan
+    names = ("p_first", "p_steady", "f_steady", "delta_t")
+    return FeatureTable(names=names, units=("m", "m", "N", "s"), values=values), labels
+
+
+def a_trial() -> Trial:
+    """Return a finished trial, for observers."""
+    names = ("p_first", "f_steady")
+    return Trial(
+        run=RunInfo(
+            components={"gripper": "graspsense-test/bench 0.1"},
+            settings={"run": {"seed": 7}, "gripper": {"type": "graspsense-test/bench"}},
+            seed=7,
+            labels={"object": "bottle:full"},
+        ),
+        trace=squeeze(),
+        outcome=Outcome.STEADY,
+        reason="",
+        features=Features(
+            names=names, values=(0.06, nan), units=("m", "N"), reasons={"f_steady": "not measured"}
+        ),
+        prediction=None,
+        device=DeviceInfo(
+            name="bench",
+            clock="virtual",
+            rate_hz=RATE_HZ,
+            effort_limit_n=100.0,
+            speed_limit_m_s=0.2,
+            opening=None,
+            relaxed=Command(EFFORT, 0.0, float("inf"), float("inf")),
+        ),
+        report={},
+        counts={"ticks": 1200, "late": 0, "guarded": 0},
+        events=(an_event(),),
+        seconds_simulated=2.4,
+        seconds_wall=2.4,
+    )
+
+
+def an_event() -> GraspEvent:
+    """Return an event, for observers."""
+    return GraspEvent(1.02, Phase.SQUEEZE, "squeeze")

@@ -1,0 +1,123 @@
+"""What a gripper gives while it is opened, closed gently, and opened again; recorded once and looked at often."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from math import ceil
+from typing import TYPE_CHECKING, Any, Final
+
+from attrs import define, field
+
+from graspsense.core.contact import CONTACT_FORCE_N
+from graspsense.core.errors import GraspsenseError, RecordingEnded
+from graspsense.core.guard import GuardParams, GuardState, guard
+from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
+from graspsense.core.signals import Command, Frame, Pads
+from graspsense.testing.checks import CheckFailed
+from graspsense.testing.gentle import EFFORT_N, closing, kind_of
+
+if TYPE_CHECKING:
+    from graspsense.testing.subject import Subject
+
+TIMEOUT_S: Final = 0.1
+OPENING_S: Final = 1.0
+CLOSING_S: Final = 2.5
+FIRST_SPEED_M_S: Final = 0.015
+RECORDED_FRAMES: Final = 2000
+
+
+@define
+class Session:
+    """One use of a gripper, by stages `opening`, `closing`, `open again`; a recording has `recording` alone."""
+
+    info: DeviceInfo
+    stages: dict[str, list[Reading]] = field(factory=dict)
+    longest_read_s: float = 0.0
+    silent: int = 0
+
+    @property
+    def readings(self) -> list[Reading]:
+        """Return everything that was read, in order."""
+        return [one for stage in self.stages.values() for one in stage]
+
+    @property
+    def frames(self) -> list[Frame]:
+        """Return the frames, in order."""
+        return [one.frame for one in self.readings]
+
+    @property
+    def images(self) -> list[Pads]:
+        """Return the cell images, each once, in order."""
+        found: list[Pads] = []
+        for _, pads in self.readings:
+            if pads.counter and (not found or found[-1].counter != pads.counter):
+                found.append(pads)
+        return found
+
+
+def recorded(subject: Subject) -> Session:
+    """Open the gripper, use it for some seconds of its own clock, close it, and return what it gave."""
+    backend: SensorBackend[Any] = subject.create()
+    try:
+        info = backend.open(0)
+        if not isinstance(info, DeviceInfo):
+            raise CheckFailed(f"open returned {info!r}: return graspsense.plugin_api.DeviceInfo")
+        session = Session(info)
+        with suppress(RecordingEnded):
+            if info.opening is None:
+                _use(session, backend, "recording", RECORDED_FRAMES, None)
+            else:
+                kind = kind_of(subject.entry.accepts)
+                _use(session, backend, "opening", _ticks(info, OPENING_S), info.opening)
+                _use(session, backend, "closing", _ticks(info, CLOSING_S), kind)
+                _use(session, backend, "open again", _ticks(info, OPENING_S), info.opening)
+                backend.apply(info.relaxed)
+    except GraspsenseError as error:
+        raise CheckFailed(
+            f"it cannot be used as it is set: {error}\n    give it the settings to be checked with (-o KEY=VALUE, or "
+            "`keys` in a test)"
+        ) from error
+    finally:
+        backend.close()
+    if not session.frames:
+        raise CheckFailed(
+            f"no frame came within {TIMEOUT_S} s, {session.silent} times: is its rate what it says?"
+        )
+    return session
+
+
+def limits_of(info: DeviceInfo) -> GuardParams:
+    """Return the limits that hold at the first use of a gripper."""
+    return GuardParams(info.effort_limit_n, info.speed_limit_m_s, EFFORT_N, FIRST_SPEED_M_S, CONTACT_FORCE_N)
+
+
+def _ticks(info: DeviceInfo, seconds: float) -> int:
+    return max(ceil(seconds * info.rate_hz), 20)
+
+
+def _use(
+    session: Session, backend: SensorBackend[Any], stage: str, ticks: int, command: Command | int | None
+) -> None:
+    """Read so often, and command each time: a command as it is, or the kind to close with."""
+    readings = session.stages.setdefault(stage, [])
+    watcher, limits = GuardState(0, 0, 0), limits_of(session.info)
+    for _ in range(ticks):
+        began = time.perf_counter()
+        reading = backend.read(TIMEOUT_S)
+        session.longest_read_s = max(session.longest_read_s, time.perf_counter() - began)
+        if reading is None:
+            session.silent += 1
+            if session.silent > 10:
+                return
+            continue
+        readings.append(reading)
+        if command is None:
+            continue
+        frame = reading[0]
+        asked = command
+        if isinstance(asked, int):
+            before = readings[max(len(readings) - 2, 0)].frame
+            asked = closing(asked, frame.t_s - readings[0].frame.t_s, before.gap_m, frame)
+        allowed, watcher = guard(limits, watcher, frame, asked)
+        backend.apply(allowed)

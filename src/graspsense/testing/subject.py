@@ -1,0 +1,106 @@
+"""What is checked: a component with the settings to check it under, or a whole distribution."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from attrs import define, field
+
+from graspsense.core.config import build
+from graspsense.core.plugins import Component, Offer, Plugins, PluginStatus, canonical
+
+if TYPE_CHECKING:
+    from graspsense.testing.session import Session
+
+
+@define(slots=False, eq=False, kw_only=True)
+class Subject:
+    """A component under check.
+
+    `keys` are the settings it is checked with, as in its table of a pipeline file. `unplugged` are keys with which
+    the gripper vanishes within two seconds of use, `absent` keys with which it is not there at all; without them
+    the checks that need them are skipped.
+    """
+
+    component: Component
+    keys: Mapping[str, Any] = field(factory=dict)
+    unplugged: Mapping[str, Any] | None = None
+    absent: Mapping[str, Any] | None = None
+    kept: dict[str, Any] = field(factory=dict, init=False)
+    """What several checks look at, made once."""
+
+    @property
+    def name(self) -> str:
+        """Its qualified name."""
+        return self.component.qualified
+
+    @property
+    def role(self) -> str:
+        """Its role."""
+        return self.component.role
+
+    @property
+    def entry(self) -> Any:
+        """What its plugin declares about it."""
+        return self.component.entry
+
+    def config(self, **keys: Any) -> Any:
+        """Return its config, made from `keys` as strictly as from a file."""
+        return build(self.component, {**self.keys, **keys})
+
+    def create(self, **keys: Any) -> Any:
+        """Return a new instance of it."""
+        return self.component.create(self.config(**keys))
+
+    @cached_property
+    def session(self) -> Session:
+        """Return what a gripper gave while it was opened, closed and opened again; recorded once."""
+        from graspsense.testing.session import recorded
+
+        return recorded(self)
+
+
+@define(eq=False, kw_only=True)
+class Package:
+    """A distribution under check: its plugins, and everything that these declare."""
+
+    distribution: str
+    version: str
+    statuses: tuple[PluginStatus, ...]
+    components: tuple[Component, ...]
+    offers: tuple[Offer[Any], ...]
+    plugins: Plugins
+    builds: bool = True
+    """Whether a wheel is built to see that nothing is missing from it."""
+
+    @property
+    def name(self) -> str:
+        """The distribution's name."""
+        return self.distribution
+
+    role = "distribution"
+
+
+def package_of(distribution: str, plugins: Plugins, *, builds: bool = True) -> Package | None:
+    """Return the distribution of this name as it is installed, or None."""
+    name = canonical(distribution)
+    statuses = tuple(one for one in plugins.statuses if one.distribution == name)
+    if not statuses:
+        return None
+    offers: list[Offer[Any]] = [
+        *plugins.pipelines(),
+        *plugins.models(),
+        *plugins.datasets(),
+        *plugins.commands(),
+    ]
+    return Package(
+        distribution=name,
+        version=statuses[0].version,
+        statuses=statuses,
+        components=tuple(one for one in plugins.components() if one.distribution == name),
+        offers=tuple(one for one in offers if one.distribution == name),
+        plugins=plugins,
+        builds=builds,
+    )
