@@ -25,7 +25,8 @@ import numpy as np
 
 from graspsense.core.errors import RecordingEnded
 from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
-from graspsense.core.runner import RunConfig, run_grasp
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
 from graspsense.core.signals import CELLS, EFFORT, Command, Frame, Pads
 from graspsense.plugin_api import create
 from graspsense.trials.layout import PADS_FIELDS, TICK_FIELDS

@@ -1,5 +1,9 @@
 from __future__ import annotations
 
+import os
+import shutil
+import signal
+import subprocess
 import sys
 from pathlib import Path
 from textwrap import dedent
@@ -8,6 +12,9 @@ import pytest
 from attrs import field, frozen
 
 from graspsense.core.plugins import Plugins
+
+# Whoever starts the tests in the background of a shell has them ignore Ctrl-C, and every process they start, too.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @frozen
@@ -42,6 +49,7 @@ class Site:
         with pytest.MonkeyPatch.context() as patch:
             for name in ("GRASPSENSE_PLUGINS", "GRASPSENSE_DISABLED_PLUGINS", "GRASPSENSE_STRICT_PLUGINS"):
                 patch.delenv(name, raising=False)
+            patch.setenv("XDG_CONFIG_HOME", str(self.folder / "no config"))
             for name, value in environ.items():
                 patch.setenv(name, value)
             patch.setattr(sys, "path", [one for one in sys.path if "site-packages" not in one])
@@ -57,3 +65,29 @@ def site(tmp_path, monkeypatch):
     yield site
     for name in site.modules:
         sys.modules.pop(name, None)
+
+
+@pytest.fixture
+def mounted(tmp_path):
+    """Return a function that mounts a small disk and remounts it; skips where this machine does not allow it."""
+    if os.geteuid() != 0 or not sys.platform.startswith("linux") or shutil.which("mount") is None:
+        pytest.skip("needs root on Linux, to mount a small or a read-only disk")
+    places = []
+
+    def mount(options, remount=False):
+        place = tmp_path / "disk"
+        place.mkdir(exist_ok=True)
+        command = [
+            "mount",
+            *(["-o", f"remount,{options}"] if remount else ["-t", "tmpfs", "-o", options, "none"]),
+        ]
+        done = subprocess.run([*command, str(place)], capture_output=True, text=True, check=False)
+        if done.returncode:
+            pytest.skip(f"mounting is not allowed here: {done.stderr.strip()}")
+        if not remount:
+            places.append(place)
+        return place
+
+    yield mount
+    for place in places:
+        subprocess.run(["umount", "-l", str(place)], check=True)

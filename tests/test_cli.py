@@ -419,6 +419,7 @@ class TestDevices:
 
     def test_a_timeout_is_positive(self, run):
         assert run("devices", "--timeout", "0").code == 2
+        assert run("devices", "--timeout", "nan").code == 2
 
 
 class TestCompletion:

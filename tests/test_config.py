@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
+from decimal import Decimal
 from pathlib import Path
 
 import pytest
-from attrs import asdict
+from attrs import asdict, evolve
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,6 +19,7 @@ from graspsense.core.config import (
     build,
     create,
     read_layer,
+    recipe_of,
     resolve,
     to_toml,
     toml_key,
@@ -516,6 +519,25 @@ def test_create_makes_a_component_as_strictly_as_a_file():
 def test_build_tells_every_error(plugins):
     with pytest.raises(ConfigError, match="2 errors"):
         build(plugins.find("controller", "law"), {"force_n": -1, "speed_m_s": "x"})
+
+
+def test_a_recipe_makes_the_same_component_again():
+    with IsolatedPlugins():
+        made = create("controller", "hybrid", probing_force_n=17)
+        name, values = recipe_of("controller", made)
+        again = create("controller", name, **json.loads(json.dumps(values)))
+        assert name == "graspsense/hybrid"
+        assert type(again) is type(made)
+        assert again.config == made.config
+
+        class Own(type(made)):
+            """Of a script."""
+
+        with pytest.raises(UnknownName, match="Own is no controller that a plugin declares"):
+            recipe_of("controller", Own(made.config))
+        made.config = evolve(made.config, probing_force_n=Decimal(17))
+        with pytest.raises(ConfigError, match="probing_force_n"):
+            recipe_of("controller", made)
 
 
 class TestToToml:

@@ -193,6 +193,11 @@ def test_the_learning_curve_ends_at_the_headline_and_grows():
 
     assert curve[-1].rate == found.headline
     assert [round(point.trained_on) for point in curve] == [20, 44, 88, 152, 216]
+    # Of few trials a tenth and a fifth come to the same ones: that is one point.
+    labels, width, force = four_states(n=4)
+    few = judged(labelled(labels, width, force), folds=4).learning_curve
+    assert [point.trained_on for point in few] == sorted({point.trained_on for point in few})
+    assert len(few) < len(curve)
 
 
 @pytest.mark.parametrize("n", [9, 4])

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from traces import made_trace
 
+from graspsense.core.features import in_words
 from graspsense.core.signals import Phase
 from graspsense.core.trace import SI_UNITS
 from graspsense.plugins.features.chitta import NAMES, ChittaConfig, ChittaFeatures
@@ -169,3 +170,10 @@ def test_pads_that_drop_out_before_the_rest_leave_the_gaps():
     missing, reasons = missing_of(made_trace(rows))
     assert missing == {"f_steady", "df_dt"}
     assert "no number" in reasons["f_steady"]
+
+
+def test_a_value_in_words():
+    assert in_words(0.05786, "m") == "57.86 mm"
+    assert in_words(-0.0102, "m/s") == "-10.2 mm/s"
+    assert in_words(7.3, "N") == "7.3 N"
+    assert in_words(1.452, "1") == "1.452"

@@ -12,7 +12,7 @@ import click
 import pytest
 
 from graspsense.core import hookspecs
-from graspsense.core.entries import FoundDevice
+from graspsense.core.entries import Finding, FoundDevice
 from graspsense.core.features import Features
 from graspsense.core.plugins import IsolatedPlugins
 from graspsense.core.signals import Outcome, Phase
@@ -146,6 +146,45 @@ def test_hook_graspsense_commands():
 
     assert [one.name for one in plugins.commands()] == ["again", "home-hand"]
     assert plugins.command("again").load() is click.Command
+
+
+def test_hook_graspsense_emulators():
+    plugins = IsolatedPlugins(example("graspsense_emulators"))
+
+    entry = plugins.emulator("lab-hand").entry
+    assert (entry.target, entry.wires, entry.options) == ("lab_hand.emulator:emulate", ("pty",), ())
+
+
+def test_hook_graspsense_diagnose():
+    class Failing:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl
+        def graspsense_diagnose(self):
+            raise PermissionError("cannot list the bus")
+
+    class Told:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl
+        def graspsense_diagnose(self, config, timeout_s):
+            return [Finding("what I was told", "ok", f"{config} for {timeout_s} s")]
+
+    plugins = IsolatedPlugins(builtins=False)
+    plugins.add(Failing(), "lab-a")
+    plugins.add(example("graspsense_diagnose"), "lab-b")
+    plugins.add(Told(), "lab-c")
+
+    failed, found, told = plugins.diagnose("these settings", 0.25)
+
+    assert (failed.findings, failed.error) == ((), "PermissionError: cannot list the bus")
+    assert (found.findings[0].state, found.findings[0].numbers) == ("problem", {"baud": 115200})
+    assert told.findings[0].found == "these settings for 0.25 s"
+
+
+def test_a_finding_is_in_one_of_three_states():
+    with pytest.raises(ValueError, match=r"'state' is 'fine'; there are ok, note, problem"):
+        Finding("cable", "fine", "straight")  # type: ignore[arg-type]
 
 
 def test_hook_graspsense_probe_devices():

@@ -50,6 +50,12 @@ def test_one_force_is_that_of_both_pads_and_said_so(squeeze):
     assert any("one force was recorded" in note for note in recording.notes)
 
 
+def test_a_gap_that_is_likely_in_millimetres_is_told(squeeze):
+    (note,) = [one for one in read_squeeze(name_of(squeeze, gap="opening")).notes if "gap" in one]
+    assert note.endswith("m: where the column is in mm, write COLUMN*0.001 for it")
+    assert not [one for one in read_squeeze(name_of(squeeze)).notes if "gap" in one]
+
+
 @pytest.mark.parametrize(
     ("query", "says"),
     [
@@ -107,6 +113,7 @@ def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squ
         "classifier.type=none", "--json",
     )  # fmt: skip
     assert code == 0, err
+    assert "2200 lines of squeeze.csv: taken to be in s, m and N" in err
     assert json.loads(out)["trials"] == [{"source": str(squeeze), "trial": 1, "outcome": "steady"}]
     with Store.read(store) as opened:
         kept = opened.trial(1)

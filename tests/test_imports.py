@@ -22,10 +22,11 @@ MAY_KNOW = {
     "plugins": {"plugin_api", "plugins"},
     "trials": {"core", "trials"},
     "evaluation": {"core", "trials", "evaluation"},
-    "experiments": {"core", "trials", "evaluation", "experiments"},
+    "experiments": {"core", "trials", "evaluation", "report", "experiments"},
     "report": {"core", "trials", "evaluation", "report"},
-    "cli": {"core", "trials", "evaluation", "experiments", "report", "cli"},
+    "cli": {"core", "trials", "evaluation", "experiments", "report", "scaffold", "testing", "cli"},
     "testing": {"core", "plugin_api", "testing"},
+    "scaffold": {"core", "scaffold"},
     "plugin_api": {"core"},
     "__init__": {"core"},
 }
@@ -144,6 +145,27 @@ def loaded_after(code: str, *arguments: str) -> set[str]:
     assert ran.returncode == 0, ran.stderr
     (line,) = [line for line in ran.stderr.splitlines() if line.startswith("loaded:")]
     return set(line.split()[1:])
+
+
+def test_nothing_loads_what_could_run_code():
+    # joblib and dill are pickle by other names; cloudpickle is what Dask would bring.
+    banned = {"pickle", "_pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib", "copyreg"}
+    paths = [*files(SOURCE), *files(ROOT / "plugins"), *files(ROOT / "examples")]
+    assert len(paths) > 200
+    for path in paths:
+        tree = ast.parse(path.read_text())
+        roots = {name.split(".")[0] for name in imported(tree, "")}
+        assert not roots & banned, f"{path.relative_to(ROOT)} imports {sorted(roots & banned)}"
+        for node in ast.walk(tree):
+            if isinstance(node, ast.keyword) and node.arg == "allow_pickle":
+                assert ast.unparse(node.value) == "False", f"{path.relative_to(ROOT)}:{node.value.lineno}"
+            if isinstance(node, ast.Call) and ast.unparse(node.func) in {
+                "np.load",
+                "numpy.load",
+                "read_array",
+            }:
+                # What it does by default is left to the version of numpy.
+                assert "allow_pickle" in {one.arg for one in node.keywords}, f"{path}:{node.lineno}"
 
 
 def test_importing_the_doors_is_light_and_loads_no_plugin():

@@ -139,7 +139,7 @@ def test_the_picture_of_the_confusion(run, csv, tmp_path):
         (
             ["evaluate", "nothing"],
             2,
-            "is no source of trials: name a FILE.csv, a data set as icub:FOLDER, or `simulated`",
+            "is no source of trials: name a FILE.csv, a data set as icub:FOLDER, a store as store:DIR, or `simulated`",
         ),
         (["evaluate", "none.csv", "--label", "x"], 2, "none.csv cannot be read"),
         (["evaluate", "none.csv"], 2, "which column of none.csv holds the label? Name it: --label COLUMN"),
@@ -165,6 +165,12 @@ def test_the_picture_of_the_confusion(run, csv, tmp_path):
         (["evaluate", "simulated", "--objects", "can,can:full_open"], 2, "an object is named twice"),
         (["evaluate", "simulated", "--objects", "can:full_open#3"], 2, "without an instance"),
         (["train", "x.csv", "--label", "y", "--out", "model.pkl"], 2, "a model's file ends in .json"),
+        (
+            ["train", "x.csv", "--label", "y", "--out", "gone/model.json"],
+            2,
+            "gone/model.json cannot be written: there is no folder gone",
+        ),
+        (["evaluate", "x.csv", "--label", "y", "--keep", "."], 2, ". is a folder: name a file in it"),
         (["predict", "nosuch", "x.csv"], 2, "no model named 'nosuch'"),
     ],
 )

@@ -144,6 +144,8 @@ def test_another_force_speed_or_gripper_is_said():
 
     assert warned() == ()
     assert warned("gripper.object=can:empty_open", "run.seed=4") == ()
+    told = ("gripper.explain=true", "gripper.compile=never", "gripper.expected_force_n=20")
+    assert warned(*told) == ()
     assert warned("controller.probing_force_n=17") == (
         "trained on simulated grasps with probing force 20 N, this one was with 17 N (controller.probing_force_n)",
     )

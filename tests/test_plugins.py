@@ -246,7 +246,8 @@ def test_a_plugin_for_another_api_is_refused_before_its_hooks_are_looked_at(site
         ),
         (
             "def graspsense_controllers(): return []",
-            "graspsense_controllers is not marked with @hookimpl, so it would never be called",
+            "graspsense_controllers is not marked with @hookimpl, so it would never be called: "
+            "write @hookimpl above it",
         ),
         (
             "@hookimpl(wrapper=True)\n    def graspsense_controllers(): return (yield)",
@@ -268,7 +269,10 @@ def test_a_plugin_for_another_api_is_refused_before_its_hooks_are_looked_at(site
             "@hookimpl\n    def graspsense_controllers(): raise OSError('no such file')",
             "OSError: no such file",
         ),
-        ("Channel('gap', 'mm')", "ValueError: channel 'gap' is in m, not in 'mm'"),
+        (
+            "Channel('gap', 'mm')",
+            "ValueError: channel 'gap' is in m, not in 'mm': convert its numbers, and write 'm'",
+        ),
         (
             "Channel('temperature', '')",
             "ValueError: channel 'temperature' is none of gap, velocity, effort, force_left, force_right, "
@@ -365,7 +369,7 @@ def test_calls_of_hooks_are_traced_on_demand(site, capsys):
         (
             "from graspsense.plugin_api import SensorBackend\nclass Backend(SensorBackend):\n"
             "    def open(self, seed): ...\n    def read(self, timeout_s): ...\n    def close(self): ...",
-            "lab_driver:Backend does not implement apply, tare",
+            "lab_driver:Backend does not implement apply, tare, which SensorBackend of plugin_api asks for",
         ),
     ],
 )

@@ -1,14 +1,18 @@
 """The runner: order of things, every way out, and a gripper that is never left squeezing."""
 
+import gc
 import math
 import signal
+import time
 
 import pytest
+from attrs import evolve
 from grippers import CONTACT_S, REST_S, Scripted, bottle, squeezing
 
 from graspsense.core.errors import NoDevice, RecordingEnded, TareRefused
 from graspsense.core.roles import Controller
-from graspsense.core.runner import RunConfig, run_grasp
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
 from graspsense.core.signals import EFFORT, Command, Outcome, Phase
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.plugins.controllers.supervision import not_begun
@@ -220,8 +224,6 @@ def test_a_gripper_that_cannot_be_closed_leaves_the_trace_and_says_so():
 def recorded(length):
     class Recorded(Scripted):
         def open(self, seed):
-            from attrs import evolve
-
             return evolve(super().open(seed), opening=None, tare_images=0)
 
         def read(self, timeout_s):
@@ -373,3 +375,201 @@ def test_a_report_that_fails_costs_nothing_else():
     grasp = run_grasp(Mute(squeezing, bottle), HYBRID, RUN)
     assert grasp.outcome is Outcome.STEADY
     assert grasp.report == {"report_failed": "ValueError: no report"}
+
+
+def test_no_garbage_is_collected_within_a_grasp_and_again_after_it():
+    class Watching(Scripted):
+        def apply(self, command):
+            collects.add(gc.isenabled())
+            super().apply(command)
+
+    collects: set[bool] = set()
+    assert gc.isenabled()
+    run_grasp(Watching(squeezing, bottle), HYBRID, RUN)
+    assert collects == {False}
+    assert gc.isenabled()
+    gc.disable()
+    try:
+        run_grasp(Scripted(squeezing, bottle), HYBRID, RUN)
+        assert not gc.isenabled(), "it was off before, and is nobody's to turn on"
+    finally:
+        gc.enable()
+
+
+def test_who_asks_is_told_what_was_opened_before_anything_moves_and_may_refuse():
+    gripper, told = Scripted(squeezing, bottle), []
+    run_grasp(gripper, HYBRID, RUN, on_open=lambda info: told.append((info.name, len(gripper.commands))))
+    assert told == [("scripted", 0)]
+
+    def refuse(info):
+        raise NoDevice(f"not {info.name}")
+
+    gripper = Scripted(squeezing, bottle)
+    with pytest.raises(NoDevice, match="not scripted"):
+        run_grasp(gripper, HYBRID, RUN, on_open=refuse)
+    assert (gripper.commands, gripper.closed) == ([], 1)
+
+
+def test_a_recording_is_heard_to_its_end_however_long():
+    # Longer than any grasp may take; nothing in it ends the approach, as its clock stands still.
+    class Long(Scripted):
+        def open(self, seed):
+            return evolve(super().open(seed), opening=None, tare_images=0)
+
+        def read(self, timeout_s):
+            if self.k >= 2000:
+                raise RecordingEnded
+            frame, pads = super().read(timeout_s)
+            return frame._replace(t_s=0.0, gap_m=0.05), pads
+
+    run = RunConfig(grasp_timeout_s=0.5, opening_timeout_s=0.1)
+    grasp = run_grasp(Long(squeezing, lambda t: (0.0, 0.0)), HYBRID, run)
+    assert grasp.outcome is Outcome.NOTHING_THERE
+    assert grasp.counts["ticks"] == 2001
+
+
+def test_an_endless_grasp_ends_after_the_grasp_and_three_openings_and_not_before():
+    class Endless(HybridController):
+        @staticmethod
+        def step(params, state, frame, pads):
+            return Command(EFFORT, 5.0, math.inf, math.inf), state
+
+    gripper = Scripted(lambda t: 0.05, lambda t: (9.0, 9.0))
+    grasp = run_grasp(gripper, Endless(HybridConfig()), RunConfig(grasp_timeout_s=2.0, opening_timeout_s=0.5))
+    assert grasp.reason.startswith("no end after 3.5 s of ticks")
+    # Every tick of the loop commands, then the opening: 0.1 s of stillness at first, at most half a second at the end.
+    assert 3500 + 100 <= len(gripper.commands) <= 3500 + 502
+
+
+def test_what_holds_for_a_grasp_unless_told():
+    run = RunConfig()
+    assert (run.seed, run.hold_s, run.late_periods) == (0, 0.25, 5.0)
+    # Seconds: to open, without a frame, and for the longest grasp.
+    assert (run.opening_timeout_s, run.frame_timeout_s, run.grasp_timeout_s) == (5.0, 0.1, 300.0)
+    # A real gripper closes for the first time above its breakaway (8 N), far below a squeeze, and slowly.
+    assert (run.first_effort_n, run.first_speed_m_s) == (12.0, 0.015)
+    assert RunConfig(grasp_timeout_s=1e-9).grasp_timeout_s == 1e-9
+    for value in (0.0, -1.0, math.inf, math.nan):
+        with pytest.raises(ValueError, match="grasp_timeout_s"):
+            RunConfig(grasp_timeout_s=value)
+
+
+def test_the_simulated_time_is_from_the_first_frame_to_the_last():
+    class Late(Scripted):
+        """A clock that does not begin at 0."""
+
+        def read(self, timeout_s):
+            frame, pads = super().read(timeout_s)
+            return frame._replace(t_s=frame.t_s + 40.0), pads
+
+    gripper = Late(squeezing, bottle, lose_at=51)
+    assert run_grasp(gripper, HYBRID, RUN).seconds_simulated == pytest.approx(0.050)
+    assert run_grasp(Scripted(squeezing, bottle, lose_at=0), HYBRID, RUN).seconds_simulated == 0.0
+    assert run_grasp(Scripted(squeezing, bottle, clock="device"), HYBRID, RUN).seconds_simulated is None
+
+
+def test_that_the_guard_limits_is_said_once_and_counted_each_time():
+    class Strong(HybridController):
+        @staticmethod
+        def step(params, state, frame, pads):
+            command, state = HybridController.step(params, state, frame, pads)
+            return command._replace(value=500.0), state
+
+    grasp = run_grasp(Scripted(squeezing, bottle), Strong(HybridConfig()), RUN)
+    said = [event.what for event in grasp.events if event.what.startswith("guard")]
+    assert said == ["guard: a command was limited"]
+    assert grasp.counts["guarded"] > 1000
+
+
+def interrupted(times):
+    class Pressed(Scripted):
+        """So many interrupts: one in the squeeze, the others while the fingers open."""
+
+        pressed = 0
+
+        def read(self, timeout_s):
+            if (self.pressed == 0 and self.k == 1200) or 0 < self.pressed < times:
+                self.pressed += 1
+                signal.raise_signal(signal.SIGINT)
+            return super().read(timeout_s)
+
+    gripper = Pressed(squeezing, bottle)
+    run_grasp(gripper, HYBRID, RUN)
+    return len([c for c in gripper.commands[1200:] if c.value == -20.0])
+
+
+def test_one_interrupt_opens_the_fingers_and_a_second_only_relaxes_them():
+    assert interrupted(1) >= 100  # until they have stood open for 0.1 s
+    assert interrupted(2) == 1
+
+
+def test_fingers_that_do_not_come_to_rest_are_relaxed_after_the_opening_time():
+    class Restless(Scripted):
+        """Opens and opens: the gap never stands still, by its own clock for longer than allowed."""
+
+        def read(self, timeout_s):
+            if self.k == 1200:
+                self.k += 1
+                raise ZeroDivisionError
+            frame, pads = super().read(timeout_s)
+            if self.k > 1200:
+                frame = frame._replace(gap_m=0.05 + 0.01 * (self.k % 2) + 0.1 * (frame.t_s - 1.2))
+            return frame, pads
+
+    gripper = Restless(squeezing, bottle)
+    grasp = run_grasp(gripper, HYBRID, RunConfig(opening_timeout_s=2.0))
+    opening = [c for c in gripper.commands[1200:] if c.value == -20.0]
+    assert len(opening) == pytest.approx(2000, abs=3)
+    assert gripper.commands[-1].value == 0.0
+    assert grasp.outcome is Outcome.ABORTED
+
+
+def test_whoever_listens_hears_every_event_as_it_happens():
+    heard = []
+    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN, on_event=heard.append)
+    assert tuple(heard) == grasp.events
+
+
+def test_a_device_lost_after_the_grasp_had_ended_says_how_it_had():
+    # The hold ends at REST_S + 0.05 + 0.25; at 1.85 s the fingers are opening.
+    grasp = run_grasp(Scripted(squeezing, bottle, lose_at=1850), HYBRID, RUN)
+    assert grasp.outcome is Outcome.DEVICE_LOST
+    assert grasp.reason == "unplugged (after the grasp had ended: steady)"
+    earlier = run_grasp(Scripted(squeezing, bottle, lose_at=1200), HYBRID, RUN)
+    assert earlier.reason == "unplugged"
+
+
+def test_a_recording_that_ends_within_the_hold_ends_as_steady():
+    grasp = run_grasp(recorded(1600), HYBRID, RUN)  # at rest since 1.55 s, held until 1.8 s
+    assert (grasp.outcome, grasp.reason) == (Outcome.STEADY, "")
+
+
+def test_a_lost_gripper_is_only_told_to_relax():
+    gripper = Scripted(squeezing, bottle, lose_at=1200)
+    run_grasp(gripper, HYBRID, RUN)
+    assert [c.value for c in gripper.commands[-2:]] == [20.0, 0.0]
+
+
+def test_fingers_that_are_open_are_not_opened_again():
+    gripper = Scripted(squeezing, bottle)
+    run_grasp(gripper, HYBRID, RUN)
+    values = [c.value for c in gripper.commands]
+    # The release ends when the gap has stood still for 0.1 s, and then there is one more command.
+    assert values[-1] == 0.0
+    opening = values[::-1].index(20.0) - 1
+    assert opening == pytest.approx(101, abs=2)
+
+
+def test_a_frame_of_just_the_allowed_age_is_not_late():
+    class Paced(Scripted):
+        def read(self, timeout_s):
+            frame, pads = super().read(timeout_s)
+            return frame._replace(dt_s=5.0 / 1000.0), pads
+
+    assert run_grasp(Paced(squeezing, bottle, clock="device"), HYBRID, RUN).counts["late"] == 0
+
+
+def test_the_wall_clock_of_a_grasp_is_what_it_took():
+    began = time.perf_counter()
+    grasp = run_grasp(Scripted(squeezing, bottle), HYBRID, RUN)
+    assert 0.0 < grasp.seconds_wall <= time.perf_counter() - began

@@ -1,8 +1,6 @@
 """The store: what is kept is there, beside other programs, and a store that is not ours or newer is left alone."""
 
 import json
-import os
-import shutil
 import sqlite3
 import struct
 import subprocess
@@ -283,37 +281,6 @@ def test_verify_finds_what_became_of_recordings(store):
     assert found.unfinished == ("loose.mcap has no row",)
 
 
-needs_mounts = pytest.mark.skipif(
-    os.geteuid() != 0 or not sys.platform.startswith("linux") or shutil.which("mount") is None,
-    reason="needs root on Linux, to mount a small or a read-only disk",
-)
-
-
-@pytest.fixture
-def mounted(tmp_path):
-    """Return a function that mounts a small disk and remounts it; skips where this machine does not allow it."""
-    places = []
-
-    def mount(options, remount=False):
-        place = tmp_path / "disk"
-        place.mkdir(exist_ok=True)
-        command = [
-            "mount",
-            *(["-o", f"remount,{options}"] if remount else ["-t", "tmpfs", "-o", options, "none"]),
-        ]
-        done = subprocess.run([*command, str(place)], capture_output=True, text=True, check=False)
-        if done.returncode:
-            pytest.skip(f"mounting is not allowed here: {done.stderr.strip()}")
-        if not remount:
-            places.append(place)
-        return place
-
-    yield mount
-    for place in places:
-        subprocess.run(["umount", "-l", str(place)], check=True)
-
-
-@needs_mounts
 @pytest.mark.parametrize("log", [False, True], ids=["closed", "with a log"])
 def test_a_store_on_a_read_only_disk_is_read_and_not_written(mounted, log):
     disk = mounted("size=20m")
@@ -335,7 +302,6 @@ def test_a_store_on_a_read_only_disk_is_read_and_not_written(mounted, log):
         Store.open(disk)
 
 
-@needs_mounts
 def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
     disk = mounted("size=1500k")
     with Store.open(disk) as store:
@@ -350,7 +316,6 @@ def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
     assert (found.trials, found.problems) == (kept, ())
 
 
-@needs_mounts
 def test_a_grasp_ends_as_it_would_have_when_the_disk_fills_up_under_it(mounted):
     disk = mounted("size=200k")
     command = [sys.executable, "-m", "graspsense", "run", "-o", "classifier.type=none", "--save", str(disk)]

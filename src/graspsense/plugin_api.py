@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from graspsense.core.binding import bind as bind
+    from graspsense.core.binding import maker as maker
     from graspsense.core.calibration import EDGE_COUNTS_PER_N as EDGE_COUNTS_PER_N
     from graspsense.core.calibration import PAD_COUNTS_PER_N as PAD_COUNTS_PER_N
     from graspsense.core.calibration import LoadTable as LoadTable
@@ -25,19 +26,24 @@ if TYPE_CHECKING:
     from graspsense.core.calibration_files import stored_tables as stored_tables
     from graspsense.core.calibration_files import stored_zero as stored_zero
     from graspsense.core.config import create as create
+    from graspsense.core.config import recipe_of as recipe_of
     from graspsense.core.contact import CONTACT_FORCE_N as CONTACT_FORCE_N
     from graspsense.core.contact import REST_SPEED_M_S as REST_SPEED_M_S
     from graspsense.core.contact import REST_WINDOW_S as REST_WINDOW_S
     from graspsense.core.contact import Stillness as Stillness
     from graspsense.core.contact import at_rest as at_rest
     from graspsense.core.contact import both_touch as both_touch
+    from graspsense.core.contact import first_rest as first_rest
     from graspsense.core.contact import watch as watch
+    from graspsense.core.emulated import EmulatedDevice as EmulatedDevice
     from graspsense.core.entries import Channel as Channel
     from graspsense.core.entries import ClassifierEntry as ClassifierEntry
     from graspsense.core.entries import CommandEntry as CommandEntry
     from graspsense.core.entries import ControllerEntry as ControllerEntry
     from graspsense.core.entries import DatasetEntry as DatasetEntry
+    from graspsense.core.entries import EmulatorEntry as EmulatorEntry
     from graspsense.core.entries import FeatureSetEntry as FeatureSetEntry
+    from graspsense.core.entries import Finding as Finding
     from graspsense.core.entries import FoundDevice as FoundDevice
     from graspsense.core.entries import ModelEntry as ModelEntry
     from graspsense.core.entries import PipelineEntry as PipelineEntry
@@ -66,16 +72,22 @@ if TYPE_CHECKING:
     from graspsense.core.labelled import Labelled as Labelled
     from graspsense.core.plugins import collect as collect
     from graspsense.core.roles import BatchBackend as BatchBackend
+    from graspsense.core.roles import BatchOptions as BatchOptions
     from graspsense.core.roles import Classifier as Classifier
     from graspsense.core.roles import ClassifierConfig as ClassifierConfig
     from graspsense.core.roles import Controller as Controller
     from graspsense.core.roles import ControllerState as ControllerState
     from graspsense.core.roles import DeviceInfo as DeviceInfo
     from graspsense.core.roles import FeatureSet as FeatureSet
+    from graspsense.core.roles import Grasped as Grasped
     from graspsense.core.roles import Reading as Reading
     from graspsense.core.roles import SensorBackend as SensorBackend
     from graspsense.core.roles import StepLaw as StepLaw
-    from graspsense.core.runner import RunConfig as RunConfig
+    from graspsense.core.roles import Variant as Variant
+    from graspsense.core.run_config import RunConfig as RunConfig
+    from graspsense.core.runner import ended_by_itself as ended_by_itself
+    from graspsense.core.runner import overdue as overdue
+    from graspsense.core.runner import seconds_at_most as seconds_at_most
     from graspsense.core.runner import tick_params as tick_params
     from graspsense.core.signals import APPROACH as APPROACH
     from graspsense.core.signals import CELLS as CELLS
@@ -120,12 +132,15 @@ if TYPE_CHECKING:
     from graspsense.core.transmission import gap_and_rate as gap_and_rate
     from graspsense.core.transmission import revolutions_at as revolutions_at
     from graspsense.core.transmission import screw_linkage as screw_linkage
+    from graspsense.core.transmission import straight_linkage as straight_linkage
+    from graspsense.core.tree import TreeNode as TreeNode
     from graspsense.core.trial import GraspEvent as GraspEvent
     from graspsense.core.trial import RunInfo as RunInfo
     from graspsense.core.trial import Trial as Trial
 
 _HOME_OF: Final = {
     "bind": "binding",
+    "maker": "binding",
     "EDGE_COUNTS_PER_N": "calibration",
     "PAD_COUNTS_PER_N": "calibration",
     "LoadTable": "calibration",
@@ -140,19 +155,24 @@ _HOME_OF: Final = {
     "stored_tables": "calibration_files",
     "stored_zero": "calibration_files",
     "create": "config",
+    "recipe_of": "config",
     "CONTACT_FORCE_N": "contact",
     "REST_SPEED_M_S": "contact",
     "REST_WINDOW_S": "contact",
     "Stillness": "contact",
     "at_rest": "contact",
     "both_touch": "contact",
+    "first_rest": "contact",
     "watch": "contact",
+    "EmulatedDevice": "emulated",
     "Channel": "entries",
     "ClassifierEntry": "entries",
     "CommandEntry": "entries",
     "ControllerEntry": "entries",
     "DatasetEntry": "entries",
+    "EmulatorEntry": "entries",
     "FeatureSetEntry": "entries",
+    "Finding": "entries",
     "FoundDevice": "entries",
     "ModelEntry": "entries",
     "PipelineEntry": "entries",
@@ -181,16 +201,22 @@ _HOME_OF: Final = {
     "Labelled": "labelled",
     "collect": "plugins",
     "BatchBackend": "roles",
+    "BatchOptions": "roles",
     "Classifier": "roles",
     "ClassifierConfig": "roles",
     "Controller": "roles",
     "ControllerState": "roles",
     "DeviceInfo": "roles",
     "FeatureSet": "roles",
+    "Grasped": "roles",
     "Reading": "roles",
     "SensorBackend": "roles",
     "StepLaw": "roles",
-    "RunConfig": "runner",
+    "Variant": "roles",
+    "RunConfig": "run_config",
+    "ended_by_itself": "runner",
+    "overdue": "runner",
+    "seconds_at_most": "runner",
     "tick_params": "runner",
     "APPROACH": "signals",
     "CELLS": "signals",
@@ -227,6 +253,7 @@ _HOME_OF: Final = {
     "first_state": "tick",
     "tick": "tick",
     "Trace": "trace",
+    "TreeNode": "tree",
     "TraceRecorder": "trace",
     "trace_of": "trace",
     "PR2_ENCODER_TICKS": "transmission",
@@ -235,6 +262,7 @@ _HOME_OF: Final = {
     "gap_and_rate": "transmission",
     "revolutions_at": "transmission",
     "screw_linkage": "transmission",
+    "straight_linkage": "transmission",
     "GraspEvent": "trial",
     "RunInfo": "trial",
     "Trial": "trial",

@@ -59,6 +59,12 @@ def test_path_in_words_and_units() -> None:
     assert str(path) == "full_open (1.00) because delta_t 0.61 s > 0.542 s and material = can"
 
 
+def test_the_unit_of_a_ratio_is_not_printed() -> None:
+    x, labels = np.arange(40.0)[:, None] / 40.0, (np.arange(40) >= 20) * 1
+    tree = fit(make_table(Schema((Attribute("slope", unit="1"),), ("a", "b")), x, labels))
+    assert explain(tree, [0.9]).steps == ("slope 0.9 > 0.475",)
+
+
 def test_path_tells_close_numbers_apart_and_says_what_is_missing() -> None:
     assert explain(grasp_tree(), [0.5421, 0.0]).steps[0] == "delta_t 0.5421 s > 0.542 s"
     missing = explain(grasp_tree(), [math.nan, 2.0])

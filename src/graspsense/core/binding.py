@@ -10,6 +10,7 @@ from types import FunctionType
 from typing import Any, TypeVar, cast
 
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
+TupleT = TypeVar("TupleT", bound=tuple[Any, ...])
 
 
 def bind(function: FunctionT, **parts: Any) -> FunctionT:
@@ -27,3 +28,12 @@ def bind(function: FunctionT, **parts: Any) -> FunctionT:
     )
     bound.__module__, bound.__qualname__ = function.__module__, function.__qualname__
     return cast(FunctionT, bound)
+
+
+def maker(named_tuple: type[TupleT]) -> Callable[..., TupleT]:
+    """Return a function that makes `named_tuple` of all its fields in order, at half the cost of calling the class.
+
+    To be bound in the class's place where steps run in the interpreter, many a tick. It counts no fields.
+    """
+    new = tuple.__new__
+    return lambda *fields: new(named_tuple, fields)

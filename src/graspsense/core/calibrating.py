@@ -12,7 +12,7 @@ from graspsense.core.contact import CONTACT_FORCE_N, Stillness, at_rest, watch
 from graspsense.core.errors import DeviceLost, GraspsenseError
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
-from graspsense.core.runner import RunConfig
+from graspsense.core.run_config import RunConfig
 from graspsense.core.signals import EFFORT, Command, Pads
 from graspsense.core.tick import OPEN_SPEED_M_S, OPEN_WINDOW_S
 

@@ -31,7 +31,7 @@ from graspsense.core.strict import Misfit, Problem, plain, shown, structured
 from graspsense.core.toml_lines import KeyPath
 
 if TYPE_CHECKING:
-    from graspsense.core.runner import RunConfig
+    from graspsense.core.run_config import RunConfig
 
 __all__ = [
     "Chosen",
@@ -40,8 +40,11 @@ __all__ = [
     "Settings",
     "build",
     "create",
+    "create_chosen",
     "read_layer",
+    "recipe_of",
     "resolve",
+    "settings_from",
     "to_toml",
 ]
 
@@ -118,9 +121,25 @@ def resolve(
     typed, complaints = option_layers(options)
     layers += typed
     layers += [flag.layer() for flag in flags]
+    return _laid(pipeline, layers, complaints, plugins)
+
+
+def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | None = None) -> Settings:
+    """Return the settings of these tables alone, as `Settings.values` or a resolved file has them.
+
+    `called` names them in errors. Raises ConfigError.
+    """
+    given = {
+        table: {key: one for key, one in keys.items() if one is not None} for table, keys in values.items()
+    }
+    return _laid(called, [Layer.of(given, called)], [], installed() if plugins is None else plugins)
+
+
+def _laid(pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins: Plugins) -> Settings:
+    """Return the settings that these layers give, one over the other. Raises ConfigError."""
     layers = [_tables_only(layer, complaints) for layer in layers]
 
-    from graspsense.core.runner import RunConfig
+    from graspsense.core.run_config import RunConfig
 
     chosen: dict[str, Chosen] = {}
     values: dict[str, dict[str, Any]] = {}
@@ -188,8 +207,36 @@ def create(role: Role, name: str, /, **config: Any) -> Any:
 
     Raises UnknownName, PluginUnavailable, ConfigError.
     """
+    return create_chosen(role, name, **config).create()
+
+
+def create_chosen(role: Role, name: str, **config: Any) -> Chosen:
+    """Return a component by role and name with its config, not built yet. Raises as `create` does."""
     component = installed().find(role, name)
-    return component.create(build(component, config))
+    return Chosen(component, build(component, config))
+
+
+def recipe_of(role: Role, part: Any) -> tuple[str, dict[str, Any]]:
+    """Return the name and the plain values of which `create` makes another such component.
+
+    Raises UnknownName where its class is no component that a plugin declares, ConfigError where its config says
+    more than values can.
+    """
+    cls = type(part)
+    for component in installed().components(role):
+        # One that lies in another package is not imported only to be told apart.
+        if component.entry.target.split(":")[0].split(".")[0] != cls.__module__.split(".")[0]:
+            continue
+        try:
+            same = component.component_class() is cls
+        except PluginUnavailable:
+            same = False
+        if same:
+            values = {key: one for key, one in plain(part.config).items() if one is not None}
+            if plain(build(component, values)) != plain(part.config):
+                raise ConfigError(f"{component.qualified}: its settings are not all plain values")
+            return component.qualified, values
+    raise UnknownName(f"{cls.__module__}.{cls.__qualname__} is no {role} that a plugin declares")
 
 
 def to_toml(settings: Settings, origins: bool = False) -> str:

@@ -8,7 +8,11 @@ Controllers and features share these, so that they never disagree on when a thin
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 CONTACT_FORCE_N: Final = 0.625
 """tau_1 on each pad: 1000 counts over the tared zero at 1600 counts/N, as in the authors' code."""
@@ -16,6 +20,9 @@ REST_SPEED_M_S: Final = 1e-4
 """tau_2: 0.1 mm/s, as in the authors' code."""
 REST_WINDOW_S: Final = 0.05
 """How long the speed must stay below tau_2: one encoder tick in 1 ms alone is 0.33 mm/s on the PR2."""
+
+FEW: Final = 8
+"""Samples that are looked at one by one before the rest of them at once."""
 
 
 class Stillness(NamedTuple):
@@ -48,3 +55,57 @@ def at_rest(still: Stillness, t_s: float, rest_window_s: float) -> bool:
     """Return whether the stillness has lasted the window (equation 2); rest then began at `still.since_t_s`."""
     # Half a nanosecond of grace: sums of ticks of 1 ms fall short of 50 ms by rounding.
     return t_s - still.since_t_s >= rest_window_s - 5e-10
+
+
+def first_rest(
+    times_s: NDArray[np.float64],
+    gaps_m: NDArray[np.float64],
+    shows: NDArray[np.bool_],
+    rest_speed_m_s: float,
+    rest_window_s: float,
+) -> tuple[int, int] | None:
+    """Return the sample at which rest begins and the first that shows it, or None.
+
+    It is what `watch` and `at_rest` say sample by sample. `shows` tells which samples may show a rest.
+    """
+    import numpy as np
+
+    n = len(times_s)
+    if n == 0:
+        return None
+    # Where the very next sample has moved on, and one alone is no rest, there is nothing to look at.
+    lasting = np.ones(n, bool)
+    if not at_rest(Stillness(times_s[0], gaps_m[0]), times_s[0], rest_window_s):
+        allowed = rest_speed_m_s * np.maximum(rest_window_s, times_s[1:] - times_s[:-1])
+        np.less_equal(np.abs(gaps_m[1:] - gaps_m[:-1]), allowed, out=lasting[:-1])
+    skipped = int(lasting.argmax())
+    begins = np.flatnonzero(lasting[skipped:]).tolist()
+    times, gaps = times_s[skipped:].tolist(), gaps_m[skipped:].tolist()
+    n -= skipped
+    end = following = 0
+    while end < n:
+        while begins[following] < end:
+            following += 1
+        since = begins[following]
+        still = Stillness(times[since], gaps[since])
+        # While it moves most stillnesses are short, so the first samples are looked at one by one, as `watch` does.
+        few = min(since + FEW, n)
+        end = since
+        while end < few and abs(gaps[end] - still.gap_m) <= rest_speed_m_s * max(
+            rest_window_s, times[end] - still.since_t_s
+        ):
+            end += 1
+        if end == few:
+            begin = skipped + few
+            allowed = rest_speed_m_s * np.maximum(rest_window_s, times_s[begin:] - still.since_t_s)
+            strayed = ~(np.abs(gaps_m[begin:] - still.gap_m) <= allowed)
+            end = few + int(strayed.argmax()) if strayed.any() else n
+        if end > since and at_rest(still, times[end - 1], rest_window_s):
+            full = since
+            while not at_rest(still, times[full], rest_window_s):
+                full += 1
+            showing = shows[skipped + full : skipped + end]
+            if showing.any():
+                return skipped + since, skipped + full + int(showing.argmax())
+        end = max(end, since + 1)
+    return None

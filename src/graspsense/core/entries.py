@@ -6,10 +6,11 @@ resolved at first use, so that listing plugins imports nothing beyond the module
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import field, frozen
-from attrs.validators import deep_iterable, ge, instance_of, matches_re
+from attrs.validators import and_, deep_iterable, ge, instance_of, matches_re
 
 from graspsense.core.errors import suggestion
 from graspsense.core.signals import CHANNELS, CommandKind
@@ -26,6 +27,9 @@ TABLE_OF_ROLE: Final[dict[Role, str]] = {
     "classifier": "classifier",
 }
 """The table of a pipeline file in which a component of each role is chosen."""
+
+STATES: Final = ("ok", "note", "problem")
+"""How a finding can be."""
 
 KINDS: Final = tuple(kind.name.lower() for kind in CommandKind)
 """Command kinds as entries name them: effort, velocity, position, force."""
@@ -80,7 +84,9 @@ class Channel:
     def __attrs_post_init__(self) -> None:
         unit = CHANNELS.get(self.name)
         if unit is not None and self.unit != unit:
-            raise ValueError(f"channel {self.name!r} is in {unit}, not in {self.unit!r}")
+            raise ValueError(
+                f"channel {self.name!r} is in {unit}, not in {self.unit!r}: convert its numbers, and write {unit!r}"
+            )
         if not self.unit:
             raise ValueError(f"channel {self.name!r} is none of {', '.join(CHANNELS)}: give it a unit")
 
@@ -181,6 +187,24 @@ class CommandEntry:
 
 
 @frozen
+class EmulatorEntry:
+    """A device that software can stand in for, as one of this machine's: `graspsense emulate NAME`.
+
+    `name` is the sensor backend that drives it. `target` is a function `emulate(config, wire, seed)` that returns an
+    `EmulatedDevice`; `config` is the backend's own, of the pipeline that was asked for.
+    """
+
+    name: str = field(validator=_IS_NAME)
+    target: str = field(validator=_IS_TARGET)
+    summary: str = field(validator=instance_of(str))
+    wires: tuple[str, ...] = field(validator=deep_iterable(and_(*_IS_NAME), instance_of(tuple)))
+    """The ways into the operating system that it knows, for `--wire`; the best first."""
+    options: tuple[str, ...] = ()
+    """Settings that come before the user's own, as in `("gripper.transport=emulated",)`."""
+    needs: str = ""
+
+
+@frozen
 class FoundDevice:
     """A device that a probe found: which backend drives it, how to name it, and whether it can be opened."""
 
@@ -189,6 +213,26 @@ class FoundDevice:
     where: str
     ready: bool
     advice: str = ""
+
+
+def _a_state(entry: object, attribute: Attribute[Any], state: str) -> None:
+    if state not in STATES:
+        raise ValueError(f"'{attribute.name}' is {state!r}; there are {', '.join(STATES)}")
+
+
+@frozen
+class Finding:
+    """What a doctor found: what was looked at, how it is, and what to do.
+
+    `state` is `ok`, `note` (nothing wrong, but worth to know) or `problem`. `numbers` are what was measured, each name
+    with its unit: `rate_hz`.
+    """
+
+    subject: str = field(validator=instance_of(str))
+    state: Literal["ok", "note", "problem"] = field(validator=_a_state)
+    found: str = field(validator=instance_of(str))
+    advice: str = field(default="", validator=instance_of(str))
+    numbers: Mapping[str, float | int | str | bool] = field(factory=dict)
 
 
 ComponentEntry = SensorBackendEntry | ControllerEntry | FeatureSetEntry | ClassifierEntry

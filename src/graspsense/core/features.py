@@ -132,4 +132,4 @@ def in_words(value: float, unit: str) -> str:
     """Return a value with its unit, lengths in mm."""
     if unit == "m" or unit.startswith("m/"):
         return f"{value * 1e3:.4g} m{unit}"
-    return f"{value:.4g} {unit}".rstrip()
+    return f"{value:.4g} {unit if unit != '1' else ''}".rstrip()

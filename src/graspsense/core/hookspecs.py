@@ -17,7 +17,9 @@ from graspsense.core.entries import (
     CommandEntry,
     ControllerEntry,
     DatasetEntry,
+    EmulatorEntry,
     FeatureSetEntry,
+    Finding,
     FoundDevice,
     ModelEntry,
     PipelineEntry,
@@ -77,8 +79,18 @@ def graspsense_commands() -> Iterable[CommandEntry]:  # type: ignore[empty-body]
 
 
 @hookspec
+def graspsense_emulators() -> Iterable[EmulatorEntry]:  # type: ignore[empty-body]
+    """Return the devices that software can stand in for, as devices of the operating system."""
+
+
+@hookspec
 def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:  # type: ignore[empty-body]
     """Look for devices for at most `timeout_s` seconds. May import drivers: only `graspsense devices` calls it."""
+
+
+@hookspec
+def graspsense_diagnose(config: object, timeout_s: float) -> Iterable[Finding]:  # type: ignore[empty-body]
+    """Look into what is plugged in and why it does not work. May import drivers: only `graspsense doctor` calls it."""
 
 
 @hookspec

@@ -103,7 +103,7 @@ class Merged:
 
 def read_layer(path: str | os.PathLike[str]) -> Layer:
     """Read a TOML file. Raises ConfigError where there is none, or where it is no readable TOML."""
-    return _read(Path(path), os.fspath(path), "configuration file")
+    return read_toml(Path(path), os.fspath(path), "configuration file")
 
 
 def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
@@ -121,7 +121,7 @@ def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
             names = " -> ".join([*(name for _, name in seen), label])
             raise ConfigError(f"{asker}extends goes round in a circle: {names}")
         seen.append((identity, label))
-        layer = _read(source, label, "pipeline file")
+        layer = read_toml(source, label, "pipeline file")
         values = dict(layer.values)
         extends = values.pop("extends", None)
         layers.insert(0, Layer(label=label, values=values, lines=layer.lines))
@@ -154,7 +154,8 @@ def _located(asked: str, base: Path, asker: str, plugins: Plugins) -> tuple[Trav
     return resource, f"pipeline {offer.qualified}", resource.parent if isinstance(resource, Path) else Path()
 
 
-def _read(source: Traversable, label: str, what: str) -> Layer:
+def read_toml(source: Traversable, label: str, what: str) -> Layer:
+    """Read a TOML file that errors call `what` and `label`. Raises ConfigError."""
     try:
         data = source.read_bytes()
     except FileNotFoundError:

@@ -38,8 +38,12 @@ VERSION: Final = 1
 
 _EQUAL: Final = 1e-6
 
-_NOT_COMPARED: Final = frozenset({"type", "object", "recording", "model"})
-"""Keys that differ from grasp to grasp, or say where something lies."""
+_NOT_COMPARED: Final = frozenset(
+    {"type", "object", "recording", "model", "explain", "compile", "expected_force_n", "expected_speed_m_s"}
+)
+"""Keys that differ from grasp to grasp, say where something lies, or change what is told and not the grasp.
+
+Or not by more than its accuracy: what a simulator is told to expect."""
 _COMPARED_TABLES: Final = ("gripper", "controller", "features", "classifier")
 _UNITS: Final = (("_m_s", "mm/s", 1e3), ("_n", "N", 1.0), ("_hz", "Hz", 1.0), ("_s", "s", 1.0))
 
@@ -73,7 +77,7 @@ class Model:
         kind = "simulated grasps" if self.simulated else f"trials of {self.provenance.get('source', '?')}"
         settings = self.provenance.get("settings", {}).get("controller", {})
         at = [
-            _worded(key, settings[key])[1]
+            worded(key, settings[key])[1]
             for key in ("probing_force_n", "closing_speed_m_s")
             if key in settings
         ]
@@ -169,9 +173,9 @@ class Model:
                 continue
             for key in sorted((then.keys() & now.keys()) - _NOT_COMPARED):
                 if then[key] != now[key]:
-                    what, value = _worded(key, then[key])
+                    what, value = worded(key, then[key])
                     yield (
-                        f"trained on {kind} with {what} {value}, this one was with {_worded(key, now[key])[1]} "
+                        f"trained on {kind} with {what} {value}, this one was with {worded(key, now[key])[1]} "
                         f"({table}.{key})"
                     )
 
@@ -362,7 +366,7 @@ def _chosen(features: Features, names: Sequence[str]) -> Features:
     )
 
 
-def _worded(key: str, value: Any) -> tuple[str, str]:
+def worded(key: str, value: Any) -> tuple[str, str]:
     """Return a key and its value as a person says them: `probing_force_n`, 20 as `probing force`, `20 N`."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         for ending, unit, factor in _UNITS:

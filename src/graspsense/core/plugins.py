@@ -27,12 +27,15 @@ import pluggy
 from attrs import define, evolve, frozen
 
 from graspsense.core import hookspecs
+from graspsense.core.disabling import config_file, disabled_in_config
 from graspsense.core.entries import (
     ENTRY_OF_ROLE,
     TABLE_OF_ROLE,
     CommandEntry,
     ComponentEntry,
     DatasetEntry,
+    EmulatorEntry,
+    Finding,
     FoundDevice,
     ModelEntry,
     PipelineEntry,
@@ -46,12 +49,22 @@ if TYPE_CHECKING:
 
     from graspsense.core.trial import GraspEvent, RunInfo, Trial
 
-EntryT = TypeVar("EntryT", PipelineEntry, ModelEntry, DatasetEntry, CommandEntry)
+EntryT = TypeVar("EntryT", PipelineEntry, ModelEntry, DatasetEntry, CommandEntry, EmulatorEntry)
 
 ALLOWED_VARIABLE: Final = "GRASPSENSE_PLUGINS"
 DISABLED_VARIABLE: Final = "GRASPSENSE_DISABLED_PLUGINS"
 STRICT_VARIABLE: Final = "GRASPSENSE_STRICT_PLUGINS"
 TRACE_VARIABLE: Final = "GRASPSENSE_TRACE_PLUGINS"
+
+HEAVY: Final = frozenset(
+    {
+        *("numpy", "scipy", "sklearn", "numba", "pandas", "matplotlib", "torch", "cattrs", "rich"),
+        *("hid", "hidraw", "usb", "serial", "pymodbus"),
+    }
+)
+"""What no plugin's module may import: listing plugins would import it for everybody."""
+SLOW_IMPORT_S: Final = 0.1
+"""Processor time from which on the import of a plugin's module is called slow."""
 
 COMPONENT_HOOKS: Final[dict[str, Role]] = {
     "graspsense_sensor_backends": "sensor-backend",
@@ -64,6 +77,7 @@ OFFER_HOOKS: Final[dict[str, type]] = {
     "graspsense_models": ModelEntry,
     "graspsense_datasets": DatasetEntry,
     "graspsense_commands": CommandEntry,
+    "graspsense_emulators": EmulatorEntry,
 }
 _SPECS: Final = tuple(name for name in vars(hookspecs) if name.startswith("graspsense_"))
 
@@ -87,6 +101,10 @@ class PluginStatus:
     reason: str = ""
     traceback: str = ""
     hooks: tuple[str, ...] = ()
+    import_s: float = 0.0
+    """Processor time that its module took to import."""
+    advice: tuple[str, ...] = ()
+    """What is to be done about it, though it works."""
 
 
 @frozen
@@ -135,7 +153,10 @@ class Component:
             raise _unavailable(self, f"{self.entry.target} is no subclass of {base.__name__}")
         if inspect.isabstract(found):
             lacking = ", ".join(sorted(found.__abstractmethods__))
-            raise _unavailable(self, f"{self.entry.target} does not implement {lacking}")
+            raise _unavailable(
+                self,
+                f"{self.entry.target} does not implement {lacking}, which {base.__name__} of plugin_api asks for",
+            )
         return found
 
     def create(self, config: object) -> Any:
@@ -145,7 +166,7 @@ class Component:
 
 @frozen
 class Offer(Generic[EntryT]):
-    """A pipeline, model, data set or command that a plugin declares."""
+    """A pipeline, model, data set, command or emulator that a plugin declares."""
 
     entry: EntryT
     distribution: str
@@ -167,13 +188,17 @@ class Offer(Generic[EntryT]):
         return _KIND_OF_ENTRY[type(self.entry)]
 
     def load(self) -> Any:
-        """Import and return what a data set's or command's entry points at. Raises PluginUnavailable."""
-        assert isinstance(self.entry, DatasetEntry | CommandEntry), "pipelines and models are files"
+        """Import and return what the entry of a data set, command or emulator points at. Raises PluginUnavailable."""
+        assert isinstance(self.entry, DatasetEntry | CommandEntry | EmulatorEntry), (
+            "pipelines and models are files"
+        )
         return _imported(self, self.entry.target)
 
     def resource(self) -> Traversable:
         """Return the file of a pipeline or model. Raises PluginUnavailable where it is not in its package."""
-        assert isinstance(self.entry, PipelineEntry | ModelEntry), "data sets and commands are code"
+        assert isinstance(self.entry, PipelineEntry | ModelEntry), (
+            "data sets, commands and emulators are code"
+        )
         package, _, path = self.entry.resource.partition(":")
         try:
             found = files(package).joinpath(path)
@@ -191,6 +216,7 @@ _KIND_OF_ENTRY: Final[dict[type, str]] = {
     ModelEntry: "model",
     DatasetEntry: "data set",
     CommandEntry: "command",
+    EmulatorEntry: "emulator",
 }
 
 
@@ -200,6 +226,15 @@ class Probe:
 
     distribution: str
     found: tuple[FoundDevice, ...] = ()
+    error: str = ""
+
+
+@frozen
+class Diagnosis:
+    """What one plugin's doctor found; `error` says why it could not look."""
+
+    distribution: str
+    findings: tuple[Finding, ...] = ()
     error: str = ""
 
 
@@ -232,6 +267,8 @@ class Source:
     entry_point: str
     module: str
     load: Callable[[], object]
+    copies: tuple[str, ...] = ()
+    """Where the distribution is installed, where that is in several places."""
 
 
 class _Refused(Exception):
@@ -245,7 +282,9 @@ class Plugins:
     its reason and takes nothing else down; with `GRASPSENSE_STRICT_PLUGINS=1` its error is raised instead.
     """
 
-    def __init__(self, sources: Iterable[Source], environ: Mapping[str, str]) -> None:
+    def __init__(
+        self, sources: Iterable[Source], environ: Mapping[str, str], disabled: Iterable[str] = ()
+    ) -> None:
         self._manager = pluggy.PluginManager(hookspecs.PROJECT)
         self._manager.add_hookspecs(hookspecs)
         if environ.get(TRACE_VARIABLE) == "1":
@@ -256,8 +295,9 @@ class Plugins:
         self._components: list[Component] = []
         self._offers: list[Offer[Any]] = []
         self._warned: set[tuple[str, str]] = set()
+        switched_off = {canonical(name) for name in disabled}
         for source in sources:
-            reason = _barred(source.distribution, environ)
+            reason = _barred(source.distribution, environ, switched_off)
             if reason:
                 self._statuses.append(_status(source, "disabled", reason))
             else:
@@ -265,8 +305,11 @@ class Plugins:
 
     @classmethod
     def discover(cls) -> Plugins:
-        """Load the parts of graspsense itself and every installed plugin that the environment allows."""
-        return cls([_builtin(), *_installed_sources()], os.environ)
+        """Load the parts of graspsense itself and every installed plugin that environment and config allow.
+
+        Raises ConfigError where the user's list of disabled plugins cannot be read.
+        """
+        return cls([_builtin(), *installed_sources()], os.environ, disabled_in_config())
 
     @property
     def statuses(self) -> tuple[PluginStatus, ...]:
@@ -309,6 +352,10 @@ class Plugins:
         """Return the subcommands that plugins add."""
         return self._offers_of(CommandEntry)
 
+    def emulators(self) -> tuple[Offer[EmulatorEntry], ...]:
+        """Return the devices that software can stand in for."""
+        return self._offers_of(EmulatorEntry)
+
     def pipeline(self, name: str) -> Offer[PipelineEntry]:
         """Return the pipeline of this short or qualified name. Raises UnknownName."""
         return self._only("pipeline", self.pipelines(), name)
@@ -325,6 +372,19 @@ class Plugins:
         """Return the subcommand of this short or qualified name. Raises UnknownName."""
         return self._only("command", self.commands(), name)
 
+    def emulator(self, name: str) -> Offer[EmulatorEntry]:
+        """Return the emulator of this short or qualified name. Raises UnknownName."""
+        return self._only("emulator", self.emulators(), name)
+
+    def unknown(self, name: str) -> UnknownName:
+        """Return the error for a name that is neither a distribution's with plugins nor a component's."""
+        known = sorted(
+            {*(one.distribution for one in self._statuses), *(one.name for one in self._components)}
+        )
+        return UnknownName(
+            f"no plugin or component named {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}"
+        )
+
     def absences(self) -> str:
         """Return lines on the plugins that are here but take no part, for whoever misses a name."""
         return "".join(_absence(status) for status in self._statuses)
@@ -339,6 +399,22 @@ class Plugins:
             except Exception as error:
                 probes.append(Probe(status.distribution, error=_in_words(error)))
         return tuple(probes)
+
+    def diagnose(self, config: object, timeout_s: float) -> tuple[Diagnosis, ...]:
+        """Let every plugin look into its devices, for at most about `timeout_s` each; a failure is its own.
+
+        `config` is that of the gripper that was named, or None.
+        """
+        diagnoses = []
+        for status, plugin in self._implementing("graspsense_diagnose"):
+            try:
+                found = self._entries(
+                    plugin, "graspsense_diagnose", Finding, config=config, timeout_s=timeout_s
+                )
+                diagnoses.append(Diagnosis(status.distribution, tuple(found)))
+            except Exception as error:
+                diagnoses.append(Diagnosis(status.distribution, error=_in_words(error)))
+        return tuple(diagnoses)
 
     def run_starting(self, run: RunInfo) -> None:
         """Tell the observers that a grasp is about to start."""
@@ -364,11 +440,21 @@ class Plugins:
                 results.extend((status.distribution, one) for one in self._call(plugin, hook, **arguments))
         return tuple(results)
 
+    def called(self, status: PluginStatus, hook: str, /, **arguments: Any) -> list[Any]:
+        """Call one plugin's implementation of a hook, for whoever checks it; what it raises is raised.
+
+        Returns its result in a list, or an empty list for None.
+        """
+        (plugin,) = [one for known, one in self._loaded if known is status]
+        return self._call(plugin, hook, **arguments)
+
     def _add(self, source: Source) -> None:
         try:
             # What a plugin prints while it is imported must not end in somebody's JSON.
             with contextlib.redirect_stdout(sys.stderr):
+                present, began = HEAVY.intersection(sys.modules), time.process_time()
                 plugin = source.load()
+                took_s, heavy = time.process_time() - began, HEAVY.intersection(sys.modules) - present
                 _check_api(plugin, source)
                 status, components, offers = self._registered(plugin, source)
         except (Exception, SystemExit) as error:
@@ -384,6 +470,7 @@ class Plugins:
                 )
             )
             return
+        status = evolve(status, import_s=took_s, advice=_advice(source, took_s, heavy))
         self._statuses.append(status)
         self._loaded.append((status, plugin))
         self._components += components
@@ -430,13 +517,21 @@ class Plugins:
                         f"it implements {caller.name}, which is no hook of {DISTRIBUTION} {_version()}."
                         + suggestion(caller.name, _SPECS)
                     )
+                if implementation.kwargnames:
+                    given = ", ".join(implementation.argnames + implementation.kwargnames)
+                    raise _Refused(
+                        f"{caller.name} gives {', '.join(implementation.kwargnames)} a default in its signature, which "
+                        f"versions of pluggy take for different things: write {caller.name}({given})"
+                    )
                 if implementation.hookwrapper or implementation.wrapper:
                     raise _Refused(
                         f"{caller.name} is a wrapper: no hook may change what another plugin returns"
                     )
         for name in _SPECS:
             if callable(getattr(plugin, name, None)) and name not in names:
-                raise _Refused(f"{name} is not marked with @hookimpl, so it would never be called")
+                raise _Refused(
+                    f"{name} is not marked with @hookimpl, so it would never be called: write @hookimpl above it"
+                )
         return tuple(sorted(names))
 
     def _entries(self, plugin: object, hook: str, kind: type, **arguments: Any) -> list[Any]:
@@ -601,12 +696,19 @@ def _builtin() -> Source:
     )
 
 
-def _installed_sources() -> list[Source]:
+def installed_sources() -> list[Source]:
     """Return every entry point of our group, sorted, each once, without importing what it names."""
     sources: dict[tuple[str, str], Source] = {}
+    places: dict[tuple[str, str], dict[str, str]] = {}
     for distribution in distributions():
         for source in _sources_of(distribution):
-            sources.setdefault((source.distribution, source.entry_point), source)
+            key = (source.distribution, source.entry_point)
+            sources.setdefault(key, source)
+            place = os.path.realpath(str(getattr(distribution, "_path", "")))  # lib64 is lib
+            places.setdefault(key, {})[place] = f"{source.version} in {os.path.dirname(place)}"
+    for key, found in places.items():
+        if len(found) > 1:
+            sources[key].copies = tuple(found.values())
     return [sources[key] for key in sorted(sources)]
 
 
@@ -637,7 +739,7 @@ def _fails(error: Exception) -> Callable[[], object]:
     return load
 
 
-def _barred(distribution: str, environ: Mapping[str, str]) -> str:
+def _barred(distribution: str, environ: Mapping[str, str], switched_off: set[str]) -> str:
     """Return why this distribution's plugins are not to be loaded, or an empty string."""
     if distribution == DISTRIBUTION:
         return ""
@@ -646,6 +748,8 @@ def _barred(distribution: str, environ: Mapping[str, str]) -> str:
         return f"not in {ALLOWED_VARIABLE}"
     if distribution in _names(environ.get(DISABLED_VARIABLE, "")):
         return f"in {DISABLED_VARIABLE}"
+    if distribution in switched_off:
+        return f"in {config_file()} (graspsense plugins enable {distribution})"
     return ""
 
 
@@ -655,6 +759,23 @@ def _names(text: str) -> set[str]:
 
 def _status(source: Source, state: Literal["loaded", "disabled", "broken"], reason: str = "") -> PluginStatus:
     return PluginStatus(source.distribution, source.version, source.entry_point, source.module, state, reason)
+
+
+def _advice(source: Source, took_s: float, heavy: frozenset[str]) -> tuple[str, ...]:
+    """Return what there is to do about a plugin that works."""
+    found = []
+    if heavy or took_s > SLOW_IMPORT_S:
+        brings = f", and brings {', '.join(sorted(heavy))}" if heavy else ""
+        found.append(
+            f"slow: importing {source.module} takes {took_s * 1e3:.0f} ms of processor time{brings}. Its author: name "
+            "classes by import strings, and import what is heavy inside them"
+        )
+    if source.copies:
+        found.append(
+            f"installed {len(source.copies)} times ({'; '.join(source.copies)}), the first is used: "
+            f"pip uninstall {source.distribution} until none is left, then install it once"
+        )
+    return tuple(found)
 
 
 def _check_api(plugin: object, source: Source) -> None:
@@ -698,4 +819,7 @@ def _absence(status: PluginStatus) -> str:
 def _in_words(error: BaseException) -> str:
     if isinstance(error, _Refused):
         return str(error)
-    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    # Of attrs' own errors the first argument is the sentence; the others are the attribute with all it has.
+    from_attrs = len(error.args) > 1 and isinstance(error.args[1], attrs.Attribute)
+    text = str(error.args[0]) if from_attrs else str(error)
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from graspsense.core.roles import Controller, DeviceInfo, Reading, SensorBackend
-from graspsense.core.runner import RunConfig, run_grasp
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
 from graspsense.core.signals import EFFORT, Command, Pads, Phase
 from graspsense.core.trial import GraspEvent
 
@@ -84,6 +85,10 @@ class _Witness(SensorBackend[None]):
                 )
             )
         return found
+
+    def expect(self, controller: Controller[Any], run: RunConfig) -> None:
+        """Tell the gripper."""
+        self._gripper.expect(controller, run)
 
     def open(self, seed: int) -> DeviceInfo:
         """Open the gripper and keep its limits."""

@@ -8,18 +8,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypedDict, TypeVar, Unpack
 
 from attrs import field, frozen
 
-from graspsense.core.signals import Command, Frame, Pads
+from graspsense.core.signals import Command, Frame, Outcome, Pads
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from graspsense.core.features import Features, FeatureTable, Prediction
+    from graspsense.core.run_config import RunConfig
     from graspsense.core.trace import Trace
+    from graspsense.core.tree import TreeNode
 
 ConfigT = TypeVar("ConfigT")
 
@@ -63,11 +65,19 @@ class DeviceInfo:
 class SensorBackend(ABC, Generic[ConfigT]):
     """A gripper with its sensors, real, simulated, emulated or recorded.
 
-    The order of calls is open, then read and apply in turn, then close. Config is kept as `self.config`.
+    The order of calls is expect (if at all), open, then read and apply in turn, then close. Config is kept as
+    `self.config`.
     """
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config
+
+    def expect(self, controller: Controller[Any], run: RunConfig) -> None:
+        """Be told, before `open`, under which controller and settings it is to be opened next.
+
+        Opens and does nothing. A simulator chooses its model by it; a gripper need not know.
+        """
+        del controller, run
 
     @abstractmethod
     def open(self, seed: int) -> DeviceInfo:
@@ -109,16 +119,71 @@ class SensorBackend(ABC, Generic[ConfigT]):
         return None
 
 
+@frozen(kw_only=True, eq=False)
+class Grasped:
+    """One grasp of many.
+
+    `drawn` is what was drawn from its trace (features), `trace` the trace itself where traces were asked for;
+    `report` as of `SensorBackend.report`.
+    """
+
+    outcome: Outcome
+    reason: str = ""
+    drawn: Any = None
+    trace: Trace | None = None
+    report: Mapping[str, float | int | str | bool] = field(factory=dict)
+
+
+@frozen(kw_only=True)
+class Variant:
+    """One way in which a simulated gripper can trade accuracy for time.
+
+    `settings` are the keys of its own table that make it so. Those of one `method` and `fidelity` lie on one curve,
+    and `step` says which of them this is. A `role` of `reference` is what errors are measured against, `floor` what
+    a fidelity comes to in steps that no longer matter: the error of the model alone.
+    """
+
+    method: str
+    fidelity: str
+    step: str
+    settings: Mapping[str, Any]
+    role: Literal["curve", "floor", "reference"] = "curve"
+
+
+class BatchOptions(TypedDict, total=False):
+    """How many grasps are run; each may be left out."""
+
+    run: RunConfig | None
+    """The `[run]` table; its seed counts for nothing."""
+    draw: Callable[[Trace], Any] | None
+    """Called with each trace, as `feature_set.extract` is; what it returns is `Grasped.drawn`."""
+    traces: bool
+    """Whether traces are kept: half a megabyte each, they are not by default."""
+    workers: int | None
+    """How many grasps run beside each other, by default one a core; it decides nothing about what comes out."""
+    progress: Callable[[int, int], None] | None
+    """Told several times a second how many are done, of how many."""
+
+
 class BatchBackend(SensorBackend[ConfigT]):
     """A backend that can do many grasps at once."""
 
+    def variants(self) -> Sequence[Variant]:
+        """Return the ways in which it trades accuracy for time; none where there is nothing to trade."""
+        return ()
+
     @abstractmethod
     def run_many(
-        self, controller: Controller[Any], scenes: Sequence[str], seeds: Sequence[int]
-    ) -> Sequence[Trace]:
-        """Grasp each scene with its seed under this controller and return the traces, in that order.
+        self,
+        controller: Controller[Any],
+        scenes: Sequence[str],
+        seeds: Sequence[int],
+        **options: Unpack[BatchOptions],
+    ) -> Sequence[Grasped]:
+        """Grasp each scene with its seed under this controller and return what came of each, in that order.
 
-        The same seed gives the same trace as `read` and `apply` under the runner, to rounding.
+        The same seed gives the same trace as `read` and `apply` under the runner, to rounding. Raises ValueError
+        where seeds and scenes differ in number, and before anything runs what the scenes' names raise.
         """
 
 
@@ -209,6 +274,10 @@ class Classifier(ABC, Generic[ConfigT]):
     @abstractmethod
     def explain(self, features: Features) -> Prediction:
         """Return the prediction for one trial with its reason in words and units."""
+
+    def tree(self) -> Sequence[TreeNode] | None:
+        """Return the fitted model as one decision tree, the root first; None where it is none."""
+        return None
 
     @abstractmethod
     def to_json(self) -> dict[str, Any]:

@@ -12,18 +12,18 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from itertools import count
-from math import ceil, inf
+from math import ceil
 from typing import Any, Protocol
 
-from attrs import field, frozen
-from attrs.validators import ge, gt, instance_of, lt
+from attrs import frozen
 
-from graspsense.core.binding import bind
+from graspsense.core.binding import bind, maker
 from graspsense.core.contact import CONTACT_FORCE_N, Stillness, at_rest, watch
 from graspsense.core.errors import DeviceLost, RecordingEnded, TareRefused, named
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.interrupts import Interrupts
 from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
+from graspsense.core.run_config import RunConfig
 from graspsense.core.signals import APPROACH, RUNNING, SQUEEZE, Command, Frame, Outcome, Pads, Phase
 from graspsense.core.tick import (
     OPEN_SPEED_M_S,
@@ -37,28 +37,6 @@ from graspsense.core.tick import (
 )
 from graspsense.core.trace import SI_UNITS, Trace, TraceRecorder
 from graspsense.core.trial import GraspEvent
-
-
-@frozen(kw_only=True)
-class RunConfig:
-    """The `[run]` table: what holds for a grasp whatever the components are."""
-
-    seed: int = field(default=0, validator=[instance_of(int), ge(0)])
-    """Decides everything drawn at random."""
-    hold_s: float = field(default=0.25, validator=ge(0.0))
-    """How long a steady grasp is held before the fingers open."""
-    opening_timeout_s: float = field(default=5.0, validator=[gt(0.0), lt(inf)])
-    """Opening, taring and releasing each take at most this long."""
-    frame_timeout_s: float = field(default=0.1, validator=gt(0.0))
-    """No frame for this long on a device clock: the device is lost."""
-    grasp_timeout_s: float = field(default=300.0, validator=[gt(0.0), lt(inf)])
-    """Longest approach, squeeze and hold together: the end of a controller that never gives up by itself."""
-    late_periods: float = field(default=5.0, validator=gt(0.0))
-    """A frame older than this many periods counts as late."""
-    first_effort_n: float = field(default=12.0, validator=gt(0.0))
-    """Most effort on a real gripper until a contact has once been seen; above its breakaway, below a squeeze."""
-    first_speed_m_s: float = field(default=0.015, validator=gt(0.0))
-    """Most speed on a real gripper until a contact has once been seen."""
 
 
 class Sink(Protocol):
@@ -107,6 +85,26 @@ def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -
     )
 
 
+def seconds_at_most(run: RunConfig) -> float:
+    """Return how long a grasp may take with opening, taring and release."""
+    return run.grasp_timeout_s + 3.0 * run.opening_timeout_s
+
+
+def overdue(run: RunConfig) -> str:
+    """Return what is said of a grasp that took longer than that."""
+    return (
+        f"no end after {seconds_at_most(run):g} s of ticks: the controller neither ended the grasp nor gave it up "
+        "(run.grasp_timeout_s)"
+    )
+
+
+def ended_by_itself(state: TickState) -> tuple[Outcome, str]:
+    """Return how a grasp ended that its controller or the guard ended, and the reason where that is not plain."""
+    if state.guard.stopped:
+        return Outcome.ABORTED, "the controller commanded no number (NaN), so the guard stopped the grasp"
+    return Outcome(state.law.outcome), ""
+
+
 def run_grasp(
     backend: SensorBackend[Any],
     controller: Controller[Any],
@@ -124,6 +122,7 @@ def run_grasp(
     began = time.perf_counter()
     with Interrupts() as interrupts:
         try:
+            backend.expect(controller, run)
             info = backend.open(run.seed)
             if on_open is not None:
                 on_open(info)
@@ -220,7 +219,7 @@ class _Grasp:
             # Of a lost gripper it is not known whether it still hears, so it is told to relax all the same.
             self._let_go(opens=not lost and not self.state.done)
         if ending is None:
-            ending = self._ended_by_itself()
+            ending = ended_by_itself(self.state)
         if self.state.law.outcome != RUNNING and ending[0] in (Outcome.DEVICE_LOST, Outcome.ABORTED):
             ending = (
                 ending[0],
@@ -234,7 +233,7 @@ class _Grasp:
 
     def _loop(self) -> None:
         read, apply, sinks, run = self.backend.read, self.backend.apply, self.sinks, self.run
-        advance = bind(tick, step=self.step)
+        advance = bind(tick, step=self.step, TickState=maker(TickState))
         params, record = self.params, self.recorder.add
         on_device_clock = self.info.clock == "device"
         late_s = run.late_periods / self.info.rate_hz if on_device_clock else float("inf")
@@ -294,13 +293,8 @@ class _Grasp:
         """
         if self.info.opening is None:
             yield from count()
-        run = self.run
-        seconds = run.grasp_timeout_s + 3.0 * run.opening_timeout_s
-        yield from range(ceil(seconds * self.info.rate_hz))
-        raise _Overdue(
-            f"no end after {seconds:g} s of ticks: the controller neither ended the grasp nor gave it up "
-            "(run.grasp_timeout_s)"
-        )
+        yield from range(ceil(seconds_at_most(self.run) * self.info.rate_hz))
+        raise _Overdue(overdue(self.run))
 
     def _guard_event(self, frame: Frame, before: GuardState, now: GuardState) -> None:
         if now.stopped and not before.stopped:
@@ -332,7 +326,8 @@ class _Grasp:
                     reading = self.backend.read(run.frame_timeout_s)
                     if reading is None:
                         break
-                    self.last = frame = reading.frame
+                    self.last, _ = reading
+                    frame = self.last
                     still = watch(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
                     if at_rest(still, frame.t_s, OPEN_WINDOW_S) or (
                         frame.t_s - began_s > run.opening_timeout_s
@@ -345,12 +340,7 @@ class _Grasp:
 
     def _recording_ended(self) -> tuple[Outcome, str]:
         if self.state.law.outcome != RUNNING:
-            return self._ended_by_itself()
+            return ended_by_itself(self.state)
         if self.state.law.phase == SQUEEZE:
             return Outcome.NEVER_STEADY, "the recording ended before the fingers came to rest"
         return Outcome.NOTHING_THERE, "the recording ended before both pads were in contact"
-
-    def _ended_by_itself(self) -> tuple[Outcome, str]:
-        if self.state.guard.stopped:
-            return Outcome.ABORTED, "the controller commanded no number (NaN), so the guard stopped the grasp"
-        return Outcome(self.state.law.outcome), ""

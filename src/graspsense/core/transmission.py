@@ -27,6 +27,7 @@ class ScrewLinkage(NamedTuple):
     """Sine of theta0 - phi0, what the finger's angle adds to the triangle's."""
     base_cosine: float
     finger_m: float
+    """0: there is no finger, and the screw moves the jaws themselves."""
     half_gap0_m: float
 
 
@@ -55,6 +56,11 @@ def screw_linkage(
         finger_m=r_mm / 1e3,
         half_gap0_m=(t0_mm - r_mm * math.sin(theta0)) / 1e3,
     )
+
+
+def straight_linkage(pitch_m: float) -> ScrewLinkage:
+    """Return a screw that moves both jaws straight: the gap is `pitch_m` for each revolution of the motor."""
+    return ScrewLinkage(pitch_m, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 _ALPHA2 = {
@@ -100,6 +106,8 @@ def gap_and_rate(link: ScrewLinkage, revolutions: float) -> tuple[float, float]:
     is written out here, which leaves one square root.
     """
     pitch, length0, cosine0, cosine_m2, base_sine, base_cosine, finger, half_gap0 = link
+    if finger == 0.0:
+        return 2.0 * half_gap0 + pitch * revolutions, pitch
     length = length0 + revolutions * pitch
     u = cosine0 - length * length * cosine_m2
     if u > 1.0:
@@ -110,12 +118,14 @@ def gap_and_rate(link: ScrewLinkage, revolutions: float) -> tuple[float, float]:
     gap = 2.0 * (half_gap0 + finger * (base_sine * u + base_cosine * sine))
     if sine < 1e-12:
         sine = 1e-12
-    turned = finger * (base_cosine * u - base_sine * sine)
-    return gap, 4.0 * turned * length * pitch * cosine_m2 / sine
+    # Nothing but a quotient and a difference waits for the root: a simulator's ticks are as long as this takes.
+    return gap, 4.0 * pitch * cosine_m2 * finger * length * (base_cosine * u / sine - base_sine)
 
 
 def revolutions_at(link: ScrewLinkage, gap_m: float) -> float:
     """Return the motor angle (revolutions) at which the gap is `gap_m`: the inverse of `gap_and_rate`."""
+    if link.finger_m == 0.0:
+        return (gap_m - 2.0 * link.half_gap0_m) / link.pitch_m
     sine = (0.5 * gap_m - link.half_gap0_m) / link.finger_m
     u = math.sqrt(1.0 - sine * sine) * link.base_cosine + sine * link.base_sine
     length = math.sqrt(max((link.cosine0 - u) / link.cosine_m2, 0.0))

@@ -25,6 +25,8 @@ from graspsense.trials.recording import Recording
 
 NEEDED: Final = ("time", "gap", "force")
 KNOWN: Final = (*NEEDED, "effort", "velocity")
+FARTHEST_M: Final = 1.0
+"""A gap that is wider is likely not in metres."""
 
 
 def named(path: str, columns: Mapping[str, Sequence[str]]) -> str:
@@ -109,6 +111,10 @@ def _recording(columns: Columns, found: Mapping[str, list[list[float]]]) -> Reco
     notes = [f"{len(times)} lines of {columns.path.name}: taken to be in s, m and N"]
     if len(forces) == 1:
         notes.append("one force was recorded: it is taken for that of both pads")
+    if max(gaps) > FARTHEST_M:
+        notes.append(
+            f"the gap goes up to {max(gaps):g} m: where the column is in mm, write COLUMN*0.001 for it"
+        )
     return Recording(
         name=f"CSV {columns.path.name}", readings=readings, rate_hz=1.0 / median(steps), notes=tuple(notes)
     )

@@ -29,7 +29,7 @@ def provenance(settings: Settings) -> dict[str, Any]:
         "config_sha256": config_sha256(settings.values),
         "components": dict(settings.components),
         "seed": settings.run.seed,
-        **_of_this_process(),
+        **of_this_process(),
     }
 
 
@@ -71,7 +71,8 @@ def _finite(value: Any) -> Any:
 
 
 @cache
-def _of_this_process() -> Mapping[str, Any]:
+def of_this_process() -> Mapping[str, Any]:
+    """Return library versions, the commit of the code and of the work here, and the machine."""
     code, work = _commit(Path(__file__).parent), _commit(Path.cwd())
     return {
         "graspsense": __version__,

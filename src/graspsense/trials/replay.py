@@ -63,7 +63,8 @@ def _known_kind(_config: object, _attribute: Attribute[str], value: str) -> None
     known = ", ".join(f"{k}:" for k in KINDS)
     if not kind:
         raise ValueError(
-            f"{value!r} does not say what kind of recording it is: write {known} before the file"
+            f"{value!r} does not say what kind of recording it is: write {known} before the file; a trial of "
+            "a store is DIR#NUMBER"
         )
     if kind not in KINDS:
         raise ValueError(f"unknown kind of recording {kind!r}. Known: {known}.{suggestion(kind, KINDS)}")

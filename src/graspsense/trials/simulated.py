@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from attrs import evolve, fields_dict
+from attrs import Attribute, evolve, field, fields_dict, frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.core.features import Features, table_of
-from graspsense.core.labelled import Control, Labelled
-from graspsense.core.roles import BatchBackend, Controller, SensorBackend
+from graspsense.core.labelled import Control, Labelled, class_of
+from graspsense.core.roles import BatchBackend, Controller, FeatureSet, SensorBackend
 from graspsense.core.runner import run_grasp
+from graspsense.core.strict import plain
 from graspsense.core.wiring import check
 from graspsense.trials.before_contact import before_contact
 
@@ -34,10 +35,55 @@ CONTAINERS: Final[Mapping[str, tuple[str, ...]]] = {
 
 THINGS_PER_SEED: Final = 1000
 TRIALS_PER_SEED: Final = 1_000_000
-BATCH: Final = 1000
-"""Grasps asked for at once: large enough that a backend may compile them, and at most some 400 MB of traces."""
+BATCH: Final = 500
+"""Grasps asked for at once where their traces are: large enough to be worth compiling, at most 250 MB."""
 
 Progress = Callable[[int, int], None]
+
+
+def _things(group: object, attribute: Attribute[int], value: int) -> None:
+    if not 1 <= value <= THINGS_PER_SEED:
+        raise ValueError(f"{value} instances of an object: give 1 to {THINGS_PER_SEED}")
+
+
+def _trials(group: object, attribute: Attribute[Any], value: int | None) -> None:
+    if value is not None and value < 1:
+        kind = "of an instance" if attribute.name == "trials" else "in all"
+        raise ValueError(f"{value} trials {kind}: give at least 1")
+
+
+@frozen(kw_only=True)
+class Group:
+    """Trials that are made alike: of which objects, how many things of each, how often each is grasped."""
+
+    objects: tuple[str, ...] = ()
+    """Names as after `--object`, or kinds (`can`: all states of it that `CONTAINERS` lists)."""
+    named: Mapping[str, str] = field(factory=dict)
+    """Labels with the object that stands for each, as a scene file for `odwalla:full_open`."""
+    instances: int = field(default=12, validator=_things)
+    trials: int = field(default=5, validator=_trials)
+    """Grasps of each thing in each state."""
+    total: int | None = field(default=None, validator=_trials)
+    """Grasps in all, in place of `trials`: dealt in turn to the states, then to the things."""
+
+    def dealt(self) -> list[tuple[str, str, int]]:
+        """Return label, object and number of the thing for each trial. Raises ConfigError."""
+        known = {**{name: name for name in _named(self.objects)}, **self.named}
+        if any("#" in name for name in (*known, *known.values())):
+            raise ConfigError(
+                "objects are named without an instance (#3) here: --instances says how many there are"
+            )
+        pairs = list(known.items())
+        if self.total is None:
+            return [
+                (label, name, i)
+                for label, name in pairs
+                for i in range(self.instances)
+                for _ in range(self.trials)
+            ]
+        n = len(pairs)
+        dealt = [(k % n, (k // n) % self.instances) for k in range(self.total)]
+        return [(*pairs[k], i) for k, i in sorted(dealt)]
 
 
 def default_objects() -> tuple[str, ...]:
@@ -48,23 +94,20 @@ def default_objects() -> tuple[str, ...]:
 def simulated(
     settings: Settings,
     *,
-    objects: Sequence[str] = (),
-    instances: int = 12,
-    trials: int = 5,
+    groups: Sequence[Group],
     seed: int = 0,
     progress: Progress | None = None,
+    on_trace: Callable[[int, str, Trace], None] | None = None,
 ) -> Labelled:
-    """Grasp `instances` things of each object `trials` times each under these settings.
+    """Grasp the things of every group under these settings.
 
-    `objects` are names as after `--object`, or kinds (`can`: all states of it that `CONTAINERS` lists); none
-    stands for all of `CONTAINERS`. Raises ConfigError where the gripper is no simulated one, UnknownName for an
-    object it does not know.
+    A group without objects stands for all of `CONTAINERS`. `on_trace` is given the number, the label and the trace
+    of each trial. Raises ConfigError where the gripper is no simulated one, UnknownName for an object it does not
+    know.
     """
-    names = _named(objects)
-    if not 1 <= instances <= THINGS_PER_SEED:
-        raise ConfigError(f"{instances} instances of an object: give 1 to {THINGS_PER_SEED}")
-    if trials < 1 or instances * trials * len(names) > TRIALS_PER_SEED:
-        raise ConfigError(f"{trials} trials of an instance: give at least 1, and at most a million in all")
+    dealt = [one for group in groups for one in _with_objects(group).dealt()]
+    if not 1 <= len(dealt) <= TRIALS_PER_SEED:
+        raise ConfigError(f"{len(dealt)} trials: give at least 1, and at most a million in all")
     check(settings)
     config = settings.gripper.config
     if "object" not in fields_dict(type(config)):
@@ -72,26 +115,26 @@ def simulated(
             f"gripper {settings.gripper.component.qualified} takes no object, so it cannot simulate trials. "
             "Choose a simulated one, as in --gripper sim"
         )
-    scenes, labels, things = [], [], []
-    for name in names:
-        for i in range(instances):
-            number = THINGS_PER_SEED * seed + i
-            scenes += [f"{name}#{number}"] * trials
-            things += [f"{name.partition(':')[0]}#{number}"] * trials
-        labels += [name] * (instances * trials)
+    labels = [label for label, _, _ in dealt]
+    numbers = [THINGS_PER_SEED * seed + i for _, _, i in dealt]
+    scenes = [f"{name}#{number}" for (_, name, _), number in zip(dealt, numbers, strict=True)]
+    things = [f"{class_of(label)}#{number}" for label, number in zip(labels, numbers, strict=True)]
     seeds = [TRIALS_PER_SEED * seed + k for k in range(len(scenes))]
 
     backend, controller = settings.gripper.create(), settings.controller.create()
     feature_set = settings.features.create()
     if progress is not None:
         progress(0, len(scenes))
+    draw = _Drawing(feature_set)
     rows: list[Features] = []
     before: list[Features] = []
-    for trace in _traces(backend, controller, settings, scenes, seeds):
-        rows.append(feature_set.extract(trace))
-        before.append(before_contact(trace))
-        if progress is not None:
-            progress(len(rows), len(scenes))
+    for drawn, trace in _grasps(
+        backend, controller, settings, scenes, seeds, draw, progress, on_trace is not None
+    ):
+        rows.append(drawn[0])
+        before.append(drawn[1])
+        if on_trace is not None and trace is not None:
+            on_trace(len(rows) - 1, labels[len(rows) - 1], trace)
     table = table_of(rows)
     has_width = "p_first" in table.names
     return Labelled(
@@ -109,9 +152,7 @@ def simulated(
         notes=("simulated: every figure here comes from a model of gripper and objects",),
         provenance={
             "simulated": True,
-            "objects": list(names),
-            "instances": instances,
-            "trials_of_an_instance": trials,
+            "groups": [plain(_with_objects(group)) for group in groups],
             "seed_of_the_trials": seed,
             "settings": {t: dict(settings.values[t]) for t in ("gripper", "controller", "features")},
             "components": {t: one for t, one in settings.components.items() if t != "classifier"},
@@ -120,6 +161,7 @@ def simulated(
 
 
 def _named(objects: Sequence[str]) -> list[str]:
+    """Return the names of these objects, a kind as the names of its states."""
     names: list[str] = []
     for one in objects:
         if one in CONTAINERS:
@@ -128,26 +170,60 @@ def _named(objects: Sequence[str]) -> list[str]:
             names.append(one)
     if len(set(names)) < len(names):
         raise ConfigError(f"an object is named twice: {', '.join(names)}")
-    if any("#" in name for name in names):
-        raise ConfigError(
-            "objects are named without an instance (#3) here: --instances says how many there are"
-        )
-    return names or list(default_objects())
+    return names
 
 
-def _traces(
+def _with_objects(group: Group) -> Group:
+    return group if group.objects or group.named else evolve(group, objects=default_objects())
+
+
+@frozen
+class _Drawing:
+    """What is drawn from each trace. A class: it may have to go to another process."""
+
+    feature_set: FeatureSet[Any]
+
+    def __call__(self, trace: Trace) -> tuple[Features, Features]:
+        """Return the features and those of before the contact."""
+        return self.feature_set.extract(trace), before_contact(trace)
+
+
+def _grasps(
     backend: SensorBackend[Any],
     controller: Controller[Any],
     settings: Settings,
     scenes: Sequence[str],
     seeds: Sequence[int],
-) -> Iterable[Trace]:
-    """Yield one trace a scene."""
+    draw: _Drawing,
+    progress: Progress | None,
+    traces: bool,
+) -> Iterable[tuple[tuple[Features, Features], Trace | None]]:
+    """Yield what was drawn from each scene's trace, with the trace where `traces` asks for it."""
+    total = len(scenes)
     if isinstance(backend, BatchBackend):
-        for start in range(0, len(scenes), BATCH):
-            end = start + BATCH
-            yield from backend.run_many(controller, scenes[start:end], seeds[start:end])
+        # Traces are half a megabyte each, so they come some hundred at a time.
+        at_once = BATCH if traces else total
+        for start in range(0, total, at_once):
+
+            def ahead(done: int, _: int, start: int = start) -> None:
+                if progress is not None:
+                    progress(start + done, total)
+
+            part = slice(start, start + at_once)
+            for one in backend.run_many(
+                controller,
+                scenes[part],
+                seeds[part],
+                run=settings.run,
+                draw=draw,
+                traces=traces,
+                progress=ahead,
+            ):
+                yield one.drawn, one.trace
         return
-    for scene, seed in zip(scenes, seeds, strict=True):
-        one = settings.gripper.component.create(evolve(settings.gripper.config, object=scene))
-        yield run_grasp(one, controller, evolve(settings.run, seed=seed)).trace
+    for k, (scene, seed) in enumerate(zip(scenes, seeds, strict=True)):
+        alone = settings.gripper.component.create(evolve(settings.gripper.config, object=scene))
+        trace = run_grasp(alone, controller, evolve(settings.run, seed=seed)).trace
+        yield draw(trace), trace
+        if progress is not None:
+            progress(k + 1, total)

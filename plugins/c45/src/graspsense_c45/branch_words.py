@@ -13,8 +13,8 @@ def label_text(tree: Tree, class_index: int) -> str:
 
 
 def with_unit(number: str, attribute: Attribute) -> str:
-    """A number and its unit, where there is one."""
-    return f"{number} {attribute.unit}" if attribute.unit else number
+    """A number and its unit, where there is one; 1 is that of a ratio."""
+    return number if attribute.unit in ("", "1") else f"{number} {attribute.unit}"
 
 
 def j48_branch(tree: Tree, node: int, slot: int) -> str:

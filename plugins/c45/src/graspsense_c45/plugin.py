@@ -19,7 +19,9 @@ from graspsense.plugin_api import (
     Features,
     FeatureTable,
     Prediction,
+    TreeNode,
     hookimpl,
+    in_words,
 )
 
 if TYPE_CHECKING:
@@ -126,6 +128,31 @@ class C45(Classifier[C45Config]):
             probabilities=dict(zip(self.classes(), shares, strict=True)),
             because=(*missing, *path.steps, f"{path.support:g} training trials came to this leaf"),
         )
+
+    def tree(self) -> Sequence[TreeNode]:
+        """Return the tree, breadth first."""
+        from graspsense_c45.branch_words import branch
+
+        tree = self._fitted()
+
+        def words(node: int, slot: int) -> str:
+            attribute = tree.attribute(node)
+            if attribute.is_nominal:
+                return branch(tree, node, slot)
+            threshold = in_words(float(tree.tests.threshold[node]), attribute.unit)
+            return f"{attribute.name} {'≤' if slot == 0 else '>'} {threshold}"
+
+        led = {son: (node, slot) for node in range(tree.n_nodes) for slot, son in enumerate(tree.sons(node))}
+        return [
+            TreeNode(
+                label=self.classes()[int(tree.majority[node])],
+                trials=float(tree.weight[node]),
+                wrong=float(tree.weight[node] - tree.weights[node].max()),
+                parent=led[node][0] if node in led else None,
+                branch=words(*led[node]) if node in led else "",
+            )
+            for node in range(tree.n_nodes)
+        ]
 
     def to_json(self) -> dict[str, Any]:
         """Return the tree as `graspsense_c45.stored` writes it."""

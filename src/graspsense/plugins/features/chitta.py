@@ -26,10 +26,8 @@ from graspsense.plugin_api import (
     REST_WINDOW_S,
     Features,
     FeatureSet,
-    Stillness,
-    at_rest,
+    first_rest,
     missing,
-    watch,
 )
 
 if TYPE_CHECKING:
@@ -84,8 +82,7 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
 
         steady, shown = rest
         p_steady = float(trace.gap_m[steady])
-        force = self._force(trace)
-        f_first, f_steady = float(force[first]), float(force[shown])
+        f_first, f_steady = self._force(trace, first), self._force(trace, shown)
         delta_t = float(trace.t_s[steady] - trace.t_s[first])
         reasons = {}
         rates = (math.nan, math.nan)
@@ -105,17 +102,15 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         t, gap, force = trace.units["t"], trace.units["gap"], trace.units["force_left"]
         return (gap, gap, force, t, f"{gap}/{t}", f"{force}/{t}")
 
-    def _force(self, trace: Trace) -> NDArray[np.float64]:
-        import numpy as np
-
-        left, right = trace.force_left_n, trace.force_right_n
+    def _force(self, trace: Trace, tick: int) -> float:
+        left, right = float(trace.force_left_n[tick]), float(trace.force_right_n[tick])
         choice = self.config.force
         if choice == "left":
             return left
         if choice == "right":
             return right
         if choice == "min":
-            return np.minimum(left, right)
+            return math.nan if left != left or right != right else min(left, right)
         return (left + right) * (0.5 if choice == "mean" else 1.0)
 
     def _first(self, trace: Trace) -> int | None:
@@ -127,20 +122,19 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
     def _rest(self, trace: Trace, first: int) -> tuple[int, int] | None:
         """Return the tick at which rest begins and the one at which its window is full, or None."""
         config = self.config
-        times, gaps = trace.t_s[first:].tolist(), trace.gap_m[first:].tolist()
-        phases = trace.phase[first:].tolist()
+        phase = trace.phase[first:]
+        released = phase > HOLD
+        end = first + (int(released.argmax()) if released.any() else len(phase))
         # A controller may wait for more than rest (for its force); where it said steady, that is the rest meant.
-        said = HOLD in phases
-        still, since = Stillness(times[0], gaps[0]), 0
-        for i, (t, gap, phase) in enumerate(zip(times, gaps, phases, strict=True)):
-            if phase > HOLD:
-                return None
-            now = watch(still, t, gap, config.rest_speed_m_s, config.rest_window_s)
-            if now is not still:
-                still, since = now, i
-            if at_rest(still, t, config.rest_window_s) and (phase == HOLD or not said):
-                return first + since, first + i
-        return None
+        held = phase == HOLD
+        found = first_rest(
+            trace.t_s[first:end],
+            trace.gap_m[first:end],
+            held if held.any() else ~held,
+            config.rest_speed_m_s,
+            config.rest_window_s,
+        )
+        return None if found is None else (first + found[0], first + found[1])
 
     def _why_no_contact(self, trace: Trace) -> str:
         if len(trace) == 0:

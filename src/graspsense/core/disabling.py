@@ -1,0 +1,53 @@
+"""Which plugins the user has switched off for good: a list in a file of their own, read before anything is imported."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+
+from graspsense.core.errors import ConfigError
+
+
+def config_file() -> Path:
+    """Return the file that holds the list, whether or not it exists."""
+    base = os.environ.get("XDG_CONFIG_HOME") or str(Path.home() / ".config")
+    return Path(base) / "graspsense" / "plugins.toml"
+
+
+def disabled_in_config() -> tuple[str, ...]:
+    """Return the distributions listed under `disabled`, as they are written there.
+
+    Raises ConfigError where the file is not `disabled = ["NAME", ...]`.
+    """
+    path = config_file()
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (FileNotFoundError, NotADirectoryError):
+        return ()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path} cannot be read: {error}") from error
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f'{path}: {error}. It holds one line, disabled = ["NAME", ...]') from error
+    names = values.pop("disabled", [])
+    if values or not isinstance(names, list) or not all(isinstance(one, str) for one in names):
+        what = f"the unknown key {next(iter(values))!r}" if values else f"disabled = {names!r}"
+        raise ConfigError(f'{path}: found {what}. It holds one line, disabled = ["NAME", ...]')
+    return tuple(names)
+
+
+def write_disabled(names: Iterable[str]) -> Path:
+    """Write the list, and return its file; an empty list removes it."""
+    path, wanted = config_file(), sorted(set(names))
+    if not wanted:
+        path.unlink(missing_ok=True)
+        return path
+    path.parent.mkdir(parents=True, exist_ok=True)
+    other = path.with_suffix(".new")
+    other.write_text(f"disabled = {json.dumps(wanted)}\n", encoding="utf-8")
+    other.replace(path)
+    return path

@@ -1,0 +1,128 @@
+"""Where labelled trials come from: a CSV of features, a data set that a plugin reads, or the simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from attrs import fields_dict, frozen
+
+from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.core.labelled import Labelled
+from graspsense.trials.simulated import Group, simulated
+
+if TYPE_CHECKING:
+    from graspsense.core.config import Settings
+    from graspsense.core.roles import FeatureSet
+    from graspsense.core.trace import Trace
+
+SIMULATED: Final = "simulated"
+Kind = Literal["CSV", "data set", "simulated"]
+
+
+@frozen(kw_only=True)
+class Source(Group):
+    """Labelled trials, as a user describes them.
+
+    `source` is `simulated`, the name of a CSV, or a data set with its folder (`icub:FOLDER`, `store:DIR`).
+    """
+
+    source: str = SIMULATED
+    only: str | None = None
+    """Only trials of this class, what is before the colon of a label."""
+    groups: tuple[Group, ...] = ()
+    """simulated: several groups of trials in place of the one that the keys of this table describe."""
+    label: str | None = None
+    """CSV: the column that says what was grasped. Likewise `instance` and `order`."""
+    instance: str | None = None
+    order: str | None = None
+    columns: tuple[str, ...] = ()
+    """CSV: the columns to learn from; none stands for all numbers."""
+    before: tuple[str, ...] = ()
+    """CSV: columns known before any contact."""
+    unreliable: bool = False
+    """Data set: whether to take in what its author calls unreliable."""
+
+    @property
+    def kind(self) -> Kind:
+        """What kind of source it is. Raises ConfigError where it is none."""
+        return kind_of(self.source)
+
+
+def kind_of(source: str) -> Kind:
+    """Return what kind of source this names. Raises ConfigError where it is none."""
+    if source == SIMULATED:
+        return "simulated"
+    if source.lower().endswith((".csv", ".tsv", ".txt")) or Path(source).is_file():
+        return "CSV"
+    if ":" in source:
+        return "data set"
+    raise ConfigError(
+        f"{source!r} is no source of trials: name a FILE.csv, a data set as icub:FOLDER, a store as "
+        f"store:DIR, or `{SIMULATED}`"
+    )
+
+
+def labelled_trials(
+    source: Source,
+    *,
+    settings: Callable[[], Settings],
+    features: Callable[[], FeatureSet[Any]],
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+    on_trace: Callable[[int, str, Trace], None] | None = None,
+) -> Labelled:
+    """Return the trials that a source describes.
+
+    `settings` are asked for where trials are simulated, `features` where a data set draws them from recordings.
+    `seed` and `on_trace` are for the simulator. Raises ConfigError, DataDamaged.
+    """
+    if source.kind == "simulated":
+        found = simulated(
+            settings(), groups=groups_of(source), seed=seed, progress=progress, on_trace=on_trace
+        )
+    elif source.kind == "CSV":
+        found = _csv(source)
+    else:
+        found = _data_set(source, features())
+    return found.of_class(source.only) if source.only else found
+
+
+def groups_of(source: Source) -> tuple[Group, ...]:
+    """Return the groups of simulated trials that a source describes. Raises ConfigError."""
+    keys: Mapping[str, Any] = {name: getattr(source, name) for name in fields_dict(Group)}
+    own = Group(**keys)
+    if source.groups and own != Group():
+        raise ConfigError("trials are described both by keys of [data] and by [[data.groups]]: leave one out")
+    return source.groups or (own,)
+
+
+def _csv(source: Source) -> Labelled:
+    from graspsense.trials.features_csv import read_labelled
+
+    if not source.label:
+        raise ConfigError(f"which column of {source.source} holds the label? Name it: --label COLUMN")
+    return read_labelled(
+        Path(source.source),
+        source.label,
+        instance=source.instance,
+        order=source.order,
+        features=source.columns,
+        before=source.before,
+    )
+
+
+def _data_set(source: Source, features: FeatureSet[Any]) -> Labelled:
+    from graspsense.core.plugins import installed
+
+    name, _, folder = source.source.partition(":")
+    if not folder:
+        raise ConfigError(f"{source.source!r} names no folder: write it after the colon")
+    reader = installed().dataset(name).load()
+    found = reader(folder, features, unreliable=source.unreliable)
+    if not isinstance(found, Labelled):
+        raise PluginUnavailable(
+            f"data set {name!r} cannot be used here: its reader gave {type(found).__name__}, not Labelled"
+        )
+    return found

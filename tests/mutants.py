@@ -1,0 +1,692 @@
+"""Broken copies of the parts of `parts.py`: for each check of the kit one that is broken in just that way."""
+
+from __future__ import annotations
+
+import itertools
+import random
+import sys
+from dataclasses import dataclass, field
+from math import inf, nan
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+from attrs import evolve, frozen
+from parts import ENTRIES, Hand, HandConfig, Law, LawConfig, Nearest, Peak, PeakConfig, channels
+
+from graspsense.plugin_api import (
+    EFFORT,
+    HOLD,
+    NO_PADS,
+    POSITION,
+    SQUEEZE,
+    STEADY,
+    ClassifierConfig,
+    Command,
+    Features,
+    Reading,
+)
+from graspsense.testing.gentle import GentleState, step
+
+
+@dataclass
+class Mutant:
+    role: str
+    check: str
+    says: str
+    entry: Any
+    keys: dict = field(default_factory=dict)
+
+
+MUTANTS: list[Mutant] = []
+_numbers = itertools.count()
+
+
+def mutant(role, check, says, *, config=None, keys=None, **changes):
+    """Keep a class as the mutant of a check, whose failure contains `says`; `changes` are to its entry."""
+
+    def keep(cls):
+        # What imports it finds it in this module.
+        module = sys.modules[__name__]
+        name = f"Mutant{next(_numbers)}"
+        setattr(module, name, cls)
+        where = {"target": f"mutants:{name}"}
+        if config is not None:
+            setattr(module, f"{name}Config", config)
+            where["config"] = f"mutants:{name}Config"
+        MUTANTS.append(Mutant(role, check, says, evolve(ENTRIES[role], **{**where, **changes}), keys or {}))
+        return cls
+
+    return keep
+
+
+# What holds for every component.
+
+mutant("feature-set", "classes-can-be-imported", "No module named 'nowhere'", target="nowhere:Peak")(Peak)
+
+
+@mutant("feature-set", "classes-can-be-imported", "does not implement extract")
+class Methodless(Peak.__mro__[1]):
+    pass
+
+
+@attrs.frozen
+class Untyped:
+    side = attrs.field(default="left")
+
+
+mutant("feature-set", "settings-have-types", "Annotate them", config=Untyped)(Peak)
+
+
+@frozen(kw_only=True)
+class WholeDefault:
+    threshold_n: float = 3
+
+
+mutant("feature-set", "defaults-are-what-their-types-say", "write 3.0", config=WholeDefault)(Peak)
+
+
+@frozen(kw_only=True)
+class Creeping:
+    side_n: float = attrs.field(default=1.0, converter=lambda x: 2.0 * x)
+
+
+mutant("feature-set", "settings-survive-a-file", "A converter", config=Creeping)(Peak)
+
+
+@attrs.define(kw_only=True)
+class Mutable:
+    side: str = "left"
+
+
+mutant("feature-set", "settings-cannot-be-changed", "@frozen", config=Mutable)(Peak)
+
+
+@mutant("feature-set", "making-one-does-nothing", "open a file")
+class Reader(Peak):
+    def __init__(self, config):
+        super().__init__(config)
+        with open("/dev/null") as file:
+            file.read()
+
+
+mutant("feature-set", "summary-is-one-line", "in one line", summary="two\nlines")(Peak)
+
+
+# Feature sets.
+
+
+def featuring(check, says, **changes):
+    """Keep a mutant whose `extract` is the decorated function of the sound features and the trace."""
+
+    def keep(change):
+        class Changed(Peak):
+            def extract(self, trace):
+                return change(super().extract(trace), trace)
+
+        return mutant("feature-set", check, says, **changes)(Changed)
+
+    return keep
+
+
+@featuring("gives-what-it-declares", "make `features` of the entry")
+def _(features, trace):
+    return evolve(features, names=("summit",), reasons={"summit": "none"})
+
+
+@featuring("gives-what-it-declares", "peak in mN")
+def _(features, trace):
+    return evolve(features, units=("mN",))
+
+
+@featuring("values-are-floats", "write float(...)")
+def _(features, trace):
+    return evolve(features, values=(features.values[0] if features.reasons else int(features.values[0]),))
+
+
+@featuring("values-are-floats", "of type float64")
+def _(features, trace):
+    return evolve(features, values=(np.float64(features.values[0]),))
+
+
+@featuring("something-is-defined-on-a-whole-grasp", "every feature is missing")
+def _(features, trace):
+    return evolve(features, values=(nan,), reasons={"peak": "too lazy"})
+
+
+@featuring("answers-every-trace", "ValueError")
+def _(features, trace):
+    trace.gap_m.max()
+    return features
+
+
+@featuring("answers-a-trace-cut-anywhere", "on trace.until(")
+def _(features, trace):
+    if 0.3 < trace.t_s[-1:].sum() < 0.4:
+        raise IndexError("no contact yet")
+    return features
+
+
+_calls = itertools.count()
+
+
+@featuring("same-trace-same-features", "keep nothing between calls")
+def _(features, trace):
+    return evolve(features, values=(features.values[0] + next(_calls),))
+
+
+@featuring("leaves-the-trace-alone", "force_left_n.copy()")
+def _(features, trace):
+    trace.force_left_n[:] = 0.0
+    return features
+
+
+@featuring("reads-what-it-declares", "add what it reads to `requires`")
+def _(features, trace):
+    known = trace.force_right_n[~np.isnan(trace.force_right_n)]
+    return evolve(features, values=(features.values[0] + float(known.sum()),))
+
+
+@featuring("does-not-hang-on-the-start-of-the-clock", "use differences of times")
+def _(features, trace):
+    return evolve(features, values=(features.values[0] + float(trace.t_s[-1:].sum()),))
+
+
+@featuring("chunks-do-not-matter", "the memory behind them")
+def _(features, trace):
+    whole = trace.gap_m.base if trace.gap_m.base is not None else trace.gap_m
+    return evolve(features, values=(features.values[0] + len(whole),))
+
+
+class Complex(float):
+    """A number that JSON writes in a way of its own."""
+
+    def __eq__(self, other):
+        return False
+
+    __hash__ = None
+
+
+@featuring("survives-json", "through JSON")
+def _(features, trace):
+    return evolve(features, values=(Complex(features.values[0]),))
+
+
+# Controllers.
+
+
+def ruling(check, says, **changes):
+    """Keep a mutant whose step is the decorated function of params, state, frame and the sound step's answer."""
+
+    def keep(change):
+        class Changed(Law):
+            @staticmethod
+            def step(params, state, frame, pads):
+                command, after = step(params, state, frame, pads)
+                return change(command, after, frame)
+
+        return mutant("controller", check, says, **changes)(Changed)
+
+    return keep
+
+
+@mutant("controller", "step-is-a-plain-function", "staticmethod(step)")
+class Bound(Law):
+    def step(self, params, state, frame):
+        return step(params, state, frame, NO_PADS)
+
+
+class WholeParams(NamedTuple):
+    kind: int
+    speed_m_s: float
+
+
+@mutant("controller", "params-are-numbers", "annotated float and is 1")
+class WholeSpeed(Law):
+    def params(self):
+        return WholeParams(EFFORT, 1)
+
+
+class Texts(NamedTuple):
+    phase: int
+    outcome: int
+    mode: str
+
+
+@mutant("controller", "state-is-numbers", "hold plain floats and ints")
+class Moody(Law):
+    def init(self):
+        return Texts(2, 0, "calm")
+
+
+@mutant("controller", "begins-in-the-approach", "begins as APPROACH")
+class Hasty(Law):
+    def init(self):
+        return super().init()._replace(phase=SQUEEZE)
+
+
+@ruling("types-stay", "keep one type throughout")
+def _(command, after, frame):
+    return command, after._replace(gap_m=1)
+
+
+@ruling("commands-are-numbers", "of type int: write a float")
+def _(command, after, frame):
+    return command._replace(value=3), after
+
+
+@ruling("commands-are-of-declared-kinds", "add it to `commands`")
+def _(command, after, frame):
+    return command._replace(kind=POSITION), after
+
+
+@ruling("commands-are-finite", "bound it")
+def _(command, after, frame):
+    return (command._replace(value=inf) if frame.t_s > 1.0 else command), after
+
+
+@ruling("commands-are-finite", "a limit of 0 or more")
+def _(command, after, frame):
+    return command._replace(effort_limit_n=nan), after
+
+
+_draw = random.Random(3)
+
+
+@ruling("same-tick-same-answer", "nothing but its arguments")
+def _(command, after, frame):
+    return command._replace(value=command.value + _draw.random()), after
+
+
+class Hidden(NamedTuple):
+    """A state that loses what it remembers when it is written down."""
+
+    phase: int
+    outcome: int
+    begun_t_s: float
+    gap_m: float
+    still: Any
+
+
+@mutant("controller", "state-is-all-it-remembers", "keep everything in the state")
+class Forgetful(Law):
+    @staticmethod
+    def step(params, state, frame, pads):
+        command, after = step(params, state, frame, pads)
+        # The one object that comes back by identity alone.
+        marked = getattr(type(state), "last", None) is state
+        GentleState.last = after
+        value = command.value if marked or frame.t_s < 0.002 else command.value + 1.0
+        return command._replace(value=value), after
+
+
+_grasps: list[float] = []
+
+
+@ruling("two-runs-do-not-meet", "keep nothing in the class")
+def _(command, after, frame):
+    _grasps.append(frame.t_s)
+    return command._replace(value=command.value + 1e-6 * len(_grasps)), after
+
+
+@ruling("reads-what-it-declares", "add what it reads to `requires`")
+def _(command, after, frame):
+    return (command._replace(value=0.0) if frame.force_left_n > 1.0 else command), after
+
+
+@ruling("survives-a-silent-sensor", "NaN falls on the safe side")
+def _(command, after, frame):
+    int(frame.gap_m)
+    return command, after
+
+
+@ruling("phases-are-a-laws-own", "a grasp goes one way")
+def _(command, after, frame):
+    return command, after._replace(phase=SQUEEZE if frame.t_s < 0.5 else 2)
+
+
+@ruling("ends-every-grasp", "leave RUNNING")
+def _(command, after, frame):
+    return command, after._replace(outcome=0, phase=min(after.phase, HOLD))
+
+
+# Grippers.
+
+
+def giving(check, says, **changes):
+    """Keep a mutant whose frames are what the decorated function makes of the sound ones."""
+
+    def keep(change):
+        class Changed(Hand):
+            def read(self, timeout_s):
+                return change(super().read(timeout_s))
+
+        return mutant("sensor-backend", check, says, **changes)(Changed)
+
+    return keep
+
+
+def describing(check, says, **device):
+    """Keep a mutant that describes itself otherwise."""
+
+    class Changed(Hand):
+        def open(self, seed):
+            return evolve(super().open(seed), **device)
+
+    mutant("sensor-backend", check, says)(Changed)
+
+
+describing("describes-itself", "must be above 0", rate_hz=0.0)
+describing("describes-itself", "in mm/s", speed_limit_m_s=200.0)
+describing(
+    "opens-and-relaxes-by-kinds-it-takes", "of kind position", opening=Command(POSITION, 0.08, inf, inf)
+)
+describing("rate-is-what-it-says", "frames come at 1e+03 Hz", rate_hz=100.0)
+
+
+@giving("frames-are-numbers", "gap_m of a frame is 0 of type int: write float(...)")
+def _(reading):
+    return Reading(reading.frame._replace(gap_m=0), reading.pads)
+
+
+@giving("frames-are-numbers", "a tuple of 22 floats")
+def _(reading):
+    return Reading(reading.frame, reading.pads._replace(left=(0.0,) * 15))
+
+
+@giving("channels-are-those-declared", "NaN in all")
+def _(reading):
+    return Reading(reading.frame._replace(edge_left_n=nan), reading.pads)
+
+
+mutant(
+    "sensor-backend",
+    "channels-are-those-declared",
+    "declare Channel('edge_right', 'N', rate)",
+    channels=channels("gap", "velocity", "effort", "force_left", "force_right", "edge_left", "pads"),
+)(Hand)
+
+
+@giving("time-runs-forward", "each is later than the last")
+def _(reading):
+    return Reading(reading.frame._replace(t_s=1.0), reading.pads)
+
+
+@giving("time-runs-forward", "dt_s is 1 s where")
+def _(reading):
+    return Reading(reading.frame._replace(dt_s=1.0), reading.pads)
+
+
+mutant(
+    "sensor-backend",
+    "rate-is-what-it-says",
+    "is declared at 5000 Hz",
+    channels=channels(*(one.name for one in ENTRIES["sensor-backend"].channels), rate_hz=5000.0),
+)(Hand)
+
+
+@giving("images-count-up", "count up by one")
+def _(reading):
+    return Reading(reading.frame, reading.pads._replace(counter=2 * reading.pads.counter))
+
+
+@giving("images-count-up", "while its counter stays")
+def _(reading):
+    return Reading(reading.frame, reading.pads._replace(left=(reading.frame.t_s,) * 22))
+
+
+@giving("gap-is-in-metres", "divide by 1000")
+def _(reading):
+    return Reading(reading.frame._replace(gap_m=1000.0 * reading.frame.gap_m), reading.pads)
+
+
+@giving("forces-are-in-newtons", "give newtons")
+def _(reading):
+    return Reading(reading.frame._replace(force_left_n=3000.0), reading.pads)
+
+
+@giving("velocity-is-the-gaps-rate", "mm where the gap moved by")
+def _(reading):
+    return Reading(reading.frame._replace(velocity_m_s=1000.0 * reading.frame.velocity_m_s), reading.pads)
+
+
+@giving("velocity-is-the-gaps-rate", "negative while it closes")
+def _(reading):
+    return Reading(reading.frame._replace(velocity_m_s=-reading.frame.velocity_m_s), reading.pads)
+
+
+@mutant("sensor-backend", "closing-closes", "close the fingers")
+class Backwards(Hand):
+    def apply(self, command):
+        super().apply(command._replace(value=-command.value))
+
+
+@mutant("sensor-backend", "stays-within-its-limits", "apply `effort_limit_n`")
+class Unlimited(Hand):
+    def read(self, timeout_s):
+        reading = super().read(timeout_s)
+        return Reading(reading.frame._replace(effort_n=self._asked), reading.pads)
+
+    def apply(self, command):
+        self._asked = 60.0 if command.value > 0.0 else 0.0
+        super().apply(command)
+
+    _asked = 0.0
+
+
+mutant(
+    "sensor-backend",
+    "takes-every-kind-it-declares",
+    "take it, or take 'force' out",
+    accepts=("effort", "force"),
+)(
+    type(
+        "Choosy",
+        (Hand,),
+        {"apply": lambda self, command: Hand.apply(self, command) if command.kind == EFFORT else 1 / 0},
+    )
+)
+
+
+@mutant("sensor-backend", "is-told-what-to-expect", "leave refusing to `open`")
+class Picky(Hand):
+    def expect(self, controller, run):
+        raise ValueError("not that one")
+
+
+@mutant("sensor-backend", "read-keeps-its-timeout", "return None when nothing came in time")
+class Sluggish(Hand):
+    def read(self, timeout_s):
+        reading = super().read(timeout_s)
+        if 0.5 < reading.frame.t_s <= 0.501:
+            import time
+
+            until = time.perf_counter() + 1.3
+            while time.perf_counter() < until:
+                pass
+        return reading
+
+
+@mutant("sensor-backend", "pads-can-be-zeroed", "subtract the zero")
+class Unzeroed(Hand):
+    def tare(self, images):
+        super().tare(images)
+        self._zero = None
+
+
+@mutant("sensor-backend", "pads-can-be-zeroed", "raise TareRefused")
+class Blind(Hand):
+    def tare(self, images):
+        self._zero = images[-1]
+
+
+@mutant("sensor-backend", "closes-in-any-state", "for the second time it raised")
+class Once(Hand):
+    def close(self):
+        if self._bench is None and hasattr(self, "_info"):
+            raise RuntimeError("closed already")
+        super().close()
+
+
+@giving("same-seed-same-frames", "draw everything from the seed")
+def _(reading):
+    return Reading(reading.frame._replace(edge_left_n=_draw.random()), reading.pads)
+
+
+@giving("does-a-whole-grasp", "ended as aborted")
+def _(reading):
+    return Reading(reading.frame._replace(t_s=float(f"{reading.frame.t_s:.9f}")), "no pads")
+
+
+@mutant("sensor-backend", "reports-plain-values", "numbers, text and truths only")
+class Talkative(Hand):
+    def report(self):
+        return {"self": self}
+
+
+@mutant("sensor-backend", "stands-in-with-the-same-commands", "return a SensorBackend or None")
+class Understudy(Hand):
+    def stand_in(self):
+        return "somebody"
+
+
+@mutant("sensor-backend", "says-when-it-is-lost", "turn what the driver raises into DeviceLost")
+class Rude(Hand):
+    def read(self, timeout_s):
+        reading = super().read(timeout_s) if self.config.vanishes_s == inf else Hand.read(self, timeout_s)
+        if reading.frame.t_s > self.config.vanishes_s - 0.1:
+            raise OSError("Input/output error")
+        return reading
+
+
+@mutant("sensor-backend", "says-when-it-is-lost", "never raised DeviceLost")
+class Undead(Hand):
+    def open(self, seed):
+        info = super().open(seed)
+        self.config = HandConfig()
+        return info
+
+
+@mutant("sensor-backend", "says-when-it-is-not-there", "open succeeded where no gripper is")
+class Dreaming(Hand):
+    def open(self, seed):
+        self.config = HandConfig(vanishes_s=self.config.vanishes_s)
+        return super().open(seed)
+
+
+# Classifiers.
+
+
+@frozen(kw_only=True)
+class NoModel:
+    k: int = 3
+
+
+mutant(
+    "classifier",
+    "a-classifier-has-a-model-key",
+    "extend graspsense.plugin_api.ClassifierConfig",
+    config=NoModel,
+)(Nearest)
+
+
+@mutant("classifier", "classes-are-the-labels", "a tuple of str")
+class Listed(Nearest):
+    def classes(self):
+        return list(super().classes())
+
+
+@mutant("classifier", "probabilities-are-probabilities", "divide each row by its sum")
+class Votes(Nearest):
+    def probabilities(self, table):
+        return 0.5 * super().probabilities(table)
+
+
+@mutant("classifier", "probabilities-are-probabilities", "float64 of shape")
+class Coarse(Nearest):
+    def probabilities(self, table):
+        return super().probabilities(table).astype(np.float32)
+
+
+@mutant("classifier", "tells-apart-what-differs", "is the order of `classes`")
+class Mixed(Nearest):
+    def classes(self):
+        return super().classes()[::-1]
+
+
+@mutant("classifier", "same-seed-same-model", "draw everything from the seed")
+class Dicing(Nearest):
+    def fit(self, table, labels, seed):
+        super().fit(table, labels, seed)
+        self._model["mean"][0] += 1e-6 * _draw.random()
+
+
+@mutant("classifier", "survives-json", "keep every number in full")
+class Rounded(Nearest):
+    def to_json(self):
+        return {**self._model, "mean": [round(one, 2) for one in self._model["mean"]]}
+
+
+@mutant("classifier", "survives-json", "what JSON cannot hold")
+class Raw(Nearest):
+    def to_json(self):
+        return {**self._model, "mean": np.array(self._model["mean"])}
+
+
+@mutant("classifier", "chunks-do-not-matter", "a trial is judged by itself")
+class Relative(Nearest):
+    def probabilities(self, table):
+        centred = evolve(table, values=table.values - 0.1 * np.nanmean(table.values, axis=0))
+        return super().probabilities(centred)
+
+
+@mutant("classifier", "missing-values-have-an-answer", "fill or skip them")
+class Strict(Nearest):
+    def probabilities(self, table):
+        found = super().probabilities(table)
+        found[np.isnan(table.values).any(axis=1)] = nan
+        return found
+
+
+@mutant("classifier", "one-label-is-refused-or-certain", "raise ValueError, or learn it")
+class Careless(Nearest):
+    def fit(self, table, labels, seed):
+        if len(set(labels)) < 2:
+            raise ZeroDivisionError("division by zero")
+        super().fit(table, labels, seed)
+
+
+@mutant("classifier", "explains-what-it-says", "explain says 'bottle:full_open'")
+class Stubborn(Nearest):
+    def explain(self, features):
+        return evolve(super().explain(features), label="bottle:full_open")
+
+
+@mutant("classifier", "explains-what-it-says", "why, one step an item")
+class Silent(Nearest):
+    def explain(self, features):
+        return evolve(super().explain(features), because=())
+
+
+@mutant("classifier", "leaves-the-table-alone", "work on a copy")
+class Filling(Nearest):
+    def probabilities(self, table):
+        np.nan_to_num(table.values, copy=False)
+        return super().probabilities(table)
+
+
+@mutant("classifier", "refuses-what-is-no-model", "from_json takes a model")
+class Credulous(Nearest):
+    def from_json(self, model):
+        self._model = {"classes": [], "mean": [], "scale": [], "centres": [], **model}
+
+
+@mutant("classifier", "refuses-what-is-no-model", "raise ValueError")
+class Crashing(Nearest):
+    def from_json(self, model):
+        if "centres" not in model:
+            raise AttributeError("centres")
+        super().from_json(model)
+
+
+__all__ = ["MUTANTS", "STEADY", "ClassifierConfig", "Features", "LawConfig", "Mutant", "PeakConfig"]

@@ -1,0 +1,235 @@
+"""A sound part of each role, small enough to be read: what the mutants of `mutants.py` are broken copies of."""
+
+from __future__ import annotations
+
+import math
+from math import inf, nan
+
+import numpy as np
+from attrs import field, frozen
+from attrs.validators import gt
+
+from graspsense.plugin_api import (
+    EFFORT,
+    NO_PADS,
+    Channel,
+    Classifier,
+    ClassifierConfig,
+    ClassifierEntry,
+    Command,
+    Controller,
+    ControllerEntry,
+    DeviceInfo,
+    DeviceLost,
+    Features,
+    FeatureSet,
+    FeatureSetEntry,
+    Frame,
+    NoDevice,
+    Prediction,
+    Reading,
+    SensorBackend,
+    SensorBackendEntry,
+    TareRefused,
+    in_words,
+)
+from graspsense.testing.bench import Bench
+from graspsense.testing.gentle import GentleController as Gentle
+from graspsense.testing.gentle import GentleParams, GentleState, step
+
+
+@frozen(kw_only=True)
+class NoKeys:
+    pass
+
+
+@frozen(kw_only=True)
+class PeakConfig:
+    side: str = "left"
+
+
+class Peak(FeatureSet[PeakConfig]):
+    def extract(self, trace):
+        known = trace.force_left_n[~np.isnan(trace.force_left_n)]
+        value = float(known.max()) if len(known) else nan
+        reasons = {} if len(known) else {"peak": "the left pad gave no number"}
+        return Features(names=("peak",), values=(value,), units=("N",), reasons=reasons)
+
+
+@frozen(kw_only=True)
+class LawConfig:
+    speed_m_s: float = field(default=0.01, validator=gt(0.0))
+
+
+class Law(Controller[LawConfig]):
+    step = staticmethod(step)
+
+    def params(self):
+        return GentleParams(EFFORT)
+
+    def init(self):
+        return Gentle(EFFORT).init()
+
+
+@frozen(kw_only=True)
+class HandConfig:
+    vanishes_s: float = inf
+    here: bool = True
+
+
+class Hand(SensorBackend[HandConfig]):
+    """The bench with cells, a zero, and a cable."""
+
+    _bench = None
+
+    def open(self, seed):
+        if not self.config.here:
+            raise NoDevice("no hand at port 7: plug it in, then `graspsense devices`")
+        self._bench, self._zero = Bench(frozenset(CHANNELS_OF_HAND), 0.05, 1500.0), None
+        self._info = self._bench.open(seed)
+        self._effort = 0.0
+        return DeviceInfo(
+            name="hand",
+            clock="virtual",
+            rate_hz=1000.0,
+            effort_limit_n=100.0,
+            speed_limit_m_s=0.2,
+            opening=Command(EFFORT, -15.0, inf, inf),
+            relaxed=Command(EFFORT, 0.0, inf, inf),
+            tare_images=2,
+        )
+
+    def read(self, timeout_s):
+        frame, pads = self._opened().read(timeout_s)
+        if frame.t_s > self.config.vanishes_s:
+            raise DeviceLost("the hand at port 7 does not answer: look at its cable")
+        if self._zero is None:
+            frame = frame._replace(
+                force_left_n=frame.force_left_n + 2.0, force_right_n=frame.force_right_n + 2.0
+            )
+        return Reading(frame, pads)
+
+    def apply(self, command):
+        self._opened().apply(command)
+
+    def tare(self, images):
+        if len(images) < 2:
+            raise TareRefused("two images are needed")
+        self._zero = images[-1]
+
+    def close(self):
+        self._bench = None
+
+    def report(self):
+        return {"hands": 1}
+
+    def stand_in(self):
+        return type(self)(HandConfig())
+
+    def _opened(self):
+        if self._bench is None:
+            raise DeviceLost("the hand is not open")
+        return self._bench
+
+
+CHANNELS_OF_HAND = (
+    *("gap", "velocity", "effort", "force_left", "force_right", "edge_left", "edge_right", "pads"),
+)
+
+
+class Nearest(Classifier[ClassifierConfig]):
+    """The label of the nearest mean, in standard deviations."""
+
+    _model = None
+
+    def fit(self, table, labels, seed):
+        if len(set(labels)) < 2:
+            raise ValueError("one label only: there is nothing to tell apart")
+        values = table.values
+        counts = np.maximum((~np.isnan(values)).sum(axis=0), 1)
+        mean = np.nansum(values, axis=0) / counts
+        scale = np.sqrt(np.nansum((values - mean) ** 2, axis=0) / counts) + 1e-12
+        known = sorted(set(labels))
+        which = np.array([known.index(one) for one in labels])
+        scaled = np.nan_to_num((values - mean) / scale)
+        centres = np.array([scaled[which == i].mean(axis=0) for i in range(len(known))])
+        self._model = {
+            "classes": known,
+            "mean": mean.tolist(),
+            "scale": scale.tolist(),
+            "centres": centres.tolist(),
+        }
+
+    def classes(self):
+        return tuple(self._model["classes"])
+
+    def probabilities(self, table):
+        model = self._model
+        scaled = np.nan_to_num((table.values - np.array(model["mean"])) / np.array(model["scale"]))
+        apart = ((scaled[:, None, :] - np.array(model["centres"])[None]) ** 2).sum(axis=2)
+        weight = np.exp(-0.5 * (apart - apart.min(axis=1, keepdims=True)))
+        return weight / weight.sum(axis=1, keepdims=True)
+
+    def explain(self, features):
+        from graspsense.plugin_api import table_of
+
+        shares = self.probabilities(table_of([features]))[0].tolist()
+        name, value, unit = features.names[0], features.values[0], features.units[0]
+        said = "missing" if math.isnan(value) else in_words(value, unit)
+        return Prediction(
+            label=self.classes()[int(np.argmax(shares))],
+            probabilities=dict(zip(self.classes(), shares, strict=True)),
+            because=(f"{name} is {said}",),
+        )
+
+    def to_json(self):
+        return self._model
+
+    def from_json(self, model):
+        if len(model["centres"]) != len(model["classes"]):
+            raise ValueError("as many centres as classes are needed")
+        self._model = {key: model[key] for key in ("classes", "mean", "scale", "centres")}
+
+
+def channels(*names, rate_hz=1000.0):
+    from graspsense.plugin_api import CHANNELS
+
+    return tuple(Channel(name, CHANNELS[name], rate_hz) for name in names)
+
+
+ENTRIES = {
+    "feature-set": FeatureSetEntry(
+        name="peak",
+        target="parts:Peak",
+        config="parts:PeakConfig",
+        summary="greatest force of the left pad",
+        requires=(Channel("force_left", "N"),),
+        features=(("peak", "N"),),
+    ),
+    "controller": ControllerEntry(
+        name="gentle",
+        target="parts:Law",
+        config="parts:LawConfig",
+        summary="closes gently",
+        requires=(Channel("gap", "m"), Channel("velocity", "m/s")),
+        commands=("effort",),
+    ),
+    "sensor-backend": SensorBackendEntry(
+        name="hand",
+        target="parts:Hand",
+        config="parts:HandConfig",
+        summary="a hand that is a mass and a spring",
+        channels=channels(*CHANNELS_OF_HAND),
+        accepts=("effort",),
+    ),
+    "classifier": ClassifierEntry(
+        name="nearest",
+        target="parts:Nearest",
+        config="graspsense.plugin_api:ClassifierConfig",
+        summary="the nearest mean",
+    ),
+}
+HAND_LOST = {"vanishes_s": 0.3}
+HAND_ABSENT = {"here": False}
+
+__all__ = ["ENTRIES", "NO_PADS", "Frame", "GentleState", "Hand", "Law", "Nearest", "NoKeys", "Peak"]

@@ -1,0 +1,147 @@
+"""Plugins that the user has switched off are not imported, and those that need attention are told what to do."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from graspsense.cli.plugins import _rows
+from graspsense.core.disabling import config_file, disabled_in_config, write_disabled
+from graspsense.core.errors import ConfigError
+from graspsense.core.plugins import Plugins, _builtin, installed_sources
+
+FEATURES = """
+    from graspsense.plugin_api import FeatureSetEntry, hookimpl
+    GRASPSENSE_API = (1, 0)
+    @hookimpl
+    def graspsense_feature_sets():
+        yield FeatureSetEntry("{name}", "lab:Peak", "lab:PeakConfig", "peak", (), (("peak", "N"),))
+"""
+
+
+@pytest.fixture
+def home(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    return tmp_path / "config" / "graspsense" / "plugins.toml"
+
+
+def graspsense(site, *arguments, code=0):
+    environ = {**os.environ, "PYTHONPATH": str(site.folder), "NO_COLOR": "1"}
+    environ["GRASPSENSE_PLUGINS"] = "lab-loud lab-peak lab-other lab-old lab-slow lab-broken"
+    program = "import sys; from graspsense.cli.main import main; main(sys.argv[1:])"
+    done = subprocess.run(
+        [sys.executable, "-c", program, *arguments], env=environ, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == code, done.stderr
+    return done.stdout + done.stderr
+
+
+def test_a_disabled_plugin_is_not_imported_until_it_is_enabled_again(home, site):
+    site.install("lab-loud", "import sys; sys.stderr.write('I was imported'); GRASPSENSE_API = (1, 0)")
+
+    assert "I was imported" in graspsense(site, "plugins", "list")
+    said = graspsense(site, "plugins", "disable", "Lab_Loud")
+    assert f"lab-loud is disabled, in {home}" in said
+    assert "I was imported" not in said
+    assert home.read_text() == 'disabled = ["lab-loud"]\n'
+
+    listed = graspsense(site, "plugins", "list")
+    assert "I was imported" not in listed
+    assert f"in {home} (graspsense plugins enable lab-loud)" in listed
+
+    graspsense(site, "plugins", "enable", "lab-loud")
+    assert not home.exists()
+    assert "I was imported" in graspsense(site, "plugins", "list")
+
+
+def test_what_cannot_be_disabled_or_enabled(home, site):
+    site.install("lab-loud", "GRASPSENSE_API = (1, 0)")
+
+    assert "Did you mean 'lab-loud'?" in graspsense(site, "plugins", "disable", "lab-lout", code=2)
+    assert "no installed plugin" in graspsense(site, "plugins", "disable", "graspsense", code=2)
+    assert "lab-loud is not disabled" in graspsense(site, "plugins", "enable", "lab-loud", code=2)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("disabled = lab", "Invalid value"),
+        ('disabled = "lab-x"', "found disabled = 'lab-x'"),
+        ('disable = ["lab-x"]', "found the unknown key 'disable'"),
+    ],
+)
+def test_a_list_that_is_none_says_what_it_holds(home, text, says):
+    home.parent.mkdir(parents=True)
+    home.write_text(text)
+
+    with pytest.raises(ConfigError, match="It holds one line, disabled =") as caught:
+        disabled_in_config()
+    assert says in str(caught.value)
+
+
+def test_the_list_survives_its_file(home):
+    assert disabled_in_config() == ()
+    assert write_disabled({"b", "a"}) == config_file() == home
+    assert disabled_in_config() == ("a", "b")
+
+
+def test_the_list_says_what_is_to_be_done(home, site):
+    site.install("lab-peak", FEATURES.format(name="peak"))
+    site.install("lab-other", FEATURES.format(name="peak"))
+    site.install("lab-old", "GRASPSENSE_API = (0, 9)")
+    site.install("lab-slow", "import numpy; GRASPSENSE_API = (1, 0)")
+    site.install("lab-broken", "import no_such_driver")
+
+    said = graspsense(site, "plugins", "list").partition("To be done:")[2]
+
+    assert (
+        "lab-peak: the feature set name 'peak' is also that of lab-other/peak: write "
+        'features.type = "lab-peak/peak", or disable one of them'
+    ) in said
+    assert "lab-old: broken: it is written for plugin API 0.9" in said
+    assert "upgrade lab-old" in said
+    assert "lab-slow: slow: importing lab_slow_plugin takes" in said
+    assert "and brings numpy. Its author: name classes by import strings" in said
+    assert (
+        "lab-broken: broken: ModuleNotFoundError: No module named 'no_such_driver'; `graspsense plugins show "
+        "lab-broken` has the whole of it, `graspsense plugins disable lab-broken` leaves it out"
+    ) in said
+
+
+def test_a_distribution_that_is_installed_twice_is_told_of(site, tmp_path, monkeypatch):
+    site.install("lab-peak", FEATURES.format(name="peak"))
+    second = tmp_path / "second" / "lab_peak-0.1.dist-info"
+    second.mkdir(parents=True)
+    (second / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-peak\nVersion: 0.1\n")
+    (second / "entry_points.txt").write_text("[graspsense.plugins]\nmain = lab_peak_plugin\n")
+    monkeypatch.syspath_prepend(tmp_path / "second")
+
+    mine = [one for one in installed_sources() if one.distribution == "lab-peak"]
+    loaded = Plugins([_builtin(), *mine], {})
+    (row,) = [one for one in _rows(loaded) if one["distribution"] == "lab-peak"]
+
+    assert len(mine) == 1
+    assert "installed 2 times" in row["advice"][0]
+    assert "pip uninstall lab-peak until none is left, then install it once" in row["advice"][0]
+
+
+def test_a_hook_with_a_default_is_refused_with_what_to_write(site):
+    site.install(
+        "lab-peak",
+        """
+        from graspsense.plugin_api import hookimpl
+        GRASPSENSE_API = (1, 0)
+        @hookimpl
+        def graspsense_probe_devices(timeout_s=1.0):
+            return []
+        """,
+    )
+
+    (status,) = [one for one in site.discover().statuses if one.distribution == "lab-peak"]
+
+    assert status.state == "broken"
+    assert "gives timeout_s a default in its signature" in status.reason
+    assert "write graspsense_probe_devices(timeout_s)" in status.reason

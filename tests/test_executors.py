@@ -1,0 +1,244 @@
+"""Experiments on one machine and on many, and everything that can go wrong there, with whole processes."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import wayward
+from attrs import frozen
+
+pytestmark = pytest.mark.slow
+
+EXPERIMENT = """
+title = "Going wrong"
+seeds = 2
+classifiers = ["wayward"]
+
+{variants}
+
+[data]
+source = "trials.csv"
+label = "what"
+
+[judge]
+folds = 2
+controls = false
+grasps = 0
+"""
+PROGRAM = (sys.executable, "-c", "from graspsense.cli.main import main; main()")
+
+
+@frozen
+class Lab:
+    """A folder with the experiment, and the environment in which the plugin is found."""
+
+    folder: Path
+    environ: dict[str, str]
+
+    def write(self, *hows):
+        variants = "\n".join(f'[[variants]]\nname = "{how}"\nclassifier.how = "{how}"' for how in hows)
+        (self.folder / "trials.csv").write_text(wayward.CSV)
+        (self.folder / "it.toml").write_text(EXPERIMENT.format(variants=variants))
+
+    def start(self, out, *arguments, **environ):
+        return subprocess.Popen(
+            [*PROGRAM, "experiment", "it.toml", "--out", out, "--json", *arguments],
+            cwd=self.folder,
+            env={**self.environ, **environ},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def run(self, out, *arguments, **environ):
+        process = self.start(out, *arguments, **environ)
+        stdout, stderr = process.communicate(timeout=300)
+        return process.returncode, json.loads(stdout) if stdout else {}, stderr
+
+    def results(self, out):
+        """Return state and result of each task in a folder, by name."""
+        found = {}
+        for path in (self.folder / out / "results").glob("*.json"):
+            done = json.loads(path.read_text())
+            found[done["name"]] = (done["state"], done["result"])
+        return found
+
+    def until(self, condition, process):
+        """Wait until something is there; fail where the process has ended before."""
+        while not condition():
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.02)
+
+    def waiting(self):
+        """Return how many tasks are being done and wait to be told to go on."""
+        return len(list((self.folder / "plugin" / "marks").glob("waits-*")))
+
+    def go(self):
+        (self.folder / "plugin" / "marks" / "go").touch()
+
+
+@pytest.fixture
+def lab(tmp_path):
+    return Lab(tmp_path, wayward.install(tmp_path / "plugin"))
+
+
+@pytest.mark.parametrize("executor", ["processes", "dask"])
+def test_whatever_a_task_does_the_others_are_kept(lab, executor):
+    lab.write("fine", "kills", "kills once", "raises", "prints", "exits")
+    how = ("-o", "seeds=1", "--executor", executor, "--workers", "2")
+    code, found, stderr = lab.run("out", *how)
+
+    assert code == 1, stderr
+    assert found["stopped"] is None
+    assert found["missing"] == 0
+    states = {name: state for name, (state, _) in lab.results("out").items()}
+    expected = {"fine": "done", "kills once": "done", "prints": "done", "kills": "failed", "raises": "failed"}
+    expected["exits"] = "failed"
+    assert states == {f"{name}, seed 0": state for name, state in expected.items()}
+    reasons = {one["task"]: one["reason"] for one in found["failed"]}
+    assert "Unpicklable: as it is told to" in reasons["raises, seed 0"]
+    assert reasons["exits, seed 0"] == "SystemExit: 3"
+    assert "it ended its worker" in reasons["kills, seed 0"]
+
+    kept = lab.results("out")
+    code, found, stderr = lab.run("out", *how, "--resume", WAYWARD_TAMED="1")
+
+    assert code == 0, stderr
+    assert (found["kept"], found["done"], found["complete"]) == (3, 3, True)
+    assert all(lab.results("out")[name] == one for name, one in kept.items() if one[0] == "done")
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
+@pytest.mark.parametrize("how", ["SIGKILL", "SIGINT", "SIGTERM"])
+def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
+    lab.write("fine", "waits")
+    process = lab.start("out", "--executor", "processes", "--workers", "2")
+    lab.until(lambda: len(lab.results("out")) >= 1 and lab.waiting() >= 1, process)
+    process.send_signal(getattr(signal, how))
+    process.wait(60)
+    if how == "SIGKILL":
+        lab.go()  # a worker whose run is gone ends with its task
+    stdout, _ = process.communicate(timeout=60)
+    if how != "SIGKILL":
+        assert process.returncode == 130
+        found = json.loads(stdout)
+        assert found["stopped"] == "interrupted"
+        assert 1 <= found["done"] < 4
+    before = lab.results("out")
+    lab.go()
+    code, found, stderr = lab.run("out", "--executor", "processes", "--workers", "2", "--resume")
+
+    assert code == 0, stderr
+    assert found["kept"] == len(before) < 4
+    assert found["complete"]
+    lab.run("undisturbed", "--executor", "serial")
+    assert lab.results("out") == lab.results("undisturbed")
+
+
+@pytest.fixture
+def cluster(lab):
+    """Start a real scheduler and two workers, as processes of their own."""
+    pytest.importorskip("distributed", reason="Dask is not installed")
+    started = []
+
+    def start(*arguments, **environ):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]],
+            env={**lab.environ, **environ},
+            cwd=lab.folder,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        started.append(process)
+        return process
+
+    note = lab.folder / "scheduler.json"
+    scheduler = start(
+        "dask_scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+        "--scheduler-file",
+        str(note),
+    )
+    lab.until(lambda: note.exists() and note.read_text().endswith("}"), scheduler)
+    address = json.loads(note.read_text())["address"]
+
+    def worker(**environ):
+        return start(
+            "dask_worker", address, "--nthreads", "1", "--no-dashboard", "--death-timeout", "60", **environ
+        )
+
+    yield scheduler, address, worker
+    for process in started:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait(30)
+
+
+def test_a_cluster_of_two_workers_gives_what_one_process_gives(lab, cluster):
+    _, address, worker = cluster
+    lab.write("fine")
+    (lab.folder / "it.toml").write_text(
+        EXPERIMENT.format(variants="")
+        .replace('["wayward"]', '["c45", "knn"]')
+        .replace("seeds = 2", "seeds = 3")
+    )
+    worker(), worker()
+    code, _, stderr = lab.run("dask", "--executor", f"dask:{address}")
+    assert code == 0, stderr
+    for executor in ("serial", "processes"):
+        code, _, stderr = lab.run(executor, "--executor", executor, "--workers", "2")
+        assert code == 0, stderr
+
+    assert len(lab.results("dask")) == 3
+    assert lab.results("dask") == lab.results("serial") == lab.results("processes")
+
+
+def test_a_scheduler_that_is_stopped_ends_the_run_with_an_account(lab, cluster):
+    scheduler, address, worker = cluster
+    lab.write("fine", "waits")
+    worker(), worker()
+    process = lab.start("out", "--executor", f"dask:{address}")
+    lab.until(lambda: len(lab.results("out")) >= 1 and lab.waiting() >= 1, process)
+    os.killpg(scheduler.pid, signal.SIGKILL)
+    stdout, stderr = process.communicate(timeout=120)
+
+    assert process.returncode == 1, stderr
+    found = json.loads(stdout)
+    assert "scheduler" in found["stopped"]
+    assert found["done"] >= 1
+    lab.go()
+    code, found, stderr = lab.run("out", "--executor", "serial", "--resume")
+    assert code == 0, stderr
+    assert found["kept"] >= 1
+    assert found["complete"]
+
+
+def test_workers_with_other_versions_are_refused(lab, cluster):
+    _, address, worker = cluster
+    lab.write("fine")
+    worker(PYTHONPATH="")
+    code, _, stderr = lab.run("out", "--executor", f"dask:{address}")
+
+    assert code == 2
+    assert "wayward: 0.3 here, not installed there" in stderr
+
+
+def test_no_scheduler_there(lab):
+    pytest.importorskip("distributed", reason="Dask is not installed")
+    lab.write("fine")
+    code, _, stderr = lab.run("out", "--executor", "dask:tcp://127.0.0.1:1")
+
+    assert code == 2
+    assert "no Dask scheduler answers at tcp://127.0.0.1:1" in stderr

@@ -1,0 +1,367 @@
+"""Experiments from a file: what it means, what is kept, what is done again."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+import wayward
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.cli.main import main
+from graspsense.core.errors import ConfigError
+from graspsense.evaluation.over_seeds import OverSeeds, mean_difference
+from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.experiment import read_experiment, shipped
+from graspsense.experiments.results import Results
+from graspsense.experiments.run import run_experiment
+from graspsense.experiments.summary import summarise
+from graspsense.experiments.task import Done, Task
+from graspsense.experiments.timing import TimeLeft
+
+EXPERIMENT = """
+title = "Near ones"
+question = "How many neighbours?"
+seeds = 2
+classifiers = ["c45", { type = "knn", name = "near" }]
+
+[sweep]
+"judge.folds" = [2, 4]
+
+[data]
+source = "mine.csv"
+label = "what"
+
+[judge]
+controls = false
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    (tmp_path / "mine.csv").write_text(wayward.CSV)
+    path = tmp_path / "mine.toml"
+    path.write_text(EXPERIMENT)
+    return path
+
+
+@pytest.fixture
+def run(capsys):
+    def run(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main([str(one) for one in arguments])
+        out, err = capsys.readouterr()
+        return ended.value.code or 0, out, err
+
+    return run
+
+
+def results_in(folder):
+    """Return what came of each task, without where and when."""
+    found = {}
+    for path in (Path(folder) / "results").glob("*.json"):
+        done = json.loads(path.read_text())
+        found[path.name] = (done["state"], done["result"])
+    return found
+
+
+def test_an_experiment_is_a_file_and_ends_in_a_page(run, file, tmp_path):
+    code, out, _ = run("experiment", file, "--out", tmp_path / "out", "--executor", "serial", "--json")
+    found = json.loads(out)
+
+    assert code == 0
+    assert found["complete"]
+    assert found["tasks"] == 4
+    assert {(one["case"], one["classifier"]) for one in found["arms"]} == {
+        (case, learner) for case in ("folds 2", "folds 4") for learner in ("c45", "near")
+    }
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "How many neighbours?" in page
+    assert len(results_in(tmp_path / "out")) == 4
+
+
+def test_what_lies_beside_the_results_gives_the_same_again(file, tmp_path):
+    planned = read_experiment(str(file))
+    run_experiment(planned, Results(tmp_path / "out"), Serial)
+    file.unlink()  # nothing but what was written is needed
+
+    again = read_experiment(str(tmp_path / "out" / "experiment.toml"))
+    run_experiment(again, Results(tmp_path / "again"), Serial)
+
+    assert results_in(tmp_path / "again") == results_in(tmp_path / "out")
+    assert len(results_in(tmp_path / "out")) == 4
+
+
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_what_is_shipped_resolves_to_itself(name, tmp_path):
+    planned = read_experiment(name, ["seeds=2"])
+    results = Results(tmp_path)
+    with results.alone():
+        results.begin(planned, "")
+
+    again = read_experiment(str(tmp_path / "experiment.toml"))
+
+    assert [task.key for task in again.tasks()] == [task.key for task in planned.tasks()]
+
+
+def test_shipped_experiments_lie_in_the_package():
+    folder = files("graspsense.experiments").joinpath("shipped")
+    assert {one.name for one in folder.iterdir()} >= {f"{name}.toml" for name in shipped()}
+    assert "probing_force" in shipped()
+
+
+def test_resume_does_what_is_missing_and_nothing_else(file, tmp_path):
+    planned, results = read_experiment(str(file)), Results(tmp_path / "out")
+    run_experiment(planned, results, Serial)
+    before = results_in(results.folder)
+    stamps = {path.name: path.stat().st_mtime_ns for path in (results.folder / "results").glob("*.json")}
+    lost, broken = sorted(before)[:2]
+    (results.folder / "results" / lost).unlink()
+    (results.folder / "results" / broken).write_text('{"key": "cut o')
+
+    with pytest.raises(ConfigError, match="--resume"):
+        run_experiment(planned, results, Serial)
+    account = run_experiment(planned, results, Serial, resume=True)
+
+    assert (account.kept, account.done, account.complete) == (2, 2, True)
+    assert results_in(results.folder) == before
+    for path in (results.folder / "results").glob("*.json"):
+        assert (path.stat().st_mtime_ns == stamps[path.name]) is (path.name not in (lost, broken))
+
+
+class Interrupted(Results):
+    """Results whose keeping is interrupted just after the disk has the second one, as Ctrl-C may be."""
+
+    def add(self, done):
+        super().add(done)
+        if len(list((self.folder / "results").glob("*.json"))) == 2:
+            raise KeyboardInterrupt
+
+
+def test_a_result_that_the_disk_has_counts_as_done_whenever_the_run_was_interrupted(file, tmp_path):
+    account = run_experiment(read_experiment(str(file)), Interrupted(tmp_path / "out"), Serial)
+
+    assert (account.done, account.missing, account.stopped) == (2, 2, "interrupted")
+
+
+@pytest.mark.parametrize("executor", ["serial", pytest.param("processes", marks=pytest.mark.slow)])
+def test_a_full_disk_ends_a_run_with_an_account_and_what_is_done_stays(
+    run, file, tmp_path, mounted, executor
+):
+    command = ("experiment", file, "--executor", executor, "--workers", 1)
+    run(*command, "--out", tmp_path / "whole")
+    files = len(list((tmp_path / "whole").rglob("*"))) + 2
+    # Two of the four results, and no page: a disk that has run out of files is as full as one out of bytes.
+    out = mounted(f"size=4m,nr_inodes={files - 3}") / "out"
+
+    code, told, err = run(*command, "--out", out)
+    assert code == 1
+    assert "4 tasks: 2 done now, 2 not done" in told
+    assert "stopped: " in told
+    assert "go on with the same command and --resume" in told
+    assert f"page        none: {out / 'report.html'} cannot be written: No space left on device" in told
+    assert "Traceback" not in told + err
+    kept = results_in(out)
+    assert len(kept) == 2
+    assert not list(out.rglob("*.part"))
+
+    code, told, err = run(*command, "--out", out, "--resume")
+    assert (code, told) == (2, "")
+    assert "cannot be written: No space left on device" in err
+    assert results_in(out) == kept
+
+    mounted(f"size=4m,nr_inodes={files}", remount=True)
+    code, told, _ = run(*command, "--out", out, "--resume")
+    assert code == 0
+    assert "2 done now, 2 kept from before" in told
+    assert results_in(out) == results_in(tmp_path / "whole")
+
+
+def test_a_task_that_fails_is_a_result_with_a_reason(run, file, tmp_path):
+    file.write_text(EXPERIMENT.replace("[2, 4]", "[2, 900]"))
+    code, out, _ = run("experiment", file, "--out", tmp_path / "out", "--executor", "serial")
+
+    assert code == 1
+    assert "4 tasks: 2 done now, 2 failed" in out
+    assert "failed 2 times: 40 trials cannot be cut into 900 folds" in out
+    assert "2 tasks failed and are not in these figures" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_one_run_at_a_time_writes_to_a_folder(file, tmp_path):
+    with Results(tmp_path / "out").alone(), pytest.raises(ConfigError, match="another run"):
+        run_experiment(read_experiment(str(file)), Results(tmp_path / "out"), Serial)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('title = "x"\nsedes = 2', r"mine.toml:2: sedes: .*Did you mean 'seeds'"),
+        ('title = "x"\nseeds = 0', r"mine.toml:2: seeds: 0 seeds: give at least 1"),
+        ('title = "x"\nkind = "juggle"', r"no kind of experiment 'juggle'"),
+        ('title = "x"\n[sweep]\n"controler.x" = [1]', r"mine.toml:3: sweep.controler.x: .*'controller'"),
+        ('title = "x"\n[sweep]\n"run.seed" = 3', r"mine.toml:3: sweep.run.seed: give a list of values"),
+        ('title = "x"\n[sweep]\n"controller.probing_forse_n" = [1.0]', r"Did you mean 'probing_force_n'"),
+        ('title = "x"\nclassifiers = ["c46"]', r"mine.toml:2: .*no classifier named 'c46'"),
+        ('title = "x"\nclassifiers = ["c45", "c45"]', r"two classifiers are called 'c45'"),
+        ('title = "x"\n[data]\ninstances = 0', r"mine.toml:3: data.instances: 0 instances"),
+        ('title = "x"\n[judge]\nfolds = 1', r"mine.toml:3: judge.folds"),
+        ('title = "x"\npipelines = ["nosuch"]', r"no pipeline named 'nosuch'"),
+        ("seeds = 2", r"needs the key 'title'"),
+    ],
+)
+def test_mistakes_in_a_file(tmp_path, text, said):
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+
+    with pytest.raises(ConfigError, match=said):
+        read_experiment(str(path))
+
+
+def test_options_are_laid_over_the_file(file):
+    planned = read_experiment(str(file), ["seeds=[7]", "data.only=a", "controller.probing_force_n=17"])
+
+    assert planned.seeds == (7,)
+    assert planned.cases[0].data.only == "a"
+    assert planned.cases[0].settings.values["controller"]["probing_force_n"] == 17.0
+
+
+def test_cases_are_every_combination_and_judge_by_the_same_folds(tmp_path):
+    path = tmp_path / "many.toml"
+    path.write_text(
+        'title = "x"\nclassifiers = ["knn"]\n[sweep]\n"controller.probing_force_n" = [17.0, 20.0]\n'
+        '"gripper.noise_counts" = [0.0, 15.0]\n"classifier.neighbours" = [1, 3, 5]\n'
+        '[[variants]]\nname = "few"\ndata.trials = 1\n[[variants]]\nname = "many"\ndata.trials = 2\n'
+    )
+    planned = read_experiment(str(path))
+
+    assert len(planned.cases) == 8
+    names = [case.name for case in planned.cases]
+    assert names[0] == "few, probing force 17 N, noise counts 0.0"
+    assert len(set(names)) == 8
+    # The classifiers at all points of the sweep over their keys are in one task, on the same trials.
+    assert [one.name for one in planned.cases[0].learners] == [f"knn, neighbours {k}" for k in (1, 3, 5)]
+    assert {case.data.trials for case in planned.cases} == {1, 2}
+
+
+def test_a_key_is_the_hash_of_what_the_result_follows_from():
+    task = Task(kind="recognise", params={"a": 1.0, "b": [2, float("inf")]}, seed=0, name="one")
+
+    assert Task.from_text(task.to_text()) == task
+    assert (
+        task.key == Task(kind="recognise", params={"b": [2, float("inf")], "a": 1.0}, seed=0, name="two").key
+    )
+    assert task.key != Task(kind="recognise", params={"a": 1.0, "b": [2, 3.0]}, seed=0).key
+    assert task.key != Task(kind="recognise", params=task.params, seed=1).key
+
+
+@given(st.integers(0, 400))
+def test_no_part_of_a_result_is_taken_for_one(end):
+    text = Done(key="k", name="n", state="done", result={"rate": 0.5}, made={"seconds": 1.5}).to_text()
+
+    assert Done.from_text(text).seconds == 1.5
+    with pytest.raises((ValueError, KeyError, TypeError)):
+        Done.from_text(text[: end % len(text)])
+
+
+def test_rates_over_seeds():
+    """By hand: s = 0.0645497, and Student's t at 97.5 % with 3 degrees of freedom is 3.182446."""
+    rate = OverSeeds((0.8, 0.9, 0.85, 0.95), 10_000)
+
+    assert rate.mean == pytest.approx(0.875)
+    assert rate.interval == pytest.approx((0.772287, 0.977713), abs=1e-5)
+    assert rate.further == pytest.approx((0.645328, 1.0), abs=1e-5)
+
+
+def test_seeds_that_agree_are_no_certainty():
+    low, high = OverSeeds((1.0, 1.0, 1.0), 50).interval
+
+    assert high == 1.0
+    assert low == pytest.approx(0.9750, abs=1e-4)  # Wilson's of 150 of 150
+    value, (low, high) = mean_difference((0.9, 0.9), (0.8, 0.8), 50)
+    assert value == pytest.approx(0.1)
+    assert low < value < high
+
+
+def test_one_seed_has_the_interval_of_its_trials():
+    assert OverSeeds((0.5,), 20).interval == pytest.approx((0.2993, 0.7007), abs=1e-4)
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8), st.integers(1, 500))
+def test_intervals_hold_the_mean_and_a_further_seed_is_less_sure(rates, n):
+    rate = OverSeeds(tuple(rates), n)
+    (low, high), (below, above) = rate.interval, rate.further
+
+    assert 0.0 <= below <= low + 1e-12 <= high + 2e-12 <= above + 3e-12 <= 1.0 + 4e-12
+    if len(rates) > 1:
+        assert low - 1e-9 <= rate.mean + 0.5 / n
+        assert rate.mean - 0.5 / n <= high + 1e-9
+
+
+def test_time_left_says_no_more_than_is_known():
+    left = TimeLeft(total=10, workers=2, clock=lambda: 0.0)
+    assert "not known" in left.words
+    for seconds in (9.0, 8.0, 2.0):  # the first of each worker compiles
+        left.add(seconds)
+    assert left.bounds_s is None
+    left.add(2.0)
+    assert left.bounds_s == (6.0, 6.0)  # six tasks of 2 s, two at once
+    assert left.words == "about 6 s left"
+    left.add(8.0)
+    low, high = left.bounds_s
+    assert low < 10.0 < high
+
+
+def test_train_here_test_there(file, tmp_path):
+    other = wayward.CSV.replace("a,", "b,", 5)
+    (tmp_path / "other.csv").write_text(other)
+    file.write_text(
+        EXPERIMENT.replace(
+            '[sweep]\n"judge.folds" = [2, 4]\n', '[test]\nsource = "other.csv"\nlabel = "what"\n'
+        )
+    )
+    planned, results = read_experiment(str(file), ["seeds=1"]), Results(tmp_path / "out")
+    run_experiment(planned, results, Serial)
+    arm = summarise(planned, results).arm(learner="c45")
+
+    assert arm.protocol == "other_trials"
+    assert arm.confusion.n == 40
+    assert sum(arm.confusion.counts[0]) == 15  # five labels were changed from a to b
+
+
+def test_an_experiment_on_simulated_grasps_keeps_what_was_felt(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(
+        'title = "x"\n[data]\nobjects = ["can:full_open", "can:empty_open"]\ntotal = 7\ninstances = 2\n'
+        "[judge]\nfolds = 2\ncontrols = false\ngrasps = 1\n"
+    )
+    planned, results = read_experiment(str(path)), Results(tmp_path / "out")
+    run_experiment(planned, results, Serial)
+    result = summarise(planned, results).results["", 0]
+
+    assert result["labels"] == ["can:full_open"] * 4 + ["can:empty_open"] * 3
+    assert sorted(set(result["instances"])) == ["can#0", "can#1"]
+    assert [one["label"] for one in result["grasps"]] == ["can:full_open", "can:empty_open"]
+    grasp = result["grasps"][0]
+    at_contact = grasp["t_s"].index(0.0)
+    assert grasp["phase"][at_contact - 1 : at_contact + 1] == ["approach", "squeeze"]
+    tree = result["judged"][0]["tree"]
+    assert tree[0]["parent"] is None
+    assert sum(node["trials"] for node in tree if node["parent"] == 0) == 7
+
+
+def test_what_there_is(run):
+    code, out, _ = run("experiment", "--json")
+
+    assert code == 0
+    assert {one["name"] for one in json.loads(out)} == set(shipped())
+
+
+def test_help_imports_nothing_heavy():
+    code = "import sys; from graspsense.cli.experiment import experiment; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert not {"numpy", "dask", "distributed", "matplotlib"} & set(loaded.split())

@@ -1,0 +1,74 @@
+"""Our own components conform, the PR2's in emulation; so do our distributions as they are installed."""
+
+from __future__ import annotations
+
+import pytest
+from grippers import bottle, squeezing
+
+from graspsense.core.plugins import installed
+from graspsense.testing import CHECKS, Conformance, examine, parametrize_checks
+from graspsense.trials.csv_squeeze import named
+
+
+def recording(folder):
+    lines = ["t;gap;left;right"]
+    for k in range(2200):
+        left, right = bottle(k * 0.001)
+        lines.append(f"{k * 0.001:.6f};{squeezing(k * 0.001):.9g};{left:.9g};{right:.9g}")
+    path = folder / "squeeze.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return "csv:" + named(str(path), {"time": ["t"], "gap": ["gap"], "force": ["left", "right"]})
+
+
+def settings(name, folder):
+    if name == "graspsense/replay":
+        return {"keys": {"recording": recording(folder)}}
+    if name == "graspsense-pr2-gripper/pr2":
+        return {
+            "keys": {"transport": "emulated"},
+            "unplugged": {"faults": {"unplug_at_s": 0.5}},
+            "absent": {"transport": "hidraw", "serial": "not there"},
+        }
+    return {}
+
+
+def components():
+    return [one.qualified for one in installed().components() if one.distribution.startswith("graspsense")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", components())
+def test_a_component_of_ours_conforms(name, tmp_path):
+    report = examine(name, **settings(name, tmp_path)).report()
+
+    assert report.failures == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted({name.partition("/")[0] for name in components()}))
+def test_a_distribution_of_ours_conforms(name):
+    examined = examine(name, wheel=False)  # .ci/run builds the wheels and runs from them
+    examined.subjects = examined.subjects[:1]
+
+    assert examined.report().failures == []
+
+
+def test_the_recorded_gripper_conforms(tmp_path):
+    assert examine("replay", keys={"recording": recording(tmp_path)}).report().failures == []
+
+
+class TestChitta(Conformance):
+    """The kit as a class to inherit from."""
+
+    name = "graspsense/chitta"
+
+
+def test_the_class_has_a_test_for_each_check_and_one_for_their_number():
+    tests = {name for name in vars(TestChitta) if name.startswith("test_")}
+    wanted = {f"test_{one.id.replace('-', '_')}" for one in CHECKS["feature-set"]}
+    assert tests == wanted | {"test_enough_checks_ran"}
+
+
+@parametrize_checks("graspsense/tree")
+def test_the_kit_as_cases(check):
+    check.run()

@@ -1,0 +1,164 @@
+"""The paper again: what is printed adds up or says why not, and what ours is held against it by."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.cli.main import main
+from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.experiment import read_experiment, shipped
+from graspsense.experiments.page import experiment_page, found_in
+from graspsense.experiments.paper.claims import split_by
+from graspsense.experiments.paper.published import published
+from graspsense.experiments.paper.rows import Row, rows
+from graspsense.experiments.results import EXPERIMENT, Results
+from graspsense.experiments.run import run_experiment
+from graspsense.experiments.summary import summarise
+
+pytest.importorskip("graspsense_sim_gripper", reason="the paper is done again in simulation")
+pytest.importorskip("graspsense_c45", reason="the paper's classifier")
+
+
+def test_printed_matrices_have_the_truth_where_it_is_said_to_be():
+    paper = published()
+    assert [sum(row) for row in paper.matrix("table_2").confusion.counts] == [66, 41, 42, 80]
+    assert [sum(row) for row in paper.matrix("table_5").confusion.counts] == [24] * 4
+    assert [sum(row) for row in paper.matrix("table_6").confusion.counts] == [71, 68, 68, 68]
+    assert (paper.matrix("table_5").confusion.correct, paper.matrix("table_6").confusion.correct) == (89, 207)
+
+
+@pytest.mark.parametrize("one", published().rates, ids=lambda one: one.id)
+def test_a_printed_rate_is_its_counts_or_a_note_says_what_is_wrong(one):
+    if one.correct is None or abs(one.correct / one.n - one.printed) > 0.001:
+        assert one.note
+    low, high = one.interval or (0.0, 1.0)
+    assert low <= one.rate <= high
+
+
+def test_every_published_rate_has_an_experiment_with_a_case_for_it():
+    planned = read_experiment("paper")
+    assert len(planned.seeds) >= 20
+    for one in published().rates:
+        alone = read_experiment(one.experiment)
+        assert any(case.part == one.experiment for case in planned.cases)
+        assert any(
+            all(case.at.get(key) == value for key, value in one.at.items())
+            and one.target in case.judge.targets
+            for case in alone.cases
+        )
+
+
+def test_numbers_of_trials_are_the_papers():
+    groups = {group.objects[0]: group for group in read_experiment("table_2").cases[0].data.groups}
+    assert {name: (one.total, one.instances) for name, one in groups.items()} == {
+        "odwalla": (66, 12),
+        "naked": (41, 10),
+        "can": (42, 12),
+        "water": (80, 16),
+    }
+
+
+def test_the_number_of_fitted_parameters_is_that_of_the_catalogue():
+    text = files("graspsense_sim_gripper").joinpath("catalogue.toml").read_text(encoding="utf-8")
+    fresh = text[: text.index("[odwalla_worn]")] + text[text.index("[naked]") :]
+    assert fresh.count('reason = "fitted') == published().fitted.count
+
+
+@given(
+    st.lists(st.floats(0, 10), min_size=1, max_size=12), st.lists(st.floats(0, 10), min_size=1, max_size=12)
+)
+def test_a_split_is_between_guessing_and_perfect_and_the_same_either_way(one, other):
+    share = split_by(one, other)
+    assert 0.5 <= share <= 1.0
+    assert share == pytest.approx(split_by(other, one))
+    assert split_by(one, [11.0 + v for v in other]) == 1.0
+
+
+FIGURE = """
+title = "Impacts"
+kind = "grasp"
+seeds = 2
+[[variants]]
+name = "force"
+controller = { type = "force", probing_force_n = 23.0 }
+[[variants]]
+name = "hybrid"
+controller = { type = "hybrid", probing_force_n = 23.0 }
+[data]
+objects = ["block"]
+instances = 1
+trials = 1
+"""
+
+TABLE = """
+title = "Two states"
+kind = "table"
+seeds = 2
+[data]
+objects = ["can:full_closed", "can:empty_open"]
+instances = 3
+trials = 1
+[judge]
+targets = ["state"]
+protocol = "stratified"
+folds = 3
+controls = false
+"""
+
+
+def test_parts_are_done_as_if_alone_and_the_resolved_file_means_the_same_tasks(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "fig_5.toml").write_text(FIGURE)
+    (tmp_path / "table_3.toml").write_text(TABLE)
+    (tmp_path / "both.toml").write_text(
+        'title = "Both"\nkind = "paper"\nseeds = [3]\nparts = ["fig_5.toml", "table_3.toml"]\n'
+    )
+    planned = read_experiment("both.toml")
+    assert planned.seeds == (3,)
+    assert [case.part for case in planned.cases] == ["fig_5", "fig_5", "table_3"]
+    alone = read_experiment("table_3.toml", ["seeds=[3]"])
+    assert planned.tasks()[-1].key == alone.tasks()[0].key
+
+    results = Results(tmp_path / "out")
+    account = run_experiment(planned, results, Serial)
+    assert account.complete
+    again = read_experiment(str(results.folder / EXPERIMENT))
+    assert {task.key for task in again.tasks()} == {task.key for task in planned.tasks()}
+
+    summary = summarise(planned, results)
+    found = found_in(summary)
+    row = next(one for one in rows(summary, published()) if one.published.id == "table_3_can")
+    assert isinstance(row, Row)
+    assert row.ours.n == 6
+    claims = {one["id"]: one for one in found.values["claims"]}
+    assert claims["fig_6_force"]["holds"]
+    page = experiment_page(summary, results).html()
+    assert "Fig. 5: force control on the block" in page
+    assert "Table III" in page
+    with pytest.raises(SystemExit) as ended:
+        main(["experiment", "both.toml", "--out", "out", "--resume", "--json"])
+    assert not ended.value.code
+    told = json.loads(capsys.readouterr().out)
+    assert told["findings"]["rows"][0]["id"] == "table_3_can"
+    assert "| Table III | state of a can, 20 N |" in (results.folder / "report.md").read_text()
+
+
+def test_a_force_controller_hits_harder_than_the_hybrid_one_and_neither_counts_as_felt_before(tmp_path):
+    (tmp_path / "impacts.toml").write_text(FIGURE)
+    planned = read_experiment(str(tmp_path / "impacts.toml"), ["seeds=1"])
+    results = Results(tmp_path / "out")
+    assert run_experiment(planned, results, Serial).complete
+    row = {name: result["rows"][0] for (name, _), result in summarise(planned, results).results.items()}
+    assert row["force"]["true_peak_force_n"] > 2 * row["hybrid"]["true_peak_force_n"]
+    assert row["force"]["speed_m_s"] > 0.05 > row["hybrid"]["speed_m_s"] == pytest.approx(0.01, rel=0.1)
+    assert row["hybrid"]["closed_m"] == pytest.approx(0.086 - row["hybrid"]["p_steady"], abs=2e-4)
+
+
+def test_every_shipped_experiment_can_be_planned():
+    for name in shipped():
+        assert read_experiment(name, ["seeds=1"]).tasks()

@@ -1,0 +1,107 @@
+"""`graspsense plugins check` and `new`: what they print, and how they end."""
+
+from __future__ import annotations
+
+import json
+
+import parts
+import pytest
+from mutants import MUTANTS
+
+from graspsense.cli.main import main
+from graspsense.core.plugins import IsolatedPlugins
+from graspsense.plugin_api import hookimpl
+from graspsense.testing import CHECKS
+
+
+class Lab:
+    GRASPSENSE_API = (1, 0)
+
+    def __init__(self, *entries):
+        self.entries = entries
+
+    @hookimpl
+    def graspsense_feature_sets(self):
+        return [one for one in self.entries if hasattr(one, "features")]
+
+    @hookimpl
+    def graspsense_sensor_backends(self):
+        return [one for one in self.entries if hasattr(one, "accepts")]
+
+
+@pytest.fixture
+def graspsense(capsys):
+    def call(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main(["plugins", *arguments])
+        said = capsys.readouterr()
+        return ended.value.code, said.out, said.err
+
+    return call
+
+
+def test_a_part_that_conforms(graspsense):
+    with IsolatedPlugins(Lab(parts.ENTRIES["feature-set"])):
+        code, out, err = graspsense("check", "peak")
+
+    count = len(CHECKS["feature-set"])
+    assert code == 0
+    assert out == (f"feature-set graspsense-test/peak: {count} checks: {count} passed; floor 15\nconforms\n")
+    assert err.count("passed   graspsense-test/peak") == count
+
+
+def test_a_part_that_does_not(graspsense):
+    (broken,) = [
+        one for one in MUTANTS if one.check == "reads-what-it-declares" and one.role == "feature-set"
+    ]
+    with IsolatedPlugins(Lab(broken.entry)):
+        code, out, _ = graspsense("check", "peak", "--json")
+
+    assert code == 1
+    found = json.loads(out)
+    assert found["conforms"] is False
+    (failure,) = found["failures"]
+    assert failure.startswith(
+        "graspsense-test/peak: reads-what-it-declares: without the channels it does not"
+    )
+    assert {one["state"] for one in found["results"]} == {"passed", "failed"}
+
+
+def test_settings_reach_the_part_that_is_checked(graspsense):
+    with IsolatedPlugins(Lab(parts.ENTRIES["sensor-backend"])):
+        code, out, err = graspsense(
+            *("check", "hand", "-o", "here=true", "--unplugged", "vanishes_s=0.3", "--absent", "here=false")
+        )
+        assert (code, out.splitlines()[-1]) == (0, "conforms")
+        assert "skipped" not in err
+
+        code, _, err = graspsense("check", "hand", "-o", "hear=true")
+        assert code == 1
+        assert "has no key 'hear'. Did you mean 'here'?" in err
+
+        code, _, err = graspsense("check", "hand", "-o", "nonsense")
+        assert code == 2
+        assert "-o nonsense: expected KEY=VALUE" in err
+
+
+def test_a_name_that_nobody_has(graspsense):
+    code, _, err = graspsense("check", "chita")
+
+    assert code == 2
+    assert "Did you mean 'chitta'?" in err
+
+
+def test_a_new_package_says_what_to_do_next(graspsense, tmp_path):
+    code, out, _ = graspsense("new", "lab-thing", "--role", "observer", "--folder", str(tmp_path / "thing"))
+
+    assert code == 0
+    assert f"  pip install -e {tmp_path / 'thing'} pytest\n  graspsense plugins list\n" in out
+    assert "  graspsense plugins check lab-thing\n" in out
+
+
+def test_a_group_without_a_command_prints_its_help_once(graspsense):
+    code, out, err = graspsense()
+
+    assert code == 2
+    assert (out + err).count("Usage:") == 1
+    assert "shows what there is" not in err

@@ -1,0 +1,54 @@
+"""`plugins new`: what it makes, and what it refuses. `.ci/scaffolds` installs and tests every one of them."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+
+import pytest
+
+from graspsense.core.errors import ConfigError
+from graspsense.scaffold.make import KINDS, make
+
+
+@pytest.mark.parametrize("role", KINDS)
+def test_a_package_is_whole(role, tmp_path):
+    make("lab-thing", role, tmp_path / "lab-thing")
+
+    folder = tmp_path / "lab-thing"
+    for path in folder.rglob("*"):
+        if path.is_file():
+            text = path.read_text()
+            assert not re.search(r"\$\{?[a-zA-Z]", text), f"{path.name} has a place that was not filled"
+            if path.suffix == ".py":
+                compile(text, str(path), "exec")
+    project = tomllib.loads((folder / "pyproject.toml").read_text())
+    assert project["project"]["entry-points"]["graspsense.plugins"] == {"lab-thing": "lab_thing.plugin"}
+    assert (folder / "src" / "lab_thing" / "py.typed").is_file()
+    assert (folder / "tests" / "test_conformance.py").is_file()
+
+
+@pytest.mark.parametrize(
+    ("name", "role", "says"),
+    [
+        (
+            "lab-thing",
+            "features",
+            r"no role 'features'. There are:\n  sensor-backend .* Did you mean 'feature-set'\?",
+        ),
+        ("Lab_Thing", "feature-set", "small letters, digits and single hyphens"),
+        ("graspsense-chitta", "feature-set", "name 'chitta' is taken by graspsense/chitta: choose another"),
+        ("hybrid", "controller", "name 'hybrid' is taken by graspsense/hybrid: choose another"),
+    ],
+)
+def test_what_it_refuses(name, role, says, tmp_path):
+    with pytest.raises(ConfigError, match=re.compile(says, re.DOTALL)):
+        make(name, role, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_is_written_over(tmp_path):
+    make("lab-thing", "observer", tmp_path / "lab-thing")
+
+    with pytest.raises(ConfigError, match="is there already: give another name, or --folder"):
+        make("lab-thing", "observer", tmp_path / "lab-thing")

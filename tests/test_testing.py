@@ -1,0 +1,123 @@
+"""The conformance kit: sound parts pass it, and each check catches a part that is broken in just that way."""
+
+from __future__ import annotations
+
+import mutants
+import parts
+import pytest
+
+from graspsense.core.plugins import Component, IsolatedPlugins
+from graspsense.plugin_api import hookimpl
+from graspsense.testing import CHECKS, FLOOR, examine
+from graspsense.testing.checks import Report, Result, outcome_of
+from graspsense.testing.conformance import Examined
+from graspsense.testing.subject import Subject
+
+ROLES = tuple(parts.ENTRIES)
+
+
+def subject(role, entry, keys=None):
+    given = {"unplugged": parts.HAND_LOST, "absent": parts.HAND_ABSENT} if role == "sensor-backend" else {}
+    return Subject(component=Component(role, entry, "graspsense-test", "0.1"), keys=keys or {}, **given)
+
+
+SLOW_CHECKS = {"ends-every-grasp", "read-keeps-its-timeout", "two-runs-do-not-meet"}
+
+
+@pytest.mark.parametrize(
+    "role", [pytest.param(one, marks=pytest.mark.slow if one == "controller" else ()) for one in ROLES]
+)
+def test_a_sound_part_passes_every_check(role):
+    report = Examined((subject(role, parts.ENTRIES[role]),)).report()
+
+    assert report.failures == []
+    assert [one.state for one in report.results] == ["passed"] * len(CHECKS[role])
+
+
+@pytest.mark.parametrize(
+    "one",
+    [
+        pytest.param(one, marks=pytest.mark.slow if one.check in SLOW_CHECKS else ())
+        for one in mutants.MUTANTS
+    ],
+    ids=lambda one: f"{one.role}-{one.check}",
+)
+def test_a_check_catches_its_mutant(one):
+    (check,) = [check for check in CHECKS[one.role] if check.id == one.check]
+
+    result = outcome_of(check, subject(one.role, one.entry, one.keys), {})
+
+    assert result.state == "failed"
+    assert one.says in result.text
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_every_check_has_a_mutant(role):
+    caught = {one.check for one in mutants.MUTANTS if one.role in (role, "feature-set")}
+    assert {one.id for one in CHECKS[role]} - caught == set()
+
+
+@pytest.mark.parametrize("role", CHECKS)
+def test_most_checks_of_a_role_must_run_and_each_says_what_it_demands(role):
+    assert len(CHECKS[role]) / 3 < FLOOR[role] <= len(CHECKS[role])
+    for check in CHECKS[role]:
+        assert len(check.title) > 20
+    assert len({check.id for check in CHECKS[role]}) == len(CHECKS[role])
+
+
+def test_a_part_of_which_most_was_skipped_does_not_conform():
+    results = [Result("lab/x", "classifier", f"c{i}", "t", "skipped", "no time") for i in range(12)]
+    results += [Result("lab/x", "classifier", f"d{i}", "t", "passed") for i in range(7)]
+
+    (failure,) = Report(results).failures
+
+    assert failure.startswith(
+        "lab/x: only 7 of 19 checks of a classifier ran, 15 must. Skipped: c0: no time;"
+    )
+
+
+def test_an_expected_failure_is_no_failure_and_an_unexpected_pass_is_one():
+    peak = subject("feature-set", parts.ENTRIES["feature-set"])
+    checks = {one.id: one for one in CHECKS["feature-set"]}
+    (broken,) = [one for one in mutants.MUTANTS if one.check == "same-trace-same-features"]
+    expected = {"same-trace-same-features": "counts on purpose"}
+
+    known = outcome_of(checks["same-trace-same-features"], subject("feature-set", broken.entry), expected)
+    passing = outcome_of(checks["same-trace-same-features"], peak, expected)
+
+    assert known.state == "expected failure"
+    assert known.text.startswith("counts on purpose (")
+    assert passing.state == "failed"
+    assert "take it out of the expected failures" in passing.text
+
+
+def test_one_part_is_found_by_name_and_a_wrong_name_by_likeness():
+    class Plugin:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl
+        def graspsense_feature_sets(self):
+            return [parts.ENTRIES["feature-set"]]
+
+    plugins = IsolatedPlugins(Plugin(), builtins=False)
+
+    assert examine("peak", plugins=plugins).report().counts() == (
+        f"feature-set graspsense-test/peak: {len(CHECKS['feature-set'])} checks: "
+        f"{len(CHECKS['feature-set'])} passed; floor {FLOOR['feature-set']}"
+    )
+    with pytest.raises(Exception, match=r"no plugin or component named 'peek'.*Did you mean 'peak'\?"):
+        examine("peek", plugins=plugins)
+    with pytest.raises(Exception, match="no check named nosuch"):
+        examine("peak", plugins=plugins, expected_failures={"nosuch": "why"})
+
+
+def test_where_the_class_cannot_be_had_nothing_else_is_reported():
+    (broken,) = [one for one in mutants.MUTANTS if "implement extract" in one.says]
+
+    report = Examined((subject("feature-set", broken.entry),)).report()
+
+    (failure,) = report.failures
+    assert "does not implement extract, which FeatureSet of plugin_api asks for" in failure
+    assert {one.text for one in report.results[1:]} == {
+        "nothing more can be checked before classes-can-be-imported passes"
+    }

@@ -1,0 +1,127 @@
+"""What recognition costs: the front, paired tests, and when to squeeze again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.experiment import read_experiment
+from graspsense.experiments.page import found_in
+from graspsense.experiments.results import Results
+from graspsense.experiments.run import run_experiment
+from graspsense.experiments.summary import summarise
+from graspsense.experiments.trade.front import front
+from graspsense.experiments.trade.next_squeeze import Promise, Squeezed, decide
+from graspsense.experiments.trade.paired import corrected_t, mcnemar
+
+CASES = st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=1, max_size=12)
+
+
+@given(CASES)
+def test_nothing_beats_what_is_on_the_front_and_something_there_beats_the_rest(cases):
+    costs, rates = [c for c, _ in cases], [r for _, r in cases]
+    on = front(costs, rates)
+    best = [one for one, kept in zip(cases, on, strict=True) if kept]
+    assert best
+    for (cost, rate), kept in zip(cases, on, strict=True):
+        beaten = any(c <= cost and r >= rate and (c, r) != (cost, rate) for c, r in best)
+        assert beaten is not kept
+
+
+def test_a_high_value_may_be_the_cheap_one():
+    assert front([1.0, 2.0], [0.5, 0.5], cheap_is_low=False) == [False, True]
+
+
+def test_mcnemar_counts_only_where_they_differ():
+    test = mcnemar([1, 1, 1, 1, 1, 1, 0, 1], [0, 0, 0, 0, 0, 0, 0, 1])
+    assert (test.only_first, test.only_second) == (6, 0)
+    assert test.p == pytest.approx(2 / 2**6)  # the two tails of six tosses
+    assert mcnemar([1, 0], [1, 0]).p == 1.0
+
+
+def test_the_corrected_t_test_is_the_plain_one_where_nothing_is_shared_and_milder_else():
+    from scipy.stats import ttest_1samp
+
+    differences = [0.1, 0.0, 0.05, 0.1, -0.02, 0.04]
+    plain = ttest_1samp(differences, 0.0).pvalue
+    assert corrected_t(differences, 0.0, 1.0) == pytest.approx(plain)
+    assert corrected_t(differences, 1.0, 9.0) > plain
+    assert corrected_t([0.0, 0.0], 1.0, 9.0) == 1.0
+
+
+KNOWS = np.array([[0.98, 0.02], [0.02, 0.98]])
+GUESSES = np.full((2, 2), 0.5)
+
+
+def squeezed(answer, seconds=1.0):
+    return Squeezed(answer=np.array([answer]), seconds=np.array([seconds]))
+
+
+def promise(confusion, seconds=1.0):
+    return Promise(confusion=confusion, seconds=np.full(2, seconds))
+
+
+def test_who_is_sure_at_the_contact_does_not_squeeze():
+    known = (squeezed(1), promise(KNOWS))
+    assert decide(0, known, {17.0: squeezed(0)}, {17.0: promise(KNOWS)}, 0.9, 3, 1.0) == (1, 0.0, 0)
+
+
+def test_who_is_not_takes_the_force_that_tells_most_per_second():
+    nothing = (squeezed(0), promise(GUESSES))
+    forces = {17.0: squeezed(0, 0.3), 20.0: squeezed(1, 0.4)}
+    informative = {17.0: promise(GUESSES, 0.3), 20.0: promise(KNOWS, 0.4)}
+    assert decide(0, nothing, forces, informative, 0.9, 3, 1.0) == (1, 0.4, 1)
+    # Both know as much, one in less time.
+    slow_and_fast = {17.0: promise(KNOWS, 0.3), 20.0: promise(KNOWS, 0.4)}
+    assert decide(0, nothing, forces, slow_and_fast, 0.9, 3, 1.0) == (0, 0.3, 1)
+
+
+def test_a_second_squeeze_costs_its_opening_and_never_more_than_allowed():
+    nothing = (squeezed(0), promise(GUESSES))
+    forces = {17.0: squeezed(0, 0.3), 20.0: squeezed(1, 0.4)}
+    promises = {17.0: promise(KNOWS, 0.3), 20.0: promise(KNOWS, 0.4)}
+    _, seconds, used = decide(0, nothing, forces, promises, 0.999, 3, 1.0)
+    assert (seconds, used) == (pytest.approx(0.3 + 1.0 + 0.4), 2)
+    assert decide(0, nothing, forces, promises, 0.999, 1, 1.0)[2] == 1
+
+
+COMMON = """
+title = "Small"
+seeds = 2
+[data]
+objects = ["can:full_closed", "can:empty_open"]
+instances = 5
+trials = {trials}
+[judge]
+targets = ["state"]
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "more", "trials"),
+    [
+        ("early", "moments_s = [0.0, 1.0]", 2),
+        ("squeezes", "most = 2", 2),
+        ("physics", "error = 0.1", 2),
+        ("next_squeeze", "forces_n = [17.0, 20.0]", 1),
+        ("compare", "", 2),
+    ],
+)
+def test_each_trade_runs_and_gives_advice(tmp_path, kind, more, trials):
+    pytest.importorskip("graspsense_sim_gripper")
+    pytest.importorskip("graspsense_c45")
+    (tmp_path / "small.toml").write_text(f'kind = "{kind}"\n{COMMON.format(trials=trials)}{more}\n')
+    planned = read_experiment(str(tmp_path / "small.toml"))
+    results = Results(tmp_path / "out")
+    account = run_experiment(planned, results, Serial)
+    assert account.complete, account.failed
+    found = found_in(summarise(planned, results))
+    assert found.answer
+    assert found.tables[0].rows
+    if kind == "early":
+        at = {row[0]: float(row[2]) for row in found.tables[0].rows}
+        assert at["0 s"] == 0.0 < at["1 s"] < 1.0  # at rest before a second is over

@@ -1,0 +1,142 @@
+"""What a simulator's accuracy costs: the table, the page, the picture, and what the command refuses."""
+
+import json
+import math
+
+import pytest
+
+from graspsense.cli.main import main
+from graspsense.core.errors import ConfigError
+from graspsense.report.simulation import (
+    PEAK,
+    TRACE,
+    Point,
+    SimulationTrade,
+    simulation_markdown,
+    simulation_png,
+    simulation_rows,
+)
+
+QUANTITIES = ("p_first", "delta_t", PEAK, TRACE)
+
+
+def point(method, step, seconds, error, role="curve", failure=""):
+    errors = {} if math.isnan(error) else dict.fromkeys(QUANTITIES, error)
+    return Point(
+        method=method,
+        fidelity="full",
+        step=step,
+        role=role,
+        seconds=seconds,
+        setup_s=12.5,
+        errors=errors,
+        failure=failure,
+    )
+
+
+TRADE = SimulationTrade(
+    gripper="lab/sim",
+    scenes=("block",),
+    seeds=(1,),
+    quantities=QUANTITIES,
+    points=(
+        point("halved", "to the end", 2.0, 0.0, role="reference"),
+        point("even", "1 ms", 1e-3, 1e-2),
+        point("even", "0.5 ms", 2e-3, 1e-3),
+        point("even", "5 ms", 1e-4, math.inf, failure="no number in the force trace"),
+        point("broken", "1 ms", math.nan, math.nan, failure="ZeroDivisionError: x"),
+        point("fine", "0.02 ms", 0.1, 1e-4, role="floor"),
+    ),
+    made={"date": "2026-11-21", "numpy": "2.4"},
+)
+PEERS = {
+    "made": {"date": "2026-11-20"},
+    "scene": "a surface",
+    "runs": [
+        {
+            "engine": "graspsense",
+            "what": "graspsense, as shipped",
+            "seconds": 1e-3,
+            "rms": 1e-5,
+            "peak": 1e-6,
+        },
+        {"engine": "Other Euler", "what": "Other 1.0 Euler", "seconds": 1e-1, "rms": None, "peak": None},
+    ],
+}
+
+
+def test_a_row_says_time_set_up_errors_and_what_failed():
+    header, rows = simulation_rows(TRADE)
+    assert header[3:5] == ("MS A GRASP", "SET-UP, S")
+    assert len(rows) == len(TRADE.points)
+    assert all(len(row) == len(header) for row in rows)
+    by_step = {(row[0], row[2]): row for row in rows}
+    assert by_step["even", "1 ms"][3:7] == ("1", "12.5", "1.0e-02", "1.0e-02")
+    assert by_step["even", "5 ms"][-1] == "no number in the force trace"
+    assert by_step["broken", "1 ms"][3:7] == ("-", "12.5", "-", "-")
+
+
+def test_the_page_has_both_tables_with_date_and_versions():
+    page = simulation_markdown(TRADE, PEERS)
+    assert "date 2026-11-21" in page
+    assert "numpy 2.4" in page
+    assert "| Other 1.0 Euler | 100 | - | - |" in page
+    assert "simulated" in page
+    assert "Other" not in simulation_markdown(TRADE, None)
+
+
+@pytest.mark.parametrize("peers", [None, PEERS])
+def test_the_picture_is_drawn_with_failures_floors_and_peers(tmp_path, peers):
+    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
+    file = tmp_path / "trade.png"
+    simulation_png(TRADE, peers, file)
+    assert file.read_bytes().startswith(b"\x89PNG")
+    with pytest.raises(ConfigError, match="cannot be written"):
+        simulation_png(TRADE, peers, tmp_path / "no" / "trade.png")
+
+
+def ended(arguments):
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    return end.value.code
+
+
+def test_a_gripper_with_nothing_to_trade_is_refused(capsys, tmp_path):
+    file = tmp_path / "squeeze.csv"
+    file.write_text("t,gap\n0,0\n")
+    options = ["--gripper", "replay", "-o", f"gripper.recording=csv:{file}"]
+    assert ended(["tradeoff", "simulation", *options]) == 2
+    assert "no accuracy to trade for time" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("{", "is not what"), ('{"runs": [{"what": 1}]}', "is not what"), ('{"runs": []}', "has no runs")],
+)
+def test_a_wrong_file_of_peers_is_told_before_anything_runs(capsys, tmp_path, text, says):
+    file = tmp_path / "peers.json"
+    file.write_text(text)
+    assert ended(["tradeoff", "simulation", "--peers", str(file)]) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_the_group_lists_what_there_is(capsys):
+    assert ended(["tradeoff", "--help"]) == 0
+    assert "simulation" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_the_simulator_gets_better_where_it_takes_longer(capsys, tmp_path):
+    page = tmp_path / "page.md"
+    arguments = ["--scene", "can:empty_open", "--seeds", "1", "--markdown", str(page), "--json"]
+    assert ended(["tradeoff", "simulation", *arguments]) == 0
+    found = json.loads(capsys.readouterr().out)
+    points = found["points"]
+    assert [p["role"] for p in points].count("reference") == 1
+    assert {p["failure"] for p in points} == {""}
+    assert found["quantities"][-2:] == [PEAK, TRACE]
+    assert all(p["seconds"] > 0.0 for p in points)
+    even = [p for p in points if p["method"] == "even steps, implicit"]
+    assert even[-1]["errors"][TRACE] < even[0]["errors"][TRACE] < 0.01
+    assert even[-1]["seconds"] > even[0]["seconds"]
+    assert "| even steps, implicit |" in page.read_text()
