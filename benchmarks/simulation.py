@@ -320,7 +320,7 @@ def compiling() -> dict[str, Any]:
         return {"compile_cold_s": None, "compile_warm_s": None}
     result: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as folder:
-        environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
+        environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "XDG_CACHE_HOME": folder}
         for name in ("compile_cold_s", "compile_warm_s"):
             done = subprocess.run(
                 [sys.executable, __file__, "--compile-once"],

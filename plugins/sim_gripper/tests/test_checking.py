@@ -22,6 +22,11 @@ CONFIG = SimConfig(sensor="ideal", spread=False)
 SHELL = ("elastic", {"k1_n_m": 2000.0, "k3_n_m3": 2e6})
 
 
+@pytest.fixture(autouse=True)
+def _nothing_kept(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
 def hybrid(**settings):
     return Control(create("controller", "hybrid", **settings), RunConfig())
 

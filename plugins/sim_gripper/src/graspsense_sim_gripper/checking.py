@@ -28,6 +28,7 @@ from graspsense.plugin_api import (
     revolutions_at,
     tick_params,
 )
+from graspsense_sim_gripper import kept_choices
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.deviation import Course, deviation
 from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, NotCompilable, grasp_of
@@ -110,13 +111,19 @@ def checked_choice(
 ) -> Choice:
     """Return the model of an object that a trial grasp has found to be as exact as asked for.
 
-    One whose steps are forced, a reference, and one whose peak cannot be resolved (which it says) are not checked.
-    Raises ConfigError where no model is as exact as asked for.
+    What was found is kept on disk. One whose steps are forced, a reference, and one whose peak cannot be resolved
+    (which it says) are not checked. Raises ConfigError where no model is as exact as asked for.
     """
     bare = evolve(config, **_WITHOUT)
     key = (bare, id(spec), control.key())
     if key not in _CHECKED:
-        _CHECKED[key] = spec, _check(bare, spec, control, loops)
+        mark = kept_choices.mark_of(spec, *control.key(), bare)
+        choice = None if mark is None else kept_choices.find(mark)
+        if choice is None:
+            choice = _check(bare, spec, control, loops)
+            if mark is not None and choice.check is not None:
+                kept_choices.keep(mark, choice)
+        _CHECKED[key] = spec, choice
     return _CHECKED[key][1]
 
 

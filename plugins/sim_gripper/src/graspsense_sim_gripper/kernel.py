@@ -256,11 +256,13 @@ def refusals() -> Iterator[None]:
         raise NotCompilable(f"the compiler refuses {where}: {reason}") from error
 
 
-def compiled(function: Callable[..., Any], memo: dict[str, Any]) -> Callable[..., Any]:
+def compiled(function: Callable[..., Any], memo: dict[Any, Any]) -> Callable[..., Any]:
     """Return `function` compiled with all it reaches; `memo` keeps what this process has compiled.
 
     Raises NotCompilable for closures and recursion, and where numba cannot be imported.
     """
+    if function in memo:
+        return memo[function]  # type: ignore[no-any-return]
     try:
         import numba
     except ImportError as error:
@@ -268,12 +270,13 @@ def compiled(function: Callable[..., Any], memo: dict[str, Any]) -> Callable[...
     _use_cache_folder()
     copies: Counter[types.CodeType] = Counter()
     _count(_plain(function), 1, (), copies)
-    return _compiled(function, memo, numba, copies, outermost=True)
+    memo[function] = _compiled(function, memo, numba, copies, outermost=True)
+    return memo[function]  # type: ignore[no-any-return]
 
 
 def _compiled(
     function: Callable[..., Any],
-    memo: dict[str, Any],
+    memo: dict[Any, Any],
     numba: types.ModuleType,
     copies: Counter[types.CodeType],
     outermost: bool,
@@ -373,6 +376,7 @@ def _functions(function: types.FunctionType) -> list[tuple[str, Any]]:
     ]
 
 
+@functools.cache
 def _places(code: types.CodeType) -> Counter[str]:
     """Return in how many places the code reads each global name."""
     return Counter(
@@ -416,6 +420,10 @@ def _use_cache_folder() -> None:
     import numba
 
     if "NUMBA_CACHE_DIR" not in os.environ:
-        base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-        folder = str(Path(base) / "graspsense" / "compiled")
+        folder = str(cache_folder() / "compiled")
         setattr(numba.config, "CACHE_DIR", folder)  # noqa: B010  numba fills its config at run time
+
+
+def cache_folder() -> Path:
+    """Return the user's folder for what takes time to make and can be made again."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "graspsense"
