@@ -228,10 +228,12 @@ class Ours:
         self.law = law or Law(None)
         # The trace is kept: what is measured includes recording it and making its columns.
         self.job = Job(config=config, controller=self.law, run=RunConfig(hold_s=0.0), draw=None, traces=True)
-        plain = loop_of(composition_of(config, self.setting), type(self.law).step)
-        self.loop = kernel.compiled(plain, _MEMO)
+        composition = composition_of(config, self.setting)
+        self.loop = kernel.compiled(loop_of(composition, type(self.law).step), _MEMO)
         self.storage = Storage()
-        self.once()
+        with kernel.first_call(by_maps=composition.shape is not None):
+            self.once()
+        self.loop = kernel.entry(self.loop)
 
     def once(self) -> Run:
         """Return one run."""

@@ -8,6 +8,7 @@ Controllers and features share these, so that they never disagree on when a thin
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 if TYPE_CHECKING:
@@ -82,6 +83,7 @@ def first_rest(
     begins = np.flatnonzero(lasting[skipped:]).tolist()
     times, gaps = times_s[skipped:].tolist(), gaps_m[skipped:].tolist()
     n -= skipped
+    at_once_m = rest_speed_m_s * rest_window_s
     end = following = 0
     while end < n:
         while begins[following] < end:
@@ -90,18 +92,21 @@ def first_rest(
         still = Stillness(times[since], gaps[since])
         # While it moves most stillnesses are short, so the first samples are looked at one by one, as `watch` does.
         few = min(since + FEW, n)
-        end = since
-        while end < few and abs(gaps[end] - still.gap_m) <= rest_speed_m_s * max(
-            rest_window_s, times[end] - still.since_t_s
-        ):
-            end += 1
+        end, at_m, since_s = since, still.gap_m, still.since_t_s
+        if times[few - 1] - since_s <= rest_window_s:
+            while end < few and abs(gaps[end] - at_m) <= at_once_m:
+                end += 1
+        else:
+            while end < few and watch(still, times[end], gaps[end], rest_speed_m_s, rest_window_s) is still:
+                end += 1
         if end == few:
             begin = skipped + few
             allowed = rest_speed_m_s * np.maximum(rest_window_s, times_s[begin:] - still.since_t_s)
             strayed = ~(np.abs(gaps_m[begin:] - still.gap_m) <= allowed)
             end = few + int(strayed.argmax()) if strayed.any() else n
         if end > since and at_rest(still, times[end - 1], rest_window_s):
-            full = since
+            # From just before the window is full, for what is left is a matter of rounding.
+            full = bisect_left(times, still.since_t_s + rest_window_s - 1e-9, since, end)
             while not at_rest(still, times[full], rest_window_s):
                 full += 1
             showing = shows[skipped + full : skipped + end]

@@ -185,7 +185,7 @@ class _Batch:
             return None
 
         def guarded(*given: Any) -> Any:
-            with _COMPILING, kernel.refusals():
+            with _COMPILING, kernel.first_call():
                 return loop(*given)
 
         return guarded, as_compiled(setting)
@@ -222,9 +222,9 @@ class _Batch:
                 try:
                     plain = loop_of(kinds, type(self.job.controller).step)
                     loop = kernel.compiled(plain, _MEMO)
-                    with kernel.refusals():
+                    with kernel.first_call(by_maps=kinds.shape is not None):
                         one = grasp_compiled(self.job, setting, loop, self._storage())
-                    self.loops[kinds] = loop
+                    self.loops[kinds] = kernel.entry(loop)
                     return one
                 except kernel.NotCompilable as error:
                     self.fast[kinds] = False

@@ -217,7 +217,7 @@ class _Stand(NamedTuple):
     sensed: SensorState
     state: Any
     rows: tuple[Any, ...]
-    """The columns of `COLUMNS`, piece by piece."""
+    """The columns of `COLUMNS` and the phases behind them, piece by piece."""
     far: bool
     """Whether it began with the fingers open."""
 
@@ -265,7 +265,7 @@ class _Trial:
             speed_m_s=columns[COLUMNS.index("velocity_m_s")],
             left_n=columns[COLUMNS.index("force_left_n")],
             right_n=columns[COLUMNS.index("force_right_n")],
-            ended=int(np.sum(columns[COLUMNS.index("phase")] <= HOLD)),
+            ended=int(np.sum(columns[-1] <= HOLD)),
             peak_n=at_end.body.peak_n,
         )
 
@@ -332,7 +332,8 @@ class _Trial:
             plant: Any = made.plant._replace(steps=steps) if by_maps is None else by_maps[0]
             while not _ended(state) and stands.ticks < until:
                 table = np.zeros((len(COLUMNS), min(until - stands.ticks, ROOM)))
-                given = table if on_arrays else table.tolist()
+                numbers = np.zeros(table.shape[1], np.int64)
+                given = (table, numbers) if on_arrays else (table.tolist(), numbers.tolist())
                 stands, body, sensed, state = loop(
                     plant,
                     made.sensor,
@@ -344,9 +345,9 @@ class _Trial:
                     sensed,
                     state,
                     *parts,
-                    given,
+                    *given,
                 )
-                rows = (*rows, np.asarray(given)[:, : stands.recorded])
+                rows = (*rows, np.vstack(given)[:, : stands.recorded])
             return _Stand(stands, body, sensed, state, rows, at.far)
 
         return drive

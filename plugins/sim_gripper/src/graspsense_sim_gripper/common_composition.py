@@ -11,9 +11,8 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from attrs import evolve
 
-from graspsense_sim_gripper.plant import PlantState, Squeezed
+from graspsense_sim_gripper.plant import PlantState
 from graspsense_sim_gripper.scene import catalogue
 from graspsense_sim_gripper.setting import Setting
 from graspsense_sim_gripper.terms.registry import find_term, in_order
@@ -39,58 +38,71 @@ def is_common(kinds: tuple[str, ...]) -> bool:
     return len(set(kinds)) == len(kinds) and set(kinds) <= set(common_kinds())
 
 
+@cache
 def compiled_kinds(kinds: tuple[str, ...]) -> tuple[str, ...]:
     """Return the composition in which an object of these terms is compiled."""
     return common_kinds() if is_common(kinds) else kinds
-
-
-def filled(setting: Setting) -> Setting:
-    """Return the same grasp in that composition."""
-    if setting.kinds == compiled_kinds(setting.kinds):
-        return setting
-    thing, body = setting.plant.thing, setting.body
-    own = dict(zip(setting.kinds, thing.terms[1:], strict=True))
-    terms = (thing.terms[0], *[own.get(kind) or _filler(kind).params for kind in common_kinds()])
-    left = _more(body.squeezed, setting.kinds)
-    return evolve(
-        setting,
-        kinds=common_kinds(),
-        plant=setting.plant._replace(thing=thing._replace(terms=terms)),
-        body=body._replace(
-            squeezed=left, right=left if body.right is body.squeezed else _more(body.right, setting.kinds)
-        ),
-    )
 
 
 def as_compiled(setting: Setting) -> Setting:
     """Return the same grasp as a compiled loop takes it: in that composition, the cells' figures as arrays."""
     # As tuples these would be handed over number by number, and looked up by a chain of comparisons.
     sensor = setting.sensor
+    weights, offset = np.array(sensor.left_weights, float), np.array(sensor.left_offset, float)
+    same = sensor.right_weights is sensor.left_weights, sensor.right_offset is sensor.left_offset
     sensor = sensor._replace(
-        left_weights=np.array(sensor.left_weights),
-        right_weights=np.array(sensor.right_weights),
-        left_offset=np.array(sensor.left_offset),
-        right_offset=np.array(sensor.right_offset),
+        left_weights=weights,
+        right_weights=weights if same[0] else np.array(sensor.right_weights, float),
+        left_offset=offset,
+        right_offset=offset if same[1] else np.array(sensor.right_offset, float),
     )
-    return evolve(filled(setting), sensor=sensor)
+    kinds, plant, body = setting.kinds, setting.plant, setting.body
+    if kinds != compiled_kinds(kinds):
+        thing = plant.thing
+        places = _places(kinds)
+        own, state = thing.terms, body.squeezed.states
+        terms = tuple([own[i] if i >= 0 else filler.params for i, filler in places])
+        left = body.squeezed._replace(states=tuple([state[i] if i >= 0 else f.state for i, f in places]))
+        right = left
+        if body.right is not body.squeezed:
+            state = body.right.states
+            right = body.right._replace(states=tuple([state[i] if i >= 0 else f.state for i, f in places]))
+        kinds, plant = common_kinds(), plant._replace(thing=thing._replace(terms=terms))
+        body = body._replace(squeezed=left, right=right)
+    return Setting(
+        kinds=kinds,
+        terms=setting.terms,
+        plant=plant,
+        body=body,
+        sensor=sensor,
+        sensed=setting.sensed,
+        dt_s=setting.dt_s,
+        choice=setting.choice,
+        drawn=setting.drawn,
+    )
 
 
 def emptied(body: PlantState, kinds: tuple[str, ...]) -> PlantState:
     """Return the plant of an object of these terms as it would be without what was filled in."""
     if kinds == compiled_kinds(kinds):
         return body
-    places = [0, *(1 + common_kinds().index(kind) for kind in kinds)]
-    squeezed, right = (
-        half._replace(states=tuple(half.states[i] for i in places)) for half in (body.squeezed, body.right)
+    own = _own_places(kinds)
+    left, right = (
+        half._replace(states=tuple([half.states[i] for i in own])) for half in (body.squeezed, body.right)
     )
-    return body._replace(squeezed=squeezed, right=right)
+    return body._replace(squeezed=left, right=right)
 
 
-def _more(half: Squeezed, kinds: tuple[str, ...]) -> Squeezed:
-    own = dict(zip(kinds, half.states[1:], strict=True))
-    return half._replace(
-        states=(half.states[0], *(own.get(kind, _filler(kind).state) for kind in common_kinds()))
-    )
+@cache
+def _places(kinds: tuple[str, ...]) -> tuple[tuple[int, Filler], ...]:
+    """Return for each place of the common composition which of an object's own it is (-1: none), and what fills it."""
+    first = Filler(Kept(0, None), None)
+    return (0, first), *((kinds.index(k) + 1 if k in kinds else -1, _filler(k)) for k in common_kinds())
+
+
+@cache
+def _own_places(kinds: tuple[str, ...]) -> tuple[int, ...]:
+    return 0, *(1 + common_kinds().index(kind) for kind in kinds)
 
 
 @cache

@@ -36,7 +36,7 @@ def mark_of(spec: ObjectSpec, step: Any, *settings: Any) -> str | None:
     None where the code of a term or of the controller cannot be told from other code.
     """
     digest = hashlib.sha256(_own_code())
-    functions = (step, *laws_of([kind for kind, _ in spec.terms]))
+    functions = (step, *laws_of(spec.kinds))
     try:
         marks = [fingerprint(one) for one in functions]
         # Beside its law a term says how fast it is, and what may stand for it.

@@ -110,11 +110,9 @@ COLUMNS: Final = (
     "force_right_n",
     "edge_left_n",
     "edge_right_n",
-    "status",
-    "phase",
     "command",
 )
-"""The rows of the recorded table, one a column of the trace."""
+"""The rows of the recorded table, one a column of the trace; the phases are whole numbers and stand beside it."""
 
 
 class Loop(NamedTuple):
@@ -146,19 +144,21 @@ def grasp(
     images: Any,
     image_times: Any,
     columns: Any,
+    phases: Any,
 ) -> tuple[Loop, PlantState, SensorState, Any]:
     """Run a grasp to its end, for `most_ticks`, or until there is no more room; return where everything stands.
 
     The runner's loop on arrays: `left_zero` and `right_zero` (22,) hold the zero before the tare and become the
-    tare; `images` (k, 2, 22), the last one NaN at first, and `image_times` (k,) are filled; `columns` (11, n) get
-    a number each a tick from the approach on: the frame without its `dt_s`, then phase and command. Where `images` or
-    `columns` are full it is called again, with larger ones that begin alike and with what it returned.
+    tare; `images` (k, 2, 22), the last one NaN at first, and `image_times` (k,) are filled; `columns` (9, n) and
+    `phases` (n,) get a number each a tick from the approach on: of the frame without its `dt_s` and status, of which a
+    simulated gripper has none, and of what is commanded. Where `images` or `columns` are full it is called again, with
+    larger ones that begin alike and with what it returned.
     """
     ticks, recorded, phase, untared, effort = loop
     room = len(columns[0])
     times, gaps, velocities, efforts = columns[0], columns[1], columns[2], columns[3]
     lefts, rights, left_edges, right_edges = columns[4], columns[5], columns[6], columns[7]
-    statuses, phases, commands = columns[8], columns[9], columns[10]
+    commands = columns[8]
     count = sensor.images
     pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
     while ticks < most_ticks and recorded < room and sensor.images < len(images):
@@ -187,7 +187,6 @@ def grasp(
             rights[recorded] = frame.force_right_n
             left_edges[recorded] = frame.edge_left_n
             right_edges[recorded] = frame.edge_right_n
-            statuses[recorded] = frame.status
             phases[recorded] = phase
             commands[recorded] = effort
             recorded += 1
@@ -241,10 +240,19 @@ class NotCompilable(Exception):
 
 
 @contextmanager
-def refusals() -> Iterator[None]:
-    """Turn what numba refuses in here into NotCompilable, with the line that it names."""
+def first_call(*, by_maps: bool = False) -> Iterator[None]:
+    """Have a compiled loop called for the first time in here, which compiles it; `by_maps`: one with exact maps.
+
+    Raises NotCompilable where numba refuses, with the line that it names.
+    """
+    import numba
     from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
+    config: Any = numba.config
+    # Rows side by side are then one instruction; of a loop without products it only makes more instructions.
+    given = config.SLP_VECTORIZE
+    if by_maps:
+        config.SLP_VECTORIZE = 1
     try:
         yield
     except (NumbaError, UnsupportedBytecodeError) as error:
@@ -254,6 +262,8 @@ def refusals() -> Iterator[None]:
             (line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__
         )
         raise NotCompilable(f"the compiler refuses {where}: {reason}") from error
+    finally:
+        config.SLP_VECTORIZE = given
 
 
 def compiled(function: Callable[..., Any], memo: dict[Any, Any]) -> Callable[..., Any]:
@@ -261,17 +271,27 @@ def compiled(function: Callable[..., Any], memo: dict[Any, Any]) -> Callable[...
 
     Raises NotCompilable for closures and recursion, and where numba cannot be imported.
     """
-    if function in memo:
-        return memo[function]  # type: ignore[no-any-return]
     try:
         import numba
     except ImportError as error:
         raise NotCompilable('numba is not installed: pip install "graspsense-sim-gripper[fast]"') from error
+    if function in memo:
+        return memo[function]  # type: ignore[no-any-return]
     _use_cache_folder()
     copies: Counter[types.CodeType] = Counter()
     _count(_plain(function), 1, (), copies)
     memo[function] = _compiled(function, memo, numba, copies, outermost=True)
     return memo[function]  # type: ignore[no-any-return]
+
+
+def entry(loop: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the machine code of a compiled loop that has run once, for more of the same.
+
+    Called through the loop it would look at the type of each number it is given, which takes twice as long as handing
+    them over. What was compiled for several types is returned as it is.
+    """
+    overloads = list(getattr(loop, "overloads", {}).values())
+    return overloads[0].entry_point if len(overloads) == 1 else loop
 
 
 def _compiled(

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -25,10 +26,12 @@ from graspsense_sim_gripper.linear_modes import (
     GUARDS,
     HALVINGS,
     RISING,
+    TOGETHER,
     Scene,
     Shape,
     listed,
     modes_of,
+    padded,
 )
 from graspsense_sim_gripper.plant import IN_SHAPE_M, PlantParams, PlantState, Squeezed
 from graspsense_sim_gripper.terms.registry import find_term
@@ -112,13 +115,14 @@ def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -
     if modes is None:
         return None
     shape, look, *numbers = modes
-    room = max(shape.columns, GUARDS + shape.ends + shape.states, 2 * shape.states)
+    room = padded(max(shape.columns, GUARDS + shape.ends + shape.states, 2 * shape.states))
     rooms: list[Any] = [np.zeros(room) for _ in range(6)]
     if not on_arrays:
         rooms = [room.tolist() for room in rooms]
     return Linear(plant, look, *numbers, *rooms), shape
 
 
+@lru_cache(maxsize=256)
 def _form(kind: str, params: Any) -> LinearForm | OwnContact | None:
     """Return a term's linear form. Raises TypeError where it has other states than the law."""
     term = find_term(kind)[1]
@@ -235,17 +239,22 @@ def move_of(
         puts = bind(_put_all, put=PUT[count], put_rest=puts)
         takes = bind(_take_all, take=bind(TAKE[count], made=type(state)), take_rest=takes)
     laid_out = {name.upper(): number for name, number in shape._asdict().items()}
+    watched = padded(GUARDS + shape.ends)
+    mapped, parted = padded(shape.states + GUARDS + shape.ends), padded(2 * shape.states)
     return bind(
         move,
         plant_move=plant_move,
         put_states=puts,
         take_states=takes,
-        _moved=bind(_product, ROWS=shape.states + GUARDS + shape.ends, COLUMNS=shape.columns),
-        _seen=bind(_product, ROWS=GUARDS + shape.ends, COLUMNS=shape.columns),
-        _simply=bind(_product, ROWS=GUARDS + shape.ends, COLUMNS=shape.states),
-        _parted=bind(_product, ROWS=2 * shape.states, COLUMNS=shape.states),
-        _bounded=bind(_product, ROWS=GUARDS + shape.ends, COLUMNS=2 * shape.states),
+        _moved=bind(_product, ROWS=mapped, COLUMNS=shape.columns),
+        _seen=bind(_product, ROWS=watched, COLUMNS=shape.columns),
+        _simply=bind(_product, ROWS=watched, COLUMNS=shape.states),
+        _parted=bind(_product, ROWS=parted, COLUMNS=shape.states),
+        _bounded=bind(_product, ROWS=watched, COLUMNS=2 * shape.states),
         _row=bind(_row, **laid_out),
+        WATCHED=watched,
+        MAPPED=mapped,
+        PARTED=parted,
         **laid_out,
         **tuples,
     )
@@ -262,18 +271,24 @@ plant_move: Any = _no_plant
 put_states: Any = _put_none
 take_states: Any = _take_none
 STATES = COLUMNS = PARTS = CREEPS = LAGS = MOTIONS = CONTACTS = ENDS = ROWS = 0
+WATCHED = MAPPED = PARTED = 0
+"""Rows of the tables of what is watched, of the maps, and of the ways, with those that pad them."""
 
 
 def _product(table: Any, at: int, vector: Any, product: Any) -> None:
     """Write the matrix that begins at this place of the table, times the vector, into `product`."""
     # Known not to be negative, which compiled code else asks at each number.
     at &= MOST_NUMBERS
-    for i in range(ROWS):
-        found = 0.0
+    for group in range(ROWS // TOGETHER):
+        i = group * TOGETHER
+        first = second = third = fourth = 0.0
         for j in range(COLUMNS):
-            found += table[at + j] * vector[j]
-        product[i] = found
-        at += COLUMNS
+            k, by = at + j * ROWS + i, vector[j]
+            first += table[k] * by
+            second += table[k + 1] * by
+            third += table[k + 2] * by
+            fourth += table[k + 3] * by
+        product[i], product[i + 1], product[i + 2], product[i + 3] = first, second, third, fourth
 
 
 _moved = _seen = _simply = _parted = _bounded = _product
@@ -322,8 +337,6 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
     leaves = (revolutions >= drive.open_rev and effort_n <= 0.0) or offset != 0.0 or felt_left != felt_right
     # What the plant has yet to bring up to date is the plant's.
     leaves = leaves or alone > 0.0
-    lines = GUARDS + ENDS
-    stride = (STATES + lines) * COLUMNS
 
     closure = thing.width_m - gap
     now[0] = closure
@@ -365,7 +378,7 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
             begins = False
             mode = ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
             allowed = mode * ENDS
-            _seen(watched, mode * lines * COLUMNS, now, was)
+            _seen(watched, mode * WATCHED * COLUMNS, now, was)
             if events == 0:
                 for k in range(CONTACTS):
                     if was[GUARDS + k] < -slack[allowed + k]:
@@ -380,7 +393,7 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
                     motion, begins = 2, True
         while (WHOLE >> least) > left:
             least += 1
-        _moved(maps, (mode * (HALVINGS + 1) + least) * stride, now, then)
+        _moved(maps, (mode * (HALVINGS + 1) + least) * MAPPED * COLUMNS, now, then)
         ends = False
         for k in range(ENDS):
             if then[STATES + GUARDS + k] < -slack[allowed + k]:
@@ -392,7 +405,7 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
             if not may:
                 for j in range(STATES):
                     change[j] = abs(then[j] - now[j])
-                _simply(simple, mode * lines * STATES, change, most)
+                _simply(simple, mode * WATCHED * STATES, change, most)
                 beyond = (1.0 + PEAK_SHARE) * max(top, then[STATES + FORCE])
                 may = not was[FORCE] + most[FORCE] <= beyond
                 for k in range(ENDS):
@@ -401,10 +414,10 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
             if may and not ends:
                 for j in range(STATES):
                     change[j] = then[j] - now[j]
-                _parted(ways, 2 * mode * STATES * STATES, change, by)
+                _parted(ways, mode * PARTED * STATES, change, by)
                 for j in range(2 * STATES):
                     by[j] = abs(by[j])
-                _bounded(bounds, 2 * mode * lines * STATES, by, most)
+                _bounded(bounds, 2 * mode * WATCHED * STATES, by, most)
                 may = False
                 for k in range(ENDS):
                     if not most[GUARDS + k] <= was[GUARDS + k]:

@@ -38,6 +38,8 @@ SAFETY: Final = 2.0
 APART_M: Final = 1e-15
 ROUNDING_N: Final = 1e-9
 """A distance and a force beyond zero that is rounding."""
+TOGETHER: Final = 4
+"""So many rows of a matrix are summed at once: side by side, they are one instruction to a processor."""
 FORCE, RISING, GUARDS = range(3)
 """What is watched in a mode, in this order: the force on a pad, its rate, what ends the mode by falling below 0."""
 STUCK, CLOSING, OPENING = range(3)
@@ -76,7 +78,7 @@ class Shape(NamedTuple):
 class Modes(NamedTuple):
     """Of each mode, in a row: maps of a tick over two to the power of 0 to HALVINGS to the state and what is watched
     then, rows of what is watched now, bounds of changes within a tick, rows of d and x as the mode begins with them,
-    and by how much what ends it may be below 0.
+    and by how much what ends it may be below 0. Matrices lie column by column, `padded` with rows of zeros.
     """
 
     shape: Shape
@@ -128,8 +130,21 @@ def modes_of(scene: Scene, dt: float) -> Modes | None:
     slack = np.array([one.slack for one in found])
     # What is watched then stands in the maps: a sum less to wait for.
     ahead = np.concatenate([maps[:, :, :n], watched[:, None] @ maps], axis=2)
-    tables = (ahead, watched, simple, ways, bounds, begin, slack)
+    tables = (*(_by_columns(matrix) for matrix in (ahead, watched, simple, ways, bounds)), begin, slack)
     return Modes(shape, look, *(np.ascontiguousarray(table).ravel() for table in tables))
+
+
+def padded(rows: int) -> int:
+    """Return as how many rows these lie in a table."""
+    return -(-rows // TOGETHER) * TOGETHER
+
+
+def _by_columns(matrices: Any) -> Any:
+    """Return matrices column by column, with rows of zeros added."""
+    rows = matrices.shape[-2]
+    wide = np.zeros((*matrices.shape[:-2], matrices.shape[-1], padded(rows)))
+    wide[..., :rows] = np.swapaxes(matrices, -1, -2)
+    return wide
 
 
 @lru_cache(maxsize=256)

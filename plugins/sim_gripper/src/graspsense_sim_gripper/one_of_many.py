@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from attrs import define, evolve, field, frozen
+from attrs import define, field, frozen
 
 from graspsense.plugin_api import (
     CELLS,
@@ -35,9 +35,10 @@ from graspsense_sim_gripper.plant import PlantState
 from graspsense_sim_gripper.setting import CELL_OFFSET, Chooser, Setting, device_info, set_scene
 from graspsense_sim_gripper.terms.registry import laws_of
 
-TICKS: Final = 8192
+TICKS: Final = 8200
+"""Room for ticks; a grasp that needs more is given more on the way. Columns a power of two apart would all fall into
+one set of a processor's cache, and drive each other out of it."""
 IMAGES: Final = 128
-"""Room for a grasp of 5 s; one that needs more is given more on the way."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -91,6 +92,7 @@ class Storage:
     cells: Any = field(factory=lambda: np.full((IMAGES, 2, CELLS), np.nan))
     times: Any = field(factory=lambda: np.zeros(IMAGES))
     columns: Any = field(factory=lambda: np.zeros((len(COLUMNS), TICKS)))
+    phases: Any = field(factory=lambda: np.zeros(TICKS, np.int64))
 
 
 class Composition(NamedTuple):
@@ -119,9 +121,18 @@ def loop_of(composition: Composition, step: Callable[..., Any]) -> Callable[...,
 
 
 def grasp_once(
-    job: Job, setting: Setting, loop: Callable[..., Any], storage: Storage, *, on_arrays: bool
+    job: Job,
+    setting: Setting,
+    loop: Callable[..., Any],
+    storage: Storage,
+    *,
+    on_arrays: bool,
+    kinds: tuple[str, ...] | None = None,
 ) -> Done:
-    """Grasp what `setting` describes by `loop`, on arrays where it is compiled, on lists where it is plain."""
+    """Grasp what `setting` describes by `loop`, on arrays where it is compiled, on lists where it is plain.
+
+    `kinds`: the object's own terms, where the setting is that of a composition which has more.
+    """
     most = math.ceil(seconds_at_most(job.run) / setting.dt_s)
     body, sensor, state, stands = setting.body, setting.sensed, job.begins, NOT_BEGUN
     blocks, ideal = setting.noise(), setting.sensor.ideal == 1
@@ -129,7 +140,14 @@ def grasp_once(
         _draw(storage.noise, blocks, 0)
     zeros = np.full((2, CELLS), CELL_OFFSET[0])
     storage.cells[-1] = math.nan
-    parts: tuple[Any, ...] = (*zeros, storage.noise, storage.cells, storage.times, storage.columns)
+    parts: tuple[Any, ...] = (
+        *zeros,
+        storage.noise,
+        storage.cells,
+        storage.times,
+        storage.columns,
+        storage.phases,
+    )
     if not on_arrays:
         # Lists are what plain Python indexes quickly.
         parts = tuple(part.tolist() for part in parts)
@@ -142,23 +160,27 @@ def grasp_once(
         if state.done == 1 or state.guard.stopped == 1 or stands.ticks >= most:
             break
         parts = _more_room(parts, blocks, on_arrays, ideal)
-    _, _, noise, cells, times, columns = parts
+    _, _, noise, cells, times, columns, phases = parts
     if on_arrays:
-        storage.noise, storage.cells, storage.times, storage.columns = noise, cells, times, columns
+        storage.noise, storage.cells, storage.times = noise, cells, times
+        storage.columns, storage.phases = columns, phases
+    if kinds is not None:
+        body = emptied(body, kinds)
     outcome, reason = ended_by_itself(state)
     if state.done == 0 and state.guard.stopped == 0:
         outcome, reason = Outcome.ABORTED, overdue(job.run)
     if not job.traces and job.draw is None:
         return done_of(job, outcome, reason, body, None)
-    table = np.asarray(columns)[:, : stands.recorded]
+    n = stands.recorded
+    table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
     cells, times = cells[: sensor.images], times[: sensor.images]
-    if job.traces and 2 * stands.recorded < len(columns[0]):
-        return done_of(job, outcome, reason, body, _trace(table.copy(), cells, times))
+    if job.traces and 2 * n < len(columns[0]):
+        return done_of(job, outcome, reason, body, _trace(table.copy(), numbers.copy(), cells, times))
     # What fills most of the storage, or is only drawn from, is not copied: what keeps some of it keeps the storage.
-    held = sys.getrefcount(columns)
-    done = done_of(job, outcome, reason, body, _trace(table, cells, times))
-    if sys.getrefcount(columns) > held:
-        storage.columns = np.empty_like(storage.columns)
+    held = sys.getrefcount(columns), sys.getrefcount(phases)
+    done = done_of(job, outcome, reason, body, _trace(table, numbers, cells, times))
+    if (sys.getrefcount(columns), sys.getrefcount(phases)) != held:
+        storage.columns, storage.phases = np.empty_like(storage.columns), np.empty_like(storage.phases)
     return done
 
 
@@ -170,8 +192,7 @@ def done_of(job: Job, outcome: Outcome, reason: str, body: PlantState, trace: Tr
 
 def grasp_compiled(job: Job, setting: Setting, loop: Callable[..., Any], storage: Storage) -> Done:
     """Grasp by the compiled loop of its `composition_of`."""
-    done = grasp_once(job, as_compiled(setting), loop, storage, on_arrays=True)
-    return evolve(done, body=emptied(done.body, setting.kinds))
+    return grasp_once(job, as_compiled(setting), loop, storage, on_arrays=True, kinds=setting.kinds)
 
 
 def chooser_of(job: Job, loops: Loops | None = None) -> Chooser:
@@ -200,14 +221,14 @@ def _more_room(
     parts: tuple[Any, ...], blocks: Iterator[Any], on_arrays: bool, ideal: bool
 ) -> tuple[Any, ...]:
     """Return the storage of a grasp under way, twice as large and beginning alike, with the noise for it."""
-    left_zero, right_zero, noise, cells, times, columns = (np.asarray(part) for part in parts)
+    left_zero, right_zero, noise, cells, times, columns, phases = (np.asarray(part) for part in parts)
     had = len(noise)
-    noise, cells, times = (_doubled(part) for part in (noise, cells, times))
+    noise, cells, times, phases = (_doubled(part) for part in (noise, cells, times, phases))
     columns = np.concatenate([columns, np.zeros_like(columns)], axis=1)
     cells[-1] = math.nan
     if not ideal:
         _draw(noise, blocks, had)
-    more = (left_zero, right_zero, noise, cells, times, columns)
+    more = (left_zero, right_zero, noise, cells, times, columns, phases)
     return more if on_arrays else tuple(part.tolist() for part in more)
 
 
@@ -215,16 +236,16 @@ def _doubled(part: Any) -> Any:
     return np.concatenate([part, np.zeros_like(part)])
 
 
-def _trace(table: Any, cells: Any, times: Any) -> Trace:
-    parts: dict[str, Any] = dict(zip(COLUMNS, table, strict=True))
-    for name in ("status", "phase"):
-        parts[name] = parts[name].astype(np.int64)
+def _trace(table: Any, phases: Any, cells: Any, times: Any) -> Trace:
     # The runner keeps the image that was there when the approach began, and those after it.
-    begin = int(np.searchsorted(times, parts["t_s"][0], side="right")) - 1 if len(table[0]) else 0
-    begin = max(begin, 0)
+    begin = 0
+    if len(phases) and len(times):
+        begin = max(int(np.searchsorted(times, table[0, 0], side="right")) - 1, 0)
     cells = np.asarray(cells).reshape(-1, 2, CELLS)
     return Trace(
-        **parts,
+        **dict(zip(COLUMNS, table, strict=True)),
+        status=np.zeros(len(phases), np.int64),
+        phase=phases,
         pad_t_s=np.array(times[begin:]),
         pad_left=cells[begin:, 0].copy(),
         pad_right=cells[begin:, 1].copy(),

@@ -62,6 +62,11 @@ class ObjectSpec:
     """Where it was read from; empty: the catalogue."""
 
     @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of its terms."""
+        return tuple(kind for kind, _ in self.terms)
+
+    @cached_property
     def stiff_parts(self) -> tuple[tuple[Any, tuple[bool, ...]], ...]:
         """The parameters of each term, and which of them a thicker wall makes larger."""
         parts = []
@@ -150,7 +155,7 @@ def kinds_in(scene: str) -> tuple[str, ...]:
     """Return the terms of the object in a scene, by the name of that. Raises UnknownName and ConfigError."""
     if scene == "none":
         return ()
-    return tuple(kind for kind, _ in find(numbered(scene)[0]).terms)
+    return find(numbered(scene)[0]).kinds
 
 
 def instance_of(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None = None) -> Instance:
@@ -178,7 +183,7 @@ def instance_of(spec: ObjectSpec, rng: np.random.Generator | None, number: int |
         offset_m=spec.offset_m + spec.offset_spread_m * clipped[2],
         share=min(spec.share + spec.share_spread * clipped[3], 1.0),
         table_n=spec.friction * spec.mass_kg * GRAVITY_M_S2,
-        kinds=tuple(kind for kind, _ in spec.terms),
+        kinds=spec.kinds,
         terms=tuple(parameters),
         patch_row=0.7 * clipped[4],
     )

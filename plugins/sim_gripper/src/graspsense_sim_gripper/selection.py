@@ -116,9 +116,9 @@ class Choice:
         """Return an instance of the object as this choice simulates it."""
         for i, name in enumerate(self.made[:-1]):
             if name != KEPT:
-                thing = dict(_without(thing, kinds, i, self.point))[name]
+                thing = _named(name, _without(thing, kinds, i, self.point))
         if self.made[-1] != KEPT:
-            thing = dict(_covers(thing))[self.made[-1]]
+            thing = _named(self.made[-1], _covers(thing))
         return thing._replace(swings=1 if self.swings else 0)
 
     def covers(self, peak_n: float) -> bool:
@@ -305,7 +305,7 @@ def _leave_out(
             for name, alone in offers[i]:
                 if alone > budget:
                     continue
-                other = dict(_without(thing, kinds, i, point))[name]
+                other = _named(name, _without(thing, kinds, i, point))
                 error = _difference(other, kinds, paths, forces, budget)
                 if error <= budget:
                     made[i], errors[i], thing, spent = name, alone, other, error
@@ -338,6 +338,10 @@ def _without(thing: Thing, kinds: Sequence[str], i: int, point: WorkingPoint) ->
             continue
         kept = Kept(0, one.params) if limit.params is None else Kept(1, limit.params)
         yield limit.name, _with(thing, i, kept, limit.spring_n_m, limit.damper_n_s_m)
+
+
+def _named(name: str, things: Iterator[tuple[str, Thing]]) -> Thing:
+    return next(thing for one, thing in things if one == name)
 
 
 def _with(thing: Thing, i: int, kept: Kept, spring: float, damper: float) -> Thing:
