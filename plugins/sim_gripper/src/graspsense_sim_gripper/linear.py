@@ -467,7 +467,7 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
                     now[3] = cover
                 if pressed == 1:
                     touched = 1
-        else:
+        elif left > 0:
             for j in range(GUARDS + ENDS):
                 was[j] = then[STATES + j]
             if least > look and events < MOST_EVENTS:
