@@ -122,10 +122,10 @@ def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
     process = lab.start("out", "--executor", "processes", "--workers", "2")
     lab.until(lambda: len(lab.results("out")) >= 1 and lab.waiting() >= 1, process)
     process.send_signal(getattr(signal, how))
-    process.wait(60)
+    process.wait(300)
     if how == "SIGKILL":
         lab.go()  # a worker whose run is gone ends with its task
-    stdout, _ = process.communicate(timeout=60)
+    stdout, _ = process.communicate(timeout=300)
     if how != "SIGKILL":
         assert process.returncode == 130
         found = json.loads(stdout)
@@ -183,7 +183,7 @@ def cluster(lab):
     for process in started:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
-        process.wait(30)
+        process.wait(300)
 
 
 def test_a_cluster_of_two_workers_gives_what_one_process_gives(lab, cluster):
@@ -212,7 +212,7 @@ def test_a_scheduler_that_is_stopped_ends_the_run_with_an_account(lab, cluster):
     process = lab.start("out", "--executor", f"dask:{address}")
     lab.until(lambda: len(lab.results("out")) >= 1 and lab.waiting() >= 1, process)
     os.killpg(scheduler.pid, signal.SIGKILL)
-    stdout, stderr = process.communicate(timeout=120)
+    stdout, stderr = process.communicate(timeout=300)
 
     assert process.returncode == 1, stderr
     found = json.loads(stdout)
