@@ -32,7 +32,14 @@ folds = 2
 controls = false
 grasps = 0
 """
-PROGRAM = (sys.executable, "-c", "from graspsense.cli.main import main; main()")
+MAIN = "from graspsense.cli.main import main; main()"
+PROGRAM = (sys.executable, "-c", MAIN)
+HURRIED = (
+    sys.executable,
+    "-c",
+    f"from graspsense.experiments.executors import dask; dask.CONNECTING_S = 1.0; {MAIN}",
+)
+"""Where nobody will answer, one second of waiting for it is as good as ten."""
 
 
 @frozen
@@ -47,9 +54,9 @@ class Lab:
         (self.folder / "trials.csv").write_text(wayward.CSV)
         (self.folder / "it.toml").write_text(EXPERIMENT.format(variants=variants))
 
-    def start(self, out, *arguments, **environ):
+    def start(self, out, *arguments, program=PROGRAM, **environ):
         return subprocess.Popen(
-            [*PROGRAM, "experiment", "it.toml", "--out", out, "--json", *arguments],
+            [*program, "experiment", "it.toml", "--out", out, "--json", *arguments],
             cwd=self.folder,
             env={**self.environ, **environ},
             stdout=subprocess.PIPE,
@@ -238,7 +245,7 @@ def test_workers_with_other_versions_are_refused(lab, cluster):
 def test_no_scheduler_there(lab):
     pytest.importorskip("distributed", reason="Dask is not installed")
     lab.write("fine")
-    code, _, stderr = lab.run("out", "--executor", "dask:tcp://127.0.0.1:1")
+    code, _, stderr = lab.run("out", "--executor", "dask:tcp://127.0.0.1:1", program=HURRIED)
 
     assert code == 2
-    assert "no Dask scheduler answers at tcp://127.0.0.1:1" in stderr
+    assert "no Dask scheduler answers at tcp://127.0.0.1:1 within 1 s" in stderr
