@@ -15,6 +15,9 @@ from graspsense.core.plugins import Plugins
 
 # Whoever starts the tests in the background of a shell has them ignore Ctrl-C, and every process they start, too.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+# The same for nohup and a hang-up: these tests go on ignoring it, what they start does not.
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda number, frame: None)
 
 
 @frozen

@@ -1,26 +1,33 @@
-"""Records trials of 1 kHz in real time until it is killed; the tests of kills start it as a program.
+"""Records trials of 1 kHz until it is killed; the tests of kills start it as a program.
 
     python paced_recorder.py STORE PROGRESS SECONDS
+
+A tick comes in real time, and later where the writing process has not read those before: so what is lost tells how
+recordings are written, and not how busy the machine is.
 
 Into the file PROGRESS goes, before each tick is handed over, the number of the trial and of the tick, and at the
 beginning of each trial the writer's process. Each trial that is kept is printed.
 """
 
+import fcntl
 import json
 import mmap
 import struct
 import sys
+import termios
 import time
 from pathlib import Path
 
 from kept import DEVICE_JSON, beginning, command, ending, frame, pads
 
-from graspsense.trials.layout import DEVICE, START, TRIAL
+from graspsense.trials.layout import DEVICE, START, TICK_WIRE, TRIAL
 from graspsense.trials.recorder import Recorder
 from graspsense.trials.store import RecordingFacts, Store
 
 PROGRESS = struct.Struct("<qqq")
 """Trial, tick handed over last, process id of the writer."""
+MOST_UNREAD = 20 * TICK_WIRE.size
+"""The writer reads every 10 ms, and may have as much again in its hands beside a chunk of 50 ms."""
 
 
 def main(folder: str, progress: str, seconds: float) -> None:
@@ -46,6 +53,8 @@ def record(store: Store, trial: int, seconds: float, shared: mmap.mmap) -> None:
     for k in range(round(seconds * 1000)):
         while (late := began + k * 0.001 - time.perf_counter()) > 0:
             time.sleep(late)
+        while unread(recorder) > MOST_UNREAD:
+            time.sleep(0.001)
         recorder.take(frame(k), pads(k), 3, command(k))
         PROGRESS.pack_into(shared, 0, trial, k, recorder._process.pid)
     end = ending()
@@ -55,6 +64,12 @@ def record(store: Store, trial: int, seconds: float, shared: mmap.mmap) -> None:
     store.add(start, end, DEVICE_JSON, facts)
     sys.stdout.write(f"kept {trial}\n")
     sys.stdout.flush()
+
+
+def unread(recorder: Recorder) -> int:
+    """Return how many bytes lie in the pipe to the writer."""
+    (size,) = struct.unpack("i", fcntl.ioctl(recorder._fd, termios.FIONREAD, bytes(4)))
+    return int(size)
 
 
 if __name__ == "__main__":

@@ -193,5 +193,5 @@ table = FeatureTable(names=("a",), units=("",), values=np.arange(20.0)[:, None])
 classifier.fit(table, ["x"] * 10 + ["y"] * 10, 0)
 assert ("sklearn" in sys.modules) is {name != "c45"}
 """
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
     assert ran.returncode == 0, ran.stderr

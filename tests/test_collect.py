@@ -164,7 +164,7 @@ def test_another_gripper_is_refused_before_it_moves(tmp_path):
 def test_it_takes_its_answers_from_a_pipe(tmp_path):
     command = [sys.executable, "-m", "graspsense", "collect", "--labels", "block", "--each", "1", *PLAIN]
     done = subprocess.run(
-        command, input="\n", capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False
+        command, input="\n", capture_output=True, text=True, cwd=tmp_path, timeout=300, check=False
     )
     assert done.returncode == 0, done.stderr
     assert "next: block  (1 of 1)" in done.stderr

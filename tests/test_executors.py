@@ -32,7 +32,14 @@ folds = 2
 controls = false
 grasps = 0
 """
-PROGRAM = (sys.executable, "-c", "from graspsense.cli.main import main; main()")
+MAIN = "from graspsense.cli.main import main; main()"
+PROGRAM = (sys.executable, "-c", MAIN)
+HURRIED = (
+    sys.executable,
+    "-c",
+    f"from graspsense.experiments.executors import dask; dask.CONNECTING_S = 1.0; {MAIN}",
+)
+"""Where nobody will answer, one second of waiting for it is as good as ten."""
 
 
 @frozen
@@ -47,9 +54,9 @@ class Lab:
         (self.folder / "trials.csv").write_text(wayward.CSV)
         (self.folder / "it.toml").write_text(EXPERIMENT.format(variants=variants))
 
-    def start(self, out, *arguments, **environ):
+    def start(self, out, *arguments, program=PROGRAM, **environ):
         return subprocess.Popen(
-            [*PROGRAM, "experiment", "it.toml", "--out", out, "--json", *arguments],
+            [*program, "experiment", "it.toml", "--out", out, "--json", *arguments],
             cwd=self.folder,
             env={**self.environ, **environ},
             stdout=subprocess.PIPE,
@@ -122,10 +129,10 @@ def test_a_run_that_is_ended_goes_on_where_it_was(lab, how):
     process = lab.start("out", "--executor", "processes", "--workers", "2")
     lab.until(lambda: len(lab.results("out")) >= 1 and lab.waiting() >= 1, process)
     process.send_signal(getattr(signal, how))
-    process.wait(60)
+    process.wait(300)
     if how == "SIGKILL":
         lab.go()  # a worker whose run is gone ends with its task
-    stdout, _ = process.communicate(timeout=60)
+    stdout, _ = process.communicate(timeout=300)
     if how != "SIGKILL":
         assert process.returncode == 130
         found = json.loads(stdout)
@@ -183,7 +190,7 @@ def cluster(lab):
     for process in started:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
-        process.wait(30)
+        process.wait(300)
 
 
 def test_a_cluster_of_two_workers_gives_what_one_process_gives(lab, cluster):
@@ -212,7 +219,7 @@ def test_a_scheduler_that_is_stopped_ends_the_run_with_an_account(lab, cluster):
     process = lab.start("out", "--executor", f"dask:{address}")
     lab.until(lambda: len(lab.results("out")) >= 1 and lab.waiting() >= 1, process)
     os.killpg(scheduler.pid, signal.SIGKILL)
-    stdout, stderr = process.communicate(timeout=120)
+    stdout, stderr = process.communicate(timeout=300)
 
     assert process.returncode == 1, stderr
     found = json.loads(stdout)
@@ -238,7 +245,7 @@ def test_workers_with_other_versions_are_refused(lab, cluster):
 def test_no_scheduler_there(lab):
     pytest.importorskip("distributed", reason="Dask is not installed")
     lab.write("fine")
-    code, _, stderr = lab.run("out", "--executor", "dask:tcp://127.0.0.1:1")
+    code, _, stderr = lab.run("out", "--executor", "dask:tcp://127.0.0.1:1", program=HURRIED)
 
     assert code == 2
-    assert "no Dask scheduler answers at tcp://127.0.0.1:1" in stderr
+    assert "no Dask scheduler answers at tcp://127.0.0.1:1 within 1 s" in stderr

@@ -141,7 +141,9 @@ def test_a_distribution_knows_no_other(folder):
 def loaded_after(code: str, *arguments: str) -> set[str]:
     """Run code in a fresh interpreter; return the top-level names of the modules it loaded."""
     code += "\nimport sys; print('loaded:', *{name.split('.')[0] for name in sys.modules}, file=sys.stderr)"
-    ran = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=60)
+    ran = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=300
+    )
     assert ran.returncode == 0, ran.stderr
     (line,) = [line for line in ran.stderr.splitlines() if line.startswith("loaded:")]
     return set(line.split()[1:])

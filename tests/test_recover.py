@@ -166,7 +166,7 @@ def test_what_needs_no_recovery_or_cannot_be_recovered_is_told(tmp_path):
 
 def run(*arguments):
     command = [sys.executable, "-m", "graspsense", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
 def test_the_commands_say_what_they_did(store):

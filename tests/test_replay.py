@@ -295,7 +295,7 @@ def test_nothing_in_the_hand_is_no_contact_and_a_full_bottle_is() -> None:
 def run(recording: str) -> subprocess.CompletedProcess[str]:
     program = [sys.executable, "-c", "from graspsense.cli.main import main; main()"]
     arguments = ["run", "--json", "--gripper", "replay", "-o", f"gripper.recording={recording}"]
-    return subprocess.run([*program, *arguments], capture_output=True, text=True, timeout=60)
+    return subprocess.run([*program, *arguments], capture_output=True, text=True, timeout=300)
 
 
 def test_run_ends_a_recorded_grasp_with_outcome_and_features(tmp_path: Path) -> None:

@@ -306,7 +306,7 @@ def measured(page, width, folder):
         ],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
     )
     (content,) = re.findall(r'<pre id="measured">(.*?)</pre>', done.stdout, flags=re.DOTALL)
     assert content, done.stderr[-2000:]

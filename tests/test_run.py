@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -20,7 +19,7 @@ def graspsense(*arguments, **environment):
         capture_output=True,
         text=True,
         env={**os.environ, **environment},
-        timeout=120,
+        timeout=300,
         check=False,
     )
 
@@ -147,11 +146,12 @@ def test_a_signal_ends_the_grasp_with_the_gripper_let_go(number):
         text=True,
     )
     assert process.stderr is not None
-    began = time.monotonic()
-    while "approach" not in process.stderr.readline():
-        assert time.monotonic() - began < 60.0
+    line = ""
+    while "approach" not in line:
+        line = process.stderr.readline()
+        assert line, "it ended by itself"
     process.send_signal(number)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=300)
     assert process.returncode == 4, err
     assert "outcome     aborted: interrupted" in out
     assert "Traceback" not in err

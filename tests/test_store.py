@@ -97,7 +97,7 @@ def test_readers_read_beside_a_writer_in_another_process(store):
     with store._transaction() as connection:
         connection.execute("UPDATE trial SET set_aside = 'pending'")
         done = subprocess.run(
-            [sys.executable, "-c", program, str(store.folder)], capture_output=True, text=True, timeout=60
+            [sys.executable, "-c", program, str(store.folder)], capture_output=True, text=True, timeout=300
         )
     assert (done.stdout.strip(), done.stderr) == ("1", "")
 
@@ -319,7 +319,7 @@ def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
 def test_a_grasp_ends_as_it_would_have_when_the_disk_fills_up_under_it(mounted):
     disk = mounted("size=200k")
     command = [sys.executable, "-m", "graspsense", "run", "-o", "classifier.type=none", "--save", str(disk)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 2
     assert "outcome     steady" in done.stdout
     assert "No space left on device" in done.stderr

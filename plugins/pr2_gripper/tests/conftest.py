@@ -16,9 +16,11 @@ from graspsense.plugin_api import create
 from graspsense_pr2_gripper import link, opening
 from graspsense_pr2_gripper.config import FaultConfig
 from graspsense_pr2_gripper.discovery import LIBRARY
+from graspsense_pr2_gripper.emulator import board as emulated_boards
 from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.firmware import Firmware
 from graspsense_pr2_gripper.protocol import Identity
+from graspsense_pr2_gripper.transports import emulated
 
 
 def identity(**changes: Any) -> Identity:
@@ -59,6 +61,46 @@ def no_thread_is_left() -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True)
+def threads_have_time_to_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where closing waits for a thread, a busy machine gets a minute; how closing is bounded has a test of its own."""
+    for module in (link, opening, emulated_boards):
+        monkeypatch.setattr(module, "JOIN_S", 60.0)
+
+
+@pytest.fixture
+def answered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A paced board goes on once its last report was answered by a command, however late: no machine is too slow.
+
+    Neither its watchdog nor the driver's bound on the age of reports can then tell the machine's load.
+    """
+    answer = threading.Event()
+    on_time, transport = emulated.on_time, emulated.PacedTransport
+    write, close = transport.write, transport.close
+
+    def periods(period_s: float) -> Iterator[float]:
+        for late_s in on_time(period_s):
+            yield late_s
+            answer.wait()
+            answer.clear()
+
+    def writes(self: Any, report: bytes) -> None:
+        try:
+            write(self, report)
+        finally:
+            answer.set()
+
+    def closes(self: Any) -> None:
+        self._stop = True
+        answer.set()
+        close(self)
+
+    monkeypatch.setattr(emulated, "on_time", periods)
+    monkeypatch.setattr(transport, "write", writes)
+    monkeypatch.setattr(transport, "close", closes)
+    monkeypatch.setattr(link, "OLDEST_S", math.inf)
+
+
+@pytest.fixture(autouse=True)
 def calibrations_apart(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     """No test reads or writes the calibrations of whoever runs it."""
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
@@ -75,6 +117,8 @@ class Machine:
         self.appear: list[tuple[int, str, Wire, str]] = []
         self.listings = 0
         self.at_endpoint: list[bytes] = []
+        self.now_s = 100.0
+        """The time of this machine alone: a millisecond passes with each tick."""
 
     def plug(self, path: str, wire: Wire, serial: str = "L7") -> None:
         self.plugged[path] = (wire, serial)
@@ -97,6 +141,7 @@ class Machine:
     def tick(self, count: int = 1) -> None:
         with self.changed:
             for _ in range(count):
+                self.now_s += 0.001
                 for handle in self.open_handles:
                     if handle.path in self.plugged:
                         for report in self.plugged[handle.path][0].step():

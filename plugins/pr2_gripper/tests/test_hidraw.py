@@ -6,7 +6,6 @@ docs/pr2.md.
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import pytest
@@ -30,7 +29,7 @@ def opened(machine: Any, board: Any) -> Any:
 def following(backend: Pr2Backend, machine: Any) -> Any:
     """Let a millisecond pass, and wait for what the reader makes of it."""
     machine.tick()
-    return backend.read(10.0)
+    return backend.read(60.0)
 
 
 def test_device_says_who_it_is(machine: Any, board: Any) -> None:
@@ -61,7 +60,7 @@ def test_pulled_cable_ends_a_read_at_once(opened: Pr2Backend, machine: Any) -> N
     following(opened, machine)
     machine.unplug("/dev/hidraw3")
     with pytest.raises(DeviceLost, match="read error"):
-        opened.read(10.0)
+        opened.read(60.0)
 
 
 def test_write_that_returns_minus_one_is_a_loss(opened: Pr2Backend, machine: Any) -> None:
@@ -107,12 +106,12 @@ def test_closing_tells_the_gripper_to_let_go(machine: Any, board: Any) -> None:
 
 def test_same_gripper_is_found_again_by_its_serial_at_another_path(machine: Any, board: Any) -> None:
     machine.plug("/dev/hidraw3", board())
-    backend = Pr2Backend(Pr2Config())
+    backend = Pr2Backend(Pr2Config(reconnect_s=60.0))
     backend.open(0)
     following(backend, machine)
     machine.unplug("/dev/hidraw3")
     with pytest.raises(DeviceLost):
-        backend.read(10.0)
+        backend.read(60.0)
     backend.close()
     # First another gripper appears in its place, then ours elsewhere.
     machine.plug("/dev/hidraw3", board(serial="R2"), "R2")
@@ -130,17 +129,15 @@ def test_waiting_for_a_lost_gripper_ends(machine: Any, board: Any) -> None:
     backend.open(0)
     machine.unplug("/dev/hidraw3")
     with pytest.raises(DeviceLost):
-        backend.read(10.0)
+        backend.read(60.0)
     with pytest.raises(NoDevice, match="with serial number 'L7'"):
         backend.open(0)
 
 
 def test_first_opening_does_not_wait(machine: Any) -> None:
-    began = time.monotonic()
     with pytest.raises(NoDevice):
         Pr2Backend(Pr2Config(reconnect_s=3600.0)).open(0)
-    assert time.monotonic() - began < 600.0
-    assert machine.listings == 1
+    assert machine.listings == 1, "nobody looked again"
 
 
 def test_mouse_under_our_numbers_is_not_driven(machine: Any, board: Any) -> None:

@@ -65,7 +65,7 @@ class Host:
 
     def __init__(self, connection: socket.socket) -> None:
         self.connection = connection
-        connection.settimeout(10.0)
+        connection.settimeout(60.0)
         self.number = 0
 
     def submit(
@@ -120,7 +120,7 @@ class Served:
 
     def close(self) -> None:
         self.server.hang_up()
-        self.thread.join(10.0)
+        self.thread.join(60.0)
         assert not self.thread.is_alive()
         self.ours.close()
         self.host.connection.close()
@@ -294,14 +294,53 @@ def ports(monkeypatch: pytest.MonkeyPatch) -> list[SocketPort]:
     return made
 
 
+class HandClock:
+    """In place of `on_time`: a period passes when the test says so, and freely once it is over."""
+
+    def __init__(self) -> None:
+        self._due, self._past = threading.Semaphore(0), threading.Semaphore(0)
+        self._free = False
+
+    def __call__(self, period_s: float) -> Iterator[float]:
+        while self._free or self._due.acquire():
+            yield 0.0
+            self._past.release()
+
+    def let_pass(self, periods: int) -> None:
+        """Return when they are over."""
+        self.begin(periods)
+        for _ in range(periods):
+            assert self._past.acquire(timeout=60.0)
+
+    def begin(self, periods: int = 1) -> None:
+        self._due.release(periods)
+
+    def free(self) -> None:
+        self._free = True
+        self.begin()
+
+
 @pytest.fixture
-def emulated(ports: list[SocketPort]) -> Iterator[tuple[EmulatedBoard, SocketPort]]:
+def clock(monkeypatch: pytest.MonkeyPatch) -> HandClock:
+    """The time of an emulated board."""
+    made = HandClock()
+    monkeypatch.setattr(boards, "on_time", made)
+    return made
+
+
+@pytest.fixture
+def emulated(ports: list[SocketPort], clock: HandClock) -> Iterator[tuple[EmulatedBoard, SocketPort]]:
     """The whole emulator over a socket, its jaws at a block."""
     config = Pr2Config(transport="emulated", serial="L7", object="block")
     board = EmulatedBoard(config, "usb", 0)
     board.tell("plug")
     yield board, ports[0]
+    clock.free()
     board.close()
+
+
+SQUEEZE = encode_output(OutputReport(1, EFFORT_KIND, 20_000_000, OWN_LIMIT, OWN_LIMIT))
+WATCHDOG_PERIODS = 100
 
 
 def test_the_command_does_what_it_is_told_until_it_is_told_to_quit(
@@ -329,20 +368,24 @@ def test_the_command_does_what_it_is_told_until_it_is_told_to_quit(
     assert ports[0].served is None, "it is gone with the command"
 
 
-def test_a_pulled_plug_leaves_nothing_squeezing(emulated: tuple[EmulatedBoard, SocketPort]) -> None:
+def test_a_pulled_plug_leaves_nothing_squeezing(
+    emulated: tuple[EmulatedBoard, SocketPort], clock: HandClock
+) -> None:
     board, port = emulated
     host = port.host
     status, feature = host.control(0xA1, 1, 3 << 8 | 3, 0, 64)
     assert status == 0
     assert decode_identity(feature).serial == "L7"
-    squeeze = encode_output(OutputReport(1, EFFORT_KIND, 20_000_000, OWN_LIMIT, OWN_LIMIT))
-    host.submit(1, False, 64, data=squeeze)
+    host.submit(1, False, 64, data=SQUEEZE)
     assert host.answer(reads=False)[2] == 0
-    assert board.state()["effort_n"] == 20.0
     board.tell("unplug")
-    board_lets_go(board)
+    clock.let_pass(WATCHDOG_PERIODS // 2)
+    assert board.state()["effort_n"] == 20.0, "it still hopes for a command"
+    clock.let_pass(WATCHDOG_PERIODS)
+    assert board.state()["effort_n"] == 0.0
     board.tell("plug")
     port.host.submit(1, True, 64)
+    clock.let_pass(1)
     report = decode_input(port.host.answer()[3])
     assert report.echo == 1, "the board kept its power"
     assert report.status & 1, "and says that it has let go"
@@ -350,17 +393,16 @@ def test_a_pulled_plug_leaves_nothing_squeezing(emulated: tuple[EmulatedBoard, S
 
 @pytest.mark.parametrize("word", ["silent", "stalled"])
 def test_a_mood_stops_the_reports_and_the_watchdog_lets_go(
-    emulated: tuple[EmulatedBoard, SocketPort], word: str
+    emulated: tuple[EmulatedBoard, SocketPort], clock: HandClock, word: str
 ) -> None:
     board, port = emulated
-    squeeze = encode_output(OutputReport(1, EFFORT_KIND, 20_000_000, OWN_LIMIT, OWN_LIMIT))
-    port.host.submit(1, False, 64, data=squeeze)
+    port.host.submit(1, False, 64, data=SQUEEZE)
     port.host.answer(reads=False)
+    clock.let_pass(3)
     board.tell(word)
-    sent = board.state()["sent"]
-    board_lets_go(board)
-    # One more at most: the report that was under way when the word came.
-    assert board.state()["sent"] <= sent + 1
+    assert (board.state()["sent"], board.state()["effort_n"]) == (3, 20.0)
+    clock.let_pass(WATCHDOG_PERIODS)
+    assert (board.state()["sent"], board.state()["effort_n"]) == (3, 0.0)
     read = port.host.submit(1, True, 64)
     unlink = port.host.unlink(read)
     answer = port.host.answer()[:2]
@@ -370,21 +412,12 @@ def test_a_mood_stops_the_reports_and_the_watchdog_lets_go(
 
 
 def test_a_body_that_fails_is_a_device_that_goes_away(
-    emulated: tuple[EmulatedBoard, SocketPort], monkeypatch: pytest.MonkeyPatch
+    emulated: tuple[EmulatedBoard, SocketPort], clock: HandClock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     board, _ = emulated
     body = create("sensor-backend", "sim")
     monkeypatch.setattr(type(body), "read", lambda self, timeout_s: 1 / 0)
-    board._thread.join(10.0)
+    clock.begin()
+    board._thread.join(60.0)
     state = board.state()
     assert (state["plugged"], state["failed"]) == (False, "ZeroDivisionError: division by zero")
-
-
-def board_lets_go(board: EmulatedBoard) -> None:
-    """Wait until it does; how long that may take is the firmware's own test."""
-    turn = threading.Event()
-    for _ in range(2000):
-        if board.state()["effort_n"] == 0.0:
-            return
-        turn.wait(0.005)
-    raise AssertionError("the emulated board did not let go")

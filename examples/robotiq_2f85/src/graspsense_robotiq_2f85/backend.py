@@ -96,7 +96,7 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
                 f"no 2F-85 at {config.port}, unit {config.address}: {error}. Look at its power and cable, at "
                 "gripper.port and gripper.address; on Linux be in the group dialout"
             ) from error
-        self._began_s = self._last_s = time.monotonic()
+        self._began_s = self._last_s = self._due_s = time.monotonic()
         self._target_m = gap_of(status.position)
         self._recent: deque[tuple[float, float]] = deque(maxlen=SLOPE_FRAMES)
         self._frames = self._retries = 0
@@ -117,12 +117,14 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
 
     def read(self, timeout_s: float) -> Reading | None:
         """Wait for the next hundredth of a second, then ask the gripper. Raises DeviceLost."""
-        wait_s = self._last_s + 1.0 / RATE_HZ - time.monotonic()
+        wait_s = self._due_s - time.monotonic()
         if wait_s > timeout_s:
             time.sleep(timeout_s)
             return None
         if wait_s > 0.0:
             time.sleep(wait_s)
+        # On a grid, so that what an exchange takes does not lower the rate; what is late is not made up for.
+        self._due_s = max(self._due_s, time.monotonic()) + 1.0 / RATE_HZ
         status = self._exchanged()
         now_s = time.monotonic()
         t_s, dt_s, self._last_s = now_s - self._began_s, now_s - self._last_s, now_s

@@ -82,7 +82,8 @@ class Fingers:
 
     def _moved(self, position: int, speed: int, force: int, passed_s: float) -> float:
         """Move the fingers and return the motor's current."""
-        wanted = gap_of(min(max(position, OPEN_BYTE), CLOSED_BYTE))
+        nearest = min(max(position, OPEN_BYTE), CLOSED_BYTE)
+        wanted = gap_of(nearest)
         step = value_of(speed, SPEEDS_M_S) * passed_s
         # Where the spring pushes as hard as the motor may.
         stop = self._thing_m - value_of(force, FORCES_N) / self._stiffness_n_m
@@ -93,7 +94,8 @@ class Fingers:
         else:
             reached = min(wanted, before + step)
             self._object = MOVING
-        if position_of(reached) == position:
+        # Asked for a position beyond its stroke, it is there at the stroke's end.
+        if position_of(reached) == nearest:
             self._object = THERE
         self._gap_m = reached
         moving = FREE_RUNNING_A if abs(reached - before) > 1e-9 else 0.0

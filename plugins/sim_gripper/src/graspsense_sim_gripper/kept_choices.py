@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from attrs import asdict
 
-import graspsense
+import graspsense.plugin_api as plugin_api
 from graspsense_sim_gripper.kernel import NotCompilable, cache_folder, fingerprint
 from graspsense_sim_gripper.plant import Steps
 from graspsense_sim_gripper.scene import ObjectSpec
@@ -52,7 +52,7 @@ def mark_of(spec: ObjectSpec, step: Any, *settings: Any) -> str | None:
 @cache
 def _own_code() -> bytes:
     """Return a mark of our own code as it stands on disk."""
-    packages = (Path(__file__).parent, Path(graspsense.__file__).parent / "core")
+    packages = (Path(__file__).parent, Path(plugin_api.__file__).parent / "core")
     return "".join(_stamp(source) for one in packages for source in sorted(one.rglob("*.py"))).encode()
 
 
