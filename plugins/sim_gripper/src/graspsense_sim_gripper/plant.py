@@ -31,6 +31,8 @@ from graspsense_sim_gripper.terms.relaxation import late_share, mean_share
 MOST_STEPS: Final = 20_000
 """A tick is cut into at most so many steps; what is then left of it is taken whole, and the state says so."""
 MOST_HALVINGS: Final = 4
+LEAST_TOLERANCE: Final = 1e-8
+"""No halving asks for less: the error of a step is then rounding, which shorter steps make worse."""
 SHORTEST_S: Final = 1e-10
 SEARCH: Final = 100
 """Most steps of a search for where forces balance."""
@@ -43,6 +45,8 @@ LONG_S: Final = 10.0
 """Steps longer than this are as long as one likes."""
 TOUCH_S: Final = 0.01
 """The first step after a touch, for a tolerance of 1."""
+LEAST_TOUCH_S: Final = 1e-8
+"""And at the least: over less than this the rate of a compression is mostly rounding, which a damper makes force of."""
 CUBE: Final = -1.0 / 3.0
 ROUNDING: Final = 4e-16
 SPEED_ROUNDING: Final = 1e-11
@@ -424,7 +428,7 @@ def _driven(params: PlantParams, state: PlantState, effort_n: float, dt: float) 
                 return state
         # The error of a step goes with the third power of its length; one that the end of the tick cut is halved, too.
         steps = Steps(
-            0.125 * steps.tolerance,
+            max(0.125 * steps.tolerance, min(steps.tolerance, LEAST_TOLERANCE)),
             steps.stiff,
             0.5 * min(steps.longest_s, dt),
             steps.settle,
@@ -531,7 +535,7 @@ def _step(
 ) -> tuple[PlantState, float]:
     """Return the plant after one step of `h` without an event inside, and how long it took.
 
-    What stands still does so for all that is left of the tick. `must`: whatever its error.
+    What stands still does so for the longest step, as a rule all that is left of the tick. `must`: whatever its error.
     A step whose error is too large takes no time, and leaves the state as it was with a shorter step to try.
     """
     (
@@ -563,10 +567,9 @@ def _step(
             or (net > 0.0 and revolutions >= drive.open_rev)
             or (net < 0.0 and revolutions <= drive.closed_rev)
         ):
-            # What stands still does so for all that is left of the tick.
             if touched == 0:
                 return state, left_s
-            return _stuck(drive, thing, state, effort_n, left_s)
+            return _stuck(drive, thing, state, effort_n, left_s if must else min(left_s, steps.longest_s))
         direction = 1.0 if net > 0.0 else -1.0
     else:
         direction = 1.0 if speed > 0.0 else -1.0
@@ -695,7 +698,7 @@ def _step(
         ), 0.0
     if gap > meeting >= gap1 and steps.tolerance < math.inf:
         # A damper of cover or object begins to relax here, which only short steps see.
-        step = min(step, TOUCH_S * steps.tolerance)
+        step = min(step, max(TOUCH_S * steps.tolerance, LEAST_TOUCH_S))
     if touched == 1 or gap1 <= reach:
         # Let go and in shape again: as before the first contact.
         shape = abs(squeezed1.compression_m) + abs(squeezed1.cover_m) + abs(other1.compression_m)
@@ -760,7 +763,7 @@ def _stuck(
         spare1 = drive.breakaway_n + drive.load_share * load1 - abs(load1 - effort_n)
         if spare1 >= -1e-6 or spare < 1e-9 or used < 1e-6 * h:
             break
-        used *= (spare + 5e-7) / (spare - spare1)
+        used = max(used * (spare + 5e-7) / (spare - spare1), min(used, SHORTEST_S))
     peak = max(peak, squeezed1.force_n, other1.force_n)
     return PlantState(
         revolutions,
@@ -905,7 +908,11 @@ def _felt(
         one = squeezed if half == 0 else other
         shut = closure - shift if half == 0 else closure + shift
         if still or shut >= 0.0 or one.compression_m != 0.0:
-            one = squeeze(thing, one, shut, speed_m_s, h)
+            since = h
+            if shut <= TOUCHING_M and one.compression_m == 0.0 and speed_m_s > 0.0:
+                # Met only just, with the object pushed before: a cover's damper has worked since then and no longer.
+                since = min(h, shut / speed_m_s)
+            one = squeeze(thing, one, shut, speed_m_s, since)
         if half == 0:
             squeezed = one
         else:
