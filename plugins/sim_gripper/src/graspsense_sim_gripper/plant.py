@@ -398,7 +398,7 @@ def _driven(params: PlantParams, state: PlantState, effort_n: float, dt: float) 
             return after
     start = before = state
     left = dt
-    count = halved = 0
+    count = counted = halved = 0
     while True:
         h = min(state.step_s, steps.longest_s)
         must = count >= MOST_STEPS
@@ -419,12 +419,19 @@ def _driven(params: PlantParams, state: PlantState, effort_n: float, dt: float) 
             or (state.touched == 0 and state.speed_rev_s == 0.0)
         ):
             return state
-        if halved > 0:
+        # Where the first steps were cut at half the tick already, those of the next attempt are the same.
+        if count > counted > 0:
             speed0, speed1 = before.speed_rev_s * before.rate_m_rev, state.speed_rev_s * state.rate_m_rev
             force0, force1 = before.left_n + before.right_n, state.left_n + state.right_n
-            if abs(speed1 - speed0) <= steps.settle * max(abs(speed1), SPEED_SCALE_M_S) and abs(
-                force1 - force0
-            ) <= steps.settle * max(force1, FORCE_SCALE_N):
+            # What is let go has no force that tells of it until it strikes the fingers again.
+            shape0, shape1 = before.squeezed.compression_m, state.squeezed.compression_m
+            other0, other1 = before.right.compression_m, state.right.compression_m
+            if (
+                abs(speed1 - speed0) <= steps.settle * max(abs(speed1), SPEED_SCALE_M_S)
+                and abs(force1 - force0) <= steps.settle * max(force1, FORCE_SCALE_N)
+                and abs(shape1 - shape0) <= steps.settle * max(abs(shape1), SHAPE_SCALE_M)
+                and abs(other1 - other0) <= steps.settle * max(abs(other1), SHAPE_SCALE_M)
+            ):
                 return state
         # The error of a step goes with the third power of its length; one that the end of the tick cut is halved, too.
         steps = Steps(
@@ -434,7 +441,7 @@ def _driven(params: PlantParams, state: PlantState, effort_n: float, dt: float) 
             steps.settle,
             1.0 + 0.5 * (steps.growth - 1.0),
         )
-        before, state, left, count, halved = state, start, dt, 0, halved + 1
+        before, state, left, counted, count, halved = state, start, dt, count, 0, halved + 1
 
 
 def _glide(
