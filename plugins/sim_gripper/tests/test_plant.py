@@ -14,7 +14,7 @@ from graspsense_sim_gripper.setting import STRAIGHT
 from graspsense_sim_gripper.terms.elastic import Elastic, elastic
 from graspsense_sim_gripper.terms.foam import Foam
 from graspsense_sim_gripper.terms.gas import Gas
-from graspsense_sim_gripper.terms.liquid import Liquid
+from graspsense_sim_gripper.terms.liquid import Liquid, liquid
 from graspsense_sim_gripper.terms.loss import Loss, loss
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
 from graspsense_sim_gripper.terms.oscillator import Motion
@@ -327,6 +327,42 @@ def test_a_tick_that_is_to_settle_is_halved_even_where_no_error_asks_for_it():
         speeds.append(after.speed_rev_s * after.rate_m_rev)
     exact = -0.05 * math.exp(-3e4 / 100.0 * TICK)
     assert abs(speeds[1] - exact) < 0.01 * abs(speeds[0] - exact)
+
+
+def test_what_stands_is_looked_at_in_steps_no_longer_than_the_longest():
+    # A light liquid behind soft covers swings some five times in the tick through which the fingers stand.
+    body = Thing(0.05, 0.0, 1.5e4, (Elastic(2000.0, 0.0), Liquid(1e-3, 1e-3, 0.02, 1e-11)))
+    laws, states = [elastic, liquid], (NoState(), Motion(0.0, 0.0))
+    start = run(PlantParams(drive(), body, FINE), at(0.0499, states, speed_m_s=-0.05), 15.0, 0.5, laws)
+    assert start.speed_rev_s == 0.0
+    start = start._replace(squeezed=start.squeezed._replace(states=(NoState(), Motion(0.0, 0.05))))
+    held = PlantParams(drive(breakaway=1e4), body, FINE)
+    short = run(held, start, 15.0, TICK, laws, dt=TICK / 16)
+    cut = run(held._replace(steps=FINE._replace(longest_s=TICK / 16)), start, 15.0, TICK, laws)
+    assert cut.left_n == pytest.approx(short.left_n, rel=1e-12)
+    assert cut.left_n != pytest.approx(run(held, start, 15.0, TICK, laws).left_n, rel=1e-3)
+
+
+def test_a_pushed_object_is_pressed_only_from_when_the_second_finger_meets_it():
+    # Covers that damp: had they been closing on it since the step began, they would have borne 4 N when they meet.
+    free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=0.0)
+    body = Thing(0.05, 0.1, 4e4, SPRING, Skin(50.0, 0.0, 1.0))
+    coarse, fine = (PlantParams(free, body, Steps(6e-6, longest_s=longest)) for longest in (inf, 1e-5))
+    for begun in range(8):
+        start = at(0.0505 + 5e-6 * begun, (NoState(),), offset=2.4e-4, speed_m_s=-0.1)
+        one, other = (run(params, start, 0.0, 0.006) for params in (coarse, fine))
+        assert other.left_n > 0.0
+        assert one.left_n == pytest.approx(other.left_n, abs=2e-3)
+
+
+def test_what_a_touch_begins_with_is_not_rounding_however_fine_the_steps():
+    # Where the second finger touches, a strong damper makes 0.1 N of what rounding leaves of a rate over a picosecond.
+    free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=0.0)
+    body = Thing(0.05, 0.0, 8e3, (Elastic(200.0, 0.0), Loss(3e5)), held=1)
+    start = at(0.0521, (NoState(), NoState()), offset=1e-3, speed_m_s=-0.1)
+    after = run(PlantParams(free, body, Steps(1e-10)), start, 0.0, 0.0425, [elastic, loss])
+    assert after.left_n > 0.0
+    assert after.peak_n == pytest.approx(max(after.left_n, after.right_n), rel=1e-5)
 
 
 @settings(max_examples=60, deadline=None)

@@ -26,6 +26,7 @@ from graspsense.plugin_api import (
     first_state,
     gap_and_rate,
     revolutions_at,
+    seconds_at_most,
     tick_params,
 )
 from graspsense_sim_gripper import kept_choices
@@ -270,7 +271,7 @@ class _Trial:
         )
 
     def _ticks(self, setting: Setting) -> int:
-        return math.ceil(min(LONGEST_S, self.control.run.grasp_timeout_s) / setting.dt_s)
+        return math.ceil(min(LONGEST_S, seconds_at_most(self.control.run)) / setting.dt_s)
 
     def _approach(self, setting: Setting) -> _Stand:
         """Return the grasp as it stands shortly before the first touch."""

@@ -31,6 +31,8 @@ from graspsense_sim_gripper.terms.relaxation import late_share, mean_share
 MOST_STEPS: Final = 20_000
 """A tick is cut into at most so many steps; what is then left of it is taken whole, and the state says so."""
 MOST_HALVINGS: Final = 4
+LEAST_TOLERANCE: Final = 1e-8
+"""No halving asks for less: the error of a step is then rounding, which shorter steps make worse."""
 SHORTEST_S: Final = 1e-10
 SEARCH: Final = 100
 """Most steps of a search for where forces balance."""
@@ -43,6 +45,8 @@ LONG_S: Final = 10.0
 """Steps longer than this are as long as one likes."""
 TOUCH_S: Final = 0.01
 """The first step after a touch, for a tolerance of 1."""
+LEAST_TOUCH_S: Final = 1e-8
+"""And at the least: over less than this the rate of a compression is mostly rounding, which a damper makes force of."""
 CUBE: Final = -1.0 / 3.0
 ROUNDING: Final = 4e-16
 SPEED_ROUNDING: Final = 1e-11
@@ -394,7 +398,7 @@ def _driven(params: PlantParams, state: PlantState, effort_n: float, dt: float) 
             return after
     start = before = state
     left = dt
-    count = halved = 0
+    count = counted = halved = 0
     while True:
         h = min(state.step_s, steps.longest_s)
         must = count >= MOST_STEPS
@@ -415,22 +419,29 @@ def _driven(params: PlantParams, state: PlantState, effort_n: float, dt: float) 
             or (state.touched == 0 and state.speed_rev_s == 0.0)
         ):
             return state
-        if halved > 0:
+        # Where the first steps were cut at half the tick already, those of the next attempt are the same.
+        if count > counted > 0:
             speed0, speed1 = before.speed_rev_s * before.rate_m_rev, state.speed_rev_s * state.rate_m_rev
             force0, force1 = before.left_n + before.right_n, state.left_n + state.right_n
-            if abs(speed1 - speed0) <= steps.settle * max(abs(speed1), SPEED_SCALE_M_S) and abs(
-                force1 - force0
-            ) <= steps.settle * max(force1, FORCE_SCALE_N):
+            # What is let go has no force that tells of it until it strikes the fingers again.
+            shape0, shape1 = before.squeezed.compression_m, state.squeezed.compression_m
+            other0, other1 = before.right.compression_m, state.right.compression_m
+            if (
+                abs(speed1 - speed0) <= steps.settle * max(abs(speed1), SPEED_SCALE_M_S)
+                and abs(force1 - force0) <= steps.settle * max(force1, FORCE_SCALE_N)
+                and abs(shape1 - shape0) <= steps.settle * max(abs(shape1), SHAPE_SCALE_M)
+                and abs(other1 - other0) <= steps.settle * max(abs(other1), SHAPE_SCALE_M)
+            ):
                 return state
         # The error of a step goes with the third power of its length; one that the end of the tick cut is halved, too.
         steps = Steps(
-            0.125 * steps.tolerance,
+            max(0.125 * steps.tolerance, min(steps.tolerance, LEAST_TOLERANCE)),
             steps.stiff,
             0.5 * min(steps.longest_s, dt),
             steps.settle,
             1.0 + 0.5 * (steps.growth - 1.0),
         )
-        before, state, left, count, halved = state, start, dt, 0, halved + 1
+        before, state, left, counted, count, halved = state, start, dt, count, 0, halved + 1
 
 
 def _glide(
@@ -531,7 +542,7 @@ def _step(
 ) -> tuple[PlantState, float]:
     """Return the plant after one step of `h` without an event inside, and how long it took.
 
-    What stands still does so for all that is left of the tick. `must`: whatever its error.
+    What stands still does so for the longest step, as a rule all that is left of the tick. `must`: whatever its error.
     A step whose error is too large takes no time, and leaves the state as it was with a shorter step to try.
     """
     (
@@ -563,10 +574,9 @@ def _step(
             or (net > 0.0 and revolutions >= drive.open_rev)
             or (net < 0.0 and revolutions <= drive.closed_rev)
         ):
-            # What stands still does so for all that is left of the tick.
             if touched == 0:
                 return state, left_s
-            return _stuck(drive, thing, state, effort_n, left_s)
+            return _stuck(drive, thing, state, effort_n, left_s if must else min(left_s, steps.longest_s))
         direction = 1.0 if net > 0.0 else -1.0
     else:
         direction = 1.0 if speed > 0.0 else -1.0
@@ -695,7 +705,7 @@ def _step(
         ), 0.0
     if gap > meeting >= gap1 and steps.tolerance < math.inf:
         # A damper of cover or object begins to relax here, which only short steps see.
-        step = min(step, TOUCH_S * steps.tolerance)
+        step = min(step, max(TOUCH_S * steps.tolerance, LEAST_TOUCH_S))
     if touched == 1 or gap1 <= reach:
         # Let go and in shape again: as before the first contact.
         shape = abs(squeezed1.compression_m) + abs(squeezed1.cover_m) + abs(other1.compression_m)
@@ -760,7 +770,7 @@ def _stuck(
         spare1 = drive.breakaway_n + drive.load_share * load1 - abs(load1 - effort_n)
         if spare1 >= -1e-6 or spare < 1e-9 or used < 1e-6 * h:
             break
-        used *= (spare + 5e-7) / (spare - spare1)
+        used = max(used * (spare + 5e-7) / (spare - spare1), min(used, SHORTEST_S))
     peak = max(peak, squeezed1.force_n, other1.force_n)
     return PlantState(
         revolutions,
@@ -905,7 +915,11 @@ def _felt(
         one = squeezed if half == 0 else other
         shut = closure - shift if half == 0 else closure + shift
         if still or shut >= 0.0 or one.compression_m != 0.0:
-            one = squeeze(thing, one, shut, speed_m_s, h)
+            since = h
+            if shut <= TOUCHING_M and one.compression_m == 0.0 and speed_m_s > 0.0:
+                # Met only just, with the object pushed before: a cover's damper has worked since then and no longer.
+                since = min(h, shut / speed_m_s)
+            one = squeeze(thing, one, shut, speed_m_s, since)
         if half == 0:
             squeezed = one
         else:

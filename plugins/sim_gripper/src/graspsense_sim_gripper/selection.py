@@ -45,7 +45,7 @@ BOLD: Final = Rung("bold", 0.3)
 CAREFUL: Final = Rung("careful", 0.05)
 WHOLE: Final = Rung("every term", 0.0)
 FINE: Final = Rung("every term, finer steps", 0.0, 10.0, 4)
-FINEST: Final = Rung("every term, finest steps", 0.0, 100.0, 16)
+FINEST: Final = Rung("every term, finest steps", 0.0, 100.0, 32)
 LADDER: Final = (BOLD, CAREFUL, WHOLE, FINE, FINEST)
 FULL_LADDER: Final = (WHOLE, FINE, FINEST)
 """Where every term is wanted."""

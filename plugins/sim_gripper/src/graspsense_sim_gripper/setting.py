@@ -61,7 +61,7 @@ EVEN: Final = (1.0 / 15.0,) * 15
 IMAGES_A_BLOCK: Final = 64
 REFERENCE: Final = 1e-3
 """The accuracy that a reference's steps begin at."""
-SETTLED: Final = 1e-5
+SETTLED: Final = 1e-7
 """Where speed and force after a tick change by less than this part of the accuracy, halving the steps ends."""
 FORCE_N: Final = 20.0
 SPEED_M_S: Final = 0.01
