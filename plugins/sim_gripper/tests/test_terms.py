@@ -20,7 +20,7 @@ from graspsense_sim_gripper.terms.slosh import Slosh, slosh
 from graspsense_sim_gripper.terms.snap import Snap, snap
 from graspsense_sim_gripper.terms.surface import Surface, surface
 from graspsense_sim_gripper.terms.term import NoState, Term, WorkingPoint
-from graspsense_sim_gripper.terms.vent import LAMINAR_BELOW_PA, conductance
+from graspsense_sim_gripper.terms.vent import LAMINAR_BELOW_PA, conductance, vented
 from graspsense_sim_gripper.terms.worn import Worn, worn
 
 
@@ -149,6 +149,13 @@ def test_a_vent_is_viscous_below_a_pascal_and_a_root_far_above():
 def test_the_vents_flow_rises_with_its_area_and_with_pressure(area, pressure):
     assert conductance(1.01 * area, pressure) > conductance(area, pressure)
     assert conductance(area, 1.01 * pressure) * 1.01 * pressure > conductance(area, pressure) * pressure
+
+
+@given(area=st.floats(1e-10, 1e-3), driven=st.floats(-1e5, 1e5), spent=st.floats(1e-6, 1e12))
+def test_what_a_vent_leaves_of_a_pressure_is_what_its_flow_goes_by(area, driven, spent):
+    left, through = vented(area, driven, spent)
+    assert left + spent * through * left == pytest.approx(driven, rel=1e-12, abs=1e-12)
+    assert through == pytest.approx(conductance(area, left), rel=1e-9)
 
 
 def test_a_pinhole_tends_to_sealed_and_an_open_neck_to_nothing():

@@ -7,11 +7,7 @@ from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.terms.relaxation import late_share, mean_share
 from graspsense_sim_gripper.terms.term import Limit, Rate, Term, WorkingPoint
-from graspsense_sim_gripper.terms.vent import LAMINAR_BELOW_PA, conductance
-
-MOST_LOOKS: Final = 4
-LOOKED: Final = 1e-5
-"""A change of the pressure by this share changes its conductance by less, and only that of the middle of a step."""
+from graspsense_sim_gripper.terms.vent import conductance, vented
 
 LEAST_M3: Final = 1e-9
 """A millilitre in a thousand is the least it holds."""
@@ -75,17 +71,10 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float, v1: float)
     heated = _heated(volume, warmth, warmth, kept, exponent) if warm else 0.0
     own = _give(volume, pressure + rise, exponent)
     give = own + bulge
-    middle = rise + 0.5 * (swept1 - swept0 + heated) / give
+    middle, through = rise + 0.5 * (swept1 - swept0 + heated) / give, 0.0
     if opening > 0.0:
-        # The conductance at the pressure it leads to: the root of the orifice law makes this converge fast.
-        middle = rise
-        for _ in range(MOST_LOOKS):
-            guess = middle
-            x = 0.5 * h * conductance(opening, guess) / give
-            decay = math.exp(-x)
-            middle = rise * decay + 0.5 * (swept1 - swept0 + heated) / give * mean_share(x, decay)
-            if abs(middle - guess) <= LOOKED * (abs(middle) + LAMINAR_BELOW_PA):
-                break
+        # By a backward step: it only says what the conductance and the volume are there.
+        middle, through = vented(opening, middle, 0.5 * h / give)
     if middle < lowest:
         middle = lowest
     half = 0.0
@@ -99,7 +88,7 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float, v1: float)
     give = _give(volume, pressure + middle, exponent)
     before = rise
     if opening > 0.0:
-        x = h * conductance(opening, middle) / (give + bulge)
+        x = h * through / (give + bulge)
         decay = math.exp(-x)
         # What is swept faster at the end than in the mean the vent has had less time for.
         late = ((area + slope * d1) * v1 * h - (swept1 - swept0)) * late_share(x, decay)

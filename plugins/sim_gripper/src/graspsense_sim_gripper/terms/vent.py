@@ -18,7 +18,24 @@ def conductance(opening_m2: float, rise_pa: float) -> float:
     Viscous and inertial losses add up, p = R q + B q |q| with B = rho / (2 (C_d A)^2), and R is such that the
     two are alike at about `LAMINAR_BELOW_PA`: straight through zero, a square root far from it.
     """
+    viscous, inertial = _losses(opening_m2)
+    return 2.0 / (viscous + math.sqrt(viscous * viscous + 4.0 * inertial * abs(rise_pa)))
+
+
+def vented(opening_m2: float, driven_pa: float, spent_pa_s_m3: float) -> tuple[float, float]:
+    """Return what an opening leaves of a pressure, and its conductance there.
+
+    Its flow q leaves p = `driven_pa` - `spent_pa_s_m3` q, which with the losses above is a quadratic in q.
+    """
+    viscous, inertial = _losses(opening_m2)
+    linear = viscous + spent_pa_s_m3
+    flow = 2.0 * driven_pa / (linear + math.sqrt(linear * linear + 4.0 * inertial * abs(driven_pa)))
+    resistance = viscous + inertial * abs(flow)
+    return resistance * flow, 1.0 / resistance
+
+
+def _losses(opening_m2: float) -> tuple[float, float]:
+    """Return R and B of an opening."""
     through = DISCHARGE * opening_m2
     inertial = 0.5 * AIR_KG_M3 / (through * through)
-    viscous = 2.0 * math.sqrt(inertial * LAMINAR_BELOW_PA)
-    return 2.0 / (viscous + math.sqrt(viscous * viscous + 4.0 * inertial * abs(rise_pa)))
+    return 2.0 * math.sqrt(inertial * LAMINAR_BELOW_PA), inertial
