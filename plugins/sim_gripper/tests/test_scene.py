@@ -3,13 +3,16 @@
 import math
 import tomllib
 from importlib.resources import files
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from graspsense.plugin_api import ConfigError, UnknownName
 from graspsense_sim_gripper import scene
-from graspsense_sim_gripper.scene import catalogue, cell_weights, find, instance_of
+from graspsense_sim_gripper.scene import ObjectSpec, catalogue, cell_weights, find, instance_of
+from graspsense_sim_gripper.terms import NoState, Term
+from graspsense_sim_gripper.terms.registry import TERMS
 
 
 def test_the_four_containers_have_their_states_and_the_rest_is_there():
@@ -139,3 +142,16 @@ def test_a_faulty_entry_names_the_object_and_the_key(change, says):
     with pytest.raises(ConfigError, match=says) as error:
         scene._catalogued("thing", table)
     assert "thing" in str(error.value)
+
+
+class Whole(NamedTuple):
+    k_n_m: float
+    scale: float = 2
+
+
+def test_a_default_written_as_a_whole_number_is_a_figure_like_others(monkeypatch):
+    """Compiled for one object it is compiled for all: a whole number there would cut the others' figures off."""
+    term = Term(name="whole", summary="", params=Whole, law=lambda *_: (0.0, NoState()))
+    monkeypatch.setitem(TERMS, "whole", term)
+    spec = ObjectSpec(name="made up", width_m=0.05, terms=(("whole", {"k_n_m": 100}),))
+    assert [type(value) for value in instance_of(spec, None).terms[0]] == [float, float]

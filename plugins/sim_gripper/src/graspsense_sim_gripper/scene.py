@@ -72,7 +72,8 @@ class ObjectSpec:
         parts = []
         for kind, values in self.terms:
             term = find_term(kind)[1]
-            params = term.params(**values)
+            # A default may be written as a whole number, and compiled code is of types.
+            params = term.params._make(float(value) for value in term.params(**values))
             parts.append((params, tuple(name in term.stiffnesses for name in params._fields)))
         return tuple(parts)
 

@@ -336,7 +336,9 @@ def _without(thing: Thing, kinds: Sequence[str], i: int, point: WorkingPoint) ->
     for limit in term.limits(one.params, point):
         if limit.params == one.params and limit.spring_n_m == 0.0 and limit.damper_n_s_m == 0.0:
             continue
-        kept = Kept(0, one.params) if limit.params is None else Kept(1, limit.params)
+        kept = Kept(0, one.params)
+        if limit.params is not None:
+            kept = Kept(1, one.params._make(float(value) for value in limit.params))
         yield limit.name, _with(thing, i, kept, limit.spring_n_m, limit.damper_n_s_m)
 
 
