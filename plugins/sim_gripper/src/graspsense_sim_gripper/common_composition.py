@@ -8,15 +8,26 @@ from the last term to the first, so that a term which adds nothing changes no bi
 from __future__ import annotations
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant import PlantState
 from graspsense_sim_gripper.scene import catalogue
-from graspsense_sim_gripper.setting import Setting
+from graspsense_sim_gripper.setting import Setting, setting_of
 from graspsense_sim_gripper.terms.registry import find_term, in_order
 from graspsense_sim_gripper.terms.remainder import Kept
+
+
+def _arrays(figures: Any) -> dict[str, Any]:
+    """Return the figures of a sensor's cells as arrays."""
+    names = "left_weights", "right_weights", "left_offset", "right_offset"
+    return {name: np.array(getattr(figures, name), float) for name in names}
+
+
+IDEAL: Final = _arrays(setting_of(SimConfig(sensor="ideal"), None, 0).sensor)
+"""Those of an ideal sensor, which nobody looks at."""
 
 
 class Filler(NamedTuple):
@@ -48,14 +59,7 @@ def as_compiled(setting: Setting) -> Setting:
     """Return the same grasp as a compiled loop takes it: in that composition, the cells' figures as arrays."""
     # As tuples these would be handed over number by number, and looked up by a chain of comparisons.
     sensor = setting.sensor
-    weights, offset = np.array(sensor.left_weights, float), np.array(sensor.left_offset, float)
-    same = sensor.right_weights is sensor.left_weights, sensor.right_offset is sensor.left_offset
-    sensor = sensor._replace(
-        left_weights=weights,
-        right_weights=weights if same[0] else np.array(sensor.right_weights, float),
-        left_offset=offset,
-        right_offset=offset if same[1] else np.array(sensor.right_offset, float),
-    )
+    sensor = sensor._replace(**(IDEAL if sensor.ideal == 1 else _arrays(sensor)))
     kinds, plant, body = setting.kinds, setting.plant, setting.body
     if kinds != compiled_kinds(kinds):
         thing = plant.thing

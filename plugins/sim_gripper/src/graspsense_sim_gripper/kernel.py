@@ -126,6 +126,8 @@ class Loop(NamedTuple):
 
 
 NOT_BEGUN: Final = Loop(0, 0, -1, 0, 0.0)
+NOT_NEGATIVE: Final = 0x3FFFFFFF
+"""An index with this mask is known not to be negative, which compiled code else asks of each array."""
 
 
 def grasp(
@@ -179,16 +181,17 @@ def grasp(
             untared = count
         effort = command.value
         if phase > TARING and stepped:
-            times[recorded] = frame.t_s
-            gaps[recorded] = frame.gap_m
-            velocities[recorded] = frame.velocity_m_s
-            efforts[recorded] = frame.effort_n
-            lefts[recorded] = frame.force_left_n
-            rights[recorded] = frame.force_right_n
-            left_edges[recorded] = frame.edge_left_n
-            right_edges[recorded] = frame.edge_right_n
-            phases[recorded] = phase
-            commands[recorded] = effort
+            row = recorded & NOT_NEGATIVE
+            times[row] = frame.t_s
+            gaps[row] = frame.gap_m
+            velocities[row] = frame.velocity_m_s
+            efforts[row] = frame.effort_n
+            lefts[row] = frame.force_left_n
+            rights[row] = frame.force_right_n
+            left_edges[row] = frame.edge_left_n
+            right_edges[row] = frame.edge_right_n
+            phases[row] = phase
+            commands[row] = effort
             recorded += 1
         ticks += 1
         if state.done == 1 or state.guard.stopped == 1:

@@ -116,9 +116,7 @@ def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -
         return None
     shape, look, *numbers = modes
     room = padded(max(shape.columns, GUARDS + shape.ends + shape.states, 2 * shape.states))
-    rooms: list[Any] = [np.zeros(room) for _ in range(6)]
-    if not on_arrays:
-        rooms = [room.tolist() for room in rooms]
+    rooms = np.zeros((6, room)) if on_arrays else np.zeros((6, room)).tolist()
     return Linear(plant, look, *numbers, *rooms), shape
 
 
@@ -377,7 +375,7 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
         while begins:
             begins = False
             mode = ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
-            allowed = mode * ENDS
+            allowed = (mode * ENDS) & MOST_NUMBERS
             _seen(watched, mode * WATCHED * COLUMNS, now, was)
             if events == 0:
                 for k in range(CONTACTS):
@@ -476,7 +474,9 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
 
     came = now[0] - closure
     gap1 = gap - came
-    revolutions1 = revolutions - came / rate
+    # The state waits for this, and a product comes sooner than a quotient.
+    turns = 1.0 / rate
+    revolutions1 = revolutions - came * turns
     if leaves or not drive.closed_rev < revolutions1 < drive.open_rev:
         return plant_move(plant, state, effort_n, dt)  # type: ignore[no-any-return]
     # A mode that begins at the very end of the tick has yet to act.
@@ -503,7 +503,7 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
         other = felt
     return PlantState(
         revolutions1,
-        -now[1] / rate,
+        -now[1] * turns,
         gap1,
         rate,
         force,
