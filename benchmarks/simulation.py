@@ -254,13 +254,16 @@ def gas() -> dict[str, Any]:
     reference = Ours("reference", evolve(gas_config, fidelity="reference", accuracy=1e-4)).run(1)
     found: dict[str, Any] = {}
     for bar, error in BARS.items():
-        times = []
+        chosen = []
         for config, truth in ((CONFIG, closed), (gas_config, reference)):
             candidates = [Ours(what, evolve(config, **settings)) for what, settings in SETTINGS.items()]
             good = [one for one in candidates if one.once().error(truth)[0] <= error]
-            times.append(min((one.run(REPEATS).seconds for one in good), default=math.nan))
+            chosen.append(min(good, key=lambda one: one.run(REPEATS).seconds))
+        # In turn, so that both had the same machine.
+        runs = [[one.once().seconds for one in chosen] for _ in range(10 * REPEATS)]
+        times = np.min(runs, axis=0)
         name = "gas_over_linear" if bar == "4e-4" else f"gas_over_linear_{bar}"
-        found[name] = times[1] / times[0]
+        found[name] = float(times[1] / times[0])
     return found
 
 
