@@ -102,7 +102,7 @@ _WITHOUT: Final[dict[str, Any]] = {
     one.name: one.default
     for one in fields(SimConfig)
     if one.name in ("object", "explain", "compile") or one.name.startswith(("pad_", "noise_"))
-} | {"sensor": "ideal", "spread": False}
+} | {"sensor": "ideal"}
 """What a trial grasp does without, and no choice hangs on."""
 _CHECKED: dict[tuple[Any, ...], tuple[ObjectSpec, Choice]] = {}
 
@@ -149,7 +149,7 @@ def _check(bare: SimConfig, spec: ObjectSpec, control: Control, loops: Loops | N
     forced = bare.scheme != "auto" or bare.step_s is not None
     if forced or bare.fidelity == "reference":
         return choice_of(bare, spec)
-    trial = _Trial(config=bare, spec=spec, control=control, loops=loops)
+    trial = _Trial(config=evolve(bare, spread=False), spec=spec, control=control, loops=loops)
     strict = 2 if bare.accuracy <= STRICT else 1
     beside = {finer: rung._replace(least_steps=strict * rung.least_steps) for finer, rung in BESIDE.items()}
     finest = choice_of(bare, spec, rung=beside[1.0])
@@ -167,9 +167,10 @@ def _check(bare: SimConfig, spec: ObjectSpec, control: Control, loops: Loops | N
     tried: set[Any] = set()
     for rung in LADDER if bare.fidelity == "scene" else FULL_LADDER:
         choice = chosen(bare, spec, rung=rung)
-        if (choice.made, choice.steps) in tried:
+        model = choice.made, choice.pieces, choice.steps
+        if model in tried:
             continue
-        tried.add((choice.made, choice.steps))
+        tried.add(model)
         expected = trial.course(chosen(bare, spec, rung=beside[rung.finer]))
         error, quantity = deviation(trial.course(choice), expected)
         made += 1
@@ -241,7 +242,7 @@ class _Trial:
 
     def course(self, choice: Choice) -> Course:
         """Return how the grasp goes in this model."""
-        key = (choice.made, choice.steps)
+        key = (choice.made, choice.pieces, choice.steps)
         if key not in self._courses:
             try:
                 self._courses[key] = self._grasp(choice)
@@ -311,7 +312,8 @@ class _Trial:
         step = type(law).step
         compiled = None if self.loops is None else self.loops(setting, step)
         on_arrays = compiled is not None
-        by_maps = linear_of(self.config, setting, on_arrays=on_arrays)
+        loop, made = compiled or (None, setting)
+        by_maps = linear_of(self.config, made, on_arrays=on_arrays)
         # What a loop never looks at while its sensors are ideal, but of its own types.
         parts: tuple[Any, ...] = (
             *np.zeros((2, CELLS)),
@@ -319,16 +321,15 @@ class _Trial:
             np.full((1, 2, CELLS), math.nan),
             np.zeros(1),
         )
-        if compiled is not None:
-            loop, made = compiled
-        else:
+        if loop is None:
             shape = None if by_maps is None else (setting.kinds, by_maps[1])
-            loop, made = grasp_of(laws_of(setting.kinds), step, by_maps=shape), setting
+            loop = grasp_of(laws_of(setting.kinds), step, by_maps=shape)
             parts = tuple(part.tolist() for part in parts)
 
         def drive(steps: Steps, at: _Stand, until: int) -> _Stand:
             stands, body, sensed, state, rows, _ = at
-            if stands.ticks == 0:
+            if body.touched == 0:
+                # What nothing has pressed yet, as this composition has it.
                 body = body._replace(squeezed=made.body.squeezed, right=made.body.right)
             plant: Any = made.plant._replace(steps=steps) if by_maps is None else by_maps[0]
             while not _ended(state) and stands.ticks < until:
