@@ -38,7 +38,7 @@ from graspsense_sim_gripper.one_of_many import Composition, Done, Job, Storage, 
 from graspsense_sim_gripper.plant import PlantState
 from graspsense_sim_gripper.scene import ObjectSpec
 from graspsense_sim_gripper.setting import Setting, setting_of
-from graspsense_sim_gripper.terms.registry import find_term, in_order, laws_of
+from graspsense_sim_gripper.terms.registry import find_term, in_order
 from graspsense_sim_gripper.terms.remainder import Kept
 
 ACCURACIES: Final = (0.1, 0.01, 0.001)
@@ -293,6 +293,7 @@ def measure(bench: Bench, numbers: range, *, costs: bool = True) -> dict[str, An
                 one["s"] = bench.cost_s(chosen, job)
             choice = chosen.choice
             if choice is not None:
+                one["pieces"] = choice.pieces
                 one["rung"], one["made"] = choice.rung, {d.term: d.decision for d in choice.decisions}
                 one["checked"] = None if choice.check is None else choice.check.error
         rows.append(row)
@@ -320,7 +321,7 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     steps = np.array([[case["steps"] for case in pair] for pair in both]).reshape(-1, 2)
     cost, full_cost = np.median(costs, axis=0) if both else (math.nan, math.nan)
     taken, full_taken = np.median(steps, axis=0) if both else (math.nan, math.nan)
-    by_maps = sum("exact maps" in row["0.01"].get("made", {}).get("steps", "") for row in rows)
+    by_maps = sum(row["0.01"].get("pieces", 0) > 0 for row in rows)
     return {
         "scenes": len(rows),
         "within": within,

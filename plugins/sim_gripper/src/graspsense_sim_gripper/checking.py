@@ -165,7 +165,7 @@ def _check(bare: SimConfig, spec: ObjectSpec, control: Control, loops: Loops | N
         return chosen(bare, spec)
     least, whose, made = math.inf, "", 1
     tried: set[Any] = set()
-    for rung in LADDER if bare.fidelity == "scene" else FULL_LADDER:
+    for rung in _ladder(bare):
         choice = chosen(bare, spec, rung=rung)
         model = choice.made, choice.pieces, choice.steps
         if model in tried:
@@ -180,6 +180,13 @@ def _check(bare: SimConfig, spec: ObjectSpec, control: Control, loops: Loops | N
             least, whose = error, quantity
     term = _culprit(trial, *(chosen(bare, spec, rung=rung) for rung in (FINE, beside[FINE.finer])))
     raise ConfigError(_refusal(bare, spec, least, whose, term))
+
+
+def _ladder(config: SimConfig) -> tuple[Rung, ...]:
+    if config.fidelity != "scene":
+        return FULL_LADDER
+    # What only just holds for the object that is tried need not for others of its kind.
+    return LADDER[1:] if config.spread else LADDER
 
 
 def _about(value: float) -> float:

@@ -436,7 +436,9 @@ def _in_place(link: ScrewLinkage, state: PlantState) -> PlantState:
 
 def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> PlantState:
     """Return the plant after `dt`, the tick that the maps are for, in which this effort was asked for."""
-    plant, look, lever, pieces, per_root, slopes, maps, watched, simple, ways, bounds, begin, slack = params[:13]
+    plant, look, lever, pieces, per_root, slopes, maps, watched, simple, ways, bounds, begin, slack = params[
+        :13
+    ]
     now, then, was, change, most, by = params[13:]
     (
         revolutions,

@@ -234,11 +234,13 @@ def choose(
     damping_n_s_m: float,
     rubs: bool,
     maps: bool = False,
+    straight: bool = False,
     rung: Rung = CAREFUL,
 ) -> Choice:
     """Return the model for a grasp that touches at this speed and squeezes with this force.
 
-    `rubs`: whether the drive has friction; `maps`: whether exact maps can take this grasp and are worth making.
+    `rubs`: whether the drive has friction; `maps`: whether exact maps can take this grasp and are worth making;
+    `straight`: whether the drive is linear as it is.
     """
     seen = _survey(full, tuple(kinds), force_n, max(speed_m_s, LEAST_SPEED_M_S), mass_kg)
     paths, point = seen.paths, seen.point
@@ -248,7 +250,7 @@ def choose(
     # Verlet lets the energy of a swing rise and fall by a share of it, which only shows where nothing else takes it.
     swing = contact.number / dt_s * (6.0 * tolerance(accuracy)) ** (2.0 / 3.0) / 4.0
     stiff = rate * dt_s > 1.0 or (rate < swing and not rubs)
-    pieces = _pieces(thing, kinds, accuracy) if maps and rung.maps else 0
+    pieces = _pieces(thing, kinds, accuracy, straight) if maps and rung.maps else 0
     return Choice(
         accuracy=accuracy,
         made=made,
@@ -280,13 +282,14 @@ def choose(
     )
 
 
-def _pieces(thing: Thing, kinds: Sequence[str], accuracy: float) -> int:
-    """Return into how many straight pieces the curve of what is left is cut for exact maps; 0: they cannot take it."""
+def _pieces(thing: Thing, kinds: Sequence[str], accuracy: float, straight: bool) -> int:
+    """Return into how many straight pieces the curve of what is left is cut for exact maps; 0: none is needed, or they
+    cannot take it."""
     forms = forms_of(thing, kinds)
     if forms is None:
         return 0
     if not is_bent(forms):
-        return 1
+        return 0 if straight else 1
     # Between knots at even roots a force that goes with d^1.5 is off by 0.4 of it over the square of their number.
     pieces = 1 << math.ceil(math.log2(PIECES_SCALE / math.sqrt(accuracy)))
     return pieces if pieces <= MOST_PIECES else 0

@@ -282,6 +282,7 @@ def choice_of(
             damping_n_s_m=config.damping_n_s_m,
             rubs=config.coulomb_n > 0.0,
             maps=_worth_maps(config, instance),
+            straight=config.transmission == "straight" and config.breakaway_n <= config.coulomb_n,
             rung=rung,
         )
         steps = choice.steps

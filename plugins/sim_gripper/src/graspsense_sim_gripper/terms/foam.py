@@ -32,7 +32,7 @@ class FoamState(NamedTuple):
 def power(params: Foam, d: float) -> float:
     """Return the force (N) of the power law at a compression."""
     # Odd in d, so that a search that strays below zero still finds its way back.
-    force = params.force_n * (abs(d) / params.at_m) ** params.exponent
+    force: float = params.force_n * (abs(d) / params.at_m) ** params.exponent
     return force if d >= 0.0 else -force
 
 
