@@ -2,6 +2,7 @@
 of each tick. And what is compiled of a model: what it keeps."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -77,7 +78,7 @@ def test_the_pieces_of_a_curve_meet_and_are_as_near_to_it_as_is_said(reach, piec
     found = _straightened([form], reach, pieces)
     assert len(found) == pieces
     knots = [reach * (k / pieces) ** 2 for k in range(1, pieces)]
-    for d, (before, after) in zip(knots, zip(found, found[1:], strict=False), strict=True):
+    for d, (before, after) in zip(knots, pairwise(found), strict=True):
         one, other = (piece.offset_n + piece.slope_n_m * d for piece in (before, after))
         assert one == pytest.approx(other, rel=1e-9)
     d = reach * place

@@ -116,10 +116,12 @@ def sense(
     """
     if params.ideal == 1:
         velocity = plant.speed_rev_s * plant.rate_m_rev
+        gap, left_n, right_n = plant.gap_m, plant.left_n, plant.right_n
         off_n, off_share, from_m = params.bias
-        gap = plant.gap_m + off_share * min(plant.gap_m - from_m, 0.0)
-        left_n = plant.left_n + off_n if plant.left_n > 0.0 else plant.left_n
-        right_n = plant.right_n + off_n if plant.right_n > 0.0 else plant.right_n
+        if off_n != 0.0:
+            gap += off_share * min(gap - from_m, 0.0)
+            left_n += off_n if left_n > 0.0 else 0.0
+            right_n += off_n if right_n > 0.0 else 0.0
         frame = Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, 0.0, 0.0, 0)
         return frame, state
 
