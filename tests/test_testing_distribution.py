@@ -62,6 +62,7 @@ TERM = """
         by_compression: tuple = ()
         by_speed: tuple = ()
         force: tuple = ()
+        curve: object = None
 
     def linear(params):
         return {form}
@@ -175,6 +176,8 @@ ARM = {
         ({}, "None", ""),
         ({}, "Form(2.0 * params.k_n_m)", "the linear form of term 'gel' gives"),
         ({}, "Form(0.0, 1.0, ((1.0, 0.0), (0.0, 1.0)))", "has 2 states and its law 1"),
+        ({}, "Form(curve=lambda d: params.k_n_m * d)", ""),
+        ({}, "Form(params.k_n_m, curve=lambda d: d * d)", "the linear form of term 'gel' gives"),
         (ARM, "Form(0.0, 0.0, ((-20.0,),), (0.0,), (params.k_n_m,), (1.0,))", ""),
         (
             ARM,

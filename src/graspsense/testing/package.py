@@ -272,7 +272,8 @@ def _along(form: Any, state: Any, d0: float, speed: float, h: float) -> float:
         now = [s + step * r for s, r in zip(now, rates(half, d + 0.5 * step * speed), strict=True)]
         d += step * speed
     own = sum(a * b for a, b in zip(form.force, now, strict=True)) if now else 0.0
-    return float(form.spring_n_m * d + form.damper_n_s_m * speed + own)
+    curve = getattr(form, "curve", None)
+    return float(form.spring_n_m * d + form.damper_n_s_m * speed + own + (curve(d) if curve else 0.0))
 
 
 def _stepped(term: Any, params: Any, state: Any, d0: float, d1: float) -> tuple[Any, Any]:

@@ -225,12 +225,17 @@ def _form(kind: str, params: Any) -> LinearForm | OwnContact | None:
     form = term.linear(params)
     if form is None:
         return None
+    count = _numbers(term.at_rest)
     for one in (form.touching, form.parted) if isinstance(form, OwnContact) else (form,):
-        if len(one.rates) != _numbers(term.at_rest):
+        if len(one.rates) not in (0, count):
             raise TypeError(
                 f"term {kind!r}: its linear form has {len(one.rates)} states, the law's are "
                 f"{len(term.at_rest)}, {term.at_rest!r}: as many as it has fields, all of them floats"
             )
+    if isinstance(form, LinearForm) and not form.rates and count:
+        # What the form leaves as it is stands in the state like all else, and stands still.
+        none = (0.0,) * count
+        return form._replace(rates=(none,) * count, by_compression=none, by_speed=none, force=none)
     return form
 
 

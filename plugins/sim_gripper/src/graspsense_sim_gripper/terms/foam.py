@@ -72,6 +72,8 @@ def linear(params: Foam) -> LinearForm:
     form = LinearForm(
         params.force_n / params.at_m if straight else 0.0, curve=None if straight else partial(power, params)
     )
+    if params.arm1_n_m == 0.0 and params.arm2_n_m == 0.0:
+        return form
     # An arm that is none needs not be followed as fast as it is.
     first, second = (
         1.0 / tau if stiffness > 0.0 else 0.0

@@ -46,8 +46,8 @@ class Limit(NamedTuple):
 class LinearForm(NamedTuple):
     """A term that is linear: s' = A s + b d + c d' of its states s, force k d + g d' + f s.
 
-    d is the compression (m); the states are the fields of the term's state, in their order, all floats. A state of
-    other fields stays as it is, and the form has none of it.
+    d is the compression (m); the states are the fields of the term's state, in their order, all floats. A form
+    without `rates` leaves the state as it is.
     """
 
     spring_n_m: float = 0.0
