@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import Any, Final, NamedTuple
 
@@ -35,7 +36,7 @@ from graspsense.plugin_api import (
     tick_params,
 )
 from graspsense_sim_gripper import kept_choices
-from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.config import LEAST_ACCURACY, SimConfig
 from graspsense_sim_gripper.deviation import Course, deviation
 from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, NotCompilable, grasp_of
 from graspsense_sim_gripper.linear import linear_of
@@ -194,6 +195,11 @@ def _check(bare: SimConfig, spec: ObjectSpec, control: Control, loops: Loops | N
         elif error < least:
             least, whose = error, quantity
     if edge is not None:
+        if bare.accuracy >= 10.0 * LEAST_ACCURACY:
+            # What is met so nearly may still be told apart by what is finer than anybody asked for.
+            finer = evolve(bare, accuracy=0.1 * bare.accuracy)
+            with suppress(ConfigError):
+                return evolve(_check(finer, spec, control, loops), accuracy=bare.accuracy)
         raise ConfigError(_undecided(bare, spec, edge))
     term = _culprit(trial, *(chosen(bare, spec, rung=rung) for rung in (FINE, beside[FINE.finer])))
     raise ConfigError(_refusal(bare, spec, least, whose, term))
