@@ -45,12 +45,14 @@ MOST_NUMBERS: Final = 0x3FFFFFFF
 WHOLE: Final = 1 << HALVINGS
 MOST_EVENTS: Final = 64
 """A tick in which more modes end than this is taken on without looking."""
+PLACES: Final = ("NOW", "THEN", "WAS", "CHANGE", "MOST", "BY")
+"""What a tick's room is for: the state before and after a piece of the tick, what is watched before it, and bounds."""
 PEAK_SHARE: Final = 2e-3
 """A swing inside a tick that goes beyond the greatest force by less than this share of it may be missed."""
 
 
 class Linear(NamedTuple):
-    """A plant with its modes, and room for the state before and after a piece of a tick and for what is watched."""
+    """A plant with its modes, and room for what a tick works on."""
 
     plant: PlantParams
     look: int
@@ -62,14 +64,12 @@ class Linear(NamedTuple):
     bounds: Any
     begin: Any
     slack: Any
-    now: Any
-    then: Any
-    """The state, and what is watched, after a piece."""
-    was: Any
-    """What is watched before it."""
-    change: Any
-    most: Any
-    by: Any
+    room: Any
+    """The state before a piece of a tick; state and what is watched after it; what is watched before it; bounds.
+
+    In one table at places known beforehand: compiled code then need not ask whether two of them are one, and keeps
+    most of it in registers.
+    """
 
 
 def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -> tuple[Linear, Shape] | None:
@@ -115,9 +115,8 @@ def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -
     if modes is None:
         return None
     shape, look, *numbers = modes
-    room = padded(max(shape.columns, GUARDS + shape.ends + shape.states, 2 * shape.states))
-    rooms = np.zeros((6, room)) if on_arrays else np.zeros((6, room)).tolist()
-    return Linear(plant, look, *numbers, *rooms), shape
+    rooms = np.zeros(len(PLACES) * _room(shape)) if on_arrays else [0.0] * (len(PLACES) * _room(shape))
+    return Linear(plant, look, *numbers, rooms), shape
 
 
 @lru_cache(maxsize=256)
@@ -237,6 +236,8 @@ def move_of(
         puts = bind(_put_all, put=PUT[count], put_rest=puts)
         takes = bind(_take_all, take=bind(TAKE[count], made=type(state)), take_rest=takes)
     laid_out = {name.upper(): number for name, number in shape._asdict().items()}
+    places = {name: k * _room(shape) for k, name in enumerate(PLACES)}
+    now, then, was, change, most, by = places.values()
     watched = padded(GUARDS + shape.ends)
     mapped, parted = padded(shape.states + GUARDS + shape.ends), padded(2 * shape.states)
     return bind(
@@ -244,18 +245,24 @@ def move_of(
         plant_move=plant_move,
         put_states=puts,
         take_states=takes,
-        _moved=bind(_product, ROWS=mapped, COLUMNS=shape.columns),
-        _seen=bind(_product, ROWS=watched, COLUMNS=shape.columns),
-        _simply=bind(_product, ROWS=watched, COLUMNS=shape.states),
-        _parted=bind(_product, ROWS=parted, COLUMNS=shape.states),
-        _bounded=bind(_product, ROWS=watched, COLUMNS=2 * shape.states),
-        _row=bind(_row, **laid_out),
+        _moved=bind(_product, ROWS=mapped, COLUMNS=shape.columns, FROM=now, TO=then),
+        _seen=bind(_product, ROWS=watched, COLUMNS=shape.columns, FROM=now, TO=was),
+        _simply=bind(_product, ROWS=watched, COLUMNS=shape.states, FROM=change, TO=most),
+        _parted=bind(_product, ROWS=parted, COLUMNS=shape.states, FROM=change, TO=by),
+        _bounded=bind(_product, ROWS=watched, COLUMNS=2 * shape.states, FROM=by, TO=most),
+        _row=bind(_row, NOW=now, **laid_out),
         WATCHED=watched,
         MAPPED=mapped,
         PARTED=parted,
         **laid_out,
+        **places,
         **tuples,
     )
+
+
+def _room(shape: Shape) -> int:
+    """Return how many numbers there are at each of the places of a tick's room."""
+    return padded(max(shape.columns, shape.states + GUARDS + shape.ends, 2 * shape.states))
 
 
 # ---------------------------------------------------------------------------------------------------- a tick
@@ -271,32 +278,34 @@ take_states: Any = _take_none
 STATES = COLUMNS = PARTS = CREEPS = LAGS = MOTIONS = CONTACTS = ENDS = ROWS = 0
 WATCHED = MAPPED = PARTED = 0
 """Rows of the tables of what is watched, of the maps, and of the ways, with those that pad them."""
+NOW = THEN = WAS = CHANGE = MOST = BY = FROM = TO = 0
 
 
-def _product(table: Any, at: int, vector: Any, product: Any) -> None:
-    """Write the matrix that begins at this place of the table, times the vector, into `product`."""
+def _product(table: Any, at: int, room: Any) -> None:
+    """Write the matrix that begins at this place of the table, times what is at `FROM`, to `TO`."""
     # Known not to be negative, which compiled code else asks at each number.
     at &= MOST_NUMBERS
     for group in range(ROWS // TOGETHER):
         i = group * TOGETHER
         first = second = third = fourth = 0.0
         for j in range(COLUMNS):
-            k, by = at + j * ROWS + i, vector[j]
+            k, by = at + j * ROWS + i, room[FROM + j]
             first += table[k] * by
             second += table[k + 1] * by
             third += table[k + 2] * by
             fourth += table[k + 3] * by
-        product[i], product[i + 1], product[i + 2], product[i + 3] = first, second, third, fourth
+        i += TO
+        room[i], room[i + 1], room[i + 2], room[i + 3] = first, second, third, fourth
 
 
 _moved = _seen = _simply = _parted = _bounded = _product
 
 
-def _row(rows: Any, at: int, vector: Any) -> float:
+def _row(rows: Any, at: int, room: Any) -> float:
     at &= MOST_NUMBERS
     found = 0.0
     for j in range(COLUMNS):
-        found += rows[at + j] * vector[j]
+        found += rows[at + j] * room[NOW + j]
     return found
 
 
@@ -311,8 +320,7 @@ def _top(before: float, rising: float, after: float, falling: float, h: float) -
 
 def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> PlantState:
     """Return the plant after `dt`, the tick that the maps are for, in which this effort was asked for."""
-    plant, look, maps, watched, simple, ways, bounds, begin, slack = params[:9]
-    now, then, was, change, most, by = params[9:]
+    plant, look, maps, watched, simple, ways, bounds, begin, slack, room = params
     (
         revolutions,
         speed,
@@ -337,8 +345,8 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
     leaves = leaves or alone > 0.0
 
     closure = thing.width_m - gap
-    now[0] = closure
-    now[1] = -speed * rate
+    room[NOW] = closure
+    room[NOW + 1] = -speed * rate
     at = 2
     pressed = 1
     d = cover = 0.0
@@ -346,7 +354,7 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
         d = squeezed.compression_m
         if CREEPS == 1:
             cover = squeezed.cover_m
-            now[3], now[4] = cover, squeezed.arm_n
+            room[NOW + 3], room[NOW + 4] = cover, squeezed.arm_n
             at = 5
         else:
             at = 3
@@ -354,18 +362,18 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
             pressed = 0
         elif thing.skins_n_m == math.inf:
             d = closure
-        now[2] = d
-    own = at
-    at = put_states(thing.terms, squeezed.states, now, own)
+        room[NOW + 2] = d
+    own = NOW + at
+    at = put_states(thing.terms, squeezed.states, room, own)
     if LAGS == 1:
-        now[at] = given
-    now[STATES] = effort_n
+        room[at] = given
+    room[NOW + STATES] = effort_n
     if MOTIONS == 3:
-        now[STATES + 1] = drive.coulomb_n
+        room[NOW + STATES + 1] = drive.coulomb_n
     motion = mode = allowed = 0
-    standing = now[1] == 0.0
+    standing = room[NOW + 1] == 0.0
     if MOTIONS == 3 and not standing:
-        motion = 1 if now[1] > 0.0 else 2
+        motion = 1 if room[NOW + 1] > 0.0 else 2
     # Which of the terms' own contacts touch is guessed, and put right below.
     touching = (1 << CONTACTS) - 1 if squeezed.force_n > 0.0 else 0
     left, least, events, until = 0 if leaves else WHOLE, 0, 0, 0
@@ -376,25 +384,25 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
             begins = False
             mode = ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
             allowed = (mode * ENDS) & MOST_NUMBERS
-            _seen(watched, mode * WATCHED * COLUMNS, now, was)
+            _seen(watched, mode * WATCHED * COLUMNS, room)
             if events == 0:
                 for k in range(CONTACTS):
-                    if was[GUARDS + k] < -slack[allowed + k]:
+                    if room[WAS + GUARDS + k] < -slack[allowed + k]:
                         touching ^= 1 << k
                         begins = True
             if MOTIONS == 3 and standing and not begins:
                 # What stands is stuck, unless what holds it less what closes it, or less what opens it, says otherwise.
                 standing = False
-                if was[GUARDS + ENDS - 2] < -slack[allowed + ENDS - 2]:
+                if room[WAS + GUARDS + ENDS - 2] < -slack[allowed + ENDS - 2]:
                     motion, begins = 1, True
-                elif was[GUARDS + ENDS - 1] < -slack[allowed + ENDS - 1]:
+                elif room[WAS + GUARDS + ENDS - 1] < -slack[allowed + ENDS - 1]:
                     motion, begins = 2, True
         while (WHOLE >> least) > left:
             least += 1
-        _moved(maps, (mode * (HALVINGS + 1) + least) * MAPPED * COLUMNS, now, then)
+        _moved(maps, (mode * (HALVINGS + 1) + least) * MAPPED * COLUMNS, room)
         ends = False
         for k in range(ENDS):
-            if then[STATES + GUARDS + k] < -slack[allowed + k]:
+            if room[THEN + STATES + GUARDS + k] < -slack[allowed + k]:
                 ends = True
         if events >= MOST_EVENTS:
             ends = False
@@ -402,29 +410,29 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
             may, beyond = ends, 0.0
             if not may:
                 for j in range(STATES):
-                    change[j] = abs(then[j] - now[j])
-                _simply(simple, mode * WATCHED * STATES, change, most)
-                beyond = (1.0 + PEAK_SHARE) * max(top, then[STATES + FORCE])
-                may = not was[FORCE] + most[FORCE] <= beyond
+                    room[CHANGE + j] = abs(room[THEN + j] - room[NOW + j])
+                _simply(simple, mode * WATCHED * STATES, room)
+                beyond = (1.0 + PEAK_SHARE) * max(top, room[THEN + STATES + FORCE])
+                may = not room[WAS + FORCE] + room[MOST + FORCE] <= beyond
                 for k in range(ENDS):
-                    if not most[GUARDS + k] <= was[GUARDS + k]:
+                    if not room[MOST + GUARDS + k] <= room[WAS + GUARDS + k]:
                         may = True
             if may and not ends:
                 for j in range(STATES):
-                    change[j] = then[j] - now[j]
-                _parted(ways, mode * PARTED * STATES, change, by)
+                    room[CHANGE + j] = room[THEN + j] - room[NOW + j]
+                _parted(ways, mode * PARTED * STATES, room)
                 for j in range(2 * STATES):
-                    by[j] = abs(by[j])
-                _bounded(bounds, 2 * mode * WATCHED * STATES, by, most)
+                    room[BY + j] = abs(room[BY + j])
+                _bounded(bounds, 2 * mode * WATCHED * STATES, room)
                 may = False
                 for k in range(ENDS):
-                    if not most[GUARDS + k] <= was[GUARDS + k]:
+                    if not room[MOST + GUARDS + k] <= room[WAS + GUARDS + k]:
                         may = True
-                if not may and not was[FORCE] + most[FORCE] <= beyond:
+                if not may and not room[WAS + FORCE] + room[MOST + FORCE] <= beyond:
                     # Where it rises as evenly as its ends say there is no swing inside, either.
-                    rise = then[STATES + FORCE] - was[FORCE]
-                    uneven = max(abs(was[RISING] * dt - rise), abs(then[STATES + RISING] * dt - rise))
-                    may = not max(was[FORCE], then[STATES + FORCE]) + uneven <= beyond
+                    rise = room[THEN + STATES + FORCE] - room[WAS + FORCE]
+                    uneven = max(abs(room[WAS + RISING] * dt - rise), abs(room[THEN + STATES + RISING] * dt - rise))
+                    may = not max(room[WAS + FORCE], room[THEN + STATES + FORCE]) + uneven <= beyond
             if may:
                 least = look
                 continue
@@ -432,47 +440,47 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
             until = left - (WHOLE >> least)
             least += 1
             continue
-        if then[STATES + FORCE] > top:
-            top = then[STATES + FORCE]
-        if was[RISING] > 0.0 and then[STATES + RISING] < 0.0 and least >= look:
+        if room[THEN + STATES + FORCE] > top:
+            top = room[THEN + STATES + FORCE]
+        if room[WAS + RISING] > 0.0 and room[THEN + STATES + RISING] < 0.0 and least >= look:
             h = math.ldexp(dt, -least)
-            after = then[STATES + FORCE]
-            top = max(top, _top(was[FORCE], was[RISING], after, then[STATES + RISING], h))
+            after = room[THEN + STATES + FORCE]
+            top = max(top, _top(room[WAS + FORCE], room[WAS + RISING], after, room[THEN + STATES + RISING], h))
         left -= WHOLE >> least
         for j in range(STATES):
-            now[j] = then[j]
+            room[NOW + j] = room[THEN + j]
         if ends:
             events += 1
             least = look
             begins = True
             parted = False
             for k in range(ENDS):
-                if then[STATES + GUARDS + k] < -slack[allowed + k]:
+                if room[THEN + STATES + GUARDS + k] < -slack[allowed + k]:
                     if k < CONTACTS:
                         touching ^= 1 << k
                     elif PARTS == 1 and k == CONTACTS:
                         parted = True
                     else:
                         # What slid stands, for now; what was stuck does, too.
-                        now[1] = 0.0
+                        room[NOW + 1] = 0.0
                         standing, motion = True, 0
             if parted:
                 pressed = 1 - pressed
                 at = 2 * (((pressed * MOTIONS + motion) << CONTACTS) + touching) * COLUMNS
-                cover = _row(begin, at + COLUMNS, now)
-                now[2] = _row(begin, at, now)
+                cover = _row(begin, at + COLUMNS, room)
+                room[NOW + 2] = _row(begin, at, room)
                 if CREEPS == 1:
-                    now[3] = cover
+                    room[NOW + 3] = cover
                 if pressed == 1:
                     touched = 1
         elif left > 0:
             for j in range(GUARDS + ENDS):
-                was[j] = then[STATES + j]
+                room[WAS + j] = room[THEN + STATES + j]
             if least > look and events < MOST_EVENTS:
                 # What was seen to happen lies in the second half of what was looked at.
                 least = min(least + 1, HALVINGS) if left > until else look
 
-    came = now[0] - closure
+    came = room[NOW] - closure
     gap1 = gap - came
     # The state waits for this, and a product comes sooner than a quotient.
     turns = 1.0 / rate
@@ -480,30 +488,30 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
     if leaves or not drive.closed_rev < revolutions1 < drive.open_rev:
         return plant_move(plant, state, effort_n, dt)  # type: ignore[no-any-return]
     # A mode that begins at the very end of the tick has yet to act.
-    force = max(then[STATES + FORCE], 0.0) if pressed == 1 else 0.0
+    force = max(room[THEN + STATES + FORCE], 0.0) if pressed == 1 else 0.0
     cover, arm = squeezed.cover_m, squeezed.arm_n
     if CREEPS == 1:
-        cover, arm = now[3], now[4]
+        cover, arm = room[NOW + 3], room[NOW + 4]
     if PARTS == 1:
-        d = now[2]
+        d = room[NOW + 2]
         if pressed == 1:
             touched = 1
-        elif now[0] < 0.0 and abs(d) + abs(cover) <= IN_SHAPE_M:
+        elif room[NOW] < 0.0 and abs(d) + abs(cover) <= IN_SHAPE_M:
             touched = 0
     else:
-        if now[0] >= 0.0:
+        if room[NOW] >= 0.0:
             touched = 1
-        d = now[0] if touched == 1 else 0.0
+        d = room[NOW] if touched == 1 else 0.0
     if LAGS == 1:
-        given = now[STATES - 1]
-    after_states, _ = take_states(thing.terms, squeezed.states, now, own)
+        given = room[NOW + STATES - 1]
+    after_states, _ = take_states(thing.terms, squeezed.states, room, own)
     felt = Squeezed(d, force, squeezed.slope_n_m, after_states, cover, arm, squeezed.rate_m_s, math.inf)
     if thing.held == 1:
         # Centred: the other half does the same.
         other = felt
     return PlantState(
         revolutions1,
-        -now[1] * turns,
+        -room[NOW + 1] * turns,
         gap1,
         rate,
         force,
