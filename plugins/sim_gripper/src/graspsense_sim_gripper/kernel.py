@@ -236,6 +236,8 @@ LONG_CODE: Final = 2000
 LEADING: Final = (plant.move.__code__, plant._driven.__code__)
 """What does little but lead to the next: taken in before types are inferred, since every level of calls has all that
 is below it compiled once more."""
+SELDOM: Final = {linear.move.__code__: ("plant_move", "_searched")}
+"""What a function seldom calls stays a call there, whatever it takes: the processor's registers are for the rest."""
 
 
 class NotCompilable(Exception):
@@ -307,11 +309,12 @@ def _compiled(
 ) -> Callable[..., Any]:
     plain = _plain(function)
     mark = fingerprint(plain)
-    key = f"{mark}{'!' if outermost else ''}"
+    key = f"{mark}{'!' if outermost else '?' if places == 0 else ''}"
     if key not in memo:
         counts = _places(plain.__code__)
+        seldom = SELDOM.get(plain.__code__, ())
         parts = {
-            name: _compiled(value, memo, numba, copies, outermost=False, places=counts[name])
+            name: _compiled(value, memo, numba, copies, outermost=False, places=0 if name in seldom else counts[name])
             for name, value in _functions(plain)
         }
         code = plain.__code__
@@ -328,7 +331,7 @@ def _compiled(
             cache=outermost,
             no_cpython_wrapper=not outermost,
             no_cfunc_wrapper=True,
-            forceinline=once or len(code.co_code) <= SHORT_CODE,
+            forceinline=once or (places > 0 and len(code.co_code) <= SHORT_CODE),
             inline="always" if places == 1 and code in LEADING else "never",
             # Nothing here allocates, and counting references to the arrays that are handed on took half of a tick.
             _nrt=False,

@@ -45,7 +45,7 @@ MOST_NUMBERS: Final = 0x3FFFFFFF
 WHOLE: Final = 1 << HALVINGS
 MOST_EVENTS: Final = 64
 """A tick in which more modes end than this is taken on without looking."""
-PLACES: Final = ("NOW", "THEN", "WAS", "CHANGE", "MOST", "BY")
+PLACES: Final = ("NOW", "THEN", "WAS", "MOST", "BY")
 """What a tick's room is for: the state before and after a piece of the tick, what is watched before it, and bounds."""
 PEAK_SHARE: Final = 2e-3
 """A swing inside a tick that goes beyond the greatest force by less than this share of it may be missed."""
@@ -237,25 +237,30 @@ def move_of(
         takes = bind(_take_all, take=bind(TAKE[count], made=type(state)), take_rest=takes)
     laid_out = {name.upper(): number for name, number in shape._asdict().items()}
     places = {name: k * _room(shape) for k, name in enumerate(PLACES)}
-    now, then, was, change, most, by = places.values()
+    now, then, was, most, by = places.values()
     watched = padded(GUARDS + shape.ends)
     mapped, parted = padded(shape.states + GUARDS + shape.ends), padded(2 * shape.states)
+    here = {"WATCHED": watched, "MAPPED": mapped, "PARTED": parted, **laid_out, **places}
+    changes = {"COLUMNS": shape.states, "FROM": then, "CHANGES": 1, "NOW": now}
+    products = {
+        "_moved": bind(_product, ROWS=mapped, COLUMNS=shape.columns, FROM=now, TO=then),
+        "_seen": bind(_product, ROWS=watched, COLUMNS=shape.columns, FROM=now, TO=was),
+    }
+    swings = bind(
+        _swings,
+        _simply=bind(_product, ROWS=watched, TO=most, SIZES=1, **changes),
+        _parted=bind(_product, ROWS=parted, TO=by, **changes),
+        _bounded=bind(_product, ROWS=watched, COLUMNS=2 * shape.states, FROM=by, TO=most, SIZES=1),
+        **here,
+    )
     return bind(
         move,
         plant_move=plant_move,
         put_states=puts,
         take_states=takes,
-        _moved=bind(_product, ROWS=mapped, COLUMNS=shape.columns, FROM=now, TO=then),
-        _seen=bind(_product, ROWS=watched, COLUMNS=shape.columns, FROM=now, TO=was),
-        _simply=bind(_product, ROWS=watched, COLUMNS=shape.states, FROM=change, TO=most),
-        _parted=bind(_product, ROWS=parted, COLUMNS=shape.states, FROM=change, TO=by),
-        _bounded=bind(_product, ROWS=watched, COLUMNS=2 * shape.states, FROM=by, TO=most),
-        _row=bind(_row, NOW=now, **laid_out),
-        WATCHED=watched,
-        MAPPED=mapped,
-        PARTED=parted,
-        **laid_out,
-        **places,
+        _quiet=bind(_quiet, _swings=swings, **products, **here),
+        _searched=bind(_searched, _swings=swings, _row=bind(_row, **here), **products, **here),
+        **here,
         **tuples,
     )
 
@@ -278,7 +283,9 @@ take_states: Any = _take_none
 STATES = COLUMNS = PARTS = CREEPS = LAGS = MOTIONS = CONTACTS = ENDS = ROWS = 0
 WATCHED = MAPPED = PARTED = 0
 """Rows of the tables of what is watched, of the maps, and of the ways, with those that pad them."""
-NOW = THEN = WAS = CHANGE = MOST = BY = FROM = TO = 0
+NOW = THEN = WAS = MOST = BY = FROM = TO = 0
+CHANGES = SIZES = 0
+"""1: a product of how the state changes; of how much what is multiplied is, whichever way."""
 
 
 def _product(table: Any, at: int, room: Any) -> None:
@@ -290,6 +297,10 @@ def _product(table: Any, at: int, room: Any) -> None:
         first = second = third = fourth = 0.0
         for j in range(COLUMNS):
             k, by = at + j * ROWS + i, room[FROM + j]
+            if CHANGES == 1:
+                by -= room[NOW + j]
+            if SIZES == 1:
+                by = abs(by)
             first += table[k] * by
             second += table[k + 1] * by
             third += table[k + 2] * by
@@ -318,66 +329,68 @@ def _top(before: float, rising: float, after: float, falling: float, h: float) -
     return before + s * (m0 + s * (3.0 * step - 2.0 * m0 - m1 + s * (m0 + m1 - 2.0 * step)))
 
 
-def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> PlantState:
-    """Return the plant after `dt`, the tick that the maps are for, in which this effort was asked for."""
-    plant, look, maps, watched, simple, ways, bounds, begin, slack, room = params
-    (
-        revolutions,
-        speed,
-        gap,
-        rate,
-        felt_left,
-        felt_right,
-        offset,
-        touched,
-        squeezed,
-        peak,
-        given,
-        other,
-        step,
-        n,
-        lost,
-        alone,
-    ) = state
-    drive, thing = plant.drive, plant.thing
-    leaves = (revolutions >= drive.open_rev and effort_n <= 0.0) or offset != 0.0 or felt_left != felt_right
-    # What the plant has yet to bring up to date is the plant's.
-    leaves = leaves or alone > 0.0
+def _quiet(params: Linear, mode: int, standing: bool, top: float, dt: float) -> bool:
+    """Return whether nothing can end this mode within a tick, and write what the tick comes to.
 
-    closure = thing.width_m - gap
-    room[NOW] = closure
-    room[NOW + 1] = -speed * rate
-    at = 2
-    pressed = 1
-    d = cover = 0.0
-    if PARTS == 1:
-        d = squeezed.compression_m
-        if CREEPS == 1:
-            cover = squeezed.cover_m
-            room[NOW + 3], room[NOW + 4] = cover, squeezed.arm_n
-            at = 5
-        else:
-            at = 3
-        if squeezed.force_n <= 0.0 and closure - d - cover < -APART_M:
-            pressed = 0
-        elif thing.skins_n_m == math.inf:
-            d = closure
-        room[NOW + 2] = d
-    own = NOW + at
-    at = put_states(thing.terms, squeezed.states, room, own)
-    if LAGS == 1:
-        room[at] = given
-    room[NOW + STATES] = effort_n
-    if MOTIONS == 3:
-        room[NOW + STATES + 1] = drive.coulomb_n
-    motion = mode = allowed = 0
-    standing = room[NOW + 1] == 0.0
-    if MOTIONS == 3 and not standing:
-        motion = 1 if room[NOW + 1] > 0.0 else 2
-    # Which of the terms' own contacts touch is guessed, and put right below.
-    touching = (1 << CONTACTS) - 1 if squeezed.force_n > 0.0 else 0
-    left, least, events, until = 0 if leaves else WHOLE, 0, 0, 0
-    top = peak
+    As for most ticks; it is also not quiet where the force may have been greater inside it than at its ends.
+    """
+    _, look, maps, watched, _, _, _, _, slack, room = params
+    allowed = (mode * ENDS) & MOST_NUMBERS
+    _seen(watched, mode * WATCHED * COLUMNS, room)
+    _moved(maps, mode * (HALVINGS + 1) * MAPPED * COLUMNS, room)
+    for k in range(CONTACTS):
+        if room[WAS + GUARDS + k] < -slack[allowed + k]:
+            return False
+    if MOTIONS == 3 and standing:
+        for k in range(ENDS - 2, ENDS):
+            if room[WAS + GUARDS + k] < -slack[allowed + k]:
+                return False
+    for k in range(ENDS):
+        if room[THEN + STATES + GUARDS + k] < -slack[allowed + k]:
+            return False
+    if look == 0:
+        return not (room[WAS + RISING] > 0.0 > room[THEN + STATES + RISING])
+    return not _swings(params, mode, top, dt)
+
+
+def _swings(params: Linear, mode: int, top: float, dt: float) -> bool:
+    """Return whether the mode may have ended inside a tick that it lasts by its end, or the force gone beyond `top`."""
+    _, _, _, _, simple, ways, bounds, _, _, room = params
+    _simply(simple, mode * WATCHED * STATES, room)
+    beyond = (1.0 + PEAK_SHARE) * max(top, room[THEN + STATES + FORCE])
+    may = not room[WAS + FORCE] + room[MOST + FORCE] <= beyond
+    for k in range(ENDS):
+        if not room[MOST + GUARDS + k] <= room[WAS + GUARDS + k]:
+            may = True
+    if not may:
+        return False
+    _parted(ways, mode * PARTED * STATES, room)
+    _bounded(bounds, 2 * mode * WATCHED * STATES, room)
+    for k in range(ENDS):
+        if not room[MOST + GUARDS + k] <= room[WAS + GUARDS + k]:
+            return True
+    if room[WAS + FORCE] + room[MOST + FORCE] <= beyond:
+        return False
+    # Where it rises as evenly as its ends say there is no swing inside, either.
+    rise = room[THEN + STATES + FORCE] - room[WAS + FORCE]
+    uneven = max(abs(room[WAS + RISING] * dt - rise), abs(room[THEN + STATES + RISING] * dt - rise))
+    return not max(room[WAS + FORCE], room[THEN + STATES + FORCE]) + uneven <= beyond
+
+
+def _searched(
+    params: Linear,
+    pressed: int,
+    motion: int,
+    touching: int,
+    standing: bool,
+    touched: int,
+    top: float,
+    dt: float,
+) -> tuple[int, int, float, int]:
+    """Take a tick in which modes may end, in pieces; return pressed, touched and the peak then, and how many ended."""
+    _, look, maps, watched, _, _, _, begin, slack, room = params
+    mode = allowed = 0
+    left, least, events, until = WHOLE, 0, 0, 0
     begins = True
     while left > 0:
         while begins:
@@ -406,36 +419,9 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
                 ends = True
         if events >= MOST_EVENTS:
             ends = False
-        elif least == 0 and look > 0:
-            may, beyond = ends, 0.0
-            if not may:
-                for j in range(STATES):
-                    room[CHANGE + j] = abs(room[THEN + j] - room[NOW + j])
-                _simply(simple, mode * WATCHED * STATES, room)
-                beyond = (1.0 + PEAK_SHARE) * max(top, room[THEN + STATES + FORCE])
-                may = not room[WAS + FORCE] + room[MOST + FORCE] <= beyond
-                for k in range(ENDS):
-                    if not room[MOST + GUARDS + k] <= room[WAS + GUARDS + k]:
-                        may = True
-            if may and not ends:
-                for j in range(STATES):
-                    room[CHANGE + j] = room[THEN + j] - room[NOW + j]
-                _parted(ways, mode * PARTED * STATES, room)
-                for j in range(2 * STATES):
-                    room[BY + j] = abs(room[BY + j])
-                _bounded(bounds, 2 * mode * WATCHED * STATES, room)
-                may = False
-                for k in range(ENDS):
-                    if not room[MOST + GUARDS + k] <= room[WAS + GUARDS + k]:
-                        may = True
-                if not may and not room[WAS + FORCE] + room[MOST + FORCE] <= beyond:
-                    # Where it rises as evenly as its ends say there is no swing inside, either.
-                    rise = room[THEN + STATES + FORCE] - room[WAS + FORCE]
-                    uneven = max(abs(room[WAS + RISING] * dt - rise), abs(room[THEN + STATES + RISING] * dt - rise))
-                    may = not max(room[WAS + FORCE], room[THEN + STATES + FORCE]) + uneven <= beyond
-            if may:
-                least = look
-                continue
+        elif least == 0 and look > 0 and (ends or _swings(params, mode, top, dt)):
+            least = look
+            continue
         if ends and least < HALVINGS:
             until = left - (WHOLE >> least)
             least += 1
@@ -479,8 +465,79 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
             if least > look and events < MOST_EVENTS:
                 # What was seen to happen lies in the second half of what was looked at.
                 least = min(least + 1, HALVINGS) if left > until else look
+    for j in range(STATES):
+        room[THEN + j] = room[NOW + j]
+    return pressed, touched, top, events
 
-    came = room[NOW] - closure
+
+def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> PlantState:
+    """Return the plant after `dt`, the tick that the maps are for, in which this effort was asked for."""
+    plant, room = params.plant, params.room
+    (
+        revolutions,
+        speed,
+        gap,
+        rate,
+        felt_left,
+        felt_right,
+        offset,
+        touched,
+        squeezed,
+        peak,
+        given,
+        other,
+        step,
+        n,
+        lost,
+        alone,
+    ) = state
+    drive, thing = plant.drive, plant.thing
+    leaves = (revolutions >= drive.open_rev and effort_n <= 0.0) or offset != 0.0 or felt_left != felt_right
+    # What the plant has yet to bring up to date is the plant's.
+    leaves = leaves or alone > 0.0
+
+    closure = thing.width_m - gap
+    room[NOW] = closure
+    room[NOW + 1] = -speed * rate
+    at = 2
+    pressed = 1
+    d = cover = 0.0
+    if PARTS == 1:
+        d = squeezed.compression_m
+        if CREEPS == 1:
+            cover = squeezed.cover_m
+            room[NOW + 3], room[NOW + 4] = cover, squeezed.arm_n
+            at = 5
+        else:
+            at = 3
+        if squeezed.force_n <= 0.0 and closure - d - cover < -APART_M:
+            pressed = 0
+        elif thing.skins_n_m == math.inf:
+            d = closure
+        room[NOW + 2] = d
+    own = at
+    at = put_states(thing.terms, squeezed.states, room, NOW + own)
+    if LAGS == 1:
+        room[at] = given
+    room[NOW + STATES] = effort_n
+    if MOTIONS == 3:
+        room[NOW + STATES + 1] = drive.coulomb_n
+    motion = 0
+    standing = room[NOW + 1] == 0.0
+    if MOTIONS == 3 and not standing:
+        motion = 1 if room[NOW + 1] > 0.0 else 2
+    # Which of the terms' own contacts touch is guessed, and put right below.
+    touching = (1 << CONTACTS) - 1 if squeezed.force_n > 0.0 else 0
+    top, events = peak, 0
+    if not leaves:
+        if _quiet(params, ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching, standing, top, dt):
+            top = max(top, room[THEN + STATES + FORCE])
+        else:
+            pressed, touched, top, events = _searched(
+                params, pressed, motion, touching, standing, touched, top, dt
+            )
+
+    came = room[THEN] - closure
     gap1 = gap - came
     # The state waits for this, and a product comes sooner than a quotient.
     turns = 1.0 / rate
@@ -491,27 +548,27 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
     force = max(room[THEN + STATES + FORCE], 0.0) if pressed == 1 else 0.0
     cover, arm = squeezed.cover_m, squeezed.arm_n
     if CREEPS == 1:
-        cover, arm = room[NOW + 3], room[NOW + 4]
+        cover, arm = room[THEN + 3], room[THEN + 4]
     if PARTS == 1:
-        d = room[NOW + 2]
+        d = room[THEN + 2]
         if pressed == 1:
             touched = 1
-        elif room[NOW] < 0.0 and abs(d) + abs(cover) <= IN_SHAPE_M:
+        elif room[THEN] < 0.0 and abs(d) + abs(cover) <= IN_SHAPE_M:
             touched = 0
     else:
-        if room[NOW] >= 0.0:
+        if room[THEN] >= 0.0:
             touched = 1
-        d = room[NOW] if touched == 1 else 0.0
+        d = room[THEN] if touched == 1 else 0.0
     if LAGS == 1:
-        given = room[NOW + STATES - 1]
-    after_states, _ = take_states(thing.terms, squeezed.states, room, own)
+        given = room[THEN + STATES - 1]
+    after_states, _ = take_states(thing.terms, squeezed.states, room, THEN + own)
     felt = Squeezed(d, force, squeezed.slope_n_m, after_states, cover, arm, squeezed.rate_m_s, math.inf)
     if thing.held == 1:
         # Centred: the other half does the same.
         other = felt
     return PlantState(
         revolutions1,
-        -room[NOW + 1] * turns,
+        -room[THEN + 1] * turns,
         gap1,
         rate,
         force,
