@@ -83,9 +83,9 @@ def sum_of(laws: Sequence[Law]) -> Law:
 
 
 def plant_of(
-    laws: Sequence[Law], **tuples: Any
+    laws: Sequence[Law], *, settles: bool = True, **tuples: Any
 ) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
-    """Return `move` for an object that is the sum of these terms.
+    """Return `move` for an object that is the sum of these terms; not `settles`: for steps that need not settle.
 
     `tuples` are what makes the plant's named tuples, where that is not their class (see `maker`).
     """
@@ -94,7 +94,9 @@ def plant_of(
     stuck = bind(plant._stuck, _felt=felt, **tuples)
     step = bind(plant._step, _felt=felt, _stuck=stuck, _implicit=bind(plant._implicit, _felt=felt), **tuples)
     glide = bind(plant._glide, **{name: made for name, made in tuples.items() if name == "PlantState"})
-    return bind(plant.move, _driven=bind(plant._driven, _step=step, _glide=glide))
+    stepped = bind(plant._stepped, _step=step)
+    driven = plant._settled if settles else plant._driven
+    return bind(plant.move, _driven=bind(driven, _stepped=stepped, _glide=glide))
 
 
 move: Any = _nothing
@@ -213,14 +215,18 @@ def _tare(images: Any, begin: int, end: int, left_zero: Any, right_zero: Any) ->
 
 
 def grasp_of(
-    laws: Sequence[Law], step: Callable[..., Any], *, by_maps: tuple[Sequence[str], Shape] | None = None
+    laws: Sequence[Law],
+    step: Callable[..., Any],
+    *,
+    by_maps: tuple[Sequence[str], Shape] | None = None,
+    settles: bool = True,
 ) -> Callable[..., Any]:
     """Return `grasp` for an object of these terms under this control law, in plain Python.
 
     `by_maps`: their names and the shape of the maps, where its plant parameters are a `Linear` and exact maps take the
-    ticks that they can.
+    ticks that they can. Not `settles`: for steps that need not.
     """
-    move: Any = plant_of(laws)
+    move: Any = plant_of(laws, settles=settles)
     if by_maps is not None:
         move = linear.move_of(*by_maps, move)
     return bind(grasp, move=move, control=bind(tick, step=step))
@@ -233,7 +239,12 @@ SHORT_CODE: Final = 400
 """Bytes of byte code up to which a function is taken into all that call it."""
 LONG_CODE: Final = 2000
 """Bytes from which on a function stays a call where it would come to stand in several places."""
-LEADING: Final = (plant.move.__code__, plant._driven.__code__)
+LEADING: Final = (
+    plant.move.__code__,
+    plant._driven.__code__,
+    plant._settled.__code__,
+    plant._stepped.__code__,
+)
 """What does little but lead to the next: taken in before types are inferred, since every level of calls has all that
 is below it compiled once more."""
 SELDOM: Final = {linear.move.__code__: ("plant_move", "_searched")}
@@ -245,19 +256,13 @@ class NotCompilable(Exception):
 
 
 @contextmanager
-def first_call(*, by_maps: bool = False) -> Iterator[None]:
-    """Have a compiled loop called for the first time in here, which compiles it; `by_maps`: one with exact maps.
+def first_call() -> Iterator[None]:
+    """Have a compiled loop called for the first time in here, which compiles it.
 
     Raises NotCompilable where numba refuses, with the line that it names.
     """
-    import numba
     from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
-    config: Any = numba.config
-    # Rows side by side are then one instruction; of a loop without products it only makes more instructions.
-    given = config.SLP_VECTORIZE
-    if by_maps:
-        config.SLP_VECTORIZE = 1
     try:
         yield
     except (NumbaError, UnsupportedBytecodeError) as error:
@@ -267,8 +272,6 @@ def first_call(*, by_maps: bool = False) -> Iterator[None]:
             (line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__
         )
         raise NotCompilable(f"the compiler refuses {where}: {reason}") from error
-    finally:
-        config.SLP_VECTORIZE = given
 
 
 def compiled(function: Callable[..., Any], memo: dict[Any, Any]) -> Callable[..., Any]:
@@ -287,6 +290,29 @@ def compiled(function: Callable[..., Any], memo: dict[Any, Any]) -> Callable[...
     _count(_plain(function), 1, (), copies)
     memo[function] = _compiled(function, memo, numba, copies, outermost=True)
     return memo[function]  # type: ignore[no-any-return]
+
+
+@functools.cache
+def _side_by_side() -> type[Any]:
+    """Return a compiler for what sums rows: side by side they are one instruction.
+
+    Of all other code that would only make more instructions, so it is not for the loop as a whole.
+    """
+    import numba
+    from numba.core.compiler import Compiler
+
+    config: Any = numba.config
+
+    class SideBySide(Compiler):  # type: ignore[misc]
+        def compile_extra(self, func: Any) -> Any:
+            given = config.SLP_VECTORIZE
+            config.SLP_VECTORIZE = 1
+            try:
+                return super().compile_extra(func)
+            finally:
+                config.SLP_VECTORIZE = given
+
+    return SideBySide
 
 
 def entry(loop: Callable[..., Any]) -> Callable[..., Any]:
@@ -314,7 +340,9 @@ def _compiled(
         counts = _places(plain.__code__)
         seldom = SELDOM.get(plain.__code__, ())
         parts = {
-            name: _compiled(value, memo, numba, copies, outermost=False, places=0 if name in seldom else counts[name])
+            name: _compiled(
+                value, memo, numba, copies, outermost=False, places=0 if name in seldom else counts[name]
+            )
             for name, value in _functions(plain)
         }
         code = plain.__code__
@@ -333,6 +361,9 @@ def _compiled(
             no_cfunc_wrapper=True,
             forceinline=once or (places > 0 and len(code.co_code) <= SHORT_CODE),
             inline="always" if places == 1 and code in LEADING else "never",
+            pipeline_class=_side_by_side()
+            if code is linear._product.__code__
+            else numba.core.compiler.Compiler,
             # Nothing here allocates, and counting references to the arrays that are handed on took half of a tick.
             _nrt=False,
         )

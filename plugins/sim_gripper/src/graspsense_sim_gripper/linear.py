@@ -431,7 +431,9 @@ def _searched(
         if room[WAS + RISING] > 0.0 and room[THEN + STATES + RISING] < 0.0 and least >= look:
             h = math.ldexp(dt, -least)
             after = room[THEN + STATES + FORCE]
-            top = max(top, _top(room[WAS + FORCE], room[WAS + RISING], after, room[THEN + STATES + RISING], h))
+            top = max(
+                top, _top(room[WAS + FORCE], room[WAS + RISING], after, room[THEN + STATES + RISING], h)
+            )
         left -= WHOLE >> least
         for j in range(STATES):
             room[NOW + j] = room[THEN + j]
