@@ -231,7 +231,7 @@ class Ours:
         composition = composition_of(config, self.setting)
         self.loop = kernel.compiled(loop_of(composition, type(self.law).step), _MEMO)
         self.storage = Storage()
-        with kernel.first_call():
+        with kernel.first_call(by_maps=composition.shape is not None):
             self.once()
         self.loop = kernel.entry(self.loop)
 

@@ -222,7 +222,7 @@ class _Batch:
                 try:
                     plain = loop_of(kinds, type(self.job.controller).step)
                     loop = kernel.compiled(plain, _MEMO)
-                    with kernel.first_call():
+                    with kernel.first_call(by_maps=kinds.shape is not None):
                         one = grasp_compiled(self.job, setting, loop, self._storage())
                     self.loops[kinds] = kernel.entry(loop)
                     return one

@@ -256,13 +256,19 @@ class NotCompilable(Exception):
 
 
 @contextmanager
-def first_call() -> Iterator[None]:
-    """Have a compiled loop called for the first time in here, which compiles it.
+def first_call(*, by_maps: bool = False) -> Iterator[None]:
+    """Have a compiled loop called for the first time in here, which compiles it; `by_maps`: one with exact maps.
 
     Raises NotCompilable where numba refuses, with the line that it names.
     """
+    import numba
     from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
+    config: Any = numba.config
+    # Rows side by side are then one instruction; of a loop without products it only makes more instructions.
+    given = config.SLP_VECTORIZE
+    if by_maps:
+        config.SLP_VECTORIZE = 1
     try:
         yield
     except (NumbaError, UnsupportedBytecodeError) as error:
@@ -272,6 +278,8 @@ def first_call() -> Iterator[None]:
             (line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__
         )
         raise NotCompilable(f"the compiler refuses {where}: {reason}") from error
+    finally:
+        config.SLP_VECTORIZE = given
 
 
 def compiled(function: Callable[..., Any], memo: dict[Any, Any]) -> Callable[..., Any]:
@@ -290,29 +298,6 @@ def compiled(function: Callable[..., Any], memo: dict[Any, Any]) -> Callable[...
     _count(_plain(function), 1, (), copies)
     memo[function] = _compiled(function, memo, numba, copies, outermost=True)
     return memo[function]  # type: ignore[no-any-return]
-
-
-@functools.cache
-def _side_by_side() -> type[Any]:
-    """Return a compiler for what sums rows: side by side they are one instruction.
-
-    Of all other code that would only make more instructions, so it is not for the loop as a whole.
-    """
-    import numba
-    from numba.core.compiler import Compiler
-
-    config: Any = numba.config
-
-    class SideBySide(Compiler):  # type: ignore[misc]
-        def compile_extra(self, func: Any) -> Any:
-            given = config.SLP_VECTORIZE
-            config.SLP_VECTORIZE = 1
-            try:
-                return super().compile_extra(func)
-            finally:
-                config.SLP_VECTORIZE = given
-
-    return SideBySide
 
 
 def entry(loop: Callable[..., Any]) -> Callable[..., Any]:
@@ -361,9 +346,6 @@ def _compiled(
             no_cfunc_wrapper=True,
             forceinline=once or (places > 0 and len(code.co_code) <= SHORT_CODE),
             inline="always" if places == 1 and code in LEADING else "never",
-            pipeline_class=_side_by_side()
-            if code is linear._product.__code__
-            else numba.core.compiler.Compiler,
             # Nothing here allocates, and counting references to the arrays that are handed on took half of a tick.
             _nrt=False,
         )

@@ -116,7 +116,7 @@ def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -
         return None
     shape, look, *numbers = modes
     rooms = np.zeros(len(PLACES) * _room(shape)) if on_arrays else [0.0] * (len(PLACES) * _room(shape))
-    return Linear(plant, look, *numbers, rooms), shape
+    return Linear(plant, look, *numbers, room=rooms), shape
 
 
 @lru_cache(maxsize=256)

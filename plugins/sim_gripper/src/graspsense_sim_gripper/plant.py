@@ -676,25 +676,25 @@ def _step(
         if touched == 0 and gap1 <= reach:
             # The force that meets it there is of the next step.
             kick1 = kick
-        change = kick1 - kick
-        # A difference of forces that is rounding says nothing of the step.
-        noise = ROUNDING * max(
-            squeezed1.slope_n_m * abs(squeezed1.compression_m), other1.slope_n_m * abs(other1.compression_m)
-        )
-        noise += 4.0 * (FORCE_ROUNDING_N + FORCE_ROUNDING * max(load, load1))
-        if abs(change) * drive.inertia <= noise * abs(rate):
-            change = 0.0
         speed1 = speed + 0.5 * used * (kick + kick1)
-        # Where so little changes the errors below are smaller still, as in most ticks.
-        if steps.tolerance < math.inf and (
-            touched == 1 or abs(used * change * rate) > steps.tolerance * SPEED_SCALE_M_S
-        ):
-            most = max(abs(kick), abs(kick1))
-            if most > 0.0:
-                shift = abs(used * change * change / (12.0 * most) * rate)
-            fastest = max(abs(speed), abs(speed1))
-            if fastest > 0.0:
-                grip = abs((load1 - load) * used * change / (6.0 * fastest))
+        if steps.tolerance < math.inf:
+            change = kick1 - kick
+            # A difference of forces that is rounding says nothing of the step.
+            noise = ROUNDING * max(
+                squeezed1.slope_n_m * abs(squeezed1.compression_m),
+                other1.slope_n_m * abs(other1.compression_m),
+            )
+            noise += 4.0 * (FORCE_ROUNDING_N + FORCE_ROUNDING * max(load, load1))
+            if abs(change) * drive.inertia <= noise * abs(rate):
+                change = 0.0
+            # Where so little changes the errors below are smaller still, as in most ticks.
+            if touched == 1 or abs(used * change * rate) > steps.tolerance * SPEED_SCALE_M_S:
+                most = max(abs(kick), abs(kick1))
+                if most > 0.0:
+                    shift = abs(used * change * change / (12.0 * most) * rate)
+                fastest = max(abs(speed), abs(speed1))
+                if fastest > 0.0:
+                    grip = abs((load1 - load) * used * change / (6.0 * fastest))
 
     if not done and again == 0.0:
         if speed1 * direction <= 0.0:
