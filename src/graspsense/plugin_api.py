@@ -137,6 +137,7 @@ if TYPE_CHECKING:
     from graspsense.core.trial import GraspEvent as GraspEvent
     from graspsense.core.trial import RunInfo as RunInfo
     from graspsense.core.trial import Trial as Trial
+    from graspsense.core.user_folders import cache_folder as cache_folder
 
 _HOME_OF: Final = {
     "bind": "binding",
@@ -266,6 +267,7 @@ _HOME_OF: Final = {
     "GraspEvent": "trial",
     "RunInfo": "trial",
     "Trial": "trial",
+    "cache_folder": "user_folders",
 }
 
 __all__ = sorted(_HOME_OF)

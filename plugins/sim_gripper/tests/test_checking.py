@@ -3,16 +3,18 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 from attrs import evolve
 
 from graspsense.core.runner import run_grasp
-from graspsense.plugin_api import ConfigError, Controller, Outcome, RunConfig, create
+from graspsense.plugin_api import HOLD, ConfigError, Controller, Outcome, RunConfig, create
 from graspsense_sim_gripper import checking
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.checking import Control, checked_choice, standard
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.scene import ObjectSpec, find
+from graspsense_sim_gripper.deviation import Course, deviation
+from graspsense_sim_gripper.scene import ObjectSpec, catalogue, find
 from graspsense_sim_gripper.selection import BOLD, CAREFUL
 from graspsense_sim_gripper.setting import choice_of
 from graspsense_sim_gripper.terms import Term
@@ -50,7 +52,8 @@ def test_what_the_paths_say_too_boldly_the_trial_grasp_takes_back(monkeypatch):
     monkeypatch.setattr(checking, "LADDER", (rash, CAREFUL))
     assert choice_of(config, spec, rung=rash).decisions[-1].decision != "kept"
     choice = checked_choice(config, spec, hybrid())
-    assert (choice.rung, choice.check.grasps) == ("careful", 3)
+    # The first one, one in each of the two, and two more in that which holds.
+    assert (choice.rung, choice.check.grasps) == ("careful", 5)
 
 
 def test_force_and_speed_are_those_of_the_controller_unless_the_settings_say_others():
@@ -97,6 +100,64 @@ def test_a_law_that_hangs_on_its_steps_is_refused_by_name(monkeypatch):
     assert 'gripper.fidelity = "reference"' in said
     # As a reference it is what it is, and says that nothing was checked.
     assert checked_choice(evolve(CONFIG, fidelity="reference"), spec, hybrid()).check is None
+
+
+STIFF = 'width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 1e5\n[[terms]]\ntype = "loss"\ndamping_n_s_m = 200.0\n'
+
+
+def course(config, contact_force_n):
+    """Return a grasp of this config's object that squeezes from this force on."""
+    law = create("controller", "hybrid", closing_speed_m_s=0.0125, contact_force_n=contact_force_n)
+    grasp = run_grasp(SimBackend(config), law, RunConfig())
+    trace = grasp.trace
+    return Course(
+        outcome=int(grasp.outcome),
+        dt_s=1.0 / config.rate_hz,
+        gap_m=trace.gap_m,
+        speed_m_s=trace.velocity_m_s,
+        left_n=trace.force_left_n,
+        right_n=trace.force_right_n,
+        ended=int(np.sum(trace.phase <= HOLD)),
+        peak_n=grasp.report["true_peak_force_n"],
+    )
+
+
+@pytest.fixture
+def stiff(tmp_path):
+    """Return a config, and the force (N) that its reference meets at a tick of the approach."""
+    scene = tmp_path / "stiff.toml"
+    scene.write_text(STIFF)
+    config = evolve(CONFIG, object=str(scene), accuracy=0.003, open_gap_m=0.06, skin_n_m=3e4)
+    reference = evolve(config, fidelity="reference")
+    # No threshold above it changes it.
+    felt = course(reference, 5.0).left_n
+    met_n = float(felt[np.flatnonzero(felt >= 0.4)[0]])
+    # It matters: squeezed a tick later, the grasp is another.
+    error, _ = deviation(course(reference, met_n - 0.08), course(reference, met_n + 0.08))
+    assert error > 2.0 * config.accuracy
+    return config, met_n
+
+
+@pytest.mark.parametrize("off_n", [0.0, 1e-9, -1e-9])
+def test_a_threshold_that_is_met_within_rounding_at_a_tick_is_refused(stiff, off_n):
+    config, met_n = stiff
+    with pytest.raises(ConfigError) as refused:
+        course(config, met_n + off_n)
+    for told in ("stiff.toml", "within", "df_dt", "gripper.open_gap_m", "gripper.accuracy", "reference"):
+        assert told in str(refused.value)
+
+
+@pytest.mark.parametrize("off_n", [1e-4, -1e-4, 1e-3, -1e-3, 0.08])
+def test_a_threshold_that_is_nearly_met_at_a_tick_is_decided_as_by_the_reference(stiff, off_n):
+    config, met_n = stiff
+    expected = course(evolve(config, fidelity="reference"), met_n + off_n)
+    assert deviation(course(config, met_n + off_n), expected)[0] <= config.accuracy
+
+
+@pytest.mark.slow
+def test_no_object_of_the_catalogue_is_refused():
+    for spec in catalogue().values():
+        assert checked_choice(CONFIG, spec, hybrid()).check is not None, spec.name
 
 
 def test_forced_steps_and_contacts_beyond_the_tick_are_not_checked():

@@ -1,6 +1,7 @@
 """A choice that a trial grasp has checked is found again, by the same code alone."""
 
 import os
+import pwd
 
 import pytest
 from attrs import evolve
@@ -92,3 +93,14 @@ def test_the_older_half_makes_room(monkeypatch, folder):
     choice(k1=1900.0)
     assert len(list(folder.iterdir())) == 3
     assert min(path.stat().st_mtime for path in folder.iterdir()) == 2.0
+
+
+def test_without_a_home_nothing_is_kept_and_every_process_chooses_anew(trials, monkeypatch):
+    def unknown(uid):
+        raise KeyError(f"getpwuid(): uid not found: {uid}")
+
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.delenv("HOME", raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+    assert choice() == choice()
+    assert len(trials) == 2

@@ -120,7 +120,7 @@ def _bench(asked: Mapping[str, Any], replace: bool) -> Iterator[_Bench]:
     import attrs
 
     from graspsense.core.calibrating import Rig
-    from graspsense.core.calibration_files import UNCALIBRATED, calibrations_of
+    from graspsense.core.calibration_files import UNCALIBRATED, calibration_path, calibrations_of
     from graspsense.core.errors import ConfigError
 
     settings = settings_of(**asked)
@@ -135,6 +135,8 @@ def _bench(asked: Mapping[str, Any], replace: bool) -> Iterator[_Bench]:
     backend = component.create(attrs.evolve(config, calibration=UNCALIBRATED))
     try:
         info = backend.open(settings.run.seed)
+        # A calibration that cannot be kept is not begun.
+        calibration_path(folder, info.serial, UNCALIBRATED)
         rig = Rig(backend, info, settings.run)
         stored = {} if replace else calibrations_of(folder, info.serial, info.numbers)
         yield _Bench(backend, info, rig, folder, stored, settings.run.first_effort_n)

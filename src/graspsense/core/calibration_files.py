@@ -22,6 +22,7 @@ from attrs import frozen
 from graspsense.core.calibration import Cells, LoadTable
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.signals import CELLS
+from graspsense.core.user_folders import NOWHERE, data_folder
 
 FORMAT: Final = "graspsense-calibration"
 VERSION: Final = 1
@@ -46,19 +47,26 @@ class Calibration:
     sha256: str = ""
 
 
-def default_folder() -> Path:
-    """Return where the user's calibrations are kept."""
-    base = os.environ.get("XDG_DATA_HOME") or str(Path.home() / ".local" / "share")
-    return Path(base) / "graspsense" / "calibration"
-
-
 def calibration_path(folder: str | Path, serial: str, kind: str) -> Path:
-    """Return the file of this kind for this serial. Raises ConfigError for a serial that names no folder."""
+    """Return the file of this kind for this serial, in this folder or (an empty one) in the user's.
+
+    Raises ConfigError for a serial that names no folder, and where the user has none.
+    """
     if not re.fullmatch(r"[\w.+-]+", serial) or serial.startswith("."):
         raise ConfigError(
             f"calibrations are kept by serial number, and {serial!r} is none: letters, digits and . + - _ are allowed"
         )
-    return Path(folder or default_folder()) / serial / f"{kind}.json"
+    kept = _folder(folder)
+    if kept is None:
+        raise ConfigError(f"{NOWHERE.format('XDG_DATA_HOME')}, or name one by gripper.calibration")
+    return kept / serial / f"{kind}.json"
+
+
+def _folder(given: str | Path) -> Path | None:
+    if given:
+        return Path(given)
+    data = data_folder()
+    return None if data is None else data / "calibration"
 
 
 def write_calibration(path: Path, calibration: Calibration) -> Calibration:
@@ -124,12 +132,12 @@ def read_calibration(path: Path) -> Calibration:
 
 
 def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) -> dict[str, Calibration]:
-    """Return the calibrations of this device, by kind; none where `folder` is `none`.
+    """Return the calibrations of this device, by kind; none where `folder` is `none` or there is no folder to have any.
 
     Raises ConfigError, with the two choices there are, where a file was made on another device or on this one as it
     no longer is; DataDamaged.
     """
-    if folder == UNCALIBRATED:
+    if folder == UNCALIBRATED or _folder(folder) is None:
         return {}
     found: dict[str, Calibration] = {}
     for kind in KINDS:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-import os
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 
 from graspsense.core.errors import ConfigError
+from graspsense.core.user_folders import NOWHERE, config_folder
 
 
-def config_file() -> Path:
-    """Return the file that holds the list, whether or not it exists."""
-    base = os.environ.get("XDG_CONFIG_HOME") or str(Path.home() / ".config")
-    return Path(base) / "graspsense" / "plugins.toml"
+def config_file() -> Path | None:
+    """Return the file that holds the list, whether or not it exists; None for a user without a home."""
+    folder = config_folder()
+    return None if folder is None else folder / "plugins.toml"
 
 
 def disabled_in_config() -> tuple[str, ...]:
@@ -23,6 +23,8 @@ def disabled_in_config() -> tuple[str, ...]:
     Raises ConfigError where the file is not `disabled = ["NAME", ...]`.
     """
     path = config_file()
+    if path is None:
+        return ()
     try:
         text = path.read_text(encoding="utf-8")
     except (FileNotFoundError, NotADirectoryError):
@@ -41,8 +43,10 @@ def disabled_in_config() -> tuple[str, ...]:
 
 
 def write_disabled(names: Iterable[str]) -> Path:
-    """Write the list, and return its file; an empty list removes it."""
+    """Write the list, and return its file; an empty list removes it. Raises ConfigError for a user without a home."""
     path, wanted = config_file(), sorted(set(names))
+    if path is None:
+        raise ConfigError(NOWHERE.format("XDG_CONFIG_HOME"))
     if not wanted:
         path.unlink(missing_ok=True)
         return path

@@ -114,12 +114,13 @@ def gap_and_rate(link: ScrewLinkage, revolutions: float) -> tuple[float, float]:
         u = 1.0
     elif u < -1.0:
         u = -1.0
-    sine = math.sqrt(1.0 - u * u)
+    square = 1.0 - u * u
+    sine = math.sqrt(square)
     gap = 2.0 * (half_gap0 + finger * (base_sine * u + base_cosine * sine))
-    if sine < 1e-12:
-        sine = 1e-12
-    # Nothing but a quotient and a difference waits for the root: a simulator's ticks are as long as this takes.
-    return gap, 4.0 * pitch * cosine_m2 * finger * length * (base_cosine * u / sine - base_sine)
+    if square < 1e-24:
+        square, sine = 1e-24, 1e-12
+    # Nothing but a product and a difference waits for the root: a simulator's ticks are as long as this takes.
+    return gap, 4.0 * pitch * cosine_m2 * finger * length * (base_cosine * u / square * sine - base_sine)
 
 
 def revolutions_at(link: ScrewLinkage, gap_m: float) -> float:

@@ -176,8 +176,12 @@ class _Batch:
         """Return the compiled loop for a trial grasp, that of the grasps themselves; None where those run plain."""
         composition = composition_of(self.job.config, setting)
         # What maps may take is checked by steps, which would be compiled for that alone.
-        straight = self.job.config.transmission == "straight"
-        if straight or not self._worth(self.of_kinds[composition.kinds]):
+        config = self.job.config
+        if (
+            config.transmission == "straight"
+            or not config.spread
+            or not self._worth(self.of_kinds[compiled_kinds(setting.kinds)])
+        ):
             return None
         try:
             loop = kernel.compiled(loop_of(composition, step), _MEMO)

@@ -3,7 +3,12 @@
 The nominal object is grasped with ideal sensors, from the open fingers to the release, under the controller that is to
 grasp it. The first such grasp, in the full model, also tells how fast it touches and what force comes
 of it. Then the model that the boldest rung of the ladder proposes is tried; where the two differ by too much, the next
-rung's. Where even the last does not hold there is no model of this scene at that accuracy, and that is said.
+rung's.
+
+One that holds is tried twice more, with a controller that is told a little more of force and travel, and a little
+less, by as much as such a model may be wrong: where a threshold is met so nearly at a tick that the grasp then goes on
+a tick earlier or later, and that shows, both grasps may have been on the wrong side of it, and one in finer steps is
+tried. Where even the last does not hold there is no model of this scene at that accuracy, and that is said.
 """
 
 from __future__ import annotations
@@ -37,7 +42,7 @@ from graspsense_sim_gripper.linear import linear_of
 from graspsense_sim_gripper.plant import PlantState, Steps
 from graspsense_sim_gripper.scene import ObjectSpec
 from graspsense_sim_gripper.selection import DROPPED, FINE, FULL_LADDER, LADDER, Check, Choice, Rung
-from graspsense_sim_gripper.sensing import SensorState
+from graspsense_sim_gripper.sensing import Bias, SensorState
 from graspsense_sim_gripper.setting import (
     EFFORT_LIMIT_N,
     FORCE_N,
@@ -51,6 +56,10 @@ from graspsense_sim_gripper.terms.registry import laws_of
 
 HELD: Final = 0.5
 """A model holds where the trial grasps differ by less than this part of the accuracy; its instances have the rest."""
+OFF_N: Final = 0.25
+OFF_TRAVEL: Final = 0.025
+"""Times the accuracy, over how fine a rung's steps are: by so much the forces that a controller is told may be wrong,
+and by such a part the way since the touch. What thresholds of rest compare, differences of that, hardly is."""
 BESIDE: Final = {
     1.0: Rung("to check", 0.0, 30.0, 2),
     10.0: Rung("to check", 0.0, 100.0, 8),
@@ -102,7 +111,7 @@ _WITHOUT: Final[dict[str, Any]] = {
     one.name: one.default
     for one in fields(SimConfig)
     if one.name in ("object", "explain", "compile") or one.name.startswith(("pad_", "noise_"))
-} | {"sensor": "ideal", "spread": False}
+} | {"sensor": "ideal"}
 """What a trial grasp does without, and no choice hangs on."""
 _CHECKED: dict[tuple[Any, ...], tuple[ObjectSpec, Choice]] = {}
 
@@ -149,7 +158,7 @@ def _check(bare: SimConfig, spec: ObjectSpec, control: Control, loops: Loops | N
     forced = bare.scheme != "auto" or bare.step_s is not None
     if forced or bare.fidelity == "reference":
         return choice_of(bare, spec)
-    trial = _Trial(config=bare, spec=spec, control=control, loops=loops)
+    trial = _Trial(config=evolve(bare, spread=False), spec=spec, control=control, loops=loops)
     strict = 2 if bare.accuracy <= STRICT else 1
     beside = {finer: rung._replace(least_steps=strict * rung.least_steps) for finer, rung in BESIDE.items()}
     finest = choice_of(bare, spec, rung=beside[1.0])
@@ -164,21 +173,54 @@ def _check(bare: SimConfig, spec: ObjectSpec, control: Control, loops: Loops | N
     if math.isinf(chosen(bare, spec, rung=beside[1.0]).contact.error):
         return chosen(bare, spec)
     least, whose, made = math.inf, "", 1
+    edge: _Edge | None = None
     tried: set[Any] = set()
-    for rung in LADDER if bare.fidelity == "scene" else FULL_LADDER:
-        choice = chosen(bare, spec, rung=rung)
-        if (choice.made, choice.steps) in tried:
+    for rung in _ladder(bare):
+        if edge is not None and rung.finer <= edge.finer:
             continue
-        tried.add((choice.made, choice.steps))
+        choice = chosen(bare, spec, rung=rung)
+        model = choice.made, choice.pieces, choice.steps
+        if model in tried:
+            continue
+        tried.add(model)
         expected = trial.course(chosen(bare, spec, rung=beside[rung.finer]))
         error, quantity = deviation(trial.course(choice), expected)
         made += 1
         if error <= HELD * bare.accuracy:
-            return evolve(choice, check=Check(error=error, quantity=quantity, grasps=made))
-        if error < least:
+            made += 2
+            edge = _edge(trial, choice, rung.finer)
+            if error + edge.change <= bare.accuracy:
+                return evolve(choice, check=Check(error=error, quantity=quantity, grasps=made))
+        elif error < least:
             least, whose = error, quantity
+    if edge is not None:
+        raise ConfigError(_undecided(bare, spec, edge))
     term = _culprit(trial, *(chosen(bare, spec, rung=rung) for rung in (FINE, beside[FINE.finer])))
     raise ConfigError(_refusal(bare, spec, least, whose, term))
+
+
+def _ladder(config: SimConfig) -> tuple[Rung, ...]:
+    if config.fidelity != "scene":
+        return FULL_LADDER
+    # What only just holds for the object that is tried need not for others of its kind.
+    return LADDER[1:] if config.spread else LADDER
+
+
+class _Edge(NamedTuple):
+    """What a grasp hangs on: where what its controller is told is off by as much, this quantity changes."""
+
+    off: float
+    change: float
+    quantity: str
+    finer: float
+
+
+def _edge(trial: _Trial, choice: Choice, finer: float) -> _Edge:
+    """Return what becomes of this model's grasp where forces and travel are off as they may be in steps this fine."""
+    most = trial.config.accuracy / finer
+    exact = trial.course(choice)
+    change, quantity = max(deviation(trial.course(choice, off), exact) for off in (-most, most))
+    return _Edge(most, change, quantity, finer)
 
 
 def _about(value: float) -> float:
@@ -197,17 +239,34 @@ def _culprit(trial: _Trial, fine: Choice, finer: Choice) -> str:
     return least if least and errors[least] < TELLING * whole else ""
 
 
+def _undecided(config: SimConfig, spec: ObjectSpec, edge: _Edge) -> str:
+    changes = f"{edge.quantity} by {edge.change:.2g}" if math.isfinite(edge.change) else "its outcome"
+    return (
+        f"{_exactness(config, spec)}: the controller decides on a threshold that is met at a tick within "
+        f"{edge.off * OFF_N:.1g} N, or {edge.off * OFF_TRAVEL:.1g} of the travel, so that the grasp may as well go on "
+        f"a tick earlier or later, which changes {changes}. Let ticks fall otherwise (gripper.open_gap_m, or the "
+        f"controller's speed or threshold); else {_way_out(2.0 * edge.change)}"
+    )
+
+
 def _refusal(config: SimConfig, spec: ObjectSpec, least: float, whose: str, term: str) -> str:
-    where = spec.file or f"object {spec.name!r}"
     found = f"{whose} differs by {least:.2g}" if math.isfinite(least) else "not even the outcome is the same"
     blamed = f"steps through the term {term!r}" if term else "steps, and not through any one term"
-    can = 2.0 * least / HELD
-    advice = f"ask for {can:.1g} (gripper.accuracy), or " if can <= 0.5 else ""
     return (
-        f"{where}: no model of it is as exact as gripper.accuracy = {config.accuracy:g} asks for: with every term kept "
-        f"and in the finest steps, between two of them {found}. The grasp hangs on its {blamed}; {advice}"
-        'take what comes out unchecked with gripper.fidelity = "reference"'
+        f"{_exactness(config, spec)}: with every term kept and in the finest steps, between two of them {found}. "
+        f"The grasp hangs on its {blamed}; {_way_out(2.0 * least / HELD)}"
     )
+
+
+def _exactness(config: SimConfig, spec: ObjectSpec) -> str:
+    where = spec.file or f"object {spec.name!r}"
+    return f"{where}: no model of it is as exact as gripper.accuracy = {config.accuracy:g} asks for"
+
+
+def _way_out(can: float) -> str:
+    """Return what to do where this is an accuracy that can be had."""
+    advice = f"ask for {can:.1g} (gripper.accuracy), or " if can <= 0.5 else ""
+    return f'{advice}take what comes out unchecked with gripper.fidelity = "reference"'
 
 
 class _Stand(NamedTuple):
@@ -239,33 +298,41 @@ class _Trial:
     _before: _Stand | None = field(default=None, init=False)
     """Shortly before the first touch, until when all models are alike."""
 
-    def course(self, choice: Choice) -> Course:
-        """Return how the grasp goes in this model."""
-        key = (choice.made, choice.steps)
+    def course(self, choice: Choice, off: float = 0.0) -> Course:
+        """Return how the grasp goes in this model; `off`: where its controller is told what is wrong by so much.
+
+        That is times `OFF_N` of the forces, times `OFF_TRAVEL` of the way since the fingers touched.
+        """
+        key = (choice.made, choice.pieces, choice.steps, off)
         if key not in self._courses:
             try:
-                self._courses[key] = self._grasp(choice)
+                self._courses[key] = self._grasp(choice, off)
             except NotCompilable:
                 self.loops = None
-                self._courses[key] = self._grasp(choice)
+                self._courses[key] = self._grasp(choice, off)
         return self._courses[key]
 
-    def _grasp(self, choice: Choice) -> Course:
+    def _grasp(self, choice: Choice, off: float) -> Course:
         setting = setting_of(self.config, self.spec, 0, chooser=lambda config, spec: choice)
         if self._before is None:
             self._before = self._approach(setting)
         before = self._before
+        bias = Bias(off * OFF_N, off * OFF_TRAVEL, setting.plant.thing.width_m)
+        setting = evolve(setting, sensor=setting.sensor._replace(bias=bias))
         at_end = self._driven(setting, before.far)(
             setting.plant.steps, before, before.loop.ticks + self._ticks(setting)
         )
         columns = np.concatenate(at_end.rows, axis=1)
+        gap_m, left_n, right_n = (
+            columns[COLUMNS.index(name)] for name in ("gap_m", "force_left_n", "force_right_n")
+        )
         return Course(
             outcome=int(at_end.state.law.outcome) if at_end.state.guard.stopped == 0 else -1,
             dt_s=setting.dt_s,
-            gap_m=columns[COLUMNS.index("gap_m")],
+            gap_m=gap_m + (bias.from_m - np.minimum(gap_m, bias.from_m)) * bias.share / (1.0 + bias.share),
             speed_m_s=columns[COLUMNS.index("velocity_m_s")],
-            left_n=columns[COLUMNS.index("force_left_n")],
-            right_n=columns[COLUMNS.index("force_right_n")],
+            left_n=np.where(left_n != 0.0, left_n - bias.force_n, 0.0),
+            right_n=np.where(right_n != 0.0, right_n - bias.force_n, 0.0),
             ended=int(np.sum(columns[-1] <= HOLD)),
             peak_n=at_end.body.peak_n,
         )
@@ -311,7 +378,8 @@ class _Trial:
         step = type(law).step
         compiled = None if self.loops is None else self.loops(setting, step)
         on_arrays = compiled is not None
-        by_maps = linear_of(self.config, setting, on_arrays=on_arrays)
+        loop, made = compiled or (None, setting)
+        by_maps = linear_of(self.config, made, on_arrays=on_arrays)
         # What a loop never looks at while its sensors are ideal, but of its own types.
         parts: tuple[Any, ...] = (
             *np.zeros((2, CELLS)),
@@ -319,16 +387,15 @@ class _Trial:
             np.full((1, 2, CELLS), math.nan),
             np.zeros(1),
         )
-        if compiled is not None:
-            loop, made = compiled
-        else:
+        if loop is None:
             shape = None if by_maps is None else (setting.kinds, by_maps[1])
-            loop, made = grasp_of(laws_of(setting.kinds), step, by_maps=shape), setting
+            loop = grasp_of(laws_of(setting.kinds), step, by_maps=shape)
             parts = tuple(part.tolist() for part in parts)
 
         def drive(steps: Steps, at: _Stand, until: int) -> _Stand:
             stands, body, sensed, state, rows, _ = at
-            if stands.ticks == 0:
+            if body.touched == 0:
+                # What nothing has pressed yet, as this composition has it.
                 body = body._replace(squeezed=made.body.squeezed, right=made.body.right)
             plant: Any = made.plant._replace(steps=steps) if by_maps is None else by_maps[0]
             while not _ended(state) and stands.ticks < until:

@@ -1,8 +1,9 @@
-"""One composition for the whole catalogue: what an object has no use for stands in it, left out.
+"""What a grasp is compiled as: one composition for the whole catalogue, and of any other object what its model keeps.
 
 Every composition takes seconds to compile. The terms of the catalogue's objects are few, so all of these objects are
 compiled as one that has each of them once; a term that an object lacks is one that its model drops. Forces are summed
-from the last term to the first, so that a term which adds nothing changes no bit.
+from the last term to the first, so that a term which adds nothing changes no bit: neither do those that are left out
+of the composition of an object with terms of its own.
 """
 
 from __future__ import annotations
@@ -49,10 +50,46 @@ def is_common(kinds: tuple[str, ...]) -> bool:
     return len(set(kinds)) == len(kinds) and set(kinds) <= set(common_kinds())
 
 
+NOTHING: Final = Filler(Kept(0, None), None)
+
+
+class Layout(NamedTuple):
+    """In which composition a grasp is compiled, and where its parts stand there, the remainder first."""
+
+    kinds: tuple[str, ...]
+    places: tuple[tuple[int, Filler], ...]
+    """For each place which of the object's own it is (-1: none), and what fills it then."""
+    own: tuple[tuple[int, Any], ...]
+    """For each of the object's own its place (-1: none), and its state then."""
+
+
+def layout_of(setting: Setting) -> Layout:
+    """Return the composition in which this grasp is compiled."""
+    if compiled_kinds(setting.kinds) is common_kinds():
+        return _layout(setting.kinds, ())
+    return _layout(setting.kinds, tuple([one.kept for one in setting.plant.thing.terms[1:]]))
+
+
 @cache
 def compiled_kinds(kinds: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the composition in which an object of these terms is compiled."""
+    """Return the composition in which an object of these terms is compiled where its model keeps them all."""
     return common_kinds() if is_common(kinds) else kinds
+
+
+@cache
+def _layout(kinds: tuple[str, ...], kept: tuple[int, ...]) -> Layout:
+    if kept:
+        # Each kind once or more, those that its model keeps.
+        there = [i for i, one in enumerate(kept) if one == 1]
+        places = [(i + 1, NOTHING) for i in there]
+        found = [(there.index(i) + 1 if i in there else -1, i) for i in range(len(kinds))]
+        names = tuple(kinds[i] for i in there)
+    else:
+        names = common_kinds()
+        places = [(kinds.index(k) + 1 if k in kinds else -1, _filler(k)) for k in names]
+        found = [(names.index(kind) + 1, i) for i, kind in enumerate(kinds)]
+    own = [(place, find_term(kinds[i])[1].at_rest) for place, i in found]
+    return Layout(names, ((0, NOTHING), *places), ((0, None), *own))
 
 
 def as_compiled(setting: Setting) -> Setting:
@@ -61,9 +98,9 @@ def as_compiled(setting: Setting) -> Setting:
     sensor = setting.sensor
     sensor = sensor._replace(**(IDEAL if sensor.ideal == 1 else _arrays(sensor)))
     kinds, plant, body = setting.kinds, setting.plant, setting.body
-    if kinds != compiled_kinds(kinds):
-        thing = plant.thing
-        places = _places(kinds)
+    layout = layout_of(setting)
+    if kinds != layout.kinds:
+        thing, places = plant.thing, layout.places
         own, state = thing.terms, body.squeezed.states
         terms = tuple([own[i] if i >= 0 else filler.params for i, filler in places])
         left = body.squeezed._replace(states=tuple([state[i] if i >= 0 else f.state for i, f in places]))
@@ -71,7 +108,7 @@ def as_compiled(setting: Setting) -> Setting:
         if body.right is not body.squeezed:
             state = body.right.states
             right = body.right._replace(states=tuple([state[i] if i >= 0 else f.state for i, f in places]))
-        kinds, plant = common_kinds(), plant._replace(thing=thing._replace(terms=terms))
+        kinds, plant = layout.kinds, plant._replace(thing=thing._replace(terms=terms))
         body = body._replace(squeezed=left, right=right)
     return Setting(
         kinds=kinds,
@@ -86,27 +123,17 @@ def as_compiled(setting: Setting) -> Setting:
     )
 
 
-def emptied(body: PlantState, kinds: tuple[str, ...]) -> PlantState:
-    """Return the plant of an object of these terms as it would be without what was filled in."""
-    if kinds == compiled_kinds(kinds):
+def as_own(body: PlantState, setting: Setting) -> PlantState:
+    """Return the plant as it is at the end of a compiled grasp, with the object's own terms again."""
+    layout = layout_of(setting)
+    if layout.kinds == setting.kinds:
         return body
-    own = _own_places(kinds)
+    own = layout.own
     left, right = (
-        half._replace(states=tuple([half.states[i] for i in own])) for half in (body.squeezed, body.right)
+        half._replace(states=tuple([half.states[i] if i >= 0 else rests for i, rests in own]))
+        for half in (body.squeezed, body.right)
     )
     return body._replace(squeezed=left, right=right)
-
-
-@cache
-def _places(kinds: tuple[str, ...]) -> tuple[tuple[int, Filler], ...]:
-    """Return for each place of the common composition which of an object's own it is (-1: none), and what fills it."""
-    first = Filler(Kept(0, None), None)
-    return (0, first), *((kinds.index(k) + 1 if k in kinds else -1, _filler(k)) for k in common_kinds())
-
-
-@cache
-def _own_places(kinds: tuple[str, ...]) -> tuple[int, ...]:
-    return 0, *(1 + common_kinds().index(kind) for kind in kinds)
 
 
 @cache

@@ -19,7 +19,8 @@ from typing import Any, Final
 from attrs import asdict
 
 import graspsense.plugin_api as plugin_api
-from graspsense_sim_gripper.kernel import NotCompilable, cache_folder, fingerprint
+from graspsense.plugin_api import cache_folder
+from graspsense_sim_gripper.kernel import NotCompilable, fingerprint
 from graspsense_sim_gripper.plant import Steps
 from graspsense_sim_gripper.scene import ObjectSpec
 from graspsense_sim_gripper.selection import Check, Choice, Decision
@@ -63,15 +64,19 @@ def _stamp(source: Path) -> str:
 
 def find(mark: str) -> Choice | None:
     """Return the choice that is kept under this mark, if one is."""
-    with suppress(OSError, ValueError, TypeError, KeyError):
-        return _choice(json.loads((_folder() / f"{mark}.json").read_text(encoding="utf-8")))
+    folder = _folder()
+    if folder is not None:
+        with suppress(OSError, ValueError, TypeError, KeyError):
+            return _choice(json.loads((folder / f"{mark}.json").read_text(encoding="utf-8")))
     return None
 
 
 def keep(mark: str, choice: Choice) -> None:
     """Keep a choice under this mark, where that can be written."""
+    folder = _folder()
+    if folder is None:
+        return
     with suppress(OSError):
-        folder = _folder()
         folder.mkdir(parents=True, exist_ok=True)
         _make_room(folder)
         # Whole or not at all, whoever else writes the same.
@@ -85,8 +90,9 @@ def keep(mark: str, choice: Choice) -> None:
                 raise
 
 
-def _folder() -> Path:
-    return cache_folder() / "choices"
+def _folder() -> Path | None:
+    kept = cache_folder()
+    return None if kept is None else kept / "choices"
 
 
 def _make_room(folder: Path) -> None:

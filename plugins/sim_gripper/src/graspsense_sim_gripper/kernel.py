@@ -21,10 +21,9 @@ import types
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from graspsense.plugin_api import TARING, Pads, bind, tick
+from graspsense.plugin_api import TARING, Pads, bind, cache_folder, tick
 from graspsense_sim_gripper import linear, plant
 from graspsense_sim_gripper.linear_modes import Shape
 from graspsense_sim_gripper.plant import PlantParams, PlantState
@@ -293,7 +292,6 @@ def compiled(function: Callable[..., Any], memo: dict[Any, Any]) -> Callable[...
         raise NotCompilable('numba is not installed: pip install "graspsense-sim-gripper[fast]"') from error
     if function in memo:
         return memo[function]  # type: ignore[no-any-return]
-    _use_cache_folder()
     copies: Counter[types.CodeType] = Counter()
     _count(_plain(function), 1, (), copies)
     memo[function] = _compiled(function, memo, numba, copies, outermost=True)
@@ -341,7 +339,7 @@ def _compiled(
         memo[key] = numba.njit(
             copy,
             nogil=True,
-            cache=outermost,
+            cache=outermost and _kept(),
             no_cpython_wrapper=not outermost,
             no_cfunc_wrapper=True,
             forceinline=once or (places > 0 and len(code.co_code) <= SHORT_CODE),
@@ -454,15 +452,22 @@ def _plain(function: Callable[..., Any]) -> types.FunctionType:
 
 
 @functools.cache
-def _use_cache_folder() -> None:
-    """Keep compiled code in a folder of the user's: an installed package may not be writable."""
+def _kept() -> bool:
+    """Have compiled code kept in a folder of the user's, as an installed package may not be writable.
+
+    Return whether it is: where there is no such folder each process compiles anew.
+    """
     import numba
 
-    if "NUMBA_CACHE_DIR" not in os.environ:
-        folder = str(cache_folder() / "compiled")
-        setattr(numba.config, "CACHE_DIR", folder)  # noqa: B010  numba fills its config at run time
-
-
-def cache_folder() -> Path:
-    """Return the user's folder for what takes time to make and can be made again."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "graspsense"
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return True
+    folder = cache_folder()
+    if folder is None:
+        return False
+    folder /= "compiled"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    setattr(numba.config, "CACHE_DIR", str(folder))  # noqa: B010  numba fills its config at run time
+    return os.access(folder, os.W_OK | os.X_OK)

@@ -14,11 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from graspsense.plugin_api import bind
+from graspsense.plugin_api import ScrewLinkage, bind, gap_and_rate, revolutions_at
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.linear_modes import (
     APART_M,
@@ -29,11 +30,19 @@ from graspsense_sim_gripper.linear_modes import (
     TOGETHER,
     Scene,
     Shape,
+    Straight,
     listed,
     modes_of,
     padded,
 )
-from graspsense_sim_gripper.plant import IN_SHAPE_M, PlantParams, PlantState, Squeezed
+from graspsense_sim_gripper.plant import (
+    IN_SHAPE_M,
+    PlantParams,
+    PlantState,
+    Squeezed,
+    Thing,
+    friction,
+)
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.remainder import linear as remainder_form
 from graspsense_sim_gripper.terms.term import NO_STATE, LinearForm, OwnContact
@@ -43,6 +52,8 @@ if TYPE_CHECKING:
 
 MOST_NUMBERS: Final = 0x3FFFFFFF
 WHOLE: Final = 1 << HALVINGS
+LEVER_M: Final = 5e-3
+"""So far about the squeeze the parabola of the moving mass goes through what it is."""
 MOST_EVENTS: Final = 64
 """A tick in which more modes end than this is taken on without looking."""
 PLACES: Final = ("NOW", "THEN", "WAS", "MOST", "BY")
@@ -51,12 +62,26 @@ PEAK_SHARE: Final = 2e-3
 """A swing inside a tick that goes beyond the greatest force by less than this share of it may be missed."""
 
 
+class Lever(NamedTuple):
+    """The mass that the maps are made for, and how much lighter what moves is at another gap, as a parabola."""
+
+    mass_kg: float
+    gap_m: float
+    first_m: float
+    second_m2: float
+
+
 class Linear(NamedTuple):
     """A plant with its modes, and room for what a tick works on."""
 
     plant: PlantParams
     look: int
     """How often a tick is halved to look for what ends a mode."""
+    lever: Lever
+    pieces: int
+    """Of how many straight pieces the object's curve is made, and by what the root of a compression tells which."""
+    per_root: float
+    slopes: Any
     maps: Any
     watched: Any
     simple: Any
@@ -81,42 +106,115 @@ def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -
     plant = setting.plant
     drive, thing, steps = plant.drive, plant.thing, plant.steps
     forced = config.scheme != "auto" or steps.longest_s < math.inf or steps.settle > 0.0
-    # What rubs more at rest is not linear; held off the centre, each half would need a mode of its own.
+    pieces = 0 if setting.choice is None else setting.choice.pieces
+    # Held off the centre, each half would need a mode of its own.
     if (
         forced
-        or config.transmission != "straight"
-        or drive.breakaway_n != drive.coulomb_n
+        or (pieces == 0 and (drive.link.finger_m != 0.0 or drive.breakaway_n != drive.coulomb_n))
         or (thing.held == 1 and setting.body.offset_m != 0.0)
     ):
         return None
-    forms: list[LinearForm | OwnContact] = []
+    forms = forms_of(thing, setting.kinds)
+    if forms is None or (pieces == 0 and is_bent(forms)):
+        return None
+    reach, bend = 1.0, (Straight(0.0, 0.0),) * min(pieces, 1)
+    if is_bent(forms):
+        assert setting.choice is not None
+        reach = _reach(forms, setting.choice.most_n, thing.width_m)
+        bend = _straightened(forms, reach, pieces)
+    lever = _lever(setting)
+    scene = Scene(
+        lever.mass_kg,
+        drive.damping_n_s_m,
+        drive.breakaway_n > 0.0,
+        drive.load_share,
+        drive.lag_s,
+        thing.skins_n_m,
+        thing.skin,
+        forms,
+        bend,
+    )
+    modes = modes_of(scene, setting.dt_s) if on_arrays else listed(scene, setting.dt_s)
+    if modes is None:
+        return None
+    shape, look, *tables = modes
+    numbers = len(PLACES) * _room(shape)
+    room: Any = np.zeros(numbers) if on_arrays else [0.0] * numbers
+    slopes: Any = [piece.slope_n_m for piece in bend]
+    if on_arrays:
+        slopes = np.array(slopes, float)
+    per_root = len(bend) / math.sqrt(reach)
+    return Linear(plant, look, lever, len(bend), per_root, slopes, *(*tables, room)), shape
+
+
+def _lever(setting: Setting) -> Lever:
+    drive, gap = setting.plant.drive, setting.body.gap_m
+    link = drive.link
+    if link.finger_m == 0.0 or setting.choice is None:
+        return Lever(drive.inertia / setting.body.rate_m_rev**2, gap, 0.0, 0.0)
+    # About half way through the squeeze, where it counts.
+    gap = max(setting.plant.thing.width_m - 0.5 * setting.choice.point.compression_m, LEVER_M)
+    closer, rate, wider = (
+        gap_and_rate(link, revolutions_at(link, place))[1] for place in (gap - LEVER_M, gap, gap + LEVER_M)
+    )
+    less, more = (closer / rate) ** 2 - 1.0, (wider / rate) ** 2 - 1.0
+    first, second = 0.5 * (more - less) / LEVER_M, 0.5 * (more + less) / LEVER_M**2
+    return Lever(drive.inertia / rate**2, gap, first, second)
+
+
+def forms_of(thing: Thing, kinds: Sequence[str]) -> tuple[LinearForm | OwnContact, ...] | None:
+    """Return the linear forms of what is kept of an object; None where a term has none.
+
+    Raises TypeError for a term whose linear form has other states than its law.
+    """
     rest = thing.terms[0]
-    if rest.kept == 1:
-        forms.append(remainder_form(rest.params))
-    for kind, one in zip(setting.kinds, thing.terms[1:], strict=True):
+    forms: list[LinearForm | OwnContact] = [remainder_form(rest.params)] if rest.kept == 1 else []
+    for kind, one in zip(kinds, thing.terms[1:], strict=True):
         if one.kept == 0:
             continue
         form = _form(kind, one.params)
         if form is None:
             return None
         forms.append(form)
-    rate = setting.body.rate_m_rev
-    scene = Scene(
-        drive.inertia / rate**2,
-        drive.damping_n_s_m,
-        drive.coulomb_n > 0.0,
-        drive.load_share,
-        drive.lag_s,
-        thing.skins_n_m,
-        thing.skin,
-        tuple(forms),
-    )
-    modes = modes_of(scene, setting.dt_s) if on_arrays else listed(scene, setting.dt_s)
-    if modes is None:
-        return None
-    shape, look, *numbers = modes
-    rooms = np.zeros(len(PLACES) * _room(shape)) if on_arrays else [0.0] * (len(PLACES) * _room(shape))
-    return Linear(plant, look, *numbers, room=rooms), shape
+    return tuple(forms)
+
+
+def is_bent(forms: Sequence[LinearForm | OwnContact]) -> bool:
+    """Return whether one of them has a curve."""
+    return any(isinstance(form, LinearForm) and form.curve is not None for form in forms)
+
+
+def _curve(forms: Sequence[LinearForm | OwnContact], d: float) -> float:
+    """Return the force of all curves at a compression."""
+    return sum(form.curve(d) for form in forms if isinstance(form, LinearForm) and form.curve is not None)
+
+
+def _reach(forms: Sequence[LinearForm | OwnContact], force_n: float, most_m: float) -> float:
+    """Return the compression at which the curves and the springs beside them bear this force, at most `most_m`."""
+    springs = sum(form.spring_n_m for form in forms if isinstance(form, LinearForm))
+    least, most = 0.0, most_m
+    for _ in range(60):
+        middle = math.sqrt(least * most) if least > 0.0 else 0.01 * most
+        if _curve(forms, middle) + springs * middle < force_n:
+            least = middle
+        else:
+            most = middle
+        if most < 1.01 * least:
+            break
+    return most
+
+
+def _straightened(
+    forms: Sequence[LinearForm | OwnContact], reach: float, pieces: int
+) -> tuple[Straight, ...]:
+    """Return the curves together in straight pieces between knots, closer where they begin: at even roots."""
+    places = [reach * (k / pieces) ** 2 for k in range(pieces + 1)]
+    forces = [_curve(forms, place) for place in places]
+    found = []
+    for (d0, d1), (force0, force1) in zip(pairwise(places), pairwise(forces), strict=True):
+        slope = (force1 - force0) / (d1 - d0)
+        found.append(Straight(slope, force0 - slope * d0))
+    return tuple(found)
 
 
 @lru_cache(maxsize=256)
@@ -127,7 +225,7 @@ def _form(kind: str, params: Any) -> LinearForm | OwnContact | None:
     if form is None:
         return None
     for one in (form.touching, form.parted) if isinstance(form, OwnContact) else (form,):
-        if len(one.rates) not in (0, _numbers(term.at_rest)):
+        if len(one.rates) != _numbers(term.at_rest):
             raise TypeError(
                 f"term {kind!r}: its linear form has {len(one.rates)} states, the law's are "
                 f"{len(term.at_rest)}, {term.at_rest!r}: as many as it has fields, all of them floats"
@@ -240,12 +338,14 @@ def move_of(
     now, then, was, most, by = places.values()
     watched = padded(GUARDS + shape.ends)
     mapped, parted = padded(shape.states + GUARDS + shape.ends), padded(2 * shape.states)
-    here = {"WATCHED": watched, "MAPPED": mapped, "PARTED": parted, **laid_out, **places}
+    modes = ((shape.parts + 1) * shape.motions) << shape.contacts
+    here = {"MODES": modes, "WATCHED": watched, "MAPPED": mapped, "PARTED": parted, **laid_out, **places}
     changes = {"COLUMNS": shape.states, "FROM": then, "CHANGES": 1, "NOW": now}
     products = {
         "_moved": bind(_product, ROWS=mapped, COLUMNS=shape.columns, FROM=now, TO=then),
         "_seen": bind(_product, ROWS=watched, COLUMNS=shape.columns, FROM=now, TO=was),
     }
+    rubs = bind(_rubs, **here)
     swings = bind(
         _swings,
         _simply=bind(_product, ROWS=watched, TO=most, SIZES=1, **changes),
@@ -258,8 +358,8 @@ def move_of(
         plant_move=plant_move,
         put_states=puts,
         take_states=takes,
-        _quiet=bind(_quiet, _swings=swings, **products, **here),
-        _searched=bind(_searched, _swings=swings, _row=bind(_row, **here), **products, **here),
+        _quiet=bind(_quiet, _swings=swings, _rubs=rubs, **products, **here),
+        _searched=bind(_searched, _swings=swings, _rubs=rubs, _row=bind(_row, **here), **products, **here),
         **here,
         **tuples,
     )
@@ -280,7 +380,7 @@ def _no_plant(params: PlantParams, state: PlantState, effort_n: float, dt: float
 plant_move: Any = _no_plant
 put_states: Any = _put_none
 take_states: Any = _take_none
-STATES = COLUMNS = PARTS = CREEPS = LAGS = MOTIONS = CONTACTS = ENDS = ROWS = 0
+STATES = COLUMNS = PARTS = CREEPS = LAGS = MOTIONS = CONTACTS = ENDS = BENDS = MODES = ROWS = 0
 WATCHED = MAPPED = PARTED = 0
 """Rows of the tables of what is watched, of the maps, and of the ways, with those that pad them."""
 NOW = THEN = WAS = MOST = BY = FROM = TO = 0
@@ -326,18 +426,52 @@ def _top(before: float, rising: float, after: float, falling: float, h: float) -
     m0, m1 = rising * h, falling * h
     a, b = 3.0 * (m0 + m1 - 2.0 * step), 2.0 * (3.0 * step - 2.0 * m0 - m1)
     s = 2.0 * m0 / (math.sqrt(max(b * b - 4.0 * a * m0, 0.0)) - b)
-    return before + s * (m0 + s * (3.0 * step - 2.0 * m0 - m1 + s * (m0 + m1 - 2.0 * step)))
+    # What bends one way lies below its tangents.
+    most = min(before + m0, after - m1)
+    return min(before + s * (m0 + s * (3.0 * step - 2.0 * m0 - m1 + s * (m0 + m1 - 2.0 * step))), most)
 
 
-def _quiet(params: Linear, mode: int, standing: bool, top: float, dt: float) -> bool:
+def _in_place(link: ScrewLinkage, state: PlantState) -> PlantState:
+    """Return the plant with the motor where the linkage has it at this gap: the maps know it only as it is at one."""
+    revolutions = revolutions_at(link, state.gap_m)
+    _, rate = gap_and_rate(link, revolutions)
+    return PlantState(
+        revolutions,
+        state.speed_rev_s * state.rate_m_rev / rate,
+        state.gap_m,
+        rate,
+        state.left_n,
+        state.right_n,
+        state.offset_m,
+        state.touched,
+        state.squeezed,
+        state.peak_n,
+        state.effort_n,
+        state.right,
+        state.step_s,
+        state.steps,
+        state.unresolved,
+        state.alone_s,
+    )
+
+
+def _quiet(
+    params: Linear,
+    mode: int,
+    motion: int,
+    standing: bool,
+    top: float,
+    gap_m: float,
+    effort_n: float,
+    dt: float,
+) -> bool:
     """Return whether nothing can end this mode within a tick, and write what the tick comes to.
 
     As for most ticks; it is also not quiet where the force may have been greater inside it than at its ends.
     """
-    _, look, maps, watched, _, _, _, _, slack, room = params
+    look, room, slack = params.look, params.room, params.slack
     allowed = (mode * ENDS) & MOST_NUMBERS
-    _seen(watched, mode * WATCHED * COLUMNS, room)
-    _moved(maps, mode * (HALVINGS + 1) * MAPPED * COLUMNS, room)
+    _seen(params.watched, mode * WATCHED * COLUMNS, room)
     for k in range(CONTACTS):
         if room[WAS + GUARDS + k] < -slack[allowed + k]:
             return False
@@ -345,6 +479,9 @@ def _quiet(params: Linear, mode: int, standing: bool, top: float, dt: float) -> 
         for k in range(ENDS - 2, ENDS):
             if room[WAS + GUARDS + k] < -slack[allowed + k]:
                 return False
+    if BENDS == 1 and motion != 0:
+        room[NOW + STATES + 1] = _rubs(params, motion, gap_m, effort_n, dt)
+    _moved(params.maps, mode * (HALVINGS + 1) * MAPPED * COLUMNS, room)
     for k in range(ENDS):
         if room[THEN + STATES + GUARDS + k] < -slack[allowed + k]:
             return False
@@ -353,10 +490,31 @@ def _quiet(params: Linear, mode: int, standing: bool, top: float, dt: float) -> 
     return not _swings(params, mode, top, dt)
 
 
+def _rubs(params: Linear, motion: int, gap_m: float, effort_n: float, dt: float) -> float:
+    """Return the friction to move on with: with it what is no straight line in the speed or the gap.
+
+    As that will be in the middle of the tick.
+    """
+    drive, lever, room = params.plant.drive, params.lever, params.room
+    speed: float = room[NOW + 1]
+    force: float = room[WAS + FORCE]
+    way = 1.0 if motion == 1 else -1.0
+    net = effort_n - force - way * (drive.coulomb_n + drive.load_share * force)
+    net -= drive.damping_n_s_m * speed
+    middle = max(way * (speed + 0.5 * dt * net / lever.mass_kg), 0.0)
+    rubs = friction(drive, middle, 0.0)
+    off = gap_m - 0.5 * dt * speed - lever.gap_m
+    lighter = off * (lever.first_m + off * lever.second_m2)
+    steeper = lever.first_m + 2.0 * off * lever.second_m2
+    net = lighter * (net - way * (rubs - drive.coulomb_n))
+    net -= 0.5 * lever.mass_kg * steeper * middle * middle
+    return rubs - way * net
+
+
 def _swings(params: Linear, mode: int, top: float, dt: float) -> bool:
     """Return whether the mode may have ended inside a tick that it lasts by its end, or the force gone beyond `top`."""
-    _, _, _, _, simple, ways, bounds, _, _, room = params
-    _simply(simple, mode * WATCHED * STATES, room)
+    room = params.room
+    _simply(params.simple, mode * WATCHED * STATES, room)
     beyond = (1.0 + PEAK_SHARE) * max(top, room[THEN + STATES + FORCE])
     may = not room[WAS + FORCE] + room[MOST + FORCE] <= beyond
     for k in range(ENDS):
@@ -364,8 +522,8 @@ def _swings(params: Linear, mode: int, top: float, dt: float) -> bool:
             may = True
     if not may:
         return False
-    _parted(ways, mode * PARTED * STATES, room)
-    _bounded(bounds, 2 * mode * WATCHED * STATES, room)
+    _parted(params.ways, mode * PARTED * STATES, room)
+    _bounded(params.bounds, 2 * mode * WATCHED * STATES, room)
     for k in range(ENDS):
         if not room[MOST + GUARDS + k] <= room[WAS + GUARDS + k]:
             return True
@@ -379,23 +537,30 @@ def _swings(params: Linear, mode: int, top: float, dt: float) -> bool:
 
 def _searched(
     params: Linear,
+    first: int,
     pressed: int,
     motion: int,
     touching: int,
     standing: bool,
+    shifted: bool,
     touched: int,
     top: float,
+    gap_m: float,
+    effort_n: float,
     dt: float,
 ) -> tuple[int, int, float, int]:
     """Take a tick in which modes may end, in pieces; return pressed, touched and the peak then, and how many ended."""
-    _, look, maps, watched, _, _, _, begin, slack, room = params
+    drive, look, room = params.plant.drive, params.look, params.room
+    maps, watched, begin, slack = params.maps, params.watched, params.begin, params.slack
+    if MOTIONS == 3:
+        room[NOW + STATES + 1] = drive.breakaway_n if standing else drive.coulomb_n
     mode = allowed = 0
     left, least, events, until = WHOLE, 0, 0, 0
     begins = True
     while left > 0:
         while begins:
             begins = False
-            mode = ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
+            mode = first + ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
             allowed = (mode * ENDS) & MOST_NUMBERS
             _seen(watched, mode * WATCHED * COLUMNS, room)
             if events == 0:
@@ -403,6 +568,14 @@ def _searched(
                     if room[WAS + GUARDS + k] < -slack[allowed + k]:
                         touching ^= 1 << k
                         begins = True
+            if BENDS == 1 and shifted and not begins:
+                # On another piece the covers and the object balance a little elsewhere.
+                at = 2 * mode * COLUMNS
+                cover = _row(begin, at + COLUMNS, room)
+                room[NOW + 2] = _row(begin, at, room)
+                if CREEPS == 1:
+                    room[NOW + 3] = cover
+                shifted, begins = False, True
             if MOTIONS == 3 and standing and not begins:
                 # What stands is stuck, unless what holds it less what closes it, or less what opens it, says otherwise.
                 standing = False
@@ -410,6 +583,8 @@ def _searched(
                     motion, begins = 1, True
                 elif room[WAS + GUARDS + ENDS - 1] < -slack[allowed + ENDS - 1]:
                     motion, begins = 2, True
+        if BENDS == 1 and motion != 0 and left == WHOLE:
+            room[NOW + STATES + 1] = _rubs(params, motion, gap_m, effort_n, dt)
         while (WHOLE >> least) > left:
             least += 1
         _moved(maps, (mode * (HALVINGS + 1) + least) * MAPPED * COLUMNS, room)
@@ -451,10 +626,11 @@ def _searched(
                     else:
                         # What slid stands, for now; what was stuck does, too.
                         room[NOW + 1] = 0.0
+                        room[NOW + STATES + 1] = drive.breakaway_n
                         standing, motion = True, 0
             if parted:
                 pressed = 1 - pressed
-                at = 2 * (((pressed * MOTIONS + motion) << CONTACTS) + touching) * COLUMNS
+                at = 2 * (first + ((pressed * MOTIONS + motion) << CONTACTS) + touching) * COLUMNS
                 cover = _row(begin, at + COLUMNS, room)
                 room[NOW + 2] = _row(begin, at, room)
                 if CREEPS == 1:
@@ -495,8 +671,8 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
     ) = state
     drive, thing = plant.drive, plant.thing
     leaves = (revolutions >= drive.open_rev and effort_n <= 0.0) or offset != 0.0 or felt_left != felt_right
-    # What the plant has yet to bring up to date is the plant's.
-    leaves = leaves or alone > 0.0
+    # What the plant has yet to bring up to date is the plant's, and so is a linkage before the contact.
+    leaves = leaves or alone > 0.0 or (touched == 0 and drive.link.finger_m != 0.0)
 
     closure = thing.width_m - gap
     room[NOW] = closure
@@ -522,21 +698,31 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
     if LAGS == 1:
         room[at] = given
     room[NOW + STATES] = effort_n
-    if MOTIONS == 3:
-        room[NOW + STATES + 1] = drive.coulomb_n
-    motion = 0
+    motion = first = 0
     standing = room[NOW + 1] == 0.0
-    if MOTIONS == 3 and not standing:
-        motion = 1 if room[NOW + 1] > 0.0 else 2
-    # Which of the terms' own contacts touch is guessed, and put right below.
+    if MOTIONS == 3:
+        room[NOW + STATES + 1] = drive.breakaway_n if standing else drive.coulomb_n
+        if not standing:
+            motion = 1 if room[NOW + 1] > 0.0 else 2
+    slope, shifted = squeezed.slope_n_m, False
+    if BENDS == 1:
+        # The piece of the curve that the middle of the tick will see.
+        room[NOW + COLUMNS - 1] = 1.0
+        ahead = max(d + 0.5 * dt * squeezed.rate_m_s, 0.0)
+        piece = min(int(params.per_root * math.sqrt(ahead)), params.pieces - 1) & MOST_NUMBERS
+        first = piece * MODES
+        shifted = pressed == 1 and params.slopes[piece] != slope
+        slope = params.slopes[piece]
+    # Which of the terms' own contacts touch is guessed, and put right where the tick is looked into.
     touching = (1 << CONTACTS) - 1 if squeezed.force_n > 0.0 else 0
     top, events = peak, 0
     if not leaves:
-        if _quiet(params, ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching, standing, top, dt):
+        mode = first + ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
+        if not shifted and _quiet(params, mode, motion, standing, top, gap, effort_n, dt):
             top = max(top, room[THEN + STATES + FORCE])
         else:
             pressed, touched, top, events = _searched(
-                params, pressed, motion, touching, standing, touched, top, dt
+                params, first, pressed, motion, touching, standing, shifted, touched, top, gap, effort_n, dt
             )
 
     came = room[THEN] - closure
@@ -545,6 +731,8 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
     turns = 1.0 / rate
     revolutions1 = revolutions - came * turns
     if leaves or not drive.closed_rev < revolutions1 < drive.open_rev:
+        if touched == 1 and drive.link.finger_m != 0.0:
+            state = _in_place(drive.link, state)
         return plant_move(plant, state, effort_n, dt)  # type: ignore[no-any-return]
     # A mode that begins at the very end of the tick has yet to act.
     force = max(room[THEN + STATES + FORCE], 0.0) if pressed == 1 else 0.0
@@ -564,11 +752,12 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
     if LAGS == 1:
         given = room[THEN + STATES - 1]
     after_states, _ = take_states(thing.terms, squeezed.states, room, THEN + own)
-    felt = Squeezed(d, force, squeezed.slope_n_m, after_states, cover, arm, squeezed.rate_m_s, math.inf)
+    mean_m_s = (d - squeezed.compression_m) / dt if BENDS == 1 else squeezed.rate_m_s
+    felt = Squeezed(d, force, slope, after_states, cover, arm, mean_m_s, math.inf)
     if thing.held == 1:
         # Centred: the other half does the same.
         other = felt
-    return PlantState(
+    after = PlantState(
         revolutions1,
         -room[THEN + 1] * turns,
         gap1,
@@ -586,3 +775,4 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
         lost + (1 if events >= MOST_EVENTS else 0),
         0.0,
     )
+    return _in_place(drive.link, after) if touched == 0 and drive.link.finger_m != 0.0 else after

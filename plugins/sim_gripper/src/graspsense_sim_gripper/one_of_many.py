@@ -26,7 +26,7 @@ from graspsense.plugin_api import (
     tick_params,
 )
 from graspsense_sim_gripper.checking import Checking, Control, Loops
-from graspsense_sim_gripper.common_composition import as_compiled, compiled_kinds, emptied
+from graspsense_sim_gripper.common_composition import as_compiled, as_own, layout_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, grasp_of
 from graspsense_sim_gripper.linear import linear_of
@@ -107,7 +107,7 @@ class Composition(NamedTuple):
 
 def composition_of(config: SimConfig, setting: Setting) -> Composition:
     """Return the composition in which this grasp is compiled."""
-    return _composed(config, setting, compiled_kinds(setting.kinds))
+    return _composed(config, setting, layout_of(setting).kinds)
 
 
 def _composed(config: SimConfig, setting: Setting, kinds: tuple[str, ...]) -> Composition:
@@ -133,11 +133,11 @@ def grasp_once(
     storage: Storage,
     *,
     on_arrays: bool,
-    kinds: tuple[str, ...] | None = None,
+    own: Setting | None = None,
 ) -> Done:
     """Grasp what `setting` describes by `loop`, on arrays where it is compiled, on lists where it is plain.
 
-    `kinds`: the object's own terms, where the setting is that of a composition which has more.
+    `own`: the same grasp with the object's own terms, where the setting is that of another composition.
     """
     most = math.ceil(seconds_at_most(job.run) / setting.dt_s)
     body, sensor, state, stands = setting.body, setting.sensed, job.begins, NOT_BEGUN
@@ -170,8 +170,8 @@ def grasp_once(
     if on_arrays:
         storage.noise, storage.cells, storage.times = noise, cells, times
         storage.columns, storage.phases = columns, phases
-    if kinds is not None:
-        body = emptied(body, kinds)
+    if own is not None:
+        body = as_own(body, own)
     outcome, reason = ended_by_itself(state)
     if state.done == 0 and state.guard.stopped == 0:
         outcome, reason = Outcome.ABORTED, overdue(job.run)
@@ -198,7 +198,7 @@ def done_of(job: Job, outcome: Outcome, reason: str, body: PlantState, trace: Tr
 
 def grasp_compiled(job: Job, setting: Setting, loop: Callable[..., Any], storage: Storage) -> Done:
     """Grasp by the compiled loop of its `composition_of`."""
-    return grasp_once(job, as_compiled(setting), loop, storage, on_arrays=True, kinds=setting.kinds)
+    return grasp_once(job, as_compiled(setting), loop, storage, on_arrays=True, own=setting)
 
 
 def chooser_of(job: Job, loops: Loops | None = None) -> Chooser:

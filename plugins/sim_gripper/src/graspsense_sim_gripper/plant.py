@@ -60,6 +60,8 @@ MOST_LAG_PIECES: Final = 1000
 SPEED_SCALE_M_S: Final = 1e-3
 FORCE_SCALE_N: Final = 1.0
 """Below these an error counts as if the speed or the force were this."""
+SMALL_FALL: Final = 0.05
+"""Changes of an exponent up to this are four terms of a series, to 3e-7 of a newton."""
 STANDING_M_S: Final = 1e-8
 """What is slower than this and slowing down stands."""
 TOUCHING_M: Final = 1e-10
@@ -329,7 +331,7 @@ def friction(drive: Drive, velocity_m_s: float, load_n: float) -> float:
     force = drive.coulomb_n + drive.load_share * load_n
     more = drive.breakaway_n - drive.coulomb_n
     if more > 0.0:
-        x = velocity_m_s / drive.stribeck_m_s
+        x = velocity_m_s * (1.0 / drive.stribeck_m_s)
         # Beyond that less than 2e-9 of it is left.
         if -4.5 < x < 4.5:
             force += more * math.exp(-x * x)
@@ -341,7 +343,9 @@ def acceleration(
 ) -> float:
     """Return the motor's acceleration (rev/s2) under this net force on the gap, sliding in this direction."""
     damping = drive.damping_n_s_m * speed_rev_s * rate_m_rev
-    return rate_m_rev / drive.inertia * (net_n - direction * resisting_n - damping)
+    # The same for all ticks, where a quotient would be waited for in each.
+    per_inertia = 1.0 / drive.inertia
+    return rate_m_rev * per_inertia * (net_n - direction * resisting_n - damping)
 
 
 def move(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
@@ -526,13 +530,23 @@ def _glide(
             ):
                 return False, state
     net = load - effort_n
-    kick = acceleration(drive, rate, speed, net, friction(drive, speed * rate, load), direction)
+    # What slides at the end rubs as it did at the beginning, but for little: one exponential does for both.
+    slides, bare = speed * rate, drive.coulomb_n + drive.load_share * load
+    more = friction(drive, slides, load) - bare
+    kick = acceleration(drive, rate, speed, net, bare + more, direction)
     revolutions1 = revolutions + h * (speed + 0.5 * kick * h)
     speed1 = speed + kick * h
-    if speed1 * direction <= 0.0 or abs(speed * rate) < STANDING_M_S:
+    if speed1 * direction <= 0.0 or abs(slides) < STANDING_M_S:
         return False, state
     gap1, rate1 = gap_and_rate(drive.link, revolutions1)
-    kick1 = acceleration(drive, rate1, speed1, net, friction(drive, speed1 * rate1, load), direction)
+    if more > 0.0:
+        slides1 = speed1 * rate1
+        per_speed = 1.0 / drive.stribeck_m_s
+        fall = (slides - slides1) * (slides + slides1) * (per_speed * per_speed)
+        if abs(fall) > SMALL_FALL:
+            return False, state
+        more *= 1.0 + fall * (1.0 + fall * (0.5 + fall / 6.0))
+    kick1 = acceleration(drive, rate1, speed1, net, bare + more, direction)
     speed1 = speed + 0.5 * h * (kick + kick1)
     if (
         speed1 * direction <= 0.0

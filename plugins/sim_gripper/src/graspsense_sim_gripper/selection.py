@@ -20,6 +20,7 @@ from attrs import asdict, evolve, frozen
 
 from graspsense.plugin_api import bind
 from graspsense_sim_gripper.kernel import sum_of
+from graspsense_sim_gripper.linear import forms_of, is_bent
 from graspsense_sim_gripper.plant import Squeezed, Steps, Thing, squeeze
 from graspsense_sim_gripper.terms.registry import find_term, laws_of
 from graspsense_sim_gripper.terms.remainder import Kept, Remainder
@@ -39,14 +40,17 @@ class Rung(NamedTuple):
     """Steps are as for the accuracy over this."""
     least_steps: int = 1
     """Into how many steps a tick is cut at the least."""
+    maps: bool = False
+    """Whether exact maps may take the ticks of what is left, where they can."""
 
 
-BOLD: Final = Rung("bold", 0.3)
-CAREFUL: Final = Rung("careful", 0.05)
+BOLDEST: Final = Rung("boldest", 3.0, maps=True)
+BOLD: Final = Rung("bold", 0.3, maps=True)
+CAREFUL: Final = Rung("careful", 0.05, maps=True)
 WHOLE: Final = Rung("every term", 0.0)
 FINE: Final = Rung("every term, finer steps", 0.0, 10.0, 4)
 FINEST: Final = Rung("every term, finest steps", 0.0, 100.0, 32)
-LADDER: Final = (BOLD, CAREFUL, WHOLE, FINE, FINEST)
+LADDER: Final = (BOLDEST, BOLD, CAREFUL, WHOLE, FINE, FINEST)
 FULL_LADDER: Final = (WHOLE, FINE, FINEST)
 """Where every term is wanted."""
 GROWS: Final = 0.1
@@ -61,6 +65,9 @@ HOLD_S: Final = 1.0
 SQUEEZE_S: Final = 3.0
 """No squeeze takes longer: the controllers give up then."""
 PIECES: Final = 24
+PIECES_SCALE: Final = 1.6
+MOST_PIECES: Final = 32
+"""More straight pieces of a curve take longer to make maps of than any grasp."""
 TOO_MUCH: Final = 0.5
 """A change of the force beyond which no accuracy takes it."""
 EARLY: Final = 3
@@ -109,6 +116,9 @@ class Choice:
     swings: bool
     """Whether a term has a state that swings, or one of which it does not say how fast it is."""
     rung: str
+    pieces: int = 0
+    """Exact maps take the ticks, of a linkage as it is at the contact and of an object whose force over compression
+    stands in so many straight pieces; 0: they do where all is linear as it is."""
     check: Check | None = None
     """What a trial grasp said of it; None where there was none."""
 
@@ -121,12 +131,19 @@ class Choice:
             thing = _named(self.made[-1], _covers(thing))
         return thing._replace(swings=1 if self.swings else 0)
 
+    @property
+    def most_n(self) -> float:
+        """Up to which force the choice holds."""
+        return BEYOND * self.point.force_n
+
     def covers(self, peak_n: float) -> bool:
         """Return whether a grasp with this peak is one that the choice was made for."""
-        return peak_n <= BEYOND * self.point.force_n or self.error == 0.0
+        return peak_n <= self.most_n or (self.error == 0.0 and self.pieces == 0)
 
     def by_maps(self) -> Choice:
-        """Return the same choice where exact maps take the ticks."""
+        """Return the same choice where exact maps take the ticks of a scene that is linear as it is."""
+        if self.pieces > 0:
+            return self
         what = "all of it is linear between its modes"
         scheme = Decision(term="steps", decision="exact maps", what=what, number=0.0, error=0.0)
         return evolve(self, scheme=scheme)
@@ -216,11 +233,14 @@ def choose(
     mass_kg: float,
     damping_n_s_m: float,
     rubs: bool,
+    maps: bool = False,
+    straight: bool = False,
     rung: Rung = CAREFUL,
 ) -> Choice:
     """Return the model for a grasp that touches at this speed and squeezes with this force.
 
-    `rubs`: whether the drive has friction.
+    `rubs`: whether the drive has friction; `maps`: whether exact maps can take this grasp and are worth making;
+    `straight`: whether the drive is linear as it is.
     """
     seen = _survey(full, tuple(kinds), force_n, max(speed_m_s, LEAST_SPEED_M_S), mass_kg)
     paths, point = seen.paths, seen.point
@@ -230,6 +250,7 @@ def choose(
     # Verlet lets the energy of a swing rise and fall by a share of it, which only shows where nothing else takes it.
     swing = contact.number / dt_s * (6.0 * tolerance(accuracy)) ** (2.0 / 3.0) / 4.0
     stiff = rate * dt_s > 1.0 or (rate < swing and not rubs)
+    pieces = _pieces(thing, kinds, accuracy, straight) if maps and rung.maps else 0
     return Choice(
         accuracy=accuracy,
         made=made,
@@ -243,10 +264,12 @@ def choose(
         decisions=tuple(decisions),
         scheme=Decision(
             term="steps",
-            decision="TR-BDF2" if stiff else "Verlet",
-            what="rate of the dampers, times tick",
-            number=rate * dt_s,
-            error=accuracy * (1.0 - rung.model_share),
+            decision="exact maps" if pieces > 0 else "TR-BDF2" if stiff else "Verlet",
+            what="straight pieces of the object's curve, the linkage as at the contact"
+            if pieces > 0
+            else "rate of the dampers, times tick",
+            number=float(pieces) if pieces > 0 else rate * dt_s,
+            error=accuracy * max(1.0 - rung.model_share, 0.0),
         ),
         contact=contact,
         error=spent,
@@ -255,7 +278,21 @@ def choose(
             for kind, one, left in zip(kinds, full.terms[1:], thing.terms[1:], strict=True)
         ),
         rung=rung.name,
+        pieces=pieces,
     )
+
+
+def _pieces(thing: Thing, kinds: Sequence[str], accuracy: float, straight: bool) -> int:
+    """Return into how many straight pieces the curve of what is left is cut for exact maps; 0: none is needed, or they
+    cannot take it."""
+    forms = forms_of(thing, kinds)
+    if forms is None:
+        return 0
+    if not is_bent(forms):
+        return 0 if straight else 1
+    # Between knots at even roots a force that goes with d^1.5 is off by 0.4 of it over the square of their number.
+    pieces = 1 << math.ceil(math.log2(PIECES_SCALE / math.sqrt(accuracy)))
+    return pieces if pieces <= MOST_PIECES else 0
 
 
 def _swings(kind: str, params: Any, point: WorkingPoint) -> bool:

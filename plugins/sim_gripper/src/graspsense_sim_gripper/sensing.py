@@ -31,6 +31,19 @@ VELOCITY_FILTER_S: Final = 0.003
 LARGEST_COUNT: Final = 65535.0
 
 
+class Bias(NamedTuple):
+    """By what an ideal sensor is made wrong, to see whether a grasp hangs on so little."""
+
+    force_n: float
+    """On a pad that is touched."""
+    share: float
+    """Of the way that the fingers have come beyond `from_m`."""
+    from_m: float
+
+
+UNBIASED: Final = Bias(0.0, 0.0, 0.0)
+
+
 class SensorParams(NamedTuple):
     """The sensing chain of one grasp. `share` is the part of the force that lands on the fifteen cells.
 
@@ -48,6 +61,7 @@ class SensorParams(NamedTuple):
     right_weights: Any
     left_offset: Any
     right_offset: Any
+    bias: Bias = UNBIASED
 
 
 class Felt(NamedTuple):
@@ -102,7 +116,11 @@ def sense(
     """
     if params.ideal == 1:
         velocity = plant.speed_rev_s * plant.rate_m_rev
-        frame = Frame(t_s, dt_s, plant.gap_m, velocity, effort_n, plant.left_n, plant.right_n, 0.0, 0.0, 0)
+        off_n, off_share, from_m = params.bias
+        gap = plant.gap_m + off_share * min(plant.gap_m - from_m, 0.0)
+        left_n = plant.left_n + off_n if plant.left_n > 0.0 else plant.left_n
+        right_n = plant.right_n + off_n if plant.right_n > 0.0 else plant.right_n
+        frame = Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, 0.0, 0.0, 0)
         return frame, state
 
     ticks, gap, velocity, count, image_t, felt, under_way, taken_left, taken_right = state

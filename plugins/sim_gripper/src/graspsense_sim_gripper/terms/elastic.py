@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 from graspsense_sim_gripper.terms.term import Limit, LinearForm, NoState, Term, WorkingPoint
@@ -14,11 +15,16 @@ class Elastic(NamedTuple):
     k3_n_m3: float = 0.0
 
 
+def stiffened(params: Elastic, d: float) -> float:
+    """Return what the shell's stiffening adds at a compression (N)."""
+    return params.k3_n_m3 * d * d * d
+
+
 def elastic(
     params: Elastic, state: NoState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, NoState]:
     """Return the shell's force."""
-    return params.k1_n_m * d1 + params.k3_n_m3 * d1 * d1 * d1, state
+    return params.k1_n_m * d1 + stiffened(params, d1), state
 
 
 def limits(params: Elastic, at: WorkingPoint) -> tuple[Limit, ...]:
@@ -26,9 +32,11 @@ def limits(params: Elastic, at: WorkingPoint) -> tuple[Limit, ...]:
     return (Limit("spring", spring_n_m=params.k1_n_m),)
 
 
-def linear(params: Elastic) -> LinearForm | None:
-    """Return the spring that it is where it does not stiffen."""
-    return LinearForm(params.k1_n_m) if params.k3_n_m3 == 0.0 else None
+def linear(params: Elastic) -> LinearForm:
+    """Return the spring that it is, and how it stiffens."""
+    if params.k3_n_m3 == 0.0:
+        return LinearForm(params.k1_n_m)
+    return LinearForm(params.k1_n_m, curve=partial(stiffened, params))
 
 
 TERM = Term(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
@@ -24,23 +25,27 @@ class Foam(NamedTuple):
 class FoamState(NamedTuple):
     """The forces of the arms, N."""
 
-    arm1: MaxwellState
-    arm2: MaxwellState
+    arm1_n: float
+    arm2_n: float
+
+
+def power(params: Foam, d: float) -> float:
+    """Return the force (N) of the power law at a compression."""
+    # Odd in d, so that a search that strays below zero still finds its way back.
+    force: float = params.force_n * (abs(d) / params.at_m) ** params.exponent
+    return force if d >= 0.0 else -force
 
 
 def foam(
     params: Foam, state: FoamState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, FoamState]:
     """Return the force; the arms are springs and dampers on the compression, so that they never give work back."""
-    # Odd in d, so that a search that strays below zero still finds its way back.
-    force = params.force_n * (abs(d1) / params.at_m) ** params.exponent
-    if d1 < 0.0:
-        force = -force
+    force = power(params, d1)
     if params.arm1_n_m == 0.0 and params.arm2_n_m == 0.0:
         return force, state
-    force1, arm1 = maxwell(Maxwell(params.arm1_n_m, params.tau1_s), state.arm1, d0, d1, h, v1)
-    force2, arm2 = maxwell(Maxwell(params.arm2_n_m, params.tau2_s), state.arm2, d0, d1, h, v1)
-    return force + force1 + force2, FoamState(arm1, arm2)
+    force1, _ = maxwell(Maxwell(params.arm1_n_m, params.tau1_s), MaxwellState(state.arm1_n), d0, d1, h, v1)
+    force2, _ = maxwell(Maxwell(params.arm2_n_m, params.tau2_s), MaxwellState(state.arm2_n), d0, d1, h, v1)
+    return force + force1 + force2, FoamState(force1, force2)
 
 
 def rates(params: Foam, at: WorkingPoint) -> tuple[Rate, ...]:
@@ -61,11 +66,23 @@ def limits(params: Foam, at: WorkingPoint) -> tuple[Limit, ...]:
     return (Limit("without arms", bare, spring, damper),)
 
 
-def linear(params: Foam) -> LinearForm | None:
-    """Return the spring that it is with an exponent of 1 and no arms."""
-    if params.exponent != 1.0 or params.arm1_n_m != 0.0 or params.arm2_n_m != 0.0:
-        return None
-    return LinearForm(params.force_n / params.at_m)
+def linear(params: Foam) -> LinearForm:
+    """Return its arms, beside the spring that it is with an exponent of 1 or the power law."""
+    straight = params.exponent == 1.0
+    form = LinearForm(
+        params.force_n / params.at_m if straight else 0.0, curve=None if straight else partial(power, params)
+    )
+    # An arm that is none needs not be followed as fast as it is.
+    first, second = (
+        1.0 / tau if stiffness > 0.0 else 0.0
+        for stiffness, tau in ((params.arm1_n_m, params.tau1_s), (params.arm2_n_m, params.tau2_s))
+    )
+    return form._replace(
+        rates=((-first, 0.0), (0.0, -second)),
+        by_compression=(0.0, 0.0),
+        by_speed=(params.arm1_n_m, params.arm2_n_m),
+        force=(1.0, 1.0),
+    )
 
 
 TERM = Term(
@@ -73,7 +90,7 @@ TERM = Term(
     summary="power law with two Maxwell arms",
     params=Foam,
     law=foam,
-    at_rest=FoamState(MaxwellState(0.0), MaxwellState(0.0)),
+    at_rest=FoamState(0.0, 0.0),
     rates=rates,
     limits=limits,
     linear=linear,

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import LinearForm, Rate, Term, WorkingPoint
 
 
 class Rigid(NamedTuple):
@@ -23,14 +24,19 @@ class RigidState(NamedTuple):
     broken: int
 
 
+def hertz(params: Rigid, d: float) -> float:
+    """Return the force (N) of the contact at a compression."""
+    # Odd in d, so that a search that strays below zero still finds its way back.
+    return params.hertz_n_m15 * d * math.sqrt(abs(d))
+
+
 def rigid(
     params: Rigid, state: RigidState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, RigidState]:
     """Return the contact force; a break is felt from the next piece of path on."""
     if state.broken == 1:
         return params.broken_n_m * d1, state
-    # Odd in d, so that a search that strays below zero still finds its way back.
-    force = params.hertz_n_m15 * d1 * math.sqrt(abs(d1))
+    force = hertz(params, d1)
     if force > params.crush_force_n:
         return force, RigidState(1)
     return force, state
@@ -42,6 +48,11 @@ def rates(params: Rigid, at: WorkingPoint) -> tuple[Rate, ...]:
     return ()
 
 
+def linear(params: Rigid) -> LinearForm | None:
+    """Return the contact where it cannot break: nothing of it is straight."""
+    return LinearForm(curve=partial(hertz, params)) if params.crush_force_n == math.inf else None
+
+
 TERM = Term(
     name="rigid",
     summary="rigid body through its Hertz contact, K d^1.5; breaks above its crush force",
@@ -49,6 +60,7 @@ TERM = Term(
     law=rigid,
     at_rest=RigidState(0),
     rates=rates,
+    linear=linear,
     positive=("hertz_n_m15",),
     stiffnesses=("hertz_n_m15", "crush_force_n"),
 )

@@ -46,8 +46,8 @@ class Limit(NamedTuple):
 class LinearForm(NamedTuple):
     """A term that is linear: s' = A s + b d + c d' of its states s, force k d + g d' + f s.
 
-    d is the compression (m); the states are the fields of the term's state, in their order, all floats. A form
-    without `rates` leaves the state as it is.
+    d is the compression (m); the states are the fields of the term's state, in their order, all floats. A state of
+    other fields stays as it is, and the form has none of it.
     """
 
     spring_n_m: float = 0.0
@@ -62,6 +62,8 @@ class LinearForm(NamedTuple):
     """c"""
     force: tuple[float, ...] = ()
     """f"""
+    curve: Callable[[float], float] | None = None
+    """What is not linear of it: a force (N) that follows from d alone, rises with it and is 0 at 0."""
 
 
 class OwnContact(NamedTuple):
@@ -121,7 +123,8 @@ class Term:
     limits: Callable[[Any, WorkingPoint], tuple[Limit, ...]] = no_limits
     """What may stand for it, cheapest first; whether it may is found by the force it then gives."""
     linear: Callable[[Any], LinearForm | OwnContact | None] = not_linear
-    """Its linear form with these parameters, or None. Where all terms have one, exact maps take the scene's ticks."""
+    """Its linear form with these parameters, or None. Where all terms have one, exact maps may take the scene's ticks:
+    exactly where no form has a curve, else with as many straight pieces for it as the accuracy asks for."""
     positive: tuple[str, ...] = ()
     stiffnesses: tuple[str, ...] = ()
     """Parameters that a thicker wall makes larger: they vary between instances."""

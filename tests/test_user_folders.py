@@ -1,0 +1,97 @@
+"""The user's own folders, and what a user does without who has no home directory."""
+
+from __future__ import annotations
+
+import os
+import pwd
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from graspsense.core.calibration_files import calibration_path, calibrations_of
+from graspsense.core.disabling import disabled_in_config, write_disabled
+from graspsense.core.errors import ConfigError
+from graspsense.core.user_folders import cache_folder, config_folder, data_folder
+
+VARIABLES = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR")
+STRANGER = """
+import pwd, sys
+def unknown(uid):
+    raise KeyError(f"getpwuid(): uid not found: {uid}")
+pwd.getpwuid = unknown
+from graspsense.cli.main import main
+main(sys.argv[1:])
+"""
+"""The command line for a user of whom the system has no entry."""
+
+
+@pytest.fixture
+def homeless(monkeypatch):
+    def unknown(uid):
+        raise KeyError(f"getpwuid(): uid not found: {uid}")
+
+    for name in VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+
+
+def graspsense(folder, *arguments, code=0, **environ):
+    """Return what a command says to a stranger without a home who stands in this folder."""
+    kept = {name: value for name, value in os.environ.items() if name not in VARIABLES}
+    done = subprocess.run(
+        [sys.executable, "-c", STRANGER, *arguments],
+        env={**kept, "NO_COLOR": "1", **environ},
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == code, done.stderr
+    return done.stdout + done.stderr
+
+
+def test_folders_are_where_the_variables_say_and_else_in_the_home(monkeypatch, tmp_path):
+    for name in VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", "/home/ada")
+    assert config_folder() == Path("/home/ada/.config/graspsense")
+    assert data_folder() == Path("/home/ada/.local/share/graspsense")
+    assert cache_folder() == Path("/home/ada/.cache/graspsense")
+    monkeypatch.setenv("XDG_CONFIG_HOME", "/c")
+    monkeypatch.setenv("XDG_DATA_HOME", "/d")
+    monkeypatch.setenv("XDG_CACHE_HOME", "/e")
+    assert (config_folder(), data_folder(), cache_folder()) == tuple(
+        Path(one) / "graspsense" for one in ("/c", "/d", "/e")
+    )
+
+
+@pytest.mark.usefixtures("homeless")
+def test_without_a_home_nothing_is_disabled_calibrated_or_kept(tmp_path, monkeypatch):
+    assert config_folder() is data_folder() is cache_folder() is None
+    assert disabled_in_config() == ()
+    assert calibrations_of("", "L7", {}) == {}
+    with pytest.raises(ConfigError, match="set HOME or XDG_CONFIG_HOME"):
+        write_disabled({"lab-peak"})
+    with pytest.raises(ConfigError, match=r"set HOME or XDG_DATA_HOME.*gripper\.calibration"):
+        calibration_path("", "L7", "tare")
+    assert calibration_path(tmp_path, "L7", "tare") == tmp_path / "L7" / "tare.json"
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    write_disabled({"lab-peak"})
+    assert disabled_in_config() == ("lab-peak",)
+
+
+def test_commands_work_without_a_home_and_leave_nothing_behind(tmp_path):
+    scratch = tmp_path / "tmp"
+    scratch.mkdir()
+    assert "binary decision tree" in graspsense(tmp_path, "plugins", "list", TMPDIR=str(scratch))
+    assert list(tmp_path.rglob("*")) == [scratch]
+
+
+def test_disabling_without_a_home_says_what_to_set(site, tmp_path):
+    site.install("lab-peak", "GRASPSENSE_API = (1, 0)\n")
+    path = os.pathsep.join(one for one in (str(site.folder), os.environ.get("PYTHONPATH", "")) if one)
+    said = graspsense(tmp_path, "plugins", "disable", "lab-peak", code=2, PYTHONPATH=path)
+    assert "XDG_CONFIG_HOME" in said
+    assert "internal error" not in said
