@@ -61,7 +61,7 @@ class SimBackend(BatchBackend[SimConfig]):
         chooser = partial(checked_choice, control=self._control or standard(self.config))
         self._setting = setting = set_scene(self.config, self.config.object, seed, chooser)
         self._move: Callable[[Any, PlantState, float, float], PlantState] = plant_of(
-            laws_of(setting.kinds), **_PLANT_TUPLES
+            laws_of(setting.kinds), settles=setting.plant.steps.settle > 0.0, **_PLANT_TUPLES
         )
         by_maps = linear_of(self.config, setting)
         self._plant: PlantParams | Linear = setting.plant

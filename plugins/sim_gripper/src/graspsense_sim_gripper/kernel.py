@@ -82,9 +82,9 @@ def sum_of(laws: Sequence[Law]) -> Law:
 
 
 def plant_of(
-    laws: Sequence[Law], **tuples: Any
+    laws: Sequence[Law], *, settles: bool = True, **tuples: Any
 ) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
-    """Return `move` for an object that is the sum of these terms.
+    """Return `move` for an object that is the sum of these terms; not `settles`: for steps that need not settle.
 
     `tuples` are what makes the plant's named tuples, where that is not their class (see `maker`).
     """
@@ -93,7 +93,9 @@ def plant_of(
     stuck = bind(plant._stuck, _felt=felt, **tuples)
     step = bind(plant._step, _felt=felt, _stuck=stuck, _implicit=bind(plant._implicit, _felt=felt), **tuples)
     glide = bind(plant._glide, **{name: made for name, made in tuples.items() if name == "PlantState"})
-    return bind(plant.move, _driven=bind(plant._driven, _step=step, _glide=glide))
+    stepped = bind(plant._stepped, _step=step)
+    driven = plant._settled if settles else plant._driven
+    return bind(plant.move, _driven=bind(driven, _stepped=stepped, _glide=glide))
 
 
 move: Any = _nothing
@@ -212,14 +214,18 @@ def _tare(images: Any, begin: int, end: int, left_zero: Any, right_zero: Any) ->
 
 
 def grasp_of(
-    laws: Sequence[Law], step: Callable[..., Any], *, by_maps: tuple[Sequence[str], Shape] | None = None
+    laws: Sequence[Law],
+    step: Callable[..., Any],
+    *,
+    by_maps: tuple[Sequence[str], Shape] | None = None,
+    settles: bool = True,
 ) -> Callable[..., Any]:
     """Return `grasp` for an object of these terms under this control law, in plain Python.
 
     `by_maps`: their names and the shape of the maps, where its plant parameters are a `Linear` and exact maps take the
-    ticks that they can.
+    ticks that they can. Not `settles`: for steps that need not.
     """
-    move: Any = plant_of(laws)
+    move: Any = plant_of(laws, settles=settles)
     if by_maps is not None:
         move = linear.move_of(*by_maps, move)
     return bind(grasp, move=move, control=bind(tick, step=step))
@@ -232,9 +238,16 @@ SHORT_CODE: Final = 400
 """Bytes of byte code up to which a function is taken into all that call it."""
 LONG_CODE: Final = 2000
 """Bytes from which on a function stays a call where it would come to stand in several places."""
-LEADING: Final = (plant.move.__code__, plant._driven.__code__)
+LEADING: Final = (
+    plant.move.__code__,
+    plant._driven.__code__,
+    plant._settled.__code__,
+    plant._stepped.__code__,
+)
 """What does little but lead to the next: taken in before types are inferred, since every level of calls has all that
 is below it compiled once more."""
+SELDOM: Final = {linear.move.__code__: ("plant_move", "_searched")}
+"""What a function seldom calls stays a call there, whatever it takes: the processor's registers are for the rest."""
 
 
 class NotCompilable(Exception):
@@ -305,11 +318,14 @@ def _compiled(
 ) -> Callable[..., Any]:
     plain = _plain(function)
     mark = fingerprint(plain)
-    key = f"{mark}{'!' if outermost else ''}"
+    key = f"{mark}{'!' if outermost else '?' if places == 0 else ''}"
     if key not in memo:
         counts = _places(plain.__code__)
+        seldom = SELDOM.get(plain.__code__, ())
         parts = {
-            name: _compiled(value, memo, numba, copies, outermost=False, places=counts[name])
+            name: _compiled(
+                value, memo, numba, copies, outermost=False, places=0 if name in seldom else counts[name]
+            )
             for name, value in _functions(plain)
         }
         code = plain.__code__
@@ -326,7 +342,7 @@ def _compiled(
             cache=outermost and _kept(),
             no_cpython_wrapper=not outermost,
             no_cfunc_wrapper=True,
-            forceinline=once or len(code.co_code) <= SHORT_CODE,
+            forceinline=once or (places > 0 and len(code.co_code) <= SHORT_CODE),
             inline="always" if places == 1 and code in LEADING else "never",
             # Nothing here allocates, and counting references to the arrays that are handed on took half of a tick.
             _nrt=False,

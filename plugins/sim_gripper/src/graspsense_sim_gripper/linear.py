@@ -56,6 +56,8 @@ LEVER_M: Final = 5e-3
 """So far about the squeeze the parabola of the moving mass goes through what it is."""
 MOST_EVENTS: Final = 64
 """A tick in which more modes end than this is taken on without looking."""
+PLACES: Final = ("NOW", "THEN", "WAS", "MOST", "BY")
+"""What a tick's room is for: the state before and after a piece of the tick, what is watched before it, and bounds."""
 PEAK_SHARE: Final = 2e-3
 """A swing inside a tick that goes beyond the greatest force by less than this share of it may be missed."""
 
@@ -70,7 +72,7 @@ class Lever(NamedTuple):
 
 
 class Linear(NamedTuple):
-    """A plant with its modes, and room for the state before and after a piece of a tick and for what is watched."""
+    """A plant with its modes, and room for what a tick works on."""
 
     plant: PlantParams
     look: int
@@ -87,14 +89,12 @@ class Linear(NamedTuple):
     bounds: Any
     begin: Any
     slack: Any
-    now: Any
-    then: Any
-    """The state, and what is watched, after a piece."""
-    was: Any
-    """What is watched before it."""
-    change: Any
-    most: Any
-    by: Any
+    room: Any
+    """The state before a piece of a tick; state and what is watched after it; what is watched before it; bounds.
+
+    In one table at places known beforehand: compiled code then need not ask whether two of them are one, and keeps
+    most of it in registers.
+    """
 
 
 def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -> tuple[Linear, Shape] | None:
@@ -137,15 +137,14 @@ def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -
     modes = modes_of(scene, setting.dt_s) if on_arrays else listed(scene, setting.dt_s)
     if modes is None:
         return None
-    shape, look, *numbers = modes
-    room = padded(max(shape.columns, GUARDS + shape.ends + shape.states, 2 * shape.states))
-    rooms = np.zeros((6, room)) if on_arrays else np.zeros((6, room)).tolist()
+    shape, look, *tables = modes
+    numbers = len(PLACES) * _room(shape)
+    room: Any = np.zeros(numbers) if on_arrays else [0.0] * numbers
     slopes: Any = [piece.slope_n_m for piece in bend]
     if on_arrays:
         slopes = np.array(slopes, float)
-    return Linear(
-        plant, look, lever, len(bend), len(bend) / math.sqrt(reach), slopes, *numbers, *rooms
-    ), shape
+    per_root = len(bend) / math.sqrt(reach)
+    return Linear(plant, look, lever, len(bend), per_root, slopes, *(*tables, room)), shape
 
 
 def _lever(setting: Setting) -> Lever:
@@ -340,26 +339,40 @@ def move_of(
         puts = bind(_put_all, put=PUT[count], put_rest=puts)
         takes = bind(_take_all, take=bind(TAKE[count], made=type(state)), take_rest=takes)
     laid_out = {name.upper(): number for name, number in shape._asdict().items()}
+    places = {name: k * _room(shape) for k, name in enumerate(PLACES)}
+    now, then, was, most, by = places.values()
     watched = padded(GUARDS + shape.ends)
     mapped, parted = padded(shape.states + GUARDS + shape.ends), padded(2 * shape.states)
+    modes = ((shape.parts + 1) * shape.motions) << shape.contacts
+    here = {"MODES": modes, "WATCHED": watched, "MAPPED": mapped, "PARTED": parted, **laid_out, **places}
+    changes = {"COLUMNS": shape.states, "FROM": then, "CHANGES": 1, "NOW": now}
+    products = {
+        "_moved": bind(_product, ROWS=mapped, COLUMNS=shape.columns, FROM=now, TO=then),
+        "_seen": bind(_product, ROWS=watched, COLUMNS=shape.columns, FROM=now, TO=was),
+    }
+    rubs = bind(_rubs, **here)
+    swings = bind(
+        _swings,
+        _simply=bind(_product, ROWS=watched, TO=most, SIZES=1, **changes),
+        _parted=bind(_product, ROWS=parted, TO=by, **changes),
+        _bounded=bind(_product, ROWS=watched, COLUMNS=2 * shape.states, FROM=by, TO=most, SIZES=1),
+        **here,
+    )
     return bind(
         move,
         plant_move=plant_move,
         put_states=puts,
         take_states=takes,
-        _moved=bind(_product, ROWS=mapped, COLUMNS=shape.columns),
-        _seen=bind(_product, ROWS=watched, COLUMNS=shape.columns),
-        _simply=bind(_product, ROWS=watched, COLUMNS=shape.states),
-        _parted=bind(_product, ROWS=parted, COLUMNS=shape.states),
-        _bounded=bind(_product, ROWS=watched, COLUMNS=2 * shape.states),
-        _row=bind(_row, **laid_out),
-        MODES=((shape.parts + 1) * shape.motions) << shape.contacts,
-        WATCHED=watched,
-        MAPPED=mapped,
-        PARTED=parted,
-        **laid_out,
+        _quiet=bind(_quiet, _swings=swings, _rubs=rubs, **products, **here),
+        _searched=bind(_searched, _swings=swings, _rubs=rubs, _row=bind(_row, **here), **products, **here),
+        **here,
         **tuples,
     )
+
+
+def _room(shape: Shape) -> int:
+    """Return how many numbers there are at each of the places of a tick's room."""
+    return padded(max(shape.columns, shape.states + GUARDS + shape.ends, 2 * shape.states))
 
 
 # ---------------------------------------------------------------------------------------------------- a tick
@@ -375,32 +388,40 @@ take_states: Any = _take_none
 STATES = COLUMNS = PARTS = CREEPS = LAGS = MOTIONS = CONTACTS = ENDS = BENDS = MODES = ROWS = 0
 WATCHED = MAPPED = PARTED = 0
 """Rows of the tables of what is watched, of the maps, and of the ways, with those that pad them."""
+NOW = THEN = WAS = MOST = BY = FROM = TO = 0
+CHANGES = SIZES = 0
+"""1: a product of how the state changes; of how much what is multiplied is, whichever way."""
 
 
-def _product(table: Any, at: int, vector: Any, product: Any) -> None:
-    """Write the matrix that begins at this place of the table, times the vector, into `product`."""
+def _product(table: Any, at: int, room: Any) -> None:
+    """Write the matrix that begins at this place of the table, times what is at `FROM`, to `TO`."""
     # Known not to be negative, which compiled code else asks at each number.
     at &= MOST_NUMBERS
     for group in range(ROWS // TOGETHER):
         i = group * TOGETHER
         first = second = third = fourth = 0.0
         for j in range(COLUMNS):
-            k, by = at + j * ROWS + i, vector[j]
+            k, by = at + j * ROWS + i, room[FROM + j]
+            if CHANGES == 1:
+                by -= room[NOW + j]
+            if SIZES == 1:
+                by = abs(by)
             first += table[k] * by
             second += table[k + 1] * by
             third += table[k + 2] * by
             fourth += table[k + 3] * by
-        product[i], product[i + 1], product[i + 2], product[i + 3] = first, second, third, fourth
+        i += TO
+        room[i], room[i + 1], room[i + 2], room[i + 3] = first, second, third, fourth
 
 
 _moved = _seen = _simply = _parted = _bounded = _product
 
 
-def _row(rows: Any, at: int, vector: Any) -> float:
+def _row(rows: Any, at: int, room: Any) -> float:
     at &= MOST_NUMBERS
     found = 0.0
     for j in range(COLUMNS):
-        found += rows[at + j] * vector[j]
+        found += rows[at + j] * room[NOW + j]
     return found
 
 
@@ -439,12 +460,202 @@ def _in_place(link: ScrewLinkage, state: PlantState) -> PlantState:
     )
 
 
+def _quiet(
+    params: Linear,
+    mode: int,
+    motion: int,
+    standing: bool,
+    top: float,
+    gap_m: float,
+    effort_n: float,
+    dt: float,
+) -> bool:
+    """Return whether nothing can end this mode within a tick, and write what the tick comes to.
+
+    As for most ticks; it is also not quiet where the force may have been greater inside it than at its ends.
+    """
+    look, room, slack = params.look, params.room, params.slack
+    allowed = (mode * ENDS) & MOST_NUMBERS
+    _seen(params.watched, mode * WATCHED * COLUMNS, room)
+    for k in range(CONTACTS):
+        if room[WAS + GUARDS + k] < -slack[allowed + k]:
+            return False
+    if MOTIONS == 3 and standing:
+        for k in range(ENDS - 2, ENDS):
+            if room[WAS + GUARDS + k] < -slack[allowed + k]:
+                return False
+    if BENDS == 1 and motion != 0:
+        room[NOW + STATES + 1] = _rubs(params, motion, gap_m, effort_n, dt)
+    _moved(params.maps, mode * (HALVINGS + 1) * MAPPED * COLUMNS, room)
+    for k in range(ENDS):
+        if room[THEN + STATES + GUARDS + k] < -slack[allowed + k]:
+            return False
+    if look == 0:
+        return not (room[WAS + RISING] > 0.0 > room[THEN + STATES + RISING])
+    return not _swings(params, mode, top, dt)
+
+
+def _rubs(params: Linear, motion: int, gap_m: float, effort_n: float, dt: float) -> float:
+    """Return the friction to move on with: with it what is no straight line in the speed or the gap.
+
+    As that will be in the middle of the tick.
+    """
+    drive, lever, room = params.plant.drive, params.lever, params.room
+    speed: float = room[NOW + 1]
+    force: float = room[WAS + FORCE]
+    way = 1.0 if motion == 1 else -1.0
+    net = effort_n - force - way * (drive.coulomb_n + drive.load_share * force)
+    net -= drive.damping_n_s_m * speed
+    middle = max(way * (speed + 0.5 * dt * net / lever.mass_kg), 0.0)
+    rubs = friction(drive, middle, 0.0)
+    off = gap_m - 0.5 * dt * speed - lever.gap_m
+    lighter = off * (lever.first_m + off * lever.second_m2)
+    steeper = lever.first_m + 2.0 * off * lever.second_m2
+    net = lighter * (net - way * (rubs - drive.coulomb_n))
+    net -= 0.5 * lever.mass_kg * steeper * middle * middle
+    return rubs - way * net
+
+
+def _swings(params: Linear, mode: int, top: float, dt: float) -> bool:
+    """Return whether the mode may have ended inside a tick that it lasts by its end, or the force gone beyond `top`."""
+    room = params.room
+    _simply(params.simple, mode * WATCHED * STATES, room)
+    beyond = (1.0 + PEAK_SHARE) * max(top, room[THEN + STATES + FORCE])
+    may = not room[WAS + FORCE] + room[MOST + FORCE] <= beyond
+    for k in range(ENDS):
+        if not room[MOST + GUARDS + k] <= room[WAS + GUARDS + k]:
+            may = True
+    if not may:
+        return False
+    _parted(params.ways, mode * PARTED * STATES, room)
+    _bounded(params.bounds, 2 * mode * WATCHED * STATES, room)
+    for k in range(ENDS):
+        if not room[MOST + GUARDS + k] <= room[WAS + GUARDS + k]:
+            return True
+    if room[WAS + FORCE] + room[MOST + FORCE] <= beyond:
+        return False
+    # Where it rises as evenly as its ends say there is no swing inside, either.
+    rise = room[THEN + STATES + FORCE] - room[WAS + FORCE]
+    uneven = max(abs(room[WAS + RISING] * dt - rise), abs(room[THEN + STATES + RISING] * dt - rise))
+    return not max(room[WAS + FORCE], room[THEN + STATES + FORCE]) + uneven <= beyond
+
+
+def _searched(
+    params: Linear,
+    first: int,
+    pressed: int,
+    motion: int,
+    touching: int,
+    standing: bool,
+    shifted: bool,
+    touched: int,
+    top: float,
+    gap_m: float,
+    effort_n: float,
+    dt: float,
+) -> tuple[int, int, float, int]:
+    """Take a tick in which modes may end, in pieces; return pressed, touched and the peak then, and how many ended."""
+    drive, look, room = params.plant.drive, params.look, params.room
+    maps, watched, begin, slack = params.maps, params.watched, params.begin, params.slack
+    if MOTIONS == 3:
+        room[NOW + STATES + 1] = drive.breakaway_n if standing else drive.coulomb_n
+    mode = allowed = 0
+    left, least, events, until = WHOLE, 0, 0, 0
+    begins = True
+    while left > 0:
+        while begins:
+            begins = False
+            mode = first + ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
+            allowed = (mode * ENDS) & MOST_NUMBERS
+            _seen(watched, mode * WATCHED * COLUMNS, room)
+            if events == 0:
+                for k in range(CONTACTS):
+                    if room[WAS + GUARDS + k] < -slack[allowed + k]:
+                        touching ^= 1 << k
+                        begins = True
+            if BENDS == 1 and shifted and not begins:
+                # On another piece the covers and the object balance a little elsewhere.
+                at = 2 * mode * COLUMNS
+                cover = _row(begin, at + COLUMNS, room)
+                room[NOW + 2] = _row(begin, at, room)
+                if CREEPS == 1:
+                    room[NOW + 3] = cover
+                shifted, begins = False, True
+            if MOTIONS == 3 and standing and not begins:
+                # What stands is stuck, unless what holds it less what closes it, or less what opens it, says otherwise.
+                standing = False
+                if room[WAS + GUARDS + ENDS - 2] < -slack[allowed + ENDS - 2]:
+                    motion, begins = 1, True
+                elif room[WAS + GUARDS + ENDS - 1] < -slack[allowed + ENDS - 1]:
+                    motion, begins = 2, True
+        if BENDS == 1 and motion != 0 and left == WHOLE:
+            room[NOW + STATES + 1] = _rubs(params, motion, gap_m, effort_n, dt)
+        while (WHOLE >> least) > left:
+            least += 1
+        _moved(maps, (mode * (HALVINGS + 1) + least) * MAPPED * COLUMNS, room)
+        ends = False
+        for k in range(ENDS):
+            if room[THEN + STATES + GUARDS + k] < -slack[allowed + k]:
+                ends = True
+        if events >= MOST_EVENTS:
+            ends = False
+        elif least == 0 and look > 0 and (ends or _swings(params, mode, top, dt)):
+            least = look
+            continue
+        if ends and least < HALVINGS:
+            until = left - (WHOLE >> least)
+            least += 1
+            continue
+        if room[THEN + STATES + FORCE] > top:
+            top = room[THEN + STATES + FORCE]
+        if room[WAS + RISING] > 0.0 and room[THEN + STATES + RISING] < 0.0 and least >= look:
+            h = math.ldexp(dt, -least)
+            after = room[THEN + STATES + FORCE]
+            top = max(
+                top, _top(room[WAS + FORCE], room[WAS + RISING], after, room[THEN + STATES + RISING], h)
+            )
+        left -= WHOLE >> least
+        for j in range(STATES):
+            room[NOW + j] = room[THEN + j]
+        if ends:
+            events += 1
+            least = look
+            begins = True
+            parted = False
+            for k in range(ENDS):
+                if room[THEN + STATES + GUARDS + k] < -slack[allowed + k]:
+                    if k < CONTACTS:
+                        touching ^= 1 << k
+                    elif PARTS == 1 and k == CONTACTS:
+                        parted = True
+                    else:
+                        # What slid stands, for now; what was stuck does, too.
+                        room[NOW + 1] = 0.0
+                        room[NOW + STATES + 1] = drive.breakaway_n
+                        standing, motion = True, 0
+            if parted:
+                pressed = 1 - pressed
+                at = 2 * (first + ((pressed * MOTIONS + motion) << CONTACTS) + touching) * COLUMNS
+                cover = _row(begin, at + COLUMNS, room)
+                room[NOW + 2] = _row(begin, at, room)
+                if CREEPS == 1:
+                    room[NOW + 3] = cover
+                if pressed == 1:
+                    touched = 1
+        elif left > 0:
+            for j in range(GUARDS + ENDS):
+                room[WAS + j] = room[THEN + STATES + j]
+            if least > look and events < MOST_EVENTS:
+                # What was seen to happen lies in the second half of what was looked at.
+                least = min(least + 1, HALVINGS) if left > until else look
+    for j in range(STATES):
+        room[THEN + j] = room[NOW + j]
+    return pressed, touched, top, events
+
+
 def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> PlantState:
     """Return the plant after `dt`, the tick that the maps are for, in which this effort was asked for."""
-    plant, look, lever, pieces, per_root, slopes, maps, watched, simple, ways, bounds, begin, slack = params[
-        :13
-    ]
-    now, then, was, change, most, by = params[13:]
+    plant, room = params.plant, params.room
     (
         revolutions,
         speed,
@@ -469,8 +680,8 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
     leaves = leaves or alone > 0.0 or (touched == 0 and drive.link.finger_m != 0.0)
 
     closure = thing.width_m - gap
-    now[0] = closure
-    now[1] = -speed * rate
+    room[NOW] = closure
+    room[NOW + 1] = -speed * rate
     at = 2
     pressed = 1
     d = cover = 0.0
@@ -478,7 +689,7 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
         d = squeezed.compression_m
         if CREEPS == 1:
             cover = squeezed.cover_m
-            now[3], now[4] = cover, squeezed.arm_n
+            room[NOW + 3], room[NOW + 4] = cover, squeezed.arm_n
             at = 5
         else:
             at = 3
@@ -486,156 +697,40 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
             pressed = 0
         elif thing.skins_n_m == math.inf:
             d = closure
-        now[2] = d
+        room[NOW + 2] = d
     own = at
-    at = put_states(thing.terms, squeezed.states, now, own)
+    at = put_states(thing.terms, squeezed.states, room, NOW + own)
     if LAGS == 1:
-        now[at] = given
-    now[STATES] = effort_n
-    motion = mode = allowed = first = 0
-    standing = now[1] == 0.0
+        room[at] = given
+    room[NOW + STATES] = effort_n
+    motion = first = 0
+    standing = room[NOW + 1] == 0.0
     if MOTIONS == 3:
-        now[STATES + 1] = drive.breakaway_n if standing else drive.coulomb_n
+        room[NOW + STATES + 1] = drive.breakaway_n if standing else drive.coulomb_n
         if not standing:
-            motion = 1 if now[1] > 0.0 else 2
+            motion = 1 if room[NOW + 1] > 0.0 else 2
     slope, shifted = squeezed.slope_n_m, False
     if BENDS == 1:
         # The piece of the curve that the middle of the tick will see.
-        now[COLUMNS - 1] = 1.0
+        room[NOW + COLUMNS - 1] = 1.0
         ahead = max(d + 0.5 * dt * squeezed.rate_m_s, 0.0)
-        piece = min(int(per_root * math.sqrt(ahead)), pieces - 1) & MOST_NUMBERS
+        piece = min(int(params.per_root * math.sqrt(ahead)), params.pieces - 1) & MOST_NUMBERS
         first = piece * MODES
-        shifted = pressed == 1 and slopes[piece] != slope
-        slope = slopes[piece]
-    # Which of the terms' own contacts touch is guessed, and put right below.
+        shifted = pressed == 1 and params.slopes[piece] != slope
+        slope = params.slopes[piece]
+    # Which of the terms' own contacts touch is guessed, and put right where the tick is looked into.
     touching = (1 << CONTACTS) - 1 if squeezed.force_n > 0.0 else 0
-    left, least, events, until = 0 if leaves else WHOLE, 0, 0, 0
-    top = peak
-    begins = True
-    while left > 0:
-        while begins:
-            begins = False
-            mode = first + ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
-            allowed = (mode * ENDS) & MOST_NUMBERS
-            _seen(watched, mode * WATCHED * COLUMNS, now, was)
-            if events == 0:
-                for k in range(CONTACTS):
-                    if was[GUARDS + k] < -slack[allowed + k]:
-                        touching ^= 1 << k
-                        begins = True
-            if BENDS == 1 and shifted and not begins:
-                # On another piece the covers and the object balance a little elsewhere.
-                at = 2 * mode * COLUMNS
-                cover = _row(begin, at + COLUMNS, now)
-                now[2] = _row(begin, at, now)
-                if CREEPS == 1:
-                    now[3] = cover
-                shifted, begins = False, True
-            if MOTIONS == 3 and standing and not begins:
-                # What stands is stuck, unless what holds it less what closes it, or less what opens it, says otherwise.
-                standing = False
-                if was[GUARDS + ENDS - 2] < -slack[allowed + ENDS - 2]:
-                    motion, begins = 1, True
-                elif was[GUARDS + ENDS - 1] < -slack[allowed + ENDS - 1]:
-                    motion, begins = 2, True
-        if BENDS == 1 and motion != 0 and left == WHOLE:
-            # What is no straight line in the speed or the gap is taken as it will be in the middle of the tick.
-            way = 1.0 if motion == 1 else -1.0
-            net = effort_n - was[FORCE] - way * (drive.coulomb_n + drive.load_share * was[FORCE])
-            net -= drive.damping_n_s_m * now[1]
-            middle = max(way * (now[1] + 0.5 * dt * net / lever.mass_kg), 0.0)
-            rubs = friction(drive, middle, 0.0)
-            off = gap - 0.5 * dt * now[1] - lever.gap_m
-            lighter = off * (lever.first_m + off * lever.second_m2)
-            steeper = lever.first_m + 2.0 * off * lever.second_m2
-            net = lighter * (net - way * (rubs - drive.coulomb_n))
-            net -= 0.5 * lever.mass_kg * steeper * middle * middle
-            now[STATES + 1] = rubs - way * net
-        while (WHOLE >> least) > left:
-            least += 1
-        _moved(maps, (mode * (HALVINGS + 1) + least) * MAPPED * COLUMNS, now, then)
-        ends = False
-        for k in range(ENDS):
-            if then[STATES + GUARDS + k] < -slack[allowed + k]:
-                ends = True
-        if events >= MOST_EVENTS:
-            ends = False
-        elif least == 0 and look > 0:
-            may, beyond = ends, 0.0
-            if not may:
-                for j in range(STATES):
-                    change[j] = abs(then[j] - now[j])
-                _simply(simple, mode * WATCHED * STATES, change, most)
-                beyond = (1.0 + PEAK_SHARE) * max(top, then[STATES + FORCE])
-                may = not was[FORCE] + most[FORCE] <= beyond
-                for k in range(ENDS):
-                    if not most[GUARDS + k] <= was[GUARDS + k]:
-                        may = True
-            if may and not ends:
-                for j in range(STATES):
-                    change[j] = then[j] - now[j]
-                _parted(ways, mode * PARTED * STATES, change, by)
-                for j in range(2 * STATES):
-                    by[j] = abs(by[j])
-                _bounded(bounds, 2 * mode * WATCHED * STATES, by, most)
-                may = False
-                for k in range(ENDS):
-                    if not most[GUARDS + k] <= was[GUARDS + k]:
-                        may = True
-                if not may and not was[FORCE] + most[FORCE] <= beyond:
-                    # Where it rises as evenly as its ends say there is no swing inside, either.
-                    rise = then[STATES + FORCE] - was[FORCE]
-                    uneven = max(abs(was[RISING] * dt - rise), abs(then[STATES + RISING] * dt - rise))
-                    may = not max(was[FORCE], then[STATES + FORCE]) + uneven <= beyond
-            if may:
-                least = look
-                continue
-        if ends and least < HALVINGS:
-            until = left - (WHOLE >> least)
-            least += 1
-            continue
-        if then[STATES + FORCE] > top:
-            top = then[STATES + FORCE]
-        if was[RISING] > 0.0 and then[STATES + RISING] < 0.0 and least >= look:
-            h = math.ldexp(dt, -least)
-            after = then[STATES + FORCE]
-            top = max(top, _top(was[FORCE], was[RISING], after, then[STATES + RISING], h))
-        left -= WHOLE >> least
-        for j in range(STATES):
-            now[j] = then[j]
-        if ends:
-            events += 1
-            least = look
-            begins = True
-            parted = False
-            for k in range(ENDS):
-                if then[STATES + GUARDS + k] < -slack[allowed + k]:
-                    if k < CONTACTS:
-                        touching ^= 1 << k
-                    elif PARTS == 1 and k == CONTACTS:
-                        parted = True
-                    else:
-                        # What slid stands, for now; what was stuck does, too.
-                        now[1] = 0.0
-                        now[STATES + 1] = drive.breakaway_n
-                        standing, motion = True, 0
-            if parted:
-                pressed = 1 - pressed
-                at = 2 * (first + ((pressed * MOTIONS + motion) << CONTACTS) + touching) * COLUMNS
-                cover = _row(begin, at + COLUMNS, now)
-                now[2] = _row(begin, at, now)
-                if CREEPS == 1:
-                    now[3] = cover
-                if pressed == 1:
-                    touched = 1
-        elif left > 0:
-            for j in range(GUARDS + ENDS):
-                was[j] = then[STATES + j]
-            if least > look and events < MOST_EVENTS:
-                # What was seen to happen lies in the second half of what was looked at.
-                least = min(least + 1, HALVINGS) if left > until else look
+    top, events = peak, 0
+    if not leaves:
+        mode = first + ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
+        if not shifted and _quiet(params, mode, motion, standing, top, gap, effort_n, dt):
+            top = max(top, room[THEN + STATES + FORCE])
+        else:
+            pressed, touched, top, events = _searched(
+                params, first, pressed, motion, touching, standing, shifted, touched, top, gap, effort_n, dt
+            )
 
-    came = now[0] - closure
+    came = room[THEN] - closure
     gap1 = gap - came
     # The state waits for this, and a product comes sooner than a quotient.
     turns = 1.0 / rate
@@ -645,23 +740,23 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
             state = _in_place(drive.link, state)
         return plant_move(plant, state, effort_n, dt)  # type: ignore[no-any-return]
     # A mode that begins at the very end of the tick has yet to act.
-    force = max(then[STATES + FORCE], 0.0) if pressed == 1 else 0.0
+    force = max(room[THEN + STATES + FORCE], 0.0) if pressed == 1 else 0.0
     cover, arm = squeezed.cover_m, squeezed.arm_n
     if CREEPS == 1:
-        cover, arm = now[3], now[4]
+        cover, arm = room[THEN + 3], room[THEN + 4]
     if PARTS == 1:
-        d = now[2]
+        d = room[THEN + 2]
         if pressed == 1:
             touched = 1
-        elif now[0] < 0.0 and abs(d) + abs(cover) <= IN_SHAPE_M:
+        elif room[THEN] < 0.0 and abs(d) + abs(cover) <= IN_SHAPE_M:
             touched = 0
     else:
-        if now[0] >= 0.0:
+        if room[THEN] >= 0.0:
             touched = 1
-        d = now[0] if touched == 1 else 0.0
+        d = room[THEN] if touched == 1 else 0.0
     if LAGS == 1:
-        given = now[STATES - 1]
-    after_states, _ = take_states(thing.terms, squeezed.states, now, own)
+        given = room[THEN + STATES - 1]
+    after_states, _ = take_states(thing.terms, squeezed.states, room, THEN + own)
     mean_m_s = (d - squeezed.compression_m) / dt if BENDS == 1 else squeezed.rate_m_s
     felt = Squeezed(d, force, slope, after_states, cover, arm, mean_m_s, math.inf)
     if thing.held == 1:
@@ -669,7 +764,7 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
         other = felt
     after = PlantState(
         revolutions1,
-        -now[1] * turns,
+        -room[THEN + 1] * turns,
         gap1,
         rate,
         force,

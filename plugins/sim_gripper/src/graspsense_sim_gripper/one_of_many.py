@@ -101,11 +101,17 @@ class Composition(NamedTuple):
     kinds: tuple[str, ...]
     shape: Shape | None
     """Of the exact maps that take its ticks."""
+    settles: bool
+    """Whether its steps are to settle."""
 
 
 def composition_of(config: SimConfig, setting: Setting) -> Composition:
     """Return the composition in which this grasp is compiled."""
-    return Composition(layout_of(setting).kinds, _shape(config, setting))
+    return _composed(config, setting, layout_of(setting).kinds)
+
+
+def _composed(config: SimConfig, setting: Setting, kinds: tuple[str, ...]) -> Composition:
+    return Composition(kinds, _shape(config, setting), setting.plant.steps.settle > 0.0)
 
 
 def _shape(config: SimConfig, setting: Setting) -> Shape | None:
@@ -116,8 +122,8 @@ def _shape(config: SimConfig, setting: Setting) -> Shape | None:
 @lru_cache(maxsize=64)
 def loop_of(composition: Composition, step: Callable[..., Any]) -> Callable[..., Any]:
     """Return the loop for this composition under this law, in plain Python."""
-    kinds, shape = composition
-    return grasp_of(laws_of(kinds), step, by_maps=None if shape is None else (kinds, shape))
+    kinds, shape, settles = composition
+    return grasp_of(laws_of(kinds), step, by_maps=None if shape is None else (kinds, shape), settles=settles)
 
 
 def grasp_once(
@@ -203,8 +209,7 @@ def chooser_of(job: Job, loops: Loops | None = None) -> Chooser:
 def plainly(job: Job, scene: str, seed: int) -> Done:
     """Grasp this scene with this seed in the interpreter."""
     setting = set_scene(job.config, scene, seed, chooser_of(job))
-    plain = Composition(setting.kinds, _shape(job.config, setting))
-    loop = loop_of(plain, type(job.controller).step)
+    loop = loop_of(_composed(job.config, setting, setting.kinds), type(job.controller).step)
     return grasp_once(job, setting, loop, Storage(), on_arrays=False)
 
 

@@ -220,11 +220,23 @@ def squeeze(thing: Thing, now: Squeezed, closure_m: float, speed_m_s: float, h: 
         skins = 0.0
     elif h <= 0.0:
         return now
+    force, states, attempt = 0.0, states0, 0
+    if rigid:
+        # As nearly always it ends here, which a search below need not be gone into for.
+        force, states = advance(terms, states0, d0, closure_m, h, speed_m_s)
+        # A finger that is still behind where the object stood presses it only if that has not come back so far.
+        if force >= 0.0 and (force <= 0.0 or force0 > 0.0 or closure_m >= d0):
+            return Squeezed(closure_m, force, slope, states, cover0, arm0, rate0, math.inf)
+        if h <= 0.0:
+            return now
+        attempt = 1
     # Free until now, it is met where it stands; pressed until now, it is let go where its force would pull.
     touching = force0 > 0.0 and skins > 0.0
-    ahead = h / (h + span) if touching else 0.0
-    over = h / (1.0 + ahead)
-    base = d0 + over * ahead * rate0
+    over, base = h, d0
+    if touching:
+        ahead = h / (h + span)
+        over = h / (1.0 + ahead)
+        base += over * ahead * rate0
     # The covers' force is `push` less `stiff` times the object's compression.
     stiff, push, free_cover, kept = skins, skins * closure_m, 0.0, 1.0
     creeps = skins > 0.0 and (thing.skin.damping_n_s_m > 0.0 or thing.skin.arm_n_m > 0.0)
@@ -242,26 +254,21 @@ def squeeze(thing: Thing, now: Squeezed, closure_m: float, speed_m_s: float, h: 
         free_cover = ((even + at_once / h) * cover0 - arm0 * kept) / (skins + even + at_once / h)
     k, c = (stiff, push) if touching else (0.0, 0.0)
     total = max(k + slope, 1e-3 * k, 1e-9)
-    d1 = closure_m if rigid else d0 + (c - k * d0 - force0) / total
+    if rigid:
+        total = _let_go(slope, force, force0, d0, closure_m)
+    d1 = d0 + (c - k * d0 - force0) / total
     least, most, last = -math.inf, math.inf, d0
-    force = force1 = 0.0
-    states = states0
-    attempt = look = 0
-    met = False
-    # One search, pressed or free, with the laws called in one place: what is called in two is compiled twice.
+    force1 = 0.0
+    look = 0
+    rigid = met = False
+    # One search, pressed or free, with the laws called in one place: what is called in more is compiled again.
     while True:
         force, states = advance(terms, states0, d0, d1, h, speed_m_s if rigid else (d1 - base) / over)
         if rigid:
-            # A finger that is still behind where the object stood presses it only if that has not come back so far.
-            if force >= 0.0 and (met or force <= 0.0 or force0 > 0.0 or closure_m >= d0):
+            if force >= 0.0:
                 return Squeezed(d1, force, slope, states, cover0, arm0, rate0, math.inf)
-            if h <= 0.0:
-                return now
-            rigid, over, base, attempt = False, h, d0, 1
-            total = max(slope, 1e-9)
-            if d0 > closure_m:
-                # No search has found a slope yet: from one too small it would begin nowhere near.
-                total = max(total, (force0 - force) / (d0 - closure_m))
+            rigid, attempt = False, 1
+            total = _let_go(slope, force, force0, d0, closure_m)
             d1 = d0 - force0 / total
             continue
         miss = force - (c - k * d1)
@@ -308,6 +315,15 @@ def squeeze(thing: Thing, now: Squeezed, closure_m: float, speed_m_s: float, h: 
     cover = closure_m - d1
     arm = arm0 * kept + even * (cover - cover0) + late * h * (speed_m_s - (d1 - base) / over)
     return Squeezed(d1, force, slope, states, cover, arm, rate, span)
+
+
+def _let_go(slope: float, force: float, force0: float, d0: float, closure_m: float) -> float:
+    """Return the slope with which to look for where an object ends that rigid fingers at `closure_m` would pull."""
+    total = max(slope, 1e-9)
+    if d0 > closure_m:
+        # No search has found a slope yet: from one too small it would begin nowhere near.
+        total = max(total, (force0 - force) / (d0 - closure_m))
+    return total
 
 
 def friction(drive: Drive, velocity_m_s: float, load_n: float) -> float:
@@ -391,18 +407,21 @@ def _with_effort(state: PlantState, effort_n: float) -> PlantState:
 
 
 def _driven(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
-    """Return the plant after `dt` under a constant effort.
-
-    Where it is to settle, the tick is taken again in steps of half the length until its end stands still.
-    """
+    """Return the plant after `dt` under a constant effort, taken once."""
     drive, thing, steps = params
-    if state.speed_rev_s != 0.0 and steps.longest_s >= dt <= state.step_s and steps.settle <= 0.0:
+    if state.speed_rev_s != 0.0 and steps.longest_s >= dt <= state.step_s:
         alike, after = _glide(drive, thing, steps, state, effort_n, dt)
         if alike:
             return after
-    start = before = state
-    left = dt
-    count = counted = halved = 0
+    after, _ = _stepped(drive, thing, steps, state, effort_n, dt)
+    return after
+
+
+def _stepped(
+    drive: Drive, thing: Thing, steps: Steps, state: PlantState, effort_n: float, dt: float
+) -> tuple[PlantState, int]:
+    """Return the plant after `dt` under a constant effort, and in how many steps."""
+    left, count = dt, 0
     while True:
         h = min(state.step_s, steps.longest_s)
         must = count >= MOST_STEPS
@@ -413,8 +432,24 @@ def _driven(params: PlantParams, state: PlantState, effort_n: float, dt: float) 
         state, used = _step(drive, thing, steps, state, effort_n, h, left, must)
         left -= used
         count += 1
-        if left > 1e-12 * dt and count <= MOST_STEPS:
-            continue
+        if not (left > 1e-12 * dt and count <= MOST_STEPS):
+            return state, count
+
+
+def _settled(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
+    """Return the same, taken again in steps of half the length until its end stands still, where it is to settle.
+
+    The state that the tick began with is then needed to its end, which costs compiled code a twentieth.
+    """
+    drive, thing, steps = params
+    if state.speed_rev_s != 0.0 and steps.longest_s >= dt <= state.step_s and steps.settle <= 0.0:
+        alike, after = _glide(drive, thing, steps, state, effort_n, dt)
+        if alike:
+            return after
+    start = before = state
+    counted = halved = 0
+    while True:
+        state, count = _stepped(drive, thing, steps, start, effort_n, dt)
         if (
             steps.settle <= 0.0
             or halved == MOST_HALVINGS
@@ -445,7 +480,7 @@ def _driven(params: PlantParams, state: PlantState, effort_n: float, dt: float) 
             steps.settle,
             1.0 + 0.5 * (steps.growth - 1.0),
         )
-        before, state, left, counted, count, halved = state, start, dt, count, 0, halved + 1
+        before, counted, halved = state, count, halved + 1
 
 
 def _glide(
@@ -655,23 +690,25 @@ def _step(
         if touched == 0 and gap1 <= reach:
             # The force that meets it there is of the next step.
             kick1 = kick
-        change = kick1 - kick
-        # A difference of forces that is rounding says nothing of the step.
-        noise = ROUNDING * max(
-            squeezed1.slope_n_m * abs(squeezed1.compression_m), other1.slope_n_m * abs(other1.compression_m)
-        )
-        noise += 4.0 * (FORCE_ROUNDING_N + FORCE_ROUNDING * max(load, load1))
-        if abs(change) * drive.inertia <= noise * abs(rate):
-            change = 0.0
         speed1 = speed + 0.5 * used * (kick + kick1)
-        # Where so little changes the errors below are smaller still, as in most ticks.
-        if touched == 1 or abs(used * change * rate) > steps.tolerance * SPEED_SCALE_M_S:
-            most = max(abs(kick), abs(kick1))
-            if most > 0.0:
-                shift = abs(used * change * change / (12.0 * most) * rate)
-            fastest = max(abs(speed), abs(speed1))
-            if fastest > 0.0:
-                grip = abs((load1 - load) * used * change / (6.0 * fastest))
+        if steps.tolerance < math.inf:
+            change = kick1 - kick
+            # A difference of forces that is rounding says nothing of the step.
+            noise = ROUNDING * max(
+                squeezed1.slope_n_m * abs(squeezed1.compression_m),
+                other1.slope_n_m * abs(other1.compression_m),
+            )
+            noise += 4.0 * (FORCE_ROUNDING_N + FORCE_ROUNDING * max(load, load1))
+            if abs(change) * drive.inertia <= noise * abs(rate):
+                change = 0.0
+            # Where so little changes the errors below are smaller still, as in most ticks.
+            if touched == 1 or abs(used * change * rate) > steps.tolerance * SPEED_SCALE_M_S:
+                most = max(abs(kick), abs(kick1))
+                if most > 0.0:
+                    shift = abs(used * change * change / (12.0 * most) * rate)
+                fastest = max(abs(speed), abs(speed1))
+                if fastest > 0.0:
+                    grip = abs((load1 - load) * used * change / (6.0 * fastest))
 
     if not done and again == 0.0:
         if speed1 * direction <= 0.0:
@@ -930,9 +967,9 @@ def _felt(
         shut = closure - shift if half == 0 else closure + shift
         if still or shut >= 0.0 or one.compression_m != 0.0:
             since = h
-            if shut <= TOUCHING_M and one.compression_m == 0.0 and speed_m_s > 0.0:
+            if 0.0 <= shut <= TOUCHING_M and one.compression_m == 0.0 and shut < h * speed_m_s:
                 # Met only just, with the object pushed before: a cover's damper has worked since then and no longer.
-                since = min(h, shut / speed_m_s)
+                since = shut / speed_m_s
             one = squeeze(thing, one, shut, speed_m_s, since)
         if half == 0:
             squeezed = one

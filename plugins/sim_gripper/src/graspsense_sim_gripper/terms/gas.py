@@ -70,38 +70,37 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float, v1: float)
     volume = max(whole - swept0 + bulge * rise, LEAST_M3)
     heated = _heated(volume, warmth, warmth, kept, exponent) if warm else 0.0
     own = _give(volume, pressure + rise, exponent)
-    give = own + bulge
-    middle, through = rise + 0.5 * (swept1 - swept0 + heated) / give, 0.0
+    stiff = 1.0 / (own + bulge)
+    middle, through = rise + 0.5 * (swept1 - swept0 + heated) * stiff, 0.0
     if opening > 0.0:
         # By a backward step: it only says what the conductance and the volume are there.
-        middle, through = vented(opening, middle, 0.5 * h / give)
+        middle, through = vented(opening, middle, 0.5 * h * stiff)
     if middle < lowest:
         middle = lowest
     half = 0.0
     if warm:
         taken = 0.5 * heated - own * (middle - rise)
-        half = 0.5 * warmth * (1.0 + kept) - (exponent - 1.0) * taken / (own * exponent * (pressure + rise))
+        half = 0.5 * warmth * (1.0 + kept) - (exponent - 1.0) * taken / volume
 
     volume = max(whole - 0.5 * (swept0 + swept1) + bulge * middle, LEAST_M3)
     if warm:
         heated = _heated(volume, warmth, half, kept, exponent)
-    give = _give(volume, pressure + middle, exponent)
+    steep = exponent * (pressure + middle)
+    stiff = steep / (volume + bulge * steep)
     before = rise
     if opening > 0.0:
-        x = h * through / (give + bulge)
+        x = h * through * stiff
         decay = math.exp(-x)
         # What is swept faster at the end than in the mean the vent has had less time for.
         late = ((area + slope * d1) * v1 * h - (swept1 - swept0)) * late_share(x, decay)
-        rise = rise * decay + ((swept1 - swept0 + heated) * mean_share(x, decay) + late) / (give + bulge)
+        rise = rise * decay + ((swept1 - swept0 + heated) * mean_share(x, decay) + late) * stiff
     else:
-        rise += (swept1 - swept0 + heated) / (give + bulge)
+        rise += (swept1 - swept0 + heated) * stiff
     if rise < lowest:
         rise = lowest
     if warm:
-        taken = heated - give * (rise - before)
-        warmth = warmth * kept - (exponent - 1.0) * (1.0 + half) * taken / (
-            give * exponent * (pressure + middle)
-        )
+        taken = heated - volume / steep * (rise - before)
+        warmth = warmth * kept - (exponent - 1.0) * (1.0 + half) * taken / volume
     if whole - swept1 + bulge * rise <= LEAST_M3:
         spent = 1
     return (area + slope * d1) * rise, GasState(rise, warmth, spent)

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 def mean_share(x: float, decay: float) -> float:
     """Return (1 - decay) / x for decay = exp(-x): what is left, on average, of what came in evenly meanwhile."""
-    return (1.0 - decay) / x if x > 1e-6 else 1.0 - 0.5 * x
+    # What waits for the exponential is a product: it comes sooner than a quotient.
+    return (1.0 - decay) * (1.0 / x) if x > 1e-6 else 1.0 - 0.5 * x
 
 
 def late_share(x: float, decay: float) -> float:
@@ -16,5 +17,5 @@ def late_share(x: float, decay: float) -> float:
     """
     if x < 1e-3:
         return x * (1.0 - 0.5 * x) / 6.0
-    share = (1.0 - decay) / x
-    return 2.0 * (1.0 - share) / x - share
+    over = 1.0 / x
+    return 2.0 * over - (2.0 * over + 1.0) * ((1.0 - decay) * over)
