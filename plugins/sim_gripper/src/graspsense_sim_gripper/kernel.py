@@ -246,8 +246,6 @@ LEADING: Final = (
 )
 """What does little but lead to the next: taken in before types are inferred, since every level of calls has all that
 is below it compiled once more."""
-SELDOM: Final = {linear.move.__code__: ("plant_move", "_searched")}
-"""What a function seldom calls stays a call there, whatever it takes: the processor's registers are for the rest."""
 
 
 class NotCompilable(Exception):
@@ -321,7 +319,7 @@ def _compiled(
     key = f"{mark}{'!' if outermost else '?' if places == 0 else ''}"
     if key not in memo:
         counts = _places(plain.__code__)
-        seldom = SELDOM.get(plain.__code__, ())
+        seldom = linear.seldom(plain)
         parts = {
             name: _compiled(
                 value, memo, numba, copies, outermost=False, places=0 if name in seldom else counts[name]

@@ -358,9 +358,8 @@ def move_of(
         _bounded=bind(_product, ROWS=watched, COLUMNS=2 * shape.states, FROM=by, TO=most, SIZES=1),
         **here,
     )
-    return bind(
-        move,
-        plant_move=plant_move,
+    taken = bind(
+        _taken,
         put_states=puts,
         take_states=takes,
         _quiet=bind(_quiet, _swings=swings, _rubs=rubs, **products, **here),
@@ -368,6 +367,18 @@ def move_of(
         **here,
         **tuples,
     )
+    return bind(move, plant_move=plant_move, _taken=taken, BENDS=shape.bends)
+
+
+def seldom(function: Callable[..., Any]) -> tuple[str, ...]:
+    """Return what a part of `move` seldom calls: it stays a call there, as the processor's registers are for the rest.
+
+    With curves the plant has the way to the contact.
+    """
+    code = function.__code__
+    if code is move.__code__ and function.__globals__["BENDS"] == 0:
+        return ("plant_move",)
+    return ("_searched",) if code is _taken.__code__ else ()
 
 
 def _room(shape: Shape) -> int:
@@ -655,6 +666,19 @@ def _searched(
 
 def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> PlantState:
     """Return the plant after `dt`, the tick that the maps are for, in which this effort was asked for."""
+    drive = params.plant.drive
+    done, after = _taken(params, state, effort_n, dt)
+    if not done:
+        if state.touched == 1 and drive.link.finger_m != 0.0:
+            state = _in_place(drive.link, state)
+        return plant_move(params.plant, state, effort_n, dt)  # type: ignore[no-any-return]
+    if after.touched == 0 and drive.link.finger_m != 0.0:
+        return _in_place(drive.link, after)
+    return after
+
+
+def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tuple[bool, PlantState]:
+    """Return whether the maps can take this tick, and the plant after it."""
     plant, room = params.plant, params.room
     (
         revolutions,
@@ -675,9 +699,15 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
         alone,
     ) = state
     drive, thing = plant.drive, plant.thing
-    leaves = (revolutions >= drive.open_rev and effort_n <= 0.0) or offset != 0.0 or felt_left != felt_right
-    # What the plant has yet to bring up to date is the plant's, and so is a linkage before the contact.
-    leaves = leaves or alone > 0.0 or (touched == 0 and drive.link.finger_m != 0.0)
+    if (
+        (revolutions >= drive.open_rev and effort_n <= 0.0)
+        or offset != 0.0
+        or felt_left != felt_right
+        # What the plant has yet to bring up to date is the plant's, and so is a linkage before the contact.
+        or alone > 0.0
+        or (touched == 0 and drive.link.finger_m != 0.0)
+    ):
+        return False, state
 
     closure = thing.width_m - gap
     room[NOW] = closure
@@ -721,24 +751,21 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
     # Which of the terms' own contacts touch is guessed, and put right where the tick is looked into.
     touching = (1 << CONTACTS) - 1 if squeezed.force_n > 0.0 else 0
     top, events = peak, 0
-    if not leaves:
-        mode = first + ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
-        if not shifted and _quiet(params, mode, motion, standing, top, gap, effort_n, dt):
-            top = max(top, room[THEN + STATES + FORCE])
-        else:
-            pressed, touched, top, events = _searched(
-                params, first, pressed, motion, touching, standing, shifted, touched, top, gap, effort_n, dt
-            )
+    mode = first + ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
+    if not shifted and _quiet(params, mode, motion, standing, top, gap, effort_n, dt):
+        top = max(top, room[THEN + STATES + FORCE])
+    else:
+        pressed, touched, top, events = _searched(
+            params, first, pressed, motion, touching, standing, shifted, touched, top, gap, effort_n, dt
+        )
 
     came = room[THEN] - closure
     gap1 = gap - came
     # The state waits for this, and a product comes sooner than a quotient.
     turns = 1.0 / rate
     revolutions1 = revolutions - came * turns
-    if leaves or not drive.closed_rev < revolutions1 < drive.open_rev:
-        if touched == 1 and drive.link.finger_m != 0.0:
-            state = _in_place(drive.link, state)
-        return plant_move(plant, state, effort_n, dt)  # type: ignore[no-any-return]
+    if not drive.closed_rev < revolutions1 < drive.open_rev:
+        return False, state
     # A mode that begins at the very end of the tick has yet to act.
     force = max(room[THEN + STATES + FORCE], 0.0) if pressed == 1 else 0.0
     cover, arm = squeezed.cover_m, squeezed.arm_n
@@ -762,7 +789,7 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
     if thing.held == 1:
         # Centred: the other half does the same.
         other = felt
-    after = PlantState(
+    return True, PlantState(
         revolutions1,
         -room[THEN + 1] * turns,
         gap1,
@@ -780,4 +807,3 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
         lost + (1 if events >= MOST_EVENTS else 0),
         0.0,
     )
-    return _in_place(drive.link, after) if touched == 0 and drive.link.finger_m != 0.0 else after
