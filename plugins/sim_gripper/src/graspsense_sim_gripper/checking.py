@@ -39,7 +39,7 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.deviation import Course, deviation
 from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, NotCompilable, grasp_of
 from graspsense_sim_gripper.linear import linear_of
-from graspsense_sim_gripper.plant import PlantState, Steps
+from graspsense_sim_gripper.plant import EXPLICIT, PlantState, Steps
 from graspsense_sim_gripper.scene import ObjectSpec
 from graspsense_sim_gripper.selection import DROPPED, FINE, FULL_LADDER, LADDER, Check, Choice, Rung
 from graspsense_sim_gripper.sensing import Bias, SensorState
@@ -335,7 +335,7 @@ class _Trial:
     def _approach(self, setting: Setting) -> _Stand:
         """Return the grasp as it stands shortly before the first touch."""
         # Not cut into short steps, as nothing happens.
-        steps = setting.plant.steps._replace(stiff=0, longest_s=math.inf)
+        steps = setting.plant.steps._replace(scheme=EXPLICIT, longest_s=math.inf)
         reach = setting.plant.thing.width_m + 2.0 * abs(setting.body.offset_m)
         link = setting.plant.drive.link
         law = self.control.controller
