@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pwd
 from pathlib import Path
 from typing import Any
 
@@ -116,6 +117,28 @@ def test_gripper_without_calibrations_says_so(capsys: pytest.CaptureFixture[str]
         main(["calibrate", "tare"])
     assert ended.value.code == 2
     assert "keeps no calibrations" in capsys.readouterr().err
+
+
+def test_without_a_home_a_calibration_is_refused_before_it_is_made(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def unknown(uid: int) -> None:
+        raise KeyError(f"getpwuid(): uid not found: {uid}")
+
+    monkeypatch.delenv("XDG_DATA_HOME")
+    monkeypatch.delenv("HOME", raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+    tare = ["calibrate", "tare", "--images", "1000", *GRIPPER]
+    with pytest.raises(SystemExit) as ended:
+        main(tare)
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert "XDG_DATA_HOME" in said
+    assert "gripper.calibration" in said
+    with pytest.raises(SystemExit) as ended:
+        main(["calibrate", "tare", "--images", "12", *GRIPPER, "-o", f"gripper.calibration={tmp_path}"])
+    assert not ended.value.code
+    assert (tmp_path / "EMULATED" / "tare.json").exists()
 
 
 def test_load_table_rises_and_goes_on_beyond_its_end() -> None:

@@ -9,7 +9,19 @@ from hypothesis import strategies as st
 
 from graspsense.plugin_api import PR2_LINKAGES, bind, gap_and_rate, revolutions_at, straight_linkage
 from graspsense_sim_gripper.kernel import plant_of, sum_of
-from graspsense_sim_gripper.plant import Drive, PlantParams, PlantState, Skin, Squeezed, Steps, Thing, squeeze
+from graspsense_sim_gripper.plant import (
+    EXPLICIT,
+    MEAN_FORCE,
+    STIFF,
+    Drive,
+    PlantParams,
+    PlantState,
+    Skin,
+    Squeezed,
+    Steps,
+    Thing,
+    squeeze,
+)
 from graspsense_sim_gripper.setting import STRAIGHT
 from graspsense_sim_gripper.terms.elastic import Elastic, elastic
 from graspsense_sim_gripper.terms.foam import Foam
@@ -146,8 +158,8 @@ def test_with_the_drive_off_stored_energy_never_rises(stiffness, speed, coulomb,
 )
 def test_without_friction_a_squeeze_and_the_letting_go_create_no_energy(stiffness, speed, damping):
     link, terms = straight_linkage(4e-4), (Elastic(stiffness, 0.0), Loss(damping))
-    # By TR-BDF2, as is chosen where nothing rubs.
-    params = PlantParams(drive(0.0, 0.0, 0.0, 0.0, link), thing(*terms), Steps(2e-4, 1))
+    # By TR-BDF2, as where the damper makes it stiff.
+    params = PlantParams(drive(0.0, 0.0, 0.0, 0.0, link), thing(*terms), Steps(2e-4, STIFF))
     params = params._replace(drive=params.drive._replace(inertia=100.0 * link.pitch_m**2))
     state, move = at(0.0503, (NoState(), NoState()), speed_m_s=-speed, link=link), plant_of([elastic, loss])
     first = before = 50.0 * speed * speed
@@ -156,6 +168,35 @@ def test_without_friction_a_squeeze_and_the_letting_go_create_no_energy(stiffnes
         now = 50.0 * (state.speed_rev_s * state.rate_m_rev) ** 2
         now += 0.5 * stiffness * state.squeezed.compression_m**2
         assert now <= before + 1e-9 * first
+        before = now
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.floats(4.0, 6.0).map(lambda e: 10.0**e),
+    st.floats(6.0, 12.0).map(lambda e: 10.0**e if e > 6.5 else 0.0),
+    st.floats(0.001, 0.2),
+    st.floats(-6.0, -3.0).map(lambda e: 10.0**e),
+    st.sampled_from([LINK, straight_linkage(4e-4)]),
+)
+def test_what_swings_keeps_its_energy_by_the_mean_force_even_where_it_stiffens(
+    k1, k3, speed, tolerance, link
+):
+    params = PlantParams(
+        drive(0.0, 0.0, 0.0, 0.0, link), thing(Elastic(k1, k3)), Steps(tolerance, MEAN_FORCE)
+    )
+    if link is not LINK:
+        params = params._replace(drive=params.drive._replace(inertia=100.0 * link.pitch_m**2))
+    state, move = at(0.0503, (NoState(),), speed_m_s=-speed, link=link), plant_of([elastic])
+    first = before = 0.5 * params.drive.inertia * state.speed_rev_s**2
+    for _ in range(400):
+        state = move(params, state, 0.0, TICK)
+        if state.speed_rev_s == 0.0 and state.touched == 0:
+            # At the end of its travel.
+            break
+        d = state.squeezed.compression_m
+        now = 0.5 * params.drive.inertia * state.speed_rev_s**2 + 0.5 * k1 * d * d + 0.25 * k3 * d**4
+        assert abs(now - before) <= 1e-9 * first
         before = now
 
 
@@ -201,11 +242,11 @@ def test_the_slam_of_a_constant_effort_is_as_large_as_estimated(stiffness, speed
     assert state.peak_n == pytest.approx(peak, rel=0.05)
 
 
-@pytest.mark.parametrize("stiff", [0, 1])
-def test_halving_the_step_quarters_the_error_of_the_peak(stiff):
+@pytest.mark.parametrize("scheme", [EXPLICIT, STIFF, MEAN_FORCE])
+def test_halving_the_step_quarters_the_error_of_the_peak(scheme):
     def peak(steps):
         params = PlantParams(
-            drive(), thing(Elastic(2e5, 0.0), Maxwell(3e4, 0.02)), Steps(inf, stiff, TICK / steps)
+            drive(), thing(Elastic(2e5, 0.0), Maxwell(3e4, 0.02)), Steps(inf, scheme, TICK / steps)
         )
         state = at(0.052, (NoState(), MaxwellState(0.0)), speed_m_s=-0.05)
         return run(params, state, 30.0, 0.15, (elastic, maxwell)).peak_n
@@ -308,7 +349,7 @@ def test_steps_that_grow_slowly_see_what_rings_after_a_touch(tolerance):
     def force(steps):
         return plant_of([surface])(PlantParams(free, body, steps), start, 0.0, 5e-3).left_n
 
-    exact = force(Steps(inf, 0, 1e-6))
+    exact = force(Steps(inf, EXPLICIT, 1e-6))
     errors = [abs(force(Steps(tolerance, growth=growth)) - exact) / exact for growth in (2.0, 1.1, 1.03)]
     assert errors[0] > 4.0 * errors[1] > 16.0 * errors[2]
     assert errors[2] < 1e-4
@@ -322,7 +363,7 @@ def test_a_tick_that_is_to_settle_is_halved_even_where_no_error_asks_for_it():
     speeds = []
     for settle in (0.0, 1e-9):
         after = plant_of([elastic])(
-            PlantParams(free, thing(*SPRING), Steps(1e9, 0, inf, settle)), start, 0.0, TICK
+            PlantParams(free, thing(*SPRING), Steps(1e9, EXPLICIT, inf, settle)), start, 0.0, TICK
         )
         speeds.append(after.speed_rev_s * after.rate_m_rev)
     exact = -0.05 * math.exp(-3e4 / 100.0 * TICK)

@@ -69,8 +69,8 @@ def test_what_is_left_out_costs_no_more_than_may_be_given_away(name, accuracy):
 
 def test_strong_dampers_are_stepped_by_the_l_stable_scheme():
     rigid = evolve(CONFIG, skin_n_m=math.inf)
-    assert decided(SHELL, config=rigid)[1].steps.stiff == 0
-    assert decided(SHELL, ("loss", {"damping_n_s_m": 1e6}), config=rigid)[1].steps.stiff == 1
+    assert decided(SHELL, config=rigid)[1].steps.scheme == 0
+    assert decided(SHELL, ("loss", {"damping_n_s_m": 1e6}), config=rigid)[1].steps.scheme == 1
 
 
 def test_a_contact_too_stiff_for_the_tick_is_said_to_be():

@@ -24,6 +24,7 @@ from attrs import define, evolve, field, fields
 
 from graspsense.plugin_api import (
     CELLS,
+    CONTACT_FORCE_N,
     HOLD,
     ConfigError,
     Controller,
@@ -40,7 +41,7 @@ from graspsense_sim_gripper.config import LEAST_ACCURACY, SimConfig
 from graspsense_sim_gripper.deviation import Course, deviation
 from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, NotCompilable, grasp_of
 from graspsense_sim_gripper.linear import linear_of
-from graspsense_sim_gripper.plant import PlantState, Steps
+from graspsense_sim_gripper.plant import EXPLICIT, PlantState, Steps
 from graspsense_sim_gripper.scene import ObjectSpec
 from graspsense_sim_gripper.selection import DROPPED, FINE, FULL_LADDER, LADDER, Check, Choice, Rung
 from graspsense_sim_gripper.sensing import Bias, SensorState
@@ -57,10 +58,13 @@ from graspsense_sim_gripper.terms.registry import laws_of
 
 HELD: Final = 0.5
 """A model holds where the trial grasps differ by less than this part of the accuracy; its instances have the rest."""
-OFF_N: Final = 0.25
+APART: Final = 10.0
+LEAST_OFF_N: Final = 0.01
+MOST_OFF_N: Final = 0.25
+"""What a controller is told of forces may be wrong by so many times what two models are apart at the contact, and by so
+much at the least and at the most, times the accuracy over how fine a rung's steps are."""
 OFF_TRAVEL: Final = 0.025
-"""Times the accuracy, over how fine a rung's steps are: by so much the forces that a controller is told may be wrong,
-and by such a part the way since the touch. What thresholds of rest compare, differences of that, hardly is."""
+"""And by such a part, times the same, what it is told of the way since the touch, of which rest is made out."""
 BESIDE: Final = {
     1.0: Rung("to check", 0.0, 30.0, 2),
     10.0: Rung("to check", 0.0, 100.0, 8),
@@ -189,7 +193,7 @@ def _check(bare: SimConfig, spec: ObjectSpec, control: Control, loops: Loops | N
         made += 1
         if error <= HELD * bare.accuracy:
             made += 2
-            edge = _edge(trial, choice, rung.finer)
+            edge = _edge(trial, choice, expected, rung.finer)
             if error + edge.change <= bare.accuracy:
                 return evolve(choice, check=Check(error=error, quantity=quantity, grasps=made))
         elif error < least:
@@ -215,18 +219,29 @@ def _ladder(config: SimConfig) -> tuple[Rung, ...]:
 class _Edge(NamedTuple):
     """What a grasp hangs on: where what its controller is told is off by as much, this quantity changes."""
 
-    off: float
+    force_n: float
+    travel: float
     change: float
     quantity: str
     finer: float
 
 
-def _edge(trial: _Trial, choice: Choice, finer: float) -> _Edge:
-    """Return what becomes of this model's grasp where forces and travel are off as they may be in steps this fine."""
-    most = trial.config.accuracy / finer
-    exact = trial.course(choice)
-    change, quantity = max(deviation(trial.course(choice, off), exact) for off in (-most, most))
-    return _Edge(most, change, quantity, finer)
+def _edge(trial: _Trial, choice: Choice, expected: Course, finer: float) -> _Edge:
+    """Return what becomes of this model's grasp where forces and travel are off by as much as they may be wrong."""
+    exact, scale = trial.course(choice), trial.config.accuracy / finer
+    force_n = max(APART * _apart_n(exact, expected), LEAST_OFF_N * scale)
+    force_n, travel = min(force_n, MOST_OFF_N * scale), OFF_TRAVEL * scale
+    others = (trial.course(choice, (sign * force_n, sign * travel)) for sign in (-1.0, 1.0))
+    change, quantity = max(deviation(other, exact) for other in others)
+    return _Edge(force_n, travel, change, quantity, finer)
+
+
+def _apart_n(one: Course, expected: Course) -> float:
+    """Return how far the forces of two grasps are apart where both pads come to feel the contact force."""
+    felt, wanted = (np.minimum(course.left_n, course.right_n) for course in (one, expected))
+    i = min(int(np.argmax(force >= CONTACT_FORCE_N)) for force in (felt, wanted))
+    there = slice(max(i - 1, 0), i + 1)
+    return float(np.max(np.abs(felt[there] - wanted[there])))
 
 
 def _about(value: float) -> float:
@@ -249,7 +264,7 @@ def _undecided(config: SimConfig, spec: ObjectSpec, edge: _Edge) -> str:
     changes = f"{edge.quantity} by {edge.change:.2g}" if math.isfinite(edge.change) else "its outcome"
     return (
         f"{_exactness(config, spec)}: the controller decides on a threshold that is met at a tick within "
-        f"{edge.off * OFF_N:.1g} N, or {edge.off * OFF_TRAVEL:.1g} of the travel, so that the grasp may as well go on "
+        f"{edge.force_n:.1g} N, or {edge.travel:.1g} of the travel, so that the grasp may as well go on "
         f"a tick earlier or later, which changes {changes}. Let ticks fall otherwise (gripper.open_gap_m, or the "
         f"controller's speed or threshold); else {_way_out(2.0 * edge.change)}"
     )
@@ -304,10 +319,10 @@ class _Trial:
     _before: _Stand | None = field(default=None, init=False)
     """Shortly before the first touch, until when all models are alike."""
 
-    def course(self, choice: Choice, off: float = 0.0) -> Course:
-        """Return how the grasp goes in this model; `off`: where its controller is told what is wrong by so much.
+    def course(self, choice: Choice, off: tuple[float, float] = (0.0, 0.0)) -> Course:
+        """Return how the grasp goes in this model.
 
-        That is times `OFF_N` of the forces, times `OFF_TRAVEL` of the way since the fingers touched.
+        `off`: by how much (N) forces are wrong that its controller is told, and by what part the way since the touch.
         """
         key = (choice.made, choice.pieces, choice.steps, off)
         if key not in self._courses:
@@ -318,12 +333,12 @@ class _Trial:
                 self._courses[key] = self._grasp(choice, off)
         return self._courses[key]
 
-    def _grasp(self, choice: Choice, off: float) -> Course:
+    def _grasp(self, choice: Choice, off: tuple[float, float]) -> Course:
         setting = setting_of(self.config, self.spec, 0, chooser=lambda config, spec: choice)
         if self._before is None:
             self._before = self._approach(setting)
         before = self._before
-        bias = Bias(off * OFF_N, off * OFF_TRAVEL, setting.plant.thing.width_m)
+        bias = Bias(*off, setting.plant.thing.width_m)
         setting = evolve(setting, sensor=setting.sensor._replace(bias=bias))
         at_end = self._driven(setting, before.far)(
             setting.plant.steps, before, before.loop.ticks + self._ticks(setting)
@@ -349,7 +364,7 @@ class _Trial:
     def _approach(self, setting: Setting) -> _Stand:
         """Return the grasp as it stands shortly before the first touch."""
         # Not cut into short steps, as nothing happens.
-        steps = setting.plant.steps._replace(stiff=0, longest_s=math.inf)
+        steps = setting.plant.steps._replace(scheme=EXPLICIT, longest_s=math.inf)
         reach = setting.plant.thing.width_m + 2.0 * abs(setting.body.offset_m)
         link = setting.plant.drive.link
         law = self.control.controller

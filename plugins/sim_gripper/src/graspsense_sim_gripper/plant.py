@@ -13,7 +13,9 @@ A tick is cut into steps. Their length follows from the error that each makes, b
 at an event: contact, stop, reversal, the slip of what was stuck. Two schemes of second order take them. A kick, a
 drift and a kick (velocity Verlet) is explicit and needs the object's force once. Where dampers make the motion stiff
 TR-BDF2 does, which is L-stable (Bank et al., IEEE Trans. Electron Devices 32, 1985; the error estimate is that of
-Hosea and Shampine, Appl. Numer. Math. 20, 1996).
+Hosea and Shampine, Appl. Numer. Math. 20, 1996). What swings and is hardly damped is moved by the mean of the force
+along the way of the step, so that what the speed gains is the work done (a discrete gradient: McLachlan, Quispel and
+Robidoux, Phil. Trans. R. Soc. A 357, 1999; the mean is Simpson's, exact for a force that goes with the third power).
 
 The object is free on a table, its mass negligible beside m: a finger that touches first pushes it, with the
 table's friction on that pad, until both touch. Or it is held fast, and each finger presses its own half.
@@ -74,6 +76,12 @@ BEHIND: Final = (1.0 - GAMMA) * (1.0 - GAMMA) / (GAMMA * (2.0 - GAMMA))
 ESTIMATE: Final = 2.0 * (-3.0 * GAMMA * GAMMA + 4.0 * GAMMA - 2.0) / (12.0 * (2.0 - GAMMA))
 
 
+EXPLICIT: Final = 0
+STIFF: Final = 1
+MEAN_FORCE: Final = 2
+"""The schemes: velocity Verlet, TR-BDF2, and by the mean force of the step."""
+
+
 class Drive(NamedTuple):
     """The gripper: linkage, rotor, friction, ends of travel."""
 
@@ -121,8 +129,7 @@ class Steps(NamedTuple):
 
     tolerance: float
     """Error of one step, as a share of force and speed, beyond which it is taken again, shorter."""
-    stiff: int = 0
-    """1: by TR-BDF2."""
+    scheme: int = EXPLICIT
     longest_s: float = math.inf
     settle: float = 0.0
     """Share of speed and force that halving the steps of a tick may change; 0: they are taken once."""
@@ -475,7 +482,7 @@ def _settled(params: PlantParams, state: PlantState, effort_n: float, dt: float)
         # The error of a step goes with the third power of its length; one that the end of the tick cut is halved, too.
         steps = Steps(
             max(0.125 * steps.tolerance, min(steps.tolerance, LEAST_TOLERANCE)),
-            steps.stiff,
+            steps.scheme,
             0.5 * min(steps.longest_s, dt),
             steps.settle,
             1.0 + 0.5 * (steps.growth - 1.0),
@@ -645,9 +652,9 @@ def _step(
     load1 = load
     if done:
         used = 0.0
-    elif steps.stiff == 1:
+    elif steps.scheme != EXPLICIT:
         revolutions1, speed1, gap1, rate1, shift, grip, left1, right1, offset1, squeezed1, other1 = _implicit(
-            drive, thing, state, effort_n, kick, direction, h
+            drive, thing, state, effort_n, kick, direction, h, steps.scheme == MEAN_FORCE
         )
         load1 = 0.5 * (left1 + right1)
         short = 0.0
@@ -851,8 +858,9 @@ def _implicit(
     kick: float,
     direction: float,
     h: float,
+    by_mean: bool,
 ) -> tuple[float, float, float, float, float, float, float, float, float, Squeezed, Squeezed]:
-    """Take one step of TR-BDF2.
+    """Take one step of TR-BDF2, or `by_mean` of the force along the step.
 
     Return angle, speed, gap and its rate, the errors of the speed (m/s) and of the force (N), and what `_felt` does.
     """
@@ -861,27 +869,43 @@ def _implicit(
     scale = max(abs(speed), 1e-3 * SPEED_SCALE_M_S / abs(rate))
     # The trapezoid, then the backward difference over the same weight of the rate.
     from_rev, from_speed = revolutions + over * speed, speed + over * kick
-    guess = speed + part * kick
+    stages, pieces = 2, 1
+    if by_mean:
+        # In one: to the middle of the way and on to its end, at the mean speed, by Simpson's mean of the rates.
+        stages, pieces, part = 1, 2, 0.5 * h
+    guess = speed + pieces * part * kick
     middle_rev, middle_speed, middle_kick = revolutions, speed, kick
-    for stage in range(2):
+    for stage in range(stages):
         least, most = -math.inf, math.inf
         x0, miss0, slope = guess, 0.0, 1.0
         x = guess
         for look in range(SEARCH):
-            revolutions1 = from_rev + over * x
-            gap1, rate1 = gap_and_rate(drive.link, revolutions1)
             left1, right1, offset1, squeezed1, other1 = left, right, offset, squeezed, other
-            if touched == 1:
-                left1, right1, offset1, squeezed1, other1 = _felt(
-                    thing, left, right, offset, squeezed, other, gap1, -x * rate1, part + alone, False
+            since, v, kick1 = part + alone, x, kick
+            for piece in range(pieces):
+                if by_mean:
+                    middle_kick = kick1
+                    way = 0.5 * (piece + 1)
+                    v = speed + way * (x - speed)
+                    revolutions1 = revolutions + way * h * 0.5 * (speed + x)
+                else:
+                    revolutions1 = from_rev + over * x
+                gap1, rate1 = gap_and_rate(drive.link, revolutions1)
+                if touched == 1:
+                    left1, right1, offset1, squeezed1, other1 = _felt(
+                        thing, left1, right1, offset1, squeezed1, other1, gap1, -v * rate1, since, False
+                    )
+                load1 = 0.5 * (left1 + right1)
+                resisting = friction(drive, v * rate1, load1)
+                kick1 = (
+                    rate1
+                    / drive.inertia
+                    * (load1 - effort_n - direction * resisting - drive.damping_n_s_m * v * rate1)
                 )
-            load1 = 0.5 * (left1 + right1)
-            resisting = friction(drive, x * rate1, load1)
-            kick1 = (
-                rate1
-                / drive.inertia
-                * (load1 - effort_n - direction * resisting - drive.damping_n_s_m * x * rate1)
-            )
+                since = part
+            if by_mean:
+                over = h / 6.0
+                from_speed = speed + over * (kick + 4.0 * middle_kick)
             miss = x - from_speed - over * kick1
             if look > 0 and abs(x - x0) > 1e-14 * scale:
                 slope = max((miss - miss0) / (x - x0), 0.1)
@@ -899,17 +923,23 @@ def _implicit(
             if ahead == x:
                 break
             x0, miss0, x = x, miss, ahead
-        if stage == 0:
+        if stage + 1 < stages:
             middle_rev, middle_speed, middle_kick = revolutions1, x, kick1
             left, right, offset, squeezed, other = left1, right1, offset1, squeezed1, other1
             from_rev = AHEAD * middle_rev - BEHIND * revolutions
             from_speed = AHEAD * middle_speed - BEHIND * speed
             guess = x + (1.0 - GAMMA) * h * kick1
             part, alone = (1.0 - GAMMA) * h, 0.0
-    # The difference to a third-order solution, as the stages' own operator damps it.
-    early, mid, late = 1.0 / GAMMA, 1.0 / (GAMMA * (1.0 - GAMMA)), 1.0 / (1.0 - GAMMA)
-    error = ESTIMATE * h * (early * kick - mid * middle_kick + late * kick1) / slope
-    moved = ESTIMATE * h * (early * speed - mid * middle_speed + late * x) / slope
+    if by_mean:
+        # As of a trapezoid: the rate is taken where it is at half the way, not at half the time.
+        most = max(abs(kick), abs(kick1), 1e-300)
+        moved = h * h * (kick1 - kick) / 12.0
+        error = h * (kick1 - kick) * (kick1 - kick) / (12.0 * most)
+    else:
+        # The difference to a third-order solution, as the stages' own operator damps it.
+        early, mid, late = 1.0 / GAMMA, 1.0 / (GAMMA * (1.0 - GAMMA)), 1.0 / (1.0 - GAMMA)
+        error = ESTIMATE * h * (early * kick - mid * middle_kick + late * kick1) / slope
+        moved = ESTIMATE * h * (early * speed - mid * middle_speed + late * x) / slope
     way = abs(revolutions1 - revolutions)
     before = 0.5 * (state.left_n + state.right_n)
     grip = abs(load1 - before) * abs(moved) / way if way > 0.0 else 0.0

@@ -21,7 +21,7 @@ from attrs import asdict, evolve, frozen
 from graspsense.plugin_api import bind
 from graspsense_sim_gripper.kernel import sum_of
 from graspsense_sim_gripper.linear import forms_of, is_bent
-from graspsense_sim_gripper.plant import Squeezed, Steps, Thing, squeeze
+from graspsense_sim_gripper.plant import EXPLICIT, MEAN_FORCE, STIFF, Squeezed, Steps, Thing, squeeze
 from graspsense_sim_gripper.terms.registry import find_term, laws_of
 from graspsense_sim_gripper.terms.remainder import Kept, Remainder
 from graspsense_sim_gripper.terms.term import NO_STATE, WorkingPoint, no_rates
@@ -74,6 +74,7 @@ EARLY: Final = 3
 LEAST_SPEED_M_S: Final = 1e-4
 DEEPEST: Final = 0.9
 """No object is pressed further than to this share of its width."""
+SCHEMES: Final = {EXPLICIT: "Verlet", STIFF: "TR-BDF2", MEAN_FORCE: "mean force"}
 
 
 @frozen(kw_only=True)
@@ -249,7 +250,7 @@ def choose(
     contact = _contact(full, kinds, paths[-1], mass_kg, dt_s)
     # Verlet lets the energy of a swing rise and fall by a share of it, which only shows where nothing else takes it.
     swing = contact.number / dt_s * (6.0 * tolerance(accuracy)) ** (2.0 / 3.0) / 4.0
-    stiff = rate * dt_s > 1.0 or (rate < swing and not rubs)
+    scheme = STIFF if rate * dt_s > 1.0 else MEAN_FORCE if rate < swing and not rubs else EXPLICIT
     pieces = _pieces(thing, kinds, accuracy, straight) if maps and rung.maps else 0
     return Choice(
         accuracy=accuracy,
@@ -257,14 +258,14 @@ def choose(
         point=point,
         steps=Steps(
             tolerance(accuracy / rung.finer),
-            1 if stiff else 0,
+            scheme,
             dt_s / rung.least_steps if rung.least_steps > 1 else math.inf,
             growth=growth(accuracy / rung.finer),
         ),
         decisions=tuple(decisions),
         scheme=Decision(
             term="steps",
-            decision="exact maps" if pieces > 0 else "TR-BDF2" if stiff else "Verlet",
+            decision="exact maps" if pieces > 0 else SCHEMES[scheme],
             what="straight pieces of the object's curve, the linkage as at the contact"
             if pieces > 0
             else "rate of the dampers, times tick",

@@ -24,7 +24,16 @@ from graspsense.plugin_api import (
     straight_linkage,
 )
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant import Drive, PlantParams, PlantState, Skin, Steps, Thing
+from graspsense_sim_gripper.plant import (
+    EXPLICIT,
+    STIFF,
+    Drive,
+    PlantParams,
+    PlantState,
+    Skin,
+    Steps,
+    Thing,
+)
 from graspsense_sim_gripper.scene import (
     Instance,
     ObjectSpec,
@@ -287,7 +296,9 @@ def choice_of(
         )
         steps = choice.steps
         if config.scheme != "auto":
-            steps = steps._replace(stiff=1 if config.scheme == "implicit" else 0)
+            steps = steps._replace(
+                scheme=(steps.scheme or STIFF) if config.scheme == "implicit" else EXPLICIT
+            )
         if config.step_s is not None:
             steps = steps._replace(tolerance=math.inf, longest_s=float(config.step_s))
         if config.fidelity == "reference":
