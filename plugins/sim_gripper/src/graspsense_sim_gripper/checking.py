@@ -37,7 +37,7 @@ from graspsense.plugin_api import (
     tick_params,
 )
 from graspsense_sim_gripper import kept_choices
-from graspsense_sim_gripper.config import LEAST_ACCURACY, SimConfig
+from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.deviation import Course, deviation
 from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, NotCompilable, grasp_of
 from graspsense_sim_gripper.linear import linear_of
@@ -71,6 +71,8 @@ BESIDE: Final = {
     100.0: Rung("to check", 0.0, 1000.0, 32),
 }
 """Beside which grasp a rung's is laid, by how fine its own steps are."""
+COARSE: Final = 0.03
+"""From this accuracy on a threshold met too nearly is looked at again with a tenth of it."""
 TELLING: Final = 0.2
 """A term without which no more than this part of an error is left is what made it."""
 STRICT: Final = 0.003
@@ -199,8 +201,8 @@ def _check(bare: SimConfig, spec: ObjectSpec, control: Control, loops: Loops | N
         elif error < least:
             least, whose = error, quantity
     if edge is not None:
-        if bare.accuracy >= 10.0 * LEAST_ACCURACY:
-            # What is met so nearly may still be told apart by what is finer than anybody asked for.
+        if bare.accuracy >= COARSE:
+            # Steps this coarse are off by more than what is met so nearly; finer ones tell it apart.
             finer = evolve(bare, accuracy=0.1 * bare.accuracy)
             with suppress(ConfigError):
                 return evolve(_check(finer, spec, control, loops), accuracy=bare.accuracy)

@@ -9,7 +9,6 @@ from attrs import field, frozen
 from attrs.validators import and_, ge, gt, in_, instance_of, le, lt, optional
 
 FIDELITIES = ("scene", "full", "reference")
-LEAST_ACCURACY = 1e-4
 NOT_NEGATIVE = and_(ge(0.0), lt(math.inf))
 POSITIVE = and_(gt(0.0), lt(math.inf))
 SCHEMES = ("auto", "explicit", "implicit")
@@ -29,7 +28,7 @@ class SimConfig:
     """Whether instance, placement and friction vary with the seed."""
     sensor: Literal["pads", "ideal"] = field(default="pads", validator=in_(("pads", "ideal")))
     """`pads`: encoder and 22 cells a fingertip every 41 ms. `ideal`: everything exactly, at every tick."""
-    accuracy: float = field(default=0.01, validator=and_(ge(LEAST_ACCURACY), le(0.5)))
+    accuracy: float = field(default=0.01, validator=and_(ge(1e-4), le(0.5)))
     """Error that features, peak and trace may have, as a share; model and steps follow from it."""
     fidelity: Literal["scene", "full", "reference"] = field(default="scene", validator=in_(FIDELITIES))
     """`scene`: what the scene needs. `full`: every term. `reference`: that in steps halved until all stands still."""

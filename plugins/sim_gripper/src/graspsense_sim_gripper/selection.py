@@ -251,7 +251,8 @@ def choose(
     # Verlet lets the energy of a swing rise and fall by a share of it, which only shows where nothing else takes it.
     swing = contact.number / dt_s * (6.0 * tolerance(accuracy)) ** (2.0 / 3.0) / 4.0
     scheme = STIFF if rate * dt_s > 1.0 else MEAN_FORCE if rate < swing and not rubs else EXPLICIT
-    pieces = _pieces(thing, kinds, accuracy, straight) if maps and rung.maps else 0
+    # Without friction, pieces of a curve would show as energy that comes and goes.
+    pieces = _pieces(thing, kinds, accuracy, straight) if maps and rung.maps and rubs else 0
     return Choice(
         accuracy=accuracy,
         made=made,
