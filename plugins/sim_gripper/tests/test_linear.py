@@ -420,7 +420,7 @@ def test_a_surface_as_light_as_dust_is_not_tunnelled_through():
 def test_the_report_says_that_maps_take_the_ticks(tmp_path):
     """And that steps do where friction is greater at rest and every grasp is of another instance."""
     law = create("controller", "hybrid", probing_force_n=5.0)
-    rests = {"breakaway_n": 1.0}
+    rests = {"coulomb_n": 1.0, "breakaway_n": 2.0}
     for change, scheme in (
         ({}, "exact maps"),
         (rests, "exact maps"),
