@@ -253,7 +253,8 @@ class Bench:
     def loop_of(self, config: SimConfig, setting: Setting, step: Any) -> Any:
         """Return the compiled loop of a setting: that of its steps, or of the exact maps that take it."""
         by_maps = linear_of(config, setting, on_arrays=True)
-        composition = Composition(setting.kinds, None if by_maps is None else by_maps[1])
+        shape = None if by_maps is None else by_maps[1]
+        composition = Composition(setting.kinds, shape, setting.plant.steps.settle > 0.0)
         if composition not in self.compiled:
             began = time.process_time()
             loop = kernel.compiled(loop_of(composition, step), self.memo)
