@@ -155,9 +155,12 @@ def test_a_threshold_that_is_nearly_met_at_a_tick_is_decided_as_by_the_reference
 
 
 @pytest.mark.slow
-def test_no_object_of_the_catalogue_is_refused():
+def test_every_object_of_the_catalogue_has_a_model_of_ordinary_steps():
     for spec in catalogue().values():
-        assert checked_choice(CONFIG, spec, hybrid()).check is not None, spec.name
+        for config in (CONFIG, evolve(CONFIG, spread=True)):
+            choice = checked_choice(config, spec, hybrid())
+            assert choice.check is not None, spec.name
+            assert choice.rung in ("boldest", "bold", "careful"), spec.name
 
 
 def test_forced_steps_and_contacts_beyond_the_tick_are_not_checked():
