@@ -160,7 +160,7 @@ def test_every_object_of_the_catalogue_has_a_model_of_ordinary_steps():
         for config in (CONFIG, evolve(CONFIG, spread=True)):
             choice = checked_choice(config, spec, hybrid())
             assert choice.check is not None, spec.name
-            assert choice.rung in ("boldest", "bold", "careful"), spec.name
+            assert choice.rung in ("boldest", "bold", "bold, in steps", "careful"), spec.name
 
 
 def test_forced_steps_and_contacts_beyond_the_tick_are_not_checked():
