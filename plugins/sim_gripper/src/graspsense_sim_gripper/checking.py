@@ -43,7 +43,7 @@ from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, NotCompilabl
 from graspsense_sim_gripper.linear import linear_of
 from graspsense_sim_gripper.plant import EXPLICIT, PlantState, Steps
 from graspsense_sim_gripper.scene import ObjectSpec
-from graspsense_sim_gripper.selection import DROPPED, FINE, FULL_LADDER, LADDER, Check, Choice, Rung
+from graspsense_sim_gripper.selection import BOLD, DROPPED, FINE, FULL_LADDER, LADDER, Check, Choice, Rung
 from graspsense_sim_gripper.sensing import Bias, SensorState
 from graspsense_sim_gripper.setting import (
     EFFORT_LIMIT_N,
@@ -215,7 +215,7 @@ def _ladder(config: SimConfig) -> tuple[Rung, ...]:
     if config.fidelity != "scene":
         return FULL_LADDER
     # What only just holds for the object that is tried need not for others of its kind.
-    return LADDER[1:] if config.spread else LADDER
+    return LADDER[LADDER.index(BOLD) :] if config.spread else LADDER
 
 
 class _Edge(NamedTuple):

@@ -44,14 +44,15 @@ class Rung(NamedTuple):
     """Whether exact maps may take the ticks of what is left, where they can."""
 
 
-BOLDEST: Final = Rung("boldest", 3.0, maps=True)
+BOLDEST: Final = Rung("boldest", 10.0, maps=True)
+BOLDER: Final = Rung("bolder", 3.0, maps=True)
 BOLD: Final = Rung("bold", 0.3, maps=True)
 IN_STEPS: Final = Rung("bold, in steps", 0.3)
 CAREFUL: Final = Rung("careful", 0.05)
 WHOLE: Final = Rung("every term", 0.0)
 FINE: Final = Rung("every term, finer steps", 0.0, 10.0, 4)
 FINEST: Final = Rung("every term, finest steps", 0.0, 100.0, 32)
-LADDER: Final = (BOLDEST, BOLD, IN_STEPS, CAREFUL, WHOLE, FINE, FINEST)
+LADDER: Final = (BOLDEST, BOLDER, BOLD, IN_STEPS, CAREFUL, WHOLE, FINE, FINEST)
 FULL_LADDER: Final = (WHOLE, FINE, FINEST)
 """Where every term is wanted."""
 GROWS: Final = 0.1
