@@ -129,7 +129,7 @@ def benchmark():
 @pytest.mark.slow
 def test_the_choice_keeps_its_word_on_twenty_scenes(benchmark):
     module, bench = benchmark
-    result = module.measure(bench, range(20), costs=False)
+    result = module.measure(bench, range(20))
     assert result["scenes"] + result["left_out_unstable"] == 20
     for accuracy in module.ACCURACIES:
         assert result["refused"][accuracy] == 0
@@ -143,7 +143,7 @@ def test_scenes_on_which_it_was_once_broken(benchmark, number):
     # Gas pressed out of its container, light surfaces that bounce, contacts that come to rest within a tick or two, a
     # second finger that meets what the first pushes or presses.
     module, bench = benchmark
-    result = module.measure(bench, range(number, number + 1), costs=False)
+    result = module.measure(bench, range(number, number + 1))
     assert set(result["within"].values()) == {1.0}
 
 

@@ -42,6 +42,7 @@ from graspsense_sim_gripper.plant import (
     Squeezed,
     Thing,
     friction,
+    sliding_on,
 )
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.remainder import linear as remainder_form
@@ -478,6 +479,7 @@ def _quiet(
     standing: bool,
     top: float,
     gap_m: float,
+    force_n: float,
     effort_n: float,
     dt: float,
 ) -> bool:
@@ -496,7 +498,7 @@ def _quiet(
             if room[WAS + GUARDS + k] < -slack[allowed + k]:
                 return False
     if BENDS == 1 and motion != 0:
-        room[NOW + STATES + 1] = _rubs(params, motion, gap_m, effort_n, dt)
+        room[NOW + STATES + 1] = _rubs(params, motion, gap_m, force_n, effort_n, dt)
     _moved(params.maps, mode * (HALVINGS + 1) * MAPPED * COLUMNS, room)
     for k in range(ENDS):
         if room[THEN + STATES + GUARDS + k] < -slack[allowed + k]:
@@ -506,19 +508,20 @@ def _quiet(
     return not _swings(params, mode, top, dt)
 
 
-def _rubs(params: Linear, motion: int, gap_m: float, effort_n: float, dt: float) -> float:
+def _rubs(params: Linear, motion: int, gap_m: float, force_n: float, effort_n: float, dt: float) -> float:
     """Return the friction to move on with: with it what is no straight line in the speed or the gap.
 
-    As that will be in the middle of the tick.
+    As that will be in the middle of the tick. Given is the force on a pad at its beginning.
     """
     drive, lever, room = params.plant.drive, params.lever, params.room
     speed: float = room[NOW + 1]
-    force: float = room[WAS + FORCE]
     way = 1.0 if motion == 1 else -1.0
-    net = effort_n - force - way * (drive.coulomb_n + drive.load_share * force)
+    # The exponential of the speed that is known already, and a series from there: nothing then waits for it.
+    more = friction(drive, speed, 0.0) - drive.coulomb_n
+    net = effort_n - force_n - way * (drive.coulomb_n + drive.load_share * force_n)
     net -= drive.damping_n_s_m * speed
-    middle = max(way * (speed + 0.5 * dt * net / lever.mass_kg), 0.0)
-    rubs = friction(drive, middle, 0.0)
+    middle = max(way * speed + way * net * (0.5 * dt / lever.mass_kg), 0.0)
+    rubs = drive.coulomb_n + sliding_on(drive, more, way * speed, middle)
     off = gap_m - 0.5 * dt * speed - lever.gap_m
     lighter = off * (lever.first_m + off * lever.second_m2)
     steeper = lever.first_m + 2.0 * off * lever.second_m2
@@ -562,6 +565,7 @@ def _searched(
     touched: int,
     top: float,
     gap_m: float,
+    force_n: float,
     effort_n: float,
     dt: float,
 ) -> tuple[int, int, float, int]:
@@ -600,7 +604,7 @@ def _searched(
                 elif room[WAS + GUARDS + ENDS - 1] < -slack[allowed + ENDS - 1]:
                     motion, begins = 2, True
         if BENDS == 1 and motion != 0 and left == WHOLE:
-            room[NOW + STATES + 1] = _rubs(params, motion, gap_m, effort_n, dt)
+            room[NOW + STATES + 1] = _rubs(params, motion, gap_m, force_n, effort_n, dt)
         while (WHOLE >> least) > left:
             least += 1
         _moved(maps, (mode * (HALVINGS + 1) + least) * MAPPED * COLUMNS, room)
@@ -752,11 +756,24 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
     touching = (1 << CONTACTS) - 1 if squeezed.force_n > 0.0 else 0
     top, events = peak, 0
     mode = first + ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
-    if not shifted and _quiet(params, mode, motion, standing, top, gap, effort_n, dt):
+    force = squeezed.force_n
+    if not shifted and _quiet(params, mode, motion, standing, top, gap, force, effort_n, dt):
         top = max(top, room[THEN + STATES + FORCE])
     else:
         pressed, touched, top, events = _searched(
-            params, first, pressed, motion, touching, standing, shifted, touched, top, gap, effort_n, dt
+            params,
+            first,
+            pressed,
+            motion,
+            touching,
+            standing,
+            shifted,
+            touched,
+            top,
+            gap,
+            force,
+            effort_n,
+            dt,
         )
 
     came = room[THEN] - closure

@@ -345,6 +345,21 @@ def friction(drive: Drive, velocity_m_s: float, load_n: float) -> float:
     return force
 
 
+def sliding_on(drive: Drive, more_n: float, before_m_s: float, after_m_s: float) -> float:
+    """Return by how much friction is above Coulomb's at a speed, given (N) what that was at a speed near it.
+
+    The same as of `friction`, by a series instead of another exponential.
+    """
+    if more_n <= 0.0:
+        return 0.0
+    per_speed = 1.0 / drive.stribeck_m_s
+    fall = (before_m_s - after_m_s) * (before_m_s + after_m_s) * (per_speed * per_speed)
+    if abs(fall) > SMALL_FALL:
+        x = after_m_s * per_speed
+        return (drive.breakaway_n - drive.coulomb_n) * math.exp(-x * x)
+    return more_n * (1.0 + fall * (1.0 + fall * (0.5 + fall / 6.0)))
+
+
 def acceleration(
     drive: Drive, rate_m_rev: float, speed_rev_s: float, net_n: float, resisting_n: float, direction: float
 ) -> float:
@@ -546,13 +561,7 @@ def _glide(
     if speed1 * direction <= 0.0 or abs(slides) < STANDING_M_S:
         return False, state
     gap1, rate1 = gap_and_rate(drive.link, revolutions1)
-    if more > 0.0:
-        slides1 = speed1 * rate1
-        per_speed = 1.0 / drive.stribeck_m_s
-        fall = (slides - slides1) * (slides + slides1) * (per_speed * per_speed)
-        if abs(fall) > SMALL_FALL:
-            return False, state
-        more *= 1.0 + fall * (1.0 + fall * (0.5 + fall / 6.0))
+    more = sliding_on(drive, more, slides, speed1 * rate1)
     kick1 = acceleration(drive, rate1, speed1, net, bare + more, direction)
     speed1 = speed + 0.5 * h * (kick + kick1)
     if (
