@@ -36,7 +36,8 @@ from selection import controller_is_stable
 from graspsense.plugin_api import ConfigError, bind, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.kernel import NotCompilable, compiled, plant_of
-from graspsense_sim_gripper.linear import linear_of, move_of
+from graspsense_sim_gripper.linear import move_of
+from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.plant import PlantState
 from graspsense_sim_gripper.scene import ObjectSpec, find
 from graspsense_sim_gripper.setting import Setting, setting_of

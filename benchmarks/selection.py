@@ -35,7 +35,7 @@ from graspsense_sim_gripper.checking import Control, checked_choice
 from graspsense_sim_gripper.common_composition import as_compiled
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.deviation import Course, deviation
-from graspsense_sim_gripper.linear import linear_of
+from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.one_of_many import Composition, Done, Job, Storage, grasp_once, loop_of
 from graspsense_sim_gripper.plant import PlantState
 from graspsense_sim_gripper.scene import ObjectSpec

@@ -15,7 +15,8 @@ from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.deviation import Course, deviation
 from graspsense_sim_gripper.kernel import plant_of
-from graspsense_sim_gripper.linear import _straightened, linear_of, move_of
+from graspsense_sim_gripper.linear import move_of
+from graspsense_sim_gripper.linear_scene import _straightened, linear_of
 from graspsense_sim_gripper.one_of_many import Job, chooser_of, composition_of
 from graspsense_sim_gripper.scene import ObjectSpec
 from graspsense_sim_gripper.selection import BOLD, growth, tolerance
@@ -97,6 +98,7 @@ def test_the_pieces_of_a_curve_meet_and_are_as_near_to_it_as_is_said(reach, piec
         ({}, thing(SURFACE, SHELL)),
         ({"skin_creep_n_m": 2e4, "skin_damping_n_s_m": 50.0}, thing(SHELL)),
         ({"skin_n_m": math.inf}, thing(SHELL, ARM)),
+        ({"drive_lag_s": 0.02}, thing(SHELL, ARM)),
         ({}, thing(SHELL, held=True)),
         ({"open_gap_m": 0.052}, thing(SHELL, ARM, offset_m=5e-4, friction=0.3, mass_kg=0.5)),
         ({"stribeck_m_s": 0.01, "breakaway_n": 12.0}, thing(SHELL)),

@@ -28,7 +28,8 @@ from graspsense_sim_gripper.checking import Control, checked_choice, standard
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.kernel import plant_of
-from graspsense_sim_gripper.linear import Linear, linear_of, move_of
+from graspsense_sim_gripper.linear import Linear, move_of
+from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.plant import PlantParams, PlantState, Squeezed
 from graspsense_sim_gripper.scene import kinds_in
 from graspsense_sim_gripper.sensing import SensorState, felt_again, sense

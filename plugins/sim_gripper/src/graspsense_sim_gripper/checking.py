@@ -40,7 +40,7 @@ from graspsense_sim_gripper import kept_choices
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.deviation import Course, deviation
 from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, NotCompilable, grasp_of
-from graspsense_sim_gripper.linear import linear_of
+from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.plant import EXPLICIT, PlantState, Steps
 from graspsense_sim_gripper.scene import ObjectSpec
 from graspsense_sim_gripper.selection import BOLD, DROPPED, FINE, FULL_LADDER, LADDER, Check, Choice, Rung

@@ -3,24 +3,22 @@
 A straight drive, with Coulomb friction or none, on an object of linear terms is linear as long as it is free or
 pressed, slides one way or is stuck, and the terms' own contacts touch or are parted. Its motion over a piece of a tick
 is then a matrix, whatever the stiffness (exponential integration, as for stiff contacts in Del Prete et al., consim).
-The matrices of a tick and of its halves, quarters and so on are made once a scene (`linear_modes`). A tick in which
-nothing can happen, by a bound on what changes inside it, is one of them; where something may, it is looked for with
-pieces short against the fastest swing, and then between them by halving. What is no such motion (ends of travel, an
-object that is pushed across its table) is left to the plant.
+The matrices of a tick and of its halves, quarters and so on are made once a scene (`linear_scene`, `linear_modes`). A
+tick in which nothing can happen, by a bound on what changes inside it, is one of them; where something may, it is
+looked for with pieces short against the fastest swing, and then between them by halving. What is no such motion (ends
+of travel, an object that is pushed across its table) is left to the plant.
+
+Where the object's force bends over its compression it stands in straight pieces, a set of modes each. A linkage whose
+ratio varies and friction that is greater at rest are then followed, too: as a force in the middle of each tick.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import lru_cache
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
-
-import numpy as np
+from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import ScrewLinkage, bind, gap_and_rate, revolutions_at
-from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.linear_modes import (
     APART_M,
     FORCE,
@@ -28,11 +26,7 @@ from graspsense_sim_gripper.linear_modes import (
     HALVINGS,
     RISING,
     TOGETHER,
-    Scene,
     Shape,
-    Straight,
-    listed,
-    modes_of,
     padded,
 )
 from graspsense_sim_gripper.plant import (
@@ -40,21 +34,14 @@ from graspsense_sim_gripper.plant import (
     PlantParams,
     PlantState,
     Squeezed,
-    Thing,
     friction,
     sliding_on,
 )
 from graspsense_sim_gripper.terms.registry import find_term
-from graspsense_sim_gripper.terms.remainder import linear as remainder_form
-from graspsense_sim_gripper.terms.term import NO_STATE, LinearForm, OwnContact
-
-if TYPE_CHECKING:
-    from graspsense_sim_gripper.setting import Setting
+from graspsense_sim_gripper.terms.term import NO_STATE
 
 MOST_NUMBERS: Final = 0x3FFFFFFF
 WHOLE: Final = 1 << HALVINGS
-LEVER_M: Final = 5e-3
-"""So far about the squeeze the parabola of the moving mass goes through what it is."""
 MOST_EVENTS: Final = 64
 """A tick in which more modes end than this is taken on without looking."""
 PLACES: Final = ("NOW", "THEN", "WAS", "MOST", "BY")
@@ -98,153 +85,12 @@ class Linear(NamedTuple):
     """
 
 
-def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -> tuple[Linear, Shape] | None:
-    """Return the plant of a setting with its maps, and their shape; None where it is not linear, or is not to be.
-
-    `on_arrays`: as compiled code takes them; plain Python is quicker with lists. Raises TypeError for a term whose
-    linear form has other states than its law.
-    """
-    plant = setting.plant
-    drive, thing, steps = plant.drive, plant.thing, plant.steps
-    forced = config.scheme != "auto" or steps.longest_s < math.inf or steps.settle > 0.0
-    pieces = 0 if setting.choice is None else setting.choice.pieces
-    # Held off the centre, each half would need a mode of its own.
-    if (
-        forced
-        or (pieces == 0 and (drive.link.finger_m != 0.0 or drive.breakaway_n != drive.coulomb_n))
-        or (thing.held == 1 and setting.body.offset_m != 0.0)
-    ):
-        return None
-    forms = forms_of(thing, setting.kinds)
-    if forms is None or (pieces == 0 and is_bent(forms)):
-        return None
-    reach, bend = 1.0, (Straight(0.0, 0.0),) * min(pieces, 1)
-    if is_bent(forms):
-        assert setting.choice is not None
-        reach = _reach(forms, setting.choice.most_n, thing.width_m)
-        bend = _straightened(forms, reach, pieces)
-    lever = _lever(setting)
-    scene = Scene(
-        lever.mass_kg,
-        drive.damping_n_s_m,
-        drive.breakaway_n > 0.0,
-        drive.load_share,
-        drive.lag_s,
-        thing.skins_n_m,
-        thing.skin,
-        forms,
-        bend,
-    )
-    modes = modes_of(scene, setting.dt_s) if on_arrays else listed(scene, setting.dt_s)
-    if modes is None:
-        return None
-    shape, look, *tables = modes
-    numbers = len(PLACES) * _room(shape)
-    room: Any = np.zeros(numbers) if on_arrays else [0.0] * numbers
-    slopes: Any = [piece.slope_n_m for piece in bend]
-    if on_arrays:
-        slopes = np.array(slopes, float)
-    per_root = len(bend) / math.sqrt(reach)
-    return Linear(plant, look, lever, len(bend), per_root, slopes, *(*tables, room)), shape
+# --------------------------------------------------------------- the terms' states, into the maps' state and back
 
 
-def _lever(setting: Setting) -> Lever:
-    drive, gap = setting.plant.drive, setting.body.gap_m
-    link = drive.link
-    if link.finger_m == 0.0 or setting.choice is None:
-        return Lever(drive.inertia / setting.body.rate_m_rev**2, gap, 0.0, 0.0)
-    # About half way through the squeeze, where it counts.
-    gap = max(setting.plant.thing.width_m - 0.5 * setting.choice.point.compression_m, LEVER_M)
-    closer, rate, wider = (
-        gap_and_rate(link, revolutions_at(link, place))[1] for place in (gap - LEVER_M, gap, gap + LEVER_M)
-    )
-    less, more = (closer / rate) ** 2 - 1.0, (wider / rate) ** 2 - 1.0
-    first, second = 0.5 * (more - less) / LEVER_M, 0.5 * (more + less) / LEVER_M**2
-    return Lever(drive.inertia / rate**2, gap, first, second)
-
-
-def forms_of(thing: Thing, kinds: Sequence[str]) -> tuple[LinearForm | OwnContact, ...] | None:
-    """Return the linear forms of what is kept of an object; None where a term has none.
-
-    Raises TypeError for a term whose linear form has other states than its law.
-    """
-    rest = thing.terms[0]
-    forms: list[LinearForm | OwnContact] = [remainder_form(rest.params)] if rest.kept == 1 else []
-    for kind, one in zip(kinds, thing.terms[1:], strict=True):
-        if one.kept == 0:
-            continue
-        form = _form(kind, one.params)
-        if form is None:
-            return None
-        forms.append(form)
-    return tuple(forms)
-
-
-def is_bent(forms: Sequence[LinearForm | OwnContact]) -> bool:
-    """Return whether one of them has a curve."""
-    return any(isinstance(form, LinearForm) and form.curve is not None for form in forms)
-
-
-def _curve(forms: Sequence[LinearForm | OwnContact], d: float) -> float:
-    """Return the force of all curves at a compression."""
-    return sum(form.curve(d) for form in forms if isinstance(form, LinearForm) and form.curve is not None)
-
-
-def _reach(forms: Sequence[LinearForm | OwnContact], force_n: float, most_m: float) -> float:
-    """Return the compression at which the curves and the springs beside them bear this force, at most `most_m`."""
-    springs = sum(form.spring_n_m for form in forms if isinstance(form, LinearForm))
-    least, most = 0.0, most_m
-    for _ in range(60):
-        middle = math.sqrt(least * most) if least > 0.0 else 0.01 * most
-        if _curve(forms, middle) + springs * middle < force_n:
-            least = middle
-        else:
-            most = middle
-        if most < 1.01 * least:
-            break
-    return most
-
-
-def _straightened(
-    forms: Sequence[LinearForm | OwnContact], reach: float, pieces: int
-) -> tuple[Straight, ...]:
-    """Return the curves together in straight pieces between knots, closer where they begin: at even roots."""
-    places = [reach * (k / pieces) ** 2 for k in range(pieces + 1)]
-    forces = [_curve(forms, place) for place in places]
-    found = []
-    for (d0, d1), (force0, force1) in zip(pairwise(places), pairwise(forces), strict=True):
-        slope = (force1 - force0) / (d1 - d0)
-        found.append(Straight(slope, force0 - slope * d0))
-    return tuple(found)
-
-
-@lru_cache(maxsize=256)
-def _form(kind: str, params: Any) -> LinearForm | OwnContact | None:
-    """Return a term's linear form. Raises TypeError where it has other states than the law."""
-    term = find_term(kind)[1]
-    form = term.linear(params)
-    if form is None:
-        return None
-    count = _numbers(term.at_rest)
-    for one in (form.touching, form.parted) if isinstance(form, OwnContact) else (form,):
-        if len(one.rates) not in (0, count):
-            raise TypeError(
-                f"term {kind!r}: its linear form has {len(one.rates)} states, the law's are "
-                f"{len(term.at_rest)}, {term.at_rest!r}: as many as it has fields, all of them floats"
-            )
-    if isinstance(form, LinearForm) and not form.rates and count:
-        # What the form leaves as it is stands in the state like all else, and stands still.
-        none = (0.0,) * count
-        return form._replace(rates=(none,) * count, by_compression=none, by_speed=none, force=none)
-    return form
-
-
-def _numbers(state: Any) -> int:
+def numbers_of(state: Any) -> int:
     """Return how many numbers of the maps' state a term's own state is."""
     return len(state) if all(isinstance(one, float) for one in state) and len(state) <= 4 else 0
-
-
-# --------------------------------------------------------------- the terms' states, into the maps' state and back
 
 
 def _put0(state: Any, now: Any, at: int) -> int:
@@ -336,7 +182,7 @@ def move_of(
     puts: Any = _put_none
     takes: Any = _take_none
     for state in reversed((NO_STATE, *(find_term(kind)[1].at_rest for kind in kinds))):
-        count = _numbers(state)
+        count = numbers_of(state)
         puts = bind(_put_all, put=PUT[count], put_rest=puts)
         takes = bind(_take_all, take=bind(TAKE[count], made=type(state)), take_rest=takes)
     laid_out = {name.upper(): number for name, number in shape._asdict().items()}
@@ -380,6 +226,11 @@ def seldom(function: Callable[..., Any]) -> tuple[str, ...]:
     if code is move.__code__ and function.__globals__["BENDS"] == 0:
         return ("plant_move",)
     return ("_searched",) if code is _taken.__code__ else ()
+
+
+def room_of(shape: Shape) -> int:
+    """Return of how many numbers a tick's room is made."""
+    return len(PLACES) * _room(shape)
 
 
 def _room(shape: Shape) -> int:
@@ -734,8 +585,9 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
         room[NOW + 2] = d
     own = at
     at = put_states(thing.terms, squeezed.states, room, NOW + own)
+    acts = effort_n
     if LAGS == 1:
-        room[at] = given
+        room[at] = acts = given
     room[NOW + STATES] = effort_n
     motion = first = 0
     standing = room[NOW + 1] == 0.0
@@ -757,7 +609,7 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
     top, events = peak, 0
     mode = first + ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
     force = squeezed.force_n
-    if not shifted and _quiet(params, mode, motion, standing, top, gap, force, effort_n, dt):
+    if not shifted and _quiet(params, mode, motion, standing, top, gap, force, acts, dt):
         top = max(top, room[THEN + STATES + FORCE])
     else:
         pressed, touched, top, events = _searched(
@@ -772,7 +624,7 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
             top,
             gap,
             force,
-            effort_n,
+            acts,
             dt,
         )
 

@@ -29,8 +29,8 @@ from graspsense_sim_gripper.checking import Checking, Control, Loops
 from graspsense_sim_gripper.common_composition import as_compiled, as_own, layout_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, grasp_of
-from graspsense_sim_gripper.linear import linear_of
 from graspsense_sim_gripper.linear_modes import Shape
+from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.plant import PlantState
 from graspsense_sim_gripper.setting import CELL_OFFSET, Chooser, Setting, device_info, set_scene
 from graspsense_sim_gripper.terms.registry import laws_of

@@ -20,7 +20,7 @@ from attrs import asdict, evolve, frozen
 
 from graspsense.plugin_api import bind
 from graspsense_sim_gripper.kernel import sum_of
-from graspsense_sim_gripper.linear import forms_of, is_bent
+from graspsense_sim_gripper.linear_scene import forms_of, is_bent
 from graspsense_sim_gripper.plant import EXPLICIT, MEAN_FORCE, STIFF, Squeezed, Steps, Thing, squeeze
 from graspsense_sim_gripper.terms.registry import find_term, laws_of
 from graspsense_sim_gripper.terms.remainder import Kept, Remainder
