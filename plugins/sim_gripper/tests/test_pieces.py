@@ -133,6 +133,16 @@ def test_a_choice_in_pieces_is_as_exact_as_asked_for():
         assert error <= config.accuracy, (name, quantity)
 
 
+def test_an_instance_by_its_number_has_the_model_of_all_of_its_kind():
+    config = SimConfig(object="toy#2", spread=False, sensor="ideal")
+    chooser = chooser_of(job_of(config, create("controller", "hybrid")))
+    numbered, again = (set_scene(config, "toy#2", seed, chooser).choice for seed in (0, 1))
+    spread = set_scene(evolve(config, spread=True), "toy", 0, chooser).choice
+    assert numbered is again
+    assert numbered.pieces == 0
+    assert (numbered.made, numbered.steps) == (spread.made, spread.steps)
+
+
 def job_of(config, law):
     return Job(config=config, controller=law, run=RunConfig(), draw=None, traces=True)
 

@@ -153,7 +153,9 @@ def setting_of(
     if spec is not None:
         instance = instance_of(spec, rng if config.spread else None, number)
         _check_fit(config, instance)
-        choice = (chooser or choice_of)(config, spec)
+        # An instance by its number is not the one that is tried.
+        wanted = config if number is None or config.spread else _of_any_instance(config)
+        choice = (chooser or choice_of)(wanted, spec)
     plant, body = _plant(config, instance, choice, rng)
     sensor = _sensor(config, instance, rng)
     return Setting(
@@ -167,6 +169,11 @@ def setting_of(
         choice=choice,
         drawn=rng,
     )
+
+
+@lru_cache(maxsize=64)
+def _of_any_instance(config: SimConfig) -> SimConfig:
+    return evolve(config, spread=True)
 
 
 def _check_fit(config: SimConfig, instance: Instance) -> None:
