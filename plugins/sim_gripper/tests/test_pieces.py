@@ -38,9 +38,9 @@ def thing(*terms, **more):
 
 
 def in_pieces(config, spec):
-    """Return the choice of a bold rung, by maps in sixteen pieces."""
+    """Return the choice of a bold rung, by maps in thirty-two pieces."""
     choice = choice_of(config, spec, rung=BOLD, force_n=45.0)
-    assert choice.pieces in (1, 16)
+    assert choice.pieces in (1, 32)
     return choice
 
 
@@ -122,7 +122,7 @@ def test_pieces_agree_with_steps(change, spec, transmission):
 def test_a_choice_in_pieces_is_as_exact_as_asked_for():
     """The toy is a power law with arms, the can a spring: under their own controller, on the PR2's linkage."""
     law = create("controller", "hybrid")
-    for name, pieces in (("toy", 16), ("can:empty_open", 1)):
+    for name, pieces in (("toy", 32), ("can:empty_open", 1)):
         config = SimConfig(object=name, spread=False, sensor="ideal")
         one, other = (
             run_many(evolve(config, fidelity=fidelity), law, [name], [0], compiled=False)[0]

@@ -24,8 +24,11 @@ from graspsense_sim_gripper.terms.remainder import linear as remainder_form
 from graspsense_sim_gripper.terms.term import LinearForm, OwnContact
 
 if TYPE_CHECKING:
+    from graspsense_sim_gripper.selection import Choice
     from graspsense_sim_gripper.setting import Setting
 
+LEAST_SHARE: Final = 0.05
+"""At least this share of a squeeze is the object's, whose depth is known to a few hundredths; the covers have the rest."""
 LEVER_M: Final = 5e-3
 """So far about the squeeze the parabola of the moving mass goes through what it is."""
 
@@ -53,7 +56,7 @@ def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -
     reach, bend = 1.0, (Straight(0.0, 0.0),) * min(pieces, 1)
     if is_bent(forms):
         assert setting.choice is not None
-        reach = _reach(forms, setting.choice.most_n, thing.width_m)
+        reach = _reach(forms, setting.choice, thing)
         bend = _straightened(forms, reach, pieces)
     lever = _lever(setting)
     scene = Scene(
@@ -122,13 +125,19 @@ def _curve(forms: Sequence[LinearForm | OwnContact], d: float) -> float:
     return sum(form.curve(d) for form in forms if isinstance(form, LinearForm) and form.curve is not None)
 
 
-def _reach(forms: Sequence[LinearForm | OwnContact], force_n: float, most_m: float) -> float:
-    """Return the compression at which the curves and the springs beside them bear this force, at most `most_m`."""
-    springs = sum(form.spring_n_m for form in forms if isinstance(form, LinearForm))
-    least, most = 0.0, most_m
+def _reach(forms: Sequence[LinearForm | OwnContact], choice: Choice, thing: Thing) -> float:
+    """Return how far the object is compressed at the greatest force that the choice holds for.
+
+    As far as the curves and the springs beside them say, and no further than the squeeze goes in which all takes part.
+    """
+    point = choice.point
+    squeezed = point.compression_m - point.force_n / thing.skins_n_m
+    most = choice.most_n / point.force_n * max(squeezed, LEAST_SHARE * point.compression_m)
+    springs = sum(form.spring_n_m for form in forms if isinstance(form, LinearForm) and not form.rates)
+    least = 0.0
     for _ in range(60):
         middle = math.sqrt(least * most) if least > 0.0 else 0.01 * most
-        if _curve(forms, middle) + springs * middle < force_n:
+        if _curve(forms, middle) + springs * middle < choice.most_n:
             least = middle
         else:
             most = middle

@@ -67,7 +67,7 @@ HOLD_S: Final = 1.0
 SQUEEZE_S: Final = 3.0
 """No squeeze takes longer: the controllers give up then."""
 PIECES: Final = 24
-PIECES_SCALE: Final = 1.6
+PIECES_SCALE: Final = 3.2
 MOST_PIECES: Final = 32
 """More straight pieces of a curve take longer to make maps of than any grasp."""
 TOO_MUCH: Final = 0.5
