@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from graspsense_sim_gripper.setting import Setting
 
 LEAST_SHARE: Final = 0.05
-"""At least this share of a squeeze is the object's, whose depth is known to a few hundredths; the covers have the rest."""
+"""At least this share of a squeeze is the object's, as its depth is known to a few hundredths; the rest the covers'."""
 LEVER_M: Final = 5e-3
 """So far about the squeeze the parabola of the moving mass goes through what it is."""
 
