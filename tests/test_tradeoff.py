@@ -62,6 +62,13 @@ PEERS = {
         },
         {"engine": "Other Euler", "what": "Other 1.0 Euler", "seconds": 1e-1, "rms": None, "peak": None},
     ],
+    "other_4e-4": 44.5,
+    "other_4e-4_is": "Other 1.0 Euler over graspsense, as shipped",
+    "other_1e-6": None,
+    "grasps_per_s_by_count": {
+        "100": {"ms_of_processor_a_grasp": 0.5},
+        "1000": {"ms_of_processor_a_grasp": 0.6},
+    },
 }
 
 
@@ -81,6 +88,9 @@ def test_the_page_has_both_tables_with_date_and_versions():
     assert "date 2026-11-21" in page
     assert "numpy 2.4" in page
     assert "| Other 1.0 Euler | 100 | - | - |" in page
+    assert "| `other_4e-4` | 44.5 | Other 1.0 Euler over graspsense, as shipped |" in page
+    assert "| `grasps_per_s_by_count` | 0.6 | ms of processor a grasp, of 1000 |" in page
+    assert "other_1e-6" not in page
     assert "simulated" in page
     assert "Other" not in simulation_markdown(TRADE, None)
 

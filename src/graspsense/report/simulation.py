@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -97,7 +97,7 @@ def simulation_markdown(
 
 
 def peers_markdown(peers: Mapping[str, Any]) -> list[str]:
-    """Return the table of `benchmarks/simulation.py`."""
+    """Return the tables of `benchmarks/simulation.py`: its runs, and whatever figures it has drawn from them."""
     made = ", ".join(f"{key} {value}" for key, value in peers.get("made", {}).items())
     rows = [
         (
@@ -113,7 +113,20 @@ def peers_markdown(peers: Mapping[str, Any]) -> list[str]:
         f"From `benchmarks/simulation.py`: {made}.",
         "",
         *_markdown(("ENGINE", "MS A GRASP", "FORCE TRACE, RMS", "PEAK FORCE"), rows),
+        "",
+        *_markdown(("FIGURE", "VALUE", "OF"), [*_figures(peers)]),
     ]
+
+
+def _figures(peers: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Yield each figure by its name in the file, and what it is of; one that depends on how many, a row a number."""
+    for name, value in peers.items():
+        if isinstance(value, int | float):
+            yield f"`{name}`", f"{value:.4g}", str(peers.get(f"{name}_is", ""))
+        elif isinstance(value, Mapping) and name != "made":
+            for count, figures in value.items():
+                for what, figure in figures.items():
+                    yield f"`{name}`", f"{figure:.4g}", f"{what.replace('_', ' ')}, of {count}"
 
 
 def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
