@@ -9,11 +9,11 @@ import pytest
 from attrs import evolve
 from hypothesis import given
 from hypothesis import strategies as st
+from selection import error_of
 
-from graspsense.plugin_api import HOLD, RunConfig, create
+from graspsense.plugin_api import RunConfig, create
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.deviation import Course, deviation
 from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.linear import move_of
 from graspsense_sim_gripper.linear_scene import _straightened, linear_of
@@ -129,7 +129,7 @@ def test_a_choice_in_pieces_is_as_exact_as_asked_for():
             for fidelity in ("scene", "reference")
         )
         assert set_scene(config, name, 0, chooser_of(job_of(config, law))).choice.pieces == pieces
-        error, quantity = deviation(course(one), course(other))
+        error, quantity = error_of(one, other)
         assert error <= config.accuracy, (name, quantity)
 
 
@@ -145,20 +145,6 @@ def test_an_instance_by_its_number_has_the_model_of_all_of_its_kind():
 
 def job_of(config, law):
     return Job(config=config, controller=law, run=RunConfig(), draw=None, traces=True)
-
-
-def course(done):
-    trace = done.trace
-    return Course(
-        outcome=int(done.outcome),
-        dt_s=1e-3,
-        gap_m=trace.gap_m,
-        speed_m_s=trace.velocity_m_s,
-        left_n=trace.force_left_n,
-        right_n=trace.force_right_n,
-        ended=int(np.sum(trace.phase <= HOLD)),
-        peak_n=done.body.peak_n,
-    )
 
 
 THINNED = """

@@ -355,8 +355,7 @@ def sliding_on(drive: Drive, more_n: float, before_m_s: float, after_m_s: float)
     per_speed = 1.0 / drive.stribeck_m_s
     fall = (before_m_s - after_m_s) * (before_m_s + after_m_s) * (per_speed * per_speed)
     if abs(fall) > SMALL_FALL:
-        x = after_m_s * per_speed
-        return (drive.breakaway_n - drive.coulomb_n) * math.exp(-x * x)
+        return friction(drive, after_m_s, 0.0) - drive.coulomb_n
     return more_n * (1.0 + fall * (1.0 + fall * (0.5 + fall / 6.0)))
 
 

@@ -68,6 +68,7 @@ SQUEEZE_S: Final = 3.0
 """No squeeze takes longer: the controllers give up then."""
 PIECES: Final = 24
 PIECES_SCALE: Final = 3.2
+"""Over the root of the accuracy: at least so many straight pieces."""
 MOST_PIECES: Final = 32
 """More straight pieces of a curve take longer to make maps of than any grasp."""
 TOO_MUCH: Final = 0.5
@@ -120,8 +121,8 @@ class Choice:
     """Whether a term has a state that swings, or one of which it does not say how fast it is."""
     rung: str
     pieces: int = 0
-    """Exact maps take the ticks, of a linkage as it is at the contact and of an object whose force over compression
-    stands in so many straight pieces; 0: they do where all is linear as it is."""
+    """Exact maps take the ticks from the contact on, the force over compression in so many straight pieces; 0: they do
+    only where all is linear as it is."""
     check: Check | None = None
     """What a trial grasp said of it; None where there was none."""
 
@@ -269,7 +270,7 @@ def choose(
         scheme=Decision(
             term="steps",
             decision="exact maps" if pieces > 0 else SCHEMES[scheme],
-            what="straight pieces of the object's curve, the linkage as at the contact"
+            what="straight pieces of the object's force over compression"
             if pieces > 0
             else "rate of the dampers, times tick",
             number=float(pieces) if pieces > 0 else rate * dt_s,
