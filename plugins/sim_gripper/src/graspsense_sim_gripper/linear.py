@@ -34,7 +34,7 @@ from graspsense_sim_gripper.plant import (
     PlantParams,
     PlantState,
     Squeezed,
-    friction,
+    rubbing,
     sliding_on,
 )
 from graspsense_sim_gripper.terms.registry import find_term
@@ -336,14 +336,23 @@ def _quiet(
 ) -> bool:
     """Return whether nothing can end this mode within a tick, and write what the tick comes to.
 
-    As for most ticks; it is also not quiet where the force may have been greater inside it than at its ends.
+    As for most ticks; it is also not quiet where the force may have been greater inside it than at its ends. Which of
+    the terms' own contacts touch in the mode is guessed, and put right first.
     """
     look, room, slack = params.look, params.room, params.slack
-    allowed = (mode * ENDS) & MOST_NUMBERS
-    _seen(params.watched, mode * WATCHED * COLUMNS, room)
-    for k in range(CONTACTS):
-        if room[WAS + GUARDS + k] < -slack[allowed + k]:
-            return False
+    allowed = 0
+    for _ in range(2):
+        allowed = (mode * ENDS) & MOST_NUMBERS
+        _seen(params.watched, mode * WATCHED * COLUMNS, room)
+        wrong = 0
+        for k in range(CONTACTS):
+            if room[WAS + GUARDS + k] < -slack[allowed + k]:
+                wrong += 1 << k
+        if wrong == 0:
+            break
+        mode ^= wrong
+    else:
+        return False
     if MOTIONS == 3 and standing:
         for k in range(ENDS - 2, ENDS):
             if room[WAS + GUARDS + k] < -slack[allowed + k]:
@@ -368,7 +377,7 @@ def _rubs(params: Linear, motion: int, gap_m: float, force_n: float, effort_n: f
     speed: float = room[NOW + 1]
     way = 1.0 if motion == 1 else -1.0
     # The exponential of the speed that is known already, and a series from there: nothing then waits for it.
-    more = friction(drive, speed, 0.0) - drive.coulomb_n
+    more, _ = rubbing(drive, speed)
     net = effort_n - force_n - way * (drive.coulomb_n + drive.load_share * force_n)
     net -= drive.damping_n_s_m * speed
     middle = max(way * speed + way * net * (0.5 * dt / lever.mass_kg), 0.0)
@@ -554,8 +563,10 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
         alone,
     ) = state
     drive, thing = plant.drive, plant.thing
+    # Opened as far as it goes it stands, whatever opens it further, and what it let go comes back to its shape.
+    opened = revolutions >= drive.open_rev and effort_n <= 0.0
     if (
-        (revolutions >= drive.open_rev and effort_n <= 0.0)
+        (opened and (LAGS == 1 or squeezed.force_n > 0.0))
         or offset != 0.0
         or felt_left != felt_right
         # What the plant has yet to bring up to date is the plant's, and so is a linkage before the contact.
@@ -585,10 +596,10 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
         room[NOW + 2] = d
     own = at
     at = put_states(thing.terms, squeezed.states, room, NOW + own)
-    acts = effort_n
+    acts = 0.0 if opened else effort_n
+    room[NOW + STATES] = acts
     if LAGS == 1:
         room[at] = acts = given
-    room[NOW + STATES] = effort_n
     motion = first = 0
     standing = room[NOW + 1] == 0.0
     if MOTIONS == 3:
@@ -604,7 +615,7 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
         first = piece * MODES
         shifted = pressed == 1 and params.slopes[piece] != slope
         slope = params.slopes[piece]
-    # Which of the terms' own contacts touch is guessed, and put right where the tick is looked into.
+    # A guess: see `_quiet` and `_searched`.
     touching = (1 << CONTACTS) - 1 if squeezed.force_n > 0.0 else 0
     top, events = peak, 0
     mode = first + ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
@@ -633,7 +644,7 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
     # The state waits for this, and a product comes sooner than a quotient.
     turns = 1.0 / rate
     revolutions1 = revolutions - came * turns
-    if not drive.closed_rev < revolutions1 < drive.open_rev:
+    if came != 0.0 and not drive.closed_rev < revolutions1 < drive.open_rev:
         return False, state
     # A mode that begins at the very end of the tick has yet to act.
     force = max(room[THEN + STATES + FORCE], 0.0) if pressed == 1 else 0.0

@@ -333,29 +333,37 @@ def _let_go(slope: float, force: float, force0: float, d0: float, closure_m: flo
     return total
 
 
-def friction(drive: Drive, velocity_m_s: float, load_n: float) -> float:
-    """Return the sliding friction (N, positive) at this speed of the gap and this mean pad force."""
-    force = drive.coulomb_n + drive.load_share * load_n
+def rubbing(drive: Drive, velocity_m_s: float) -> tuple[float, float]:
+    """Return by how much (N) friction is above Coulomb's at this speed of the gap, and how that changes with it."""
     more = drive.breakaway_n - drive.coulomb_n
     if more > 0.0:
-        x = velocity_m_s * (1.0 / drive.stribeck_m_s)
+        per_speed = 1.0 / drive.stribeck_m_s
+        x = velocity_m_s * per_speed
         # Beyond that less than 2e-9 of it is left.
         if -4.5 < x < 4.5:
-            force += more * math.exp(-x * x)
-    return force
+            more *= math.exp(-x * x)
+            return more, -2.0 * x * per_speed * more
+    return 0.0, 0.0
+
+
+def friction(drive: Drive, velocity_m_s: float, load_n: float) -> float:
+    """Return the sliding friction (N, positive) at this speed of the gap and this mean pad force."""
+    more, _ = rubbing(drive, velocity_m_s)
+    return drive.coulomb_n + drive.load_share * load_n + more
 
 
 def sliding_on(drive: Drive, more_n: float, before_m_s: float, after_m_s: float) -> float:
     """Return by how much friction is above Coulomb's at a speed, given (N) what that was at a speed near it.
 
-    The same as of `friction`, by a series instead of another exponential.
+    The same as of `rubbing`, by a series instead of another exponential.
     """
     if more_n <= 0.0:
         return 0.0
     per_speed = 1.0 / drive.stribeck_m_s
     fall = (before_m_s - after_m_s) * (before_m_s + after_m_s) * (per_speed * per_speed)
     if abs(fall) > SMALL_FALL:
-        return friction(drive, after_m_s, 0.0) - drive.coulomb_n
+        more, _ = rubbing(drive, after_m_s)
+        return more
     return more_n * (1.0 + fall * (1.0 + fall * (0.5 + fall / 6.0)))
 
 
@@ -430,6 +438,8 @@ def _with_effort(state: PlantState, effort_n: float) -> PlantState:
 def _driven(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
     """Return the plant after `dt` under a constant effort, taken once."""
     drive, thing, steps = params
+    if state.touched == 0 and state.speed_rev_s == 0.0 and _blocked(drive, state, effort_n):
+        return state
     if state.speed_rev_s != 0.0 and steps.longest_s >= dt <= state.step_s:
         alike, after = _glide(drive, thing, steps, state, effort_n, dt)
         if alike:
@@ -463,6 +473,8 @@ def _settled(params: PlantParams, state: PlantState, effort_n: float, dt: float)
     The state that the tick began with is then needed to its end, which costs compiled code a twentieth.
     """
     drive, thing, steps = params
+    if state.touched == 0 and state.speed_rev_s == 0.0 and _blocked(drive, state, effort_n):
+        return state
     if state.speed_rev_s != 0.0 and steps.longest_s >= dt <= state.step_s and steps.settle <= 0.0:
         alike, after = _glide(drive, thing, steps, state, effort_n, dt)
         if alike:
@@ -550,24 +562,29 @@ def _glide(
                 or change * change > 2.0 * steps.tolerance * shape * shape
             ):
                 return False, state
-    net = load - effort_n
-    # What slides at the end rubs as it did at the beginning, but for little: one exponential does for both.
-    slides, bare = speed * rate, drive.coulomb_n + drive.load_share * load
-    more = friction(drive, slides, load) - bare
-    kick = acceleration(drive, rate, speed, net, bare + more, direction)
-    revolutions1 = revolutions + h * (speed + 0.5 * kick * h)
-    speed1 = speed + kick * h
-    if speed1 * direction <= 0.0 or abs(slides) < STANDING_M_S:
+    slides = speed * rate
+    more, steeper = rubbing(drive, slides)
+    net = load - effort_n - direction * (drive.coulomb_n + drive.load_share * load + more)
+    net -= drive.damping_n_s_m * slides
+    per_inertia = 1.0 / drive.inertia
+    kick = rate * per_inertia * net
+    # Where it comes to at its speed does not wait for what changes that, and lies a little before where it ends.
+    gap1, rate1 = gap_and_rate(drive.link, revolutions + h * speed)
+    bends = rate1 - rate
+    resists = direction * steeper + drive.damping_n_s_m
+    change = per_inertia * (bends * (net - resists * slides) - rate * rate * resists * (h * kick))
+    gains = 0.5 * h * kick
+    speed1 = speed + h * (kick + 0.5 * change)
+    if (speed + h * kick) * direction <= 0.0 or abs(slides) < STANDING_M_S:
         return False, state
-    gap1, rate1 = gap_and_rate(drive.link, revolutions1)
-    more = sliding_on(drive, more, slides, speed1 * rate1)
-    kick1 = acceleration(drive, rate1, speed1, net, bare + more, direction)
-    speed1 = speed + 0.5 * h * (kick + kick1)
+    revolutions1 = revolutions + h * (speed + gains)
+    gap1 += h * gains * rate1
+    rate1 += bends / speed * gains
     if (
         speed1 * direction <= 0.0
         or gap1 <= reach
         or not drive.closed_rev < revolutions1 < drive.open_rev
-        or abs(h * (kick1 - kick) * rate) > steps.tolerance * SPEED_SCALE_M_S
+        or abs(h * change * rate) > steps.tolerance * SPEED_SCALE_M_S
     ):
         return False, state
     if load > 0.0:
@@ -633,11 +650,7 @@ def _step(
 
     if speed == 0.0:
         resisting = drive.breakaway_n + drive.load_share * load
-        if (
-            abs(net) <= resisting
-            or (net > 0.0 and revolutions >= drive.open_rev)
-            or (net < 0.0 and revolutions <= drive.closed_rev)
-        ):
+        if _blocked(drive, state, effort_n):
             if touched == 0:
                 return state, left_s
             return _stuck(drive, thing, state, effort_n, left_s if must else min(left_s, steps.longest_s))
@@ -801,6 +814,17 @@ def _step(
         lost,
         alone if done else 0.0,
     ), used
+
+
+def _blocked(drive: Drive, state: PlantState, effort_n: float) -> bool:
+    """Return whether fingers that stand do not begin to move: for friction, or at an end of their travel."""
+    load = 0.5 * (state.left_n + state.right_n)
+    net = load - effort_n
+    return (
+        abs(net) <= drive.breakaway_n + drive.load_share * load
+        or (net > 0.0 and state.revolutions >= drive.open_rev)
+        or (net < 0.0 and state.revolutions <= drive.closed_rev)
+    )
 
 
 def _stuck(
