@@ -201,6 +201,27 @@ def test_maps_agree_with_the_steps_at_a_tight_tolerance(name):
     assert state.unresolved == 0
 
 
+def test_what_was_let_go_comes_back_while_the_fingers_stand_wide_open():
+    config = evolve(RUBS, skin_creep_n_m=2e4, skin_creep_s=2.0)
+    spec = thing(("maxwell", {"k_n_m": 3e3, "tau_s": 0.8}), ("elastic", {"k1_n_m": 5e3}))
+    efforts = [25.0] * 400 + [-30.0] * 1200
+    found = [along(config, spec, efforts, maps=maps, speed_m_s=0.02)[-1] for maps in (True, False)]
+    state, by_steps = found
+    open_rev = ready(config, spec)[2].plant.drive.open_rev
+    assert (state.revolutions, state.speed_rev_s, state.touched) == (open_rev, 0.0, 1)
+    assert by_steps.revolutions == open_rev
+    # It still is on its way, after a second.
+    assert abs(state.squeezed.compression_m) > 1e-6
+    for one in ("compression_m", "cover_m"):
+        assert getattr(state.squeezed, one) == pytest.approx(getattr(by_steps.squeezed, one), rel=5e-3)
+    # And where it is closed again it meets the object where that then is.
+    again = [
+        along(config, spec, [*efforts, *[30.0] * 900], maps=maps, speed_m_s=0.02)[1] for maps in (True, False)
+    ]
+    assert again[0][-1] > 10.0
+    np.testing.assert_allclose(*again, atol=5e-3 * again[1].max())
+
+
 @pytest.mark.parametrize("covers", [True, False])
 def test_maps_agree_with_an_integrator_while_it_slides_and_while_it_is_stuck(covers):
     """A shell with an arm and a swinging column: written down once more, as a differential equation."""

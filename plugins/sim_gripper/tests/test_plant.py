@@ -3,6 +3,7 @@
 import math
 from math import inf
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -20,6 +21,8 @@ from graspsense_sim_gripper.plant import (
     Squeezed,
     Steps,
     Thing,
+    friction,
+    rubbing,
     squeeze,
 )
 from graspsense_sim_gripper.setting import STRAIGHT
@@ -111,6 +114,36 @@ def test_a_free_drive_falls_as_newton_says():
     assert mass == pytest.approx(118.0, rel=0.01)
     # Over the 0.4 mm it travels the transmission's ratio, and with it the mass, changes by 0.1 %.
     assert after.speed_rev_s * after.rate_m_rev == pytest.approx(-10.0 * 0.1 / mass, rel=3e-3)
+
+
+@given(st.floats(-0.02, 0.02).filter(lambda v: abs(abs(v) - 0.009) > 1e-5))
+def test_what_friction_changes_by_is_its_slope(speed_m_s):
+    numbers = drive()
+    more, slope = rubbing(numbers, speed_m_s)
+    assert friction(numbers, speed_m_s, 4.0) == numbers.coulomb_n + 0.5 * 4.0 + more
+    ahead, behind = (rubbing(numbers, speed_m_s + h)[0] for h in (1e-7, -1e-7))
+    # The thousandth of a newton that is left of it at 9 mm/s is cut off there.
+    assert slope == pytest.approx((ahead - behind) / 2e-7, rel=1e-5, abs=1e-4)
+
+
+@pytest.mark.parametrize("effort", [8.5, 25.0, 0.0])
+def test_halving_the_tick_quarters_the_error_of_a_way_in_the_free(effort):
+    """Where friction falls with the speed, and the linkage's ratio is another every millimetre."""
+    params, move = PlantParams(drive(), thing(width=-1.0), Steps(inf)), plant_of([])
+
+    def end(dt):
+        state = at(0.05, (), speed_m_s=-3e-3)
+        for _ in range(round(0.016 / dt)):
+            state = move(params, state, effort, dt)
+        gap, rate = gap_and_rate(LINK, state.revolutions)
+        assert state.gap_m == pytest.approx(gap, abs=1e-12)
+        assert state.rate_m_rev == pytest.approx(rate, rel=1e-9)
+        return np.array([state.revolutions, state.speed_rev_s])
+
+    exact = end(1e-6)
+    coarse, fine = (np.abs(end(dt) - exact) for dt in (2e-3, 1e-3))
+    assert (coarse > 1e-9 * np.abs(exact)).all()
+    assert coarse / fine == pytest.approx([4.0, 4.0], rel=0.15)
 
 
 @pytest.mark.parametrize(

@@ -66,9 +66,8 @@ class Linear(NamedTuple):
     look: int
     """How often a tick is halved to look for what ends a mode."""
     lever: Lever
-    pieces: int
-    """Of how many straight pieces the object's curve is made, and by what the root of a compression tells which."""
-    per_root: float
+    knots: Any
+    """The compressions between which the object's curve is a straight piece, to infinity, and the slopes of these."""
     slopes: Any
     maps: Any
     watched: Any
@@ -78,7 +77,8 @@ class Linear(NamedTuple):
     begin: Any
     slack: Any
     room: Any
-    """The state before a piece of a tick; state and what is watched after it; what is watched before it; bounds.
+    """The state before a piece of a tick; state and what is watched after it; what is watched before it; bounds; and on
+    which piece of its curve the object was last.
 
     In one table at places known beforehand: compiled code then need not ask whether two of them are one, and keeps
     most of it in registers.
@@ -186,8 +186,8 @@ def move_of(
         puts = bind(_put_all, put=PUT[count], put_rest=puts)
         takes = bind(_take_all, take=bind(TAKE[count], made=type(state)), take_rest=takes)
     laid_out = {name.upper(): number for name, number in shape._asdict().items()}
-    places = {name: k * _room(shape) for k, name in enumerate(PLACES)}
-    now, then, was, most, by = places.values()
+    places = {name: k * _room(shape) for k, name in enumerate((*PLACES, "PIECE"))}
+    now, then, was, most, by, _ = places.values()
     watched = padded(GUARDS + shape.ends)
     mapped, parted = padded(shape.states + GUARDS + shape.ends), padded(2 * shape.states)
     modes = ((shape.parts + 1) * shape.motions) << shape.contacts
@@ -198,6 +198,7 @@ def move_of(
         "_seen": bind(_product, ROWS=watched, COLUMNS=shape.columns, FROM=now, TO=was),
     }
     rubs = bind(_rubs, **here)
+    piece = bind(_piece, **here)
     swings = bind(
         _swings,
         _simply=bind(_product, ROWS=watched, TO=most, SIZES=1, **changes),
@@ -209,6 +210,7 @@ def move_of(
         _taken,
         put_states=puts,
         take_states=takes,
+        _piece=piece,
         _quiet=bind(_quiet, _swings=swings, _rubs=rubs, **products, **here),
         _searched=bind(_searched, _swings=swings, _rubs=rubs, _row=bind(_row, **here), **products, **here),
         **here,
@@ -230,7 +232,7 @@ def seldom(function: Callable[..., Any]) -> tuple[str, ...]:
 
 def room_of(shape: Shape) -> int:
     """Return of how many numbers a tick's room is made."""
-    return len(PLACES) * _room(shape)
+    return len(PLACES) * _room(shape) + TOGETHER
 
 
 def _room(shape: Shape) -> int:
@@ -251,7 +253,7 @@ take_states: Any = _take_none
 STATES = COLUMNS = PARTS = CREEPS = LAGS = MOTIONS = CONTACTS = ENDS = BENDS = MODES = ROWS = 0
 WATCHED = MAPPED = PARTED = 0
 """Rows of the tables of what is watched, of the maps, and of the ways, with those that pad them."""
-NOW = THEN = WAS = MOST = BY = FROM = TO = 0
+NOW = THEN = WAS = MOST = BY = PIECE = FROM = TO = 0
 CHANGES = SIZES = 0
 """1: a product of how the state changes; of how much what is multiplied is, whichever way."""
 
@@ -297,6 +299,18 @@ def _top(before: float, rising: float, after: float, falling: float, h: float) -
     # What bends one way lies below its tangents.
     most = min(before + m0, after - m1)
     return min(before + s * (m0 + s * (3.0 * step - 2.0 * m0 - m1 + s * (m0 + m1 - 2.0 * step))), most)
+
+
+def _piece(params: Linear, compression_m: float) -> int:
+    """Return on which straight piece of its curve the object is, which is as a rule where it was."""
+    knots, room = params.knots, params.room
+    piece = int(room[PIECE]) & MOST_NUMBERS
+    while compression_m >= knots[piece + 1]:
+        piece = (piece + 1) & MOST_NUMBERS
+    while compression_m < knots[piece]:
+        piece = (piece - 1) & MOST_NUMBERS
+    room[PIECE] = float(piece)
+    return piece
 
 
 def _in_place(link: ScrewLinkage, state: PlantState) -> PlantState:
@@ -611,7 +625,7 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
         # The piece of the curve that the middle of the tick will see.
         room[NOW + COLUMNS - 1] = 1.0
         ahead = max(d + 0.5 * dt * squeezed.rate_m_s, 0.0)
-        piece = min(int(params.per_root * math.sqrt(ahead)), params.pieces - 1) & MOST_NUMBERS
+        piece = _piece(params, ahead)
         first = piece * MODES
         shifted = pressed == 1 and params.slopes[piece] != slope
         slope = params.slopes[piece]

@@ -76,11 +76,11 @@ def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -
     shape, look, *tables = modes
     numbers = room_of(shape)
     room: Any = np.zeros(numbers) if on_arrays else [0.0] * numbers
+    knots: Any = [*_knots(reach, len(bend))[:-1], math.inf] if bend else []
     slopes: Any = [piece.slope_n_m for piece in bend]
     if on_arrays:
-        slopes = np.array(slopes, float)
-    per_root = len(bend) / math.sqrt(reach)
-    return Linear(plant, look, lever, len(bend), per_root, slopes, *(*tables, room)), shape
+        knots, slopes = np.array(knots, float), np.array(slopes, float)
+    return Linear(plant, look, lever, knots, slopes, *(*tables, room)), shape
 
 
 def _lever(setting: Setting) -> Lever:
@@ -146,11 +146,16 @@ def _reach(forms: Sequence[LinearForm | OwnContact], choice: Choice, thing: Thin
     return most
 
 
+def _knots(reach: float, pieces: int) -> list[float]:
+    """Return between which compressions the pieces are, closer where they begin: at even roots."""
+    return [reach * (k / pieces) ** 2 for k in range(pieces + 1)]
+
+
 def _straightened(
     forms: Sequence[LinearForm | OwnContact], reach: float, pieces: int
 ) -> tuple[Straight, ...]:
-    """Return the curves together in straight pieces between knots, closer where they begin: at even roots."""
-    places = [reach * (k / pieces) ** 2 for k in range(pieces + 1)]
+    """Return the curves together in straight pieces between knots."""
+    places = _knots(reach, pieces)
     forces = [_curve(forms, place) for place in places]
     found = []
     for (d0, d1), (force0, force1) in zip(pairwise(places), pairwise(forces), strict=True):
