@@ -38,10 +38,10 @@ def thing(*terms):
 
 
 @pytest.mark.parametrize("accuracy", [0.1, 0.001])
-@pytest.mark.parametrize(("spread", "part"), [(True, 0.5), (False, 0.8)])
-def test_a_checked_choice_says_what_a_trial_grasp_found(accuracy, spread, part):
-    """Where instances are to differ from what is tried they have the rest of the accuracy."""
-    config = evolve(CONFIG, accuracy=accuracy, spread=spread)
+@pytest.mark.parametrize(("change", "part"), [({"spread": True}, 0.5), ({}, 0.8)])
+def test_a_checked_choice_says_what_a_trial_grasp_found(accuracy, change, part):
+    """Where the grasp is to differ from what is tried it has the rest of the accuracy."""
+    config = evolve(CONFIG, accuracy=accuracy, **change)
     choice = checked_choice(config, find("naked:full_open"), hybrid())
     assert choice.check.error <= part * accuracy
     assert choice.check.grasps >= 2

@@ -58,8 +58,8 @@ from graspsense_sim_gripper.terms.registry import laws_of
 
 HELD: Final = 0.5
 HELD_ALONE: Final = 0.8
-"""A model holds where the trial grasps differ by less than this part of the accuracy. Instances of the object have the
-rest; where it is grasped as it is tried, only what the trial grasps are off by themselves has."""
+"""A model holds where the trial grasps differ by less than this part of the accuracy. Instances of the object
+have the rest; where it is grasped as it is tried, only pads and what the trial grasps are off by themselves have."""
 APART: Final = 10.0
 LEAST_OFF_N: Final = 0.01
 MOST_OFF_N: Final = 0.25
