@@ -222,6 +222,14 @@ def test_what_was_let_go_comes_back_while_the_fingers_stand_wide_open():
     np.testing.assert_allclose(*again, atol=5e-3 * again[1].max())
 
 
+def test_what_closes_from_wide_open_is_braked_by_an_effort_that_opens():
+    efforts = [-5.0] * 20
+    closure, _, speed, _ = along(RUBS, thing(ELASTIC), efforts, speed_m_s=0.02)
+    assert speed[-1] == pytest.approx(0.02 - (7.0 + 5.0 + 10.0 * 0.0188) / 100.0 * 0.02, rel=1e-4)
+    closure1, _, _, _ = along(evolve(RUBS, accuracy=1e-4), thing(ELASTIC), efforts, maps=False, speed_m_s=0.02)
+    np.testing.assert_allclose(closure, closure1, atol=1e-9)
+
+
 @pytest.mark.parametrize("covers", [True, False])
 def test_maps_agree_with_an_integrator_while_it_slides_and_while_it_is_stuck(covers):
     """A shell with an arm and a swinging column: written down once more, as a differential equation."""

@@ -580,7 +580,7 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
     # Opened as far as it goes it stands, whatever opens it further, and what it let go comes back to its shape.
     opened = revolutions >= drive.open_rev and effort_n <= 0.0
     if (
-        (opened and (LAGS == 1 or squeezed.force_n > 0.0))
+        (opened and (LAGS == 1 or speed != 0.0 or squeezed.force_n > 0.0))
         or offset != 0.0
         or felt_left != felt_right
         # What the plant has yet to bring up to date is the plant's, and so is a linkage before the contact.

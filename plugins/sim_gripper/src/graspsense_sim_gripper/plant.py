@@ -521,8 +521,10 @@ def _glide(
 ) -> tuple[bool, PlantState]:
     """Return whether `h` of motion is without an event and presses nothing, as in most ticks, and the plant after it.
 
-    What `_step` does then, without looking at anything else: nothing is touched, or one finger pushes the object
-    before it, or what was let go comes back to its shape, of which nobody feels anything.
+    Nothing is touched, or one finger pushes the object before it, or what was let go comes back to its shape, of which
+    nobody feels anything. As by a kick, a drift and a kick, but for the third order: of the second kick only the slopes
+    are taken, of friction and damper over the speed and of the linkage's ratio over the way, so that a tick waits for
+    friction and linkage once, and for neither behind the other.
     """
     (
         revolutions,
@@ -552,14 +554,14 @@ def _glide(
             reach = thing.width_m
         else:
             alone += h
-            change = alone * max(abs(squeezed.rate_m_s), abs(other.rate_m_s))
+            came = alone * max(abs(squeezed.rate_m_s), abs(other.rate_m_s))
             shape = max(abs(squeezed.compression_m), abs(other.compression_m), SHAPE_SCALE_M)
             if (
                 gap <= reach
                 or thing.swings == 1
                 or thing.skin.damping_n_s_m > 0.0
                 or thing.skin.arm_n_m > 0.0
-                or change * change > 2.0 * steps.tolerance * shape * shape
+                or came * came > 2.0 * steps.tolerance * shape * shape
             ):
                 return False, state
     slides = speed * rate
@@ -568,7 +570,7 @@ def _glide(
     net -= drive.damping_n_s_m * slides
     per_inertia = 1.0 / drive.inertia
     kick = rate * per_inertia * net
-    # Where it comes to at its speed does not wait for what changes that, and lies a little before where it ends.
+    # Where it comes to at its speed; it ends a little beyond.
     gap1, rate1 = gap_and_rate(drive.link, revolutions + h * speed)
     bends = rate1 - rate
     resists = direction * steeper + drive.damping_n_s_m
