@@ -226,7 +226,9 @@ def test_what_closes_from_wide_open_is_braked_by_an_effort_that_opens():
     efforts = [-5.0] * 20
     closure, _, speed, _ = along(RUBS, thing(ELASTIC), efforts, speed_m_s=0.02)
     assert speed[-1] == pytest.approx(0.02 - (7.0 + 5.0 + 10.0 * 0.0188) / 100.0 * 0.02, rel=1e-4)
-    closure1, _, _, _ = along(evolve(RUBS, accuracy=1e-4), thing(ELASTIC), efforts, maps=False, speed_m_s=0.02)
+    closure1, _, _, _ = along(
+        evolve(RUBS, accuracy=1e-4), thing(ELASTIC), efforts, maps=False, speed_m_s=0.02
+    )
     np.testing.assert_allclose(closure, closure1, atol=1e-9)
 
 

@@ -117,13 +117,15 @@ def test_a_free_drive_falls_as_newton_says():
 
 
 @given(st.floats(-0.02, 0.02).filter(lambda v: abs(abs(v) - 0.009) > 1e-5))
-def test_what_friction_changes_by_is_its_slope(speed_m_s):
+def test_what_friction_changes_by_is_its_slope_and_that_by_how_it_bends(speed_m_s):
     numbers = drive()
-    more, slope = rubbing(numbers, speed_m_s)
+    more, slope, curved = rubbing(numbers, speed_m_s)
     assert friction(numbers, speed_m_s, 4.0) == numbers.coulomb_n + 0.5 * 4.0 + more
     ahead, behind = (rubbing(numbers, speed_m_s + h)[0] for h in (1e-7, -1e-7))
     # The thousandth of a newton that is left of it at 9 mm/s is cut off there.
     assert slope == pytest.approx((ahead - behind) / 2e-7, rel=1e-5, abs=1e-4)
+    ahead, behind = (rubbing(numbers, speed_m_s + h)[1] for h in (1e-7, -1e-7))
+    assert curved == pytest.approx((ahead - behind) / 2e-7, rel=1e-5, abs=0.1)
 
 
 @pytest.mark.parametrize("effort", [8.5, 25.0, 0.0])

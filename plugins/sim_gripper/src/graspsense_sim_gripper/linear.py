@@ -6,7 +6,7 @@ is then a matrix, whatever the stiffness (exponential integration, as for stiff 
 The matrices of a tick and of its halves, quarters and so on are made once a scene (`linear_scene`, `linear_modes`). A
 tick in which nothing can happen, by a bound on what changes inside it, is one of them; where something may, it is
 looked for with pieces short against the fastest swing, and then between them by halving. What is no such motion (ends
-of travel, an object that is pushed across its table) is left to the plant.
+of travel, but for standing wide open; an object that is pushed across its table) is left to the plant.
 
 Where the object's force bends over its compression it stands in straight pieces, a set of modes each. A linkage whose
 ratio varies and friction that is greater at rest are then followed, too: as a force in the middle of each tick.
@@ -67,7 +67,7 @@ class Linear(NamedTuple):
     """How often a tick is halved to look for what ends a mode."""
     lever: Lever
     knots: Any
-    """The compressions between which the object's curve is a straight piece, to infinity, and the slopes of these."""
+    """Where the straight pieces of the object's curve begin, the last being without an end, and their slopes."""
     slopes: Any
     maps: Any
     watched: Any
@@ -305,7 +305,7 @@ def _piece(params: Linear, compression_m: float) -> int:
     """Return on which straight piece of its curve the object is, which is as a rule where it was."""
     knots, room = params.knots, params.room
     piece = int(room[PIECE]) & MOST_NUMBERS
-    while compression_m >= knots[piece + 1]:
+    while piece + 1 < len(knots) and compression_m >= knots[piece + 1]:
         piece = (piece + 1) & MOST_NUMBERS
     while compression_m < knots[piece]:
         piece = (piece - 1) & MOST_NUMBERS
@@ -365,8 +365,6 @@ def _quiet(
         if wrong == 0:
             break
         mode ^= wrong
-    else:
-        return False
     if MOTIONS == 3 and standing:
         for k in range(ENDS - 2, ENDS):
             if room[WAS + GUARDS + k] < -slack[allowed + k]:
@@ -391,7 +389,7 @@ def _rubs(params: Linear, motion: int, gap_m: float, force_n: float, effort_n: f
     speed: float = room[NOW + 1]
     way = 1.0 if motion == 1 else -1.0
     # The exponential of the speed that is known already, and a series from there: nothing then waits for it.
-    more, _ = rubbing(drive, speed)
+    more, _, _ = rubbing(drive, speed)
     net = effort_n - force_n - way * (drive.coulomb_n + drive.load_share * force_n)
     net -= drive.damping_n_s_m * speed
     middle = max(way * speed + way * net * (0.5 * dt / lever.mass_kg), 0.0)
@@ -658,7 +656,7 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
     # The state waits for this, and a product comes sooner than a quotient.
     turns = 1.0 / rate
     revolutions1 = revolutions - came * turns
-    if came != 0.0 and not drive.closed_rev < revolutions1 < drive.open_rev:
+    if not (drive.closed_rev < revolutions1 < drive.open_rev or (opened and came == 0.0)):
         return False, state
     # A mode that begins at the very end of the tick has yet to act.
     force = max(room[THEN + STATES + FORCE], 0.0) if pressed == 1 else 0.0
@@ -669,7 +667,7 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
         d = room[THEN + 2]
         if pressed == 1:
             touched = 1
-        elif room[THEN] < 0.0 and abs(d) + abs(cover) <= IN_SHAPE_M:
+        elif room[THEN] < 0.0 and abs(d) + abs(cover) <= IN_SHAPE_M and (not opened or thing.swings == 0):
             touched = 0
     else:
         if room[THEN] >= 0.0:

@@ -76,7 +76,7 @@ def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -
     shape, look, *tables = modes
     numbers = room_of(shape)
     room: Any = np.zeros(numbers) if on_arrays else [0.0] * numbers
-    knots: Any = [*_knots(reach, len(bend))[:-1], math.inf] if bend else []
+    knots: Any = _knots(reach, len(bend))[:-1] if bend else []
     slopes: Any = [piece.slope_n_m for piece in bend]
     if on_arrays:
         knots, slopes = np.array(knots, float), np.array(slopes, float)

@@ -183,7 +183,7 @@ class PlantState(NamedTuple):
     step_s: float = math.inf
     """How long the next step may be, by the error of the last."""
     steps: int = 0
-    """How many steps were taken, of those that were not free or stuck for a whole tick."""
+    """How many steps were taken, a tick that is taken as a whole being one; one that stands for all of it none."""
     unresolved: int = 0
     """How many steps were taken although their error was too large."""
     alone_s: float = 0.0
@@ -333,8 +333,11 @@ def _let_go(slope: float, force: float, force0: float, d0: float, closure_m: flo
     return total
 
 
-def rubbing(drive: Drive, velocity_m_s: float) -> tuple[float, float]:
-    """Return by how much (N) friction is above Coulomb's at this speed of the gap, and how that changes with it."""
+def rubbing(drive: Drive, velocity_m_s: float) -> tuple[float, float, float]:
+    """Return by how much (N) friction is above Coulomb's at this speed of the gap, its slope, and how that bends.
+
+    The slope is in N s/m, how it bends in N s2/m2.
+    """
     more = drive.breakaway_n - drive.coulomb_n
     if more > 0.0:
         per_speed = 1.0 / drive.stribeck_m_s
@@ -342,13 +345,13 @@ def rubbing(drive: Drive, velocity_m_s: float) -> tuple[float, float]:
         # Beyond that less than 2e-9 of it is left.
         if -4.5 < x < 4.5:
             more *= math.exp(-x * x)
-            return more, -2.0 * x * per_speed * more
-    return 0.0, 0.0
+            return more, -2.0 * x * per_speed * more, (4.0 * x * x - 2.0) * per_speed * per_speed * more
+    return 0.0, 0.0, 0.0
 
 
 def friction(drive: Drive, velocity_m_s: float, load_n: float) -> float:
     """Return the sliding friction (N, positive) at this speed of the gap and this mean pad force."""
-    more, _ = rubbing(drive, velocity_m_s)
+    more, _, _ = rubbing(drive, velocity_m_s)
     return drive.coulomb_n + drive.load_share * load_n + more
 
 
@@ -362,7 +365,7 @@ def sliding_on(drive: Drive, more_n: float, before_m_s: float, after_m_s: float)
     per_speed = 1.0 / drive.stribeck_m_s
     fall = (before_m_s - after_m_s) * (before_m_s + after_m_s) * (per_speed * per_speed)
     if abs(fall) > SMALL_FALL:
-        more, _ = rubbing(drive, after_m_s)
+        more, _, _ = rubbing(drive, after_m_s)
         return more
     return more_n * (1.0 + fall * (1.0 + fall * (0.5 + fall / 6.0)))
 
@@ -565,7 +568,7 @@ def _glide(
             ):
                 return False, state
     slides = speed * rate
-    more, steeper = rubbing(drive, slides)
+    more, steeper, curved = rubbing(drive, slides)
     net = load - effort_n - direction * (drive.coulomb_n + drive.load_share * load + more)
     net -= drive.damping_n_s_m * slides
     per_inertia = 1.0 / drive.inertia
@@ -575,6 +578,9 @@ def _glide(
     bends = rate1 - rate
     resists = direction * steeper + drive.damping_n_s_m
     change = per_inertia * (bends * (net - resists * slides) - rate * rate * resists * (h * kick))
+    # Where friction is greatest it has no slope, and yet changes.
+    gained = h * kick * rate
+    unseen = abs(rate) * per_inertia * 0.5 * abs(curved) * gained * gained
     gains = 0.5 * h * kick
     speed1 = speed + h * (kick + 0.5 * change)
     if (speed + h * kick) * direction <= 0.0 or abs(slides) < STANDING_M_S:
@@ -586,7 +592,7 @@ def _glide(
         speed1 * direction <= 0.0
         or gap1 <= reach
         or not drive.closed_rev < revolutions1 < drive.open_rev
-        or abs(h * change * rate) > steps.tolerance * SPEED_SCALE_M_S
+        or h * abs(rate) * (abs(change) + unseen) > steps.tolerance * SPEED_SCALE_M_S
     ):
         return False, state
     if load > 0.0:

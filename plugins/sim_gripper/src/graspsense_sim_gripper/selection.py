@@ -57,8 +57,8 @@ FULL_LADDER: Final = (WHOLE, FINE, FINEST)
 """Where every term is wanted."""
 GROWS: Final = 0.1
 """Accuracy from which on steps grow twofold after a touch."""
-TO_MAPS: Final = 4.0
-"""By how much steps grow there that only lead from a touch to where exact maps go on: the trial grasp sees to that."""
+BESIDE_MAPS: Final = 2.0
+"""By how much steps grow where exact maps take nearly all ticks; what that does in the others the trial grasp shows."""
 KEPT: Final = "kept"
 DROPPED: Final = "dropped"
 BEYOND: Final = 1.5
@@ -266,7 +266,7 @@ def choose(
             tolerance(accuracy / rung.finer),
             scheme,
             dt_s / rung.least_steps if rung.least_steps > 1 else math.inf,
-            growth=TO_MAPS if pieces > 0 else growth(accuracy / rung.finer),
+            growth=BESIDE_MAPS if pieces > 0 else growth(accuracy / rung.finer),
         ),
         decisions=tuple(decisions),
         scheme=Decision(
