@@ -340,6 +340,19 @@ def test_the_stops_hold_at_both_ends():
     assert (opened.gap_m, opened.speed_rev_s) == (pytest.approx(0.086, abs=1e-9), 0.0)
 
 
+@pytest.mark.parametrize("link", [LINK, STRAIGHT])
+@pytest.mark.parametrize("scheme", [EXPLICIT, STIFF, MEAN_FORCE])
+def test_what_is_pressed_at_the_closed_end_is_pressed_as_far_as_the_travel_goes(scheme, link):
+    params = PlantParams(
+        drive(link=link), thing(Elastic(1e4, 0.0), width=0.002), Steps(1e-3, scheme, growth=4.0)
+    )
+    state = run(params, at(0.01, (NoState(),), speed_m_s=-0.15, link=link), 60.0, 0.3)
+    assert (state.gap_m, state.speed_rev_s) == (pytest.approx(0.0, abs=1e-9), 0.0)
+    assert state.left_n == pytest.approx(20.0, rel=1e-6)
+    # Not for a moment was it pressed through the other finger.
+    assert state.peak_n == pytest.approx(20.0, rel=1e-6)
+
+
 @pytest.mark.parametrize("mass_share", [1e-2, 1e-4, 1e-6])
 def test_no_moving_mass_is_too_light_for_the_stops(mass_share):
     numbers = drive()._replace(inertia=drive().inertia * mass_share)

@@ -674,6 +674,7 @@ def _step(
     # The gap at which a finger touches, or once one does, the second.
     reach = thing.width_m + 2.0 * abs(offset)
     meeting = reach if gap > reach else thing.width_m - (2.0 * abs(offset) if thing.held == 1 else 0.0)
+    end = drive.open_rev if direction > 0.0 else drive.closed_rev
 
     shift = grip = 0.0
     revolutions1, speed1, gap1, rate1 = revolutions, 0.0, gap, rate
@@ -689,6 +690,8 @@ def _step(
         short = 0.0
         if gap > meeting and gap1 < meeting - TOUCHING_M:
             short = (gap - meeting) / (gap - gap1)
+        elif (revolutions1 - end) * direction * abs(rate) > TOUCHING_M:
+            short = (end - revolutions) / (revolutions1 - revolutions)
         elif speed1 * direction < 0.0 and speed != 0.0 and abs(speed1 * rate1) >= STANDING_M_S:
             short = abs(speed) / (abs(speed) + abs(speed1))
         elif load > 0.0 and load1 == 0.0 and gap1 > gap:
@@ -713,6 +716,11 @@ def _step(
                     break
                 used -= off
             gap1 = min(gap1, meeting)
+        if (revolutions1 - end) * direction > 0.0:
+            # What is pressed there is pressed as far as the travel goes, and no further.
+            used = min(max(used * (end - revolutions) / (revolutions1 - revolutions), 0.0), used)
+            revolutions1 = end
+            gap1, rate1 = gap_and_rate(drive.link, end)
         speed1 = speed + kick * used
         if touched == 1 or gap1 <= reach:
             # What touches now has been touched for no time, but a rigid cover feels its damper at once.
