@@ -128,6 +128,16 @@ def test_what_friction_changes_by_is_its_slope_and_that_by_how_it_bends(speed_m_
     assert curved == pytest.approx((ahead - behind) / 2e-7, rel=1e-5, abs=0.1)
 
 
+def test_friction_that_changes_from_its_greatest_within_a_tick_is_seen():
+    # It has no slope there: the fingers all but stand.
+    params = PlantParams(drive()._replace(stribeck_m_s=5e-4), thing(), Steps(2e-4))
+    start = at(0.06, (), speed_m_s=-1e-7)
+    ends = [run(params, start, 60.0, TICK, laws=(), dt=dt) for dt in (TICK, 1e-6)]
+    one, fine = (end.speed_rev_s * end.rate_m_rev for end in ends)
+    assert abs(fine) > 4e-4
+    assert abs(one - fine) < 1e-6
+
+
 @pytest.mark.parametrize("effort", [8.5, 25.0, 0.0])
 def test_halving_the_tick_quarters_the_error_of_a_way_in_the_free(effort):
     """Where friction falls with the speed, and the linkage's ratio is another every millimetre."""
