@@ -44,7 +44,7 @@ from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.folds import stratified
 from graspsense.experiments.paper.published import published
 from graspsense.plugin_api import Classifier, Features, create, table_of
-from graspsense.trials.simulated import CONTAINERS, THINGS_PER_SEED, TRIALS_PER_SEED, Group
+from graspsense.sources.simulated import CONTAINERS, THINGS_PER_SEED, TRIALS_PER_SEED, Group
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.scene import ObjectSpec, catalogue

@@ -29,8 +29,8 @@ from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
 from graspsense.core.signals import CELLS, EFFORT, Command, Frame, Pads
 from graspsense.plugin_api import create
-from graspsense.trials.layout import PADS_FIELDS, TICK_FIELDS
-from graspsense.trials.recorder import Recorded, Recorder
+from graspsense.recording.layout import PADS_FIELDS, TICK_FIELDS
+from graspsense.recording.recorder import Recorded, Recorder
 
 RATE_HZ = 1000.0
 GOAL_US = 20.0

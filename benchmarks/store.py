@@ -26,9 +26,9 @@ from graspsense.core.errors import GraspsenseError
 from graspsense.core.model import load_model, train
 from graspsense.core.plugins import installed
 from graspsense.plugin_api import create
-from graspsense.trials.content import Beginning, Ending, Row
-from graspsense.trials.store import RecordingFacts, Store
-from graspsense.trials.store_table import labelled_store
+from graspsense.recording.trial_record import Beginning, Ending, Row
+from graspsense.store.dataset import labelled_store
+from graspsense.store.store import RecordingFacts, Store
 
 LABELS = ("can:full_open", "can:empty_open", "odwalla:full_closed", "odwalla:full_open", "odwalla:empty_open")
 FEATURES = (

@@ -4,10 +4,10 @@ import json
 from math import inf, nan
 
 from graspsense.core.signals import CELLS, EFFORT, Command, Frame, Pads
-from graspsense.trials.content import Beginning, Ending, Row
-from graspsense.trials.layout import DEVICE, PADS, START, TICK, TRIAL
-from graspsense.trials.recording_file import RecordingFile
-from graspsense.trials.recover import facts_of
+from graspsense.recording.layout import DEVICE, PADS, START, TICK, TRIAL
+from graspsense.recording.trial_record import Beginning, Ending, Row
+from graspsense.recording.writer import RecordingFile
+from graspsense.store.recover import facts_of
 
 SETTINGS = """\
 [gripper]

@@ -20,9 +20,9 @@ from pathlib import Path
 
 from kept import DEVICE_JSON, beginning, command, ending, frame, pads
 
-from graspsense.trials.layout import DEVICE, START, TICK_WIRE, TRIAL
-from graspsense.trials.recorder import Recorder
-from graspsense.trials.store import RecordingFacts, Store
+from graspsense.recording.layout import DEVICE, START, TICK_WIRE, TRIAL
+from graspsense.recording.recorder import Recorder
+from graspsense.store.store import RecordingFacts, Store
 
 PROGRESS = struct.Struct("<qqq")
 """Trial, tick handed over last, process id of the writer."""

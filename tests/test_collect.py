@@ -10,8 +10,8 @@ import pytest
 
 from graspsense.cli.main import main
 from graspsense.core.errors import ConfigError
-from graspsense.trials.collecting import Collection, Wanted
-from graspsense.trials.store import Store
+from graspsense.store.collecting import Collection, Wanted
+from graspsense.store.store import Store
 
 PLAIN = ["-o", "classifier.type=none"]
 

@@ -12,9 +12,9 @@ from scipy.io import arff
 
 from graspsense.cli.main import main
 from graspsense.core.errors import ConfigError, PluginUnavailable
-from graspsense.trials.features_csv import read_labelled
-from graspsense.trials.store import Store
-from graspsense.trials.store_table import labelled_store, read_dataset
+from graspsense.sources.features_csv import read_labelled
+from graspsense.store.dataset import labelled_store, read_dataset
+from graspsense.store.store import Store
 
 
 @pytest.fixture
@@ -120,7 +120,7 @@ def test_what_cannot_be_written_is_told(folder, export, tmp_path, source, target
 
 
 def test_without_pyarrow_parquet_says_what_to_install(folder, tmp_path, monkeypatch):
-    from graspsense.trials.export_table import trial_table, write_parquet
+    from graspsense.store.export_table import trial_table, write_parquet
 
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(PluginUnavailable, match=r"graspsense\[parquet\]"):

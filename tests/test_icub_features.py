@@ -12,7 +12,7 @@ from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.plugins import installed
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.plugin_api import create
-from graspsense.trials.icub_features import read_dataset
+from graspsense.sources.icub_dataset import read_dataset
 
 real_data = pytest.mark.skipif(
     "GRASPSENSE_ICUB" not in os.environ,

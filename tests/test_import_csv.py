@@ -8,9 +8,9 @@ from grippers import bottle, squeezing
 
 from graspsense.cli.main import main
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.trials.csv_squeeze import named, read_squeeze
-from graspsense.trials.recorded import read_recorded
-from graspsense.trials.store import Store
+from graspsense.recording.reader import read_recorded
+from graspsense.sources.grasp_csv import named, read_squeeze
+from graspsense.store.store import Store
 
 TICKS = 2200
 

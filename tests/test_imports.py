@@ -20,11 +20,24 @@ MAY_KNOW = {
     "__main__": {"cli"},
     "core": {"core"},
     "plugins": {"plugin_api", "plugins"},
-    "trials": {"core", "trials"},
-    "evaluation": {"core", "trials", "evaluation"},
-    "experiments": {"core", "trials", "evaluation", "report", "experiments"},
-    "report": {"core", "trials", "evaluation", "report"},
-    "cli": {"core", "trials", "evaluation", "experiments", "report", "scaffold", "testing", "cli"},
+    "recording": {"core", "recording"},
+    "store": {"core", "recording", "store"},
+    "sources": {"core", "recording", "store", "sources"},
+    "evaluation": {"core", "evaluation"},
+    "report": {"core", "recording", "store", "evaluation", "report"},
+    "experiments": {"core", "recording", "sources", "evaluation", "report", "experiments"},
+    "cli": {
+        "core",
+        "recording",
+        "store",
+        "sources",
+        "evaluation",
+        "experiments",
+        "report",
+        "scaffold",
+        "testing",
+        "cli",
+    },
     "testing": {"core", "plugin_api", "testing"},
     "scaffold": {"core", "scaffold"},
     "plugin_api": {"core"},
@@ -87,7 +100,7 @@ def test_a_room_knows_only_the_rooms_it_may(path):
 
 def test_the_rule_sees_every_way_of_importing():
     source = """
-import graspsense.trials.store
+import graspsense.store.store
 from graspsense import report
 from graspsense.core import config
 from ..cli import main
@@ -97,7 +110,7 @@ def late():
     names = set(imported(ast.parse(source), "graspsense.core"))
 
     assert names == {
-        "graspsense.trials.store",
+        "graspsense.store.store",
         "graspsense.report",
         "graspsense.core",
         "graspsense.cli",

@@ -16,10 +16,10 @@ from pathlib import Path
 import pytest
 from paced_recorder import PROGRESS
 
-from graspsense.trials.recorded import read_recorded
-from graspsense.trials.recover import recover_store
-from graspsense.trials.store import Store
-from graspsense.trials.verify import verify_store
+from graspsense.recording.reader import read_recorded
+from graspsense.store.recover import recover_store
+from graspsense.store.store import Store
+from graspsense.store.verify import verify_store
 
 pytestmark = [
     pytest.mark.slow,

@@ -20,12 +20,12 @@ from graspsense.core.labelled import Labelled
 from graspsense.core.model import load_model, train
 from graspsense.core.plugins import installed
 from graspsense.plugin_api import create
-from graspsense.trials.content import beginning_in, ending_in
-from graspsense.trials.recorded import read_recorded
-from graspsense.trials.recover import recover_file
-from graspsense.trials.store import Store
-from graspsense.trials.store_table import labelled_store
-from graspsense.trials.verify import verify_store
+from graspsense.recording.reader import read_recorded
+from graspsense.recording.trial_record import beginning_in, ending_in
+from graspsense.store.dataset import labelled_store
+from graspsense.store.recover import recover_file
+from graspsense.store.store import Store
+from graspsense.store.verify import verify_store
 
 MUTATIONS = int(os.environ.get("GRASPSENSE_MUTATIONS", "0"))
 NUMBER = MUTATIONS or 150

@@ -6,8 +6,8 @@ import pytest
 from grippers import bottle, squeezing
 
 from graspsense.core.plugins import installed
+from graspsense.sources.grasp_csv import named
 from graspsense.testing import CHECKS, Conformance, examine, parametrize_checks
-from graspsense.trials.csv_squeeze import named
 
 
 def recording(folder):

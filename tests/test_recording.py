@@ -18,9 +18,9 @@ from mcap_ros2.decoder import DecoderFactory
 
 from graspsense import load_pipeline
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.trials.recorded import read_recorded
-from graspsense.trials.recorder import NotKept, Recorder
-from graspsense.trials.recording_file import RecordingFile
+from graspsense.recording.reader import read_recorded
+from graspsense.recording.recorder import NotKept, Recorder
+from graspsense.recording.writer import RecordingFile
 
 OPTIONS = ["classifier.type=none", "gripper.object=can:full_open"]
 
@@ -209,7 +209,7 @@ def test_the_writer_s_process_is_light_and_starts_in_any_folder(tmp_path):
     """A file mcap.py where the user stands is not imported; numpy is not needed to write."""
     (tmp_path / "mcap.py").write_text("raise SystemExit('imported the wrong one')")
     program = (
-        "import sys; sys.argv = ['x']; import graspsense.trials.recording_process; "
+        "import sys; sys.argv = ['x']; import graspsense.recording.writer_process; "
         "print([m for m in ('numpy', 'scipy', 'sklearn', 'sqlite3') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, cwd=tmp_path)

@@ -10,11 +10,11 @@ from kept import beginning, ending, keep, write_recording
 from mcap.reader import make_reader
 
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.trials.recorded import read_recorded
-from graspsense.trials.recorder import NotKept
-from graspsense.trials.recover import recover_file, recover_store
-from graspsense.trials.store import Store
-from graspsense.trials.verify import verify_store
+from graspsense.recording.reader import read_recorded
+from graspsense.recording.recorder import NotKept
+from graspsense.store.recover import recover_file, recover_store
+from graspsense.store.store import Store
+from graspsense.store.verify import verify_store
 
 WITHOUT_END = 140
 """Bytes cut off the end of a file: its footer and a part of its summary."""

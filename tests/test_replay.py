@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 from graspsense.core.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
 from graspsense.core.roles import DeviceInfo
 from graspsense.core.signals import EFFORT, NO_PADS, VELOCITY, Command, Frame
-from graspsense.trials.icub import IcubGrasp, read_grasp, read_recording, relative_readings
-from graspsense.trials.replay import ReplayBackend, ReplayConfig
+from graspsense.sources.icub import IcubGrasp, read_grasp, read_recording, relative_readings
+from graspsense.sources.replay import ReplayBackend, ReplayConfig
 
 REST_DEG = (20.0, 80.0, 10.0, 40.0, 30.0, 50.0, 32.0, 45.0, 5.0)
 """Joints 7 to 15."""

@@ -28,7 +28,7 @@ from graspsense.report.html import Page
 from graspsense.report.matrix import confusion_table
 from graspsense.report.store_page import store_page
 from graspsense.report.svg import INKS, QUIET, Scale
-from graspsense.trials.store import Store
+from graspsense.store.store import Store
 
 SIZES = {"desk": 1280, "phone": 390}
 BROWSER = next(

@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: E
 
 from graspsense import load_pipeline  # noqa: E402
 from graspsense.core.errors import ConfigError, DataDamaged  # noqa: E402
-from graspsense.trials.rosbag import read_bag  # noqa: E402
+from graspsense.sources.rosbag import read_bag  # noqa: E402
 
 PRESSURE_NOW = (
     "pr2_msgs/msg/PressureState",

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from graspsense.trials.store import Store
+from graspsense.store.store import Store
 
 COMMAND = [sys.executable, "-m", "graspsense"]
 

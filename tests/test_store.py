@@ -11,12 +11,12 @@ import pytest
 from kept import beginning, ending, keep, write_recording
 
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.trials import schema
-from graspsense.trials.labels import labels_of
-from graspsense.trials.recorder import NotKept
-from graspsense.trials.recover import facts_of, recover_store
-from graspsense.trials.store import Store
-from graspsense.trials.verify import verify_store
+from graspsense.recording.recorder import NotKept
+from graspsense.store import schema
+from graspsense.store.labels import labels_of
+from graspsense.store.recover import facts_of, recover_store
+from graspsense.store.store import Store
+from graspsense.store.verify import verify_store
 
 
 @pytest.fixture
@@ -91,7 +91,7 @@ def test_readers_read_beside_a_writer_in_another_process(store):
     """A reader sees what was committed, while a transaction is open and after it."""
     keep(store)
     program = (
-        "import sys; from graspsense.trials.store import Store\n"
+        "import sys; from graspsense.store.store import Store\n"
         "with Store.read(sys.argv[1]) as store: print(len(store.page()))"
     )
     with store._transaction() as connection:
@@ -167,7 +167,7 @@ def test_an_older_store_is_brought_up_to_date_with_all_that_is_in_it(tmp_path, m
     monkeypatch.setattr(schema, "VERSIONS", newer)
     schema.expected.cache_clear()
     monkeypatch.setattr(schema, "NEWEST", len(newer))
-    monkeypatch.setattr("graspsense.trials.store.NEWEST", len(newer))
+    monkeypatch.setattr("graspsense.store.store.NEWEST", len(newer))
     with Store.read(tmp_path / "trials") as store:
         assert store.trial(1).values == (0.066, 5.5)
         assert store.query("SELECT mood FROM trial") == [(None,)]

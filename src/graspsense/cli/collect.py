@@ -50,9 +50,9 @@ def collect(
     """
     from graspsense.core.plugins import installed
     from graspsense.core.wiring import check
-    from graspsense.trials.collecting import Collection, Wanted
-    from graspsense.trials.recover import recover_store
-    from graspsense.trials.store import Store
+    from graspsense.store.collecting import Collection, Wanted
+    from graspsense.store.recover import recover_store
+    from graspsense.store.store import Store
 
     wanted = Wanted(
         words=tuple(one.strip() for one in labels.split(",") if one.strip()),

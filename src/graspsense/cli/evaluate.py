@@ -58,7 +58,7 @@ def evaluate(
     with Progress() as progress:
         labelled = trials_of(source, progress, given)
         if keep:
-            from graspsense.trials.features_csv import write_labelled
+            from graspsense.sources.features_csv import write_labelled
 
             write_labelled(Path(keep), labelled)
         found = judge(

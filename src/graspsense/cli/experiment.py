@@ -65,7 +65,7 @@ def experiment(
     from graspsense.experiments.results import Results
     from graspsense.experiments.run import run_experiment
     from graspsense.experiments.summary import summarise
-    from graspsense.trials.recorder import NotKept
+    from graspsense.recording.recorder import NotKept
 
     planned = read_experiment(experiment, options)
     results = Results(Path(out or planned.name))

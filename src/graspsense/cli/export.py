@@ -26,9 +26,10 @@ def export(source: str, target: str, as_json: bool) -> None:
     recording, .toml for the settings that made it. No file is ever overwritten.
     """
     from graspsense.core.errors import ConfigError
-    from graspsense.trials import export_table, export_trace
-    from graspsense.trials.recorded import read_recorded
-    from graspsense.trials.stored import stored_grasp
+    from graspsense.recording import export_trace
+    from graspsense.recording.reader import read_recorded
+    from graspsense.store import export_table
+    from graspsense.store.trial_ref import stored_grasp
 
     path, source = Path(target), source.removeprefix("store:")
     table = Path(source).is_dir()

@@ -51,10 +51,10 @@ def import_(
     from graspsense.core.config import Flag, resolve
     from graspsense.core.plugins import installed
     from graspsense.core.wiring import check
-    from graspsense.trials.csv_squeeze import named
-    from graspsense.trials.importing import import_recording
-    from graspsense.trials.labels import labels_of
-    from graspsense.trials.store import Store
+    from graspsense.sources.grasp_csv import named
+    from graspsense.sources.importing import import_recording
+    from graspsense.store.labels import labels_of
+    from graspsense.store.store import Store
 
     columns = {"time": time, "gap": gap, "effort": effort, "velocity": velocity}
     given = {what: [one] for what, one in columns.items() if one is not None}

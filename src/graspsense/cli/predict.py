@@ -46,7 +46,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     notes: tuple[str, ...] = ()
     table: FeatureTable
     if is_csv(source) and not given["label"]:
-        from graspsense.trials.features_csv import read_table
+        from graspsense.sources.features_csv import read_table
 
         table = read_table(Path(source), asked.names)
     else:

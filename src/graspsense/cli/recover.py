@@ -20,8 +20,8 @@ def recover(source: str, out: str | None, as_json: bool) -> None:
 
     Nothing is deleted: a cut recording stays as .cut. Exit code 5 means that something could not be saved.
     """
-    from graspsense.trials.recover import recover_file, recover_store
-    from graspsense.trials.store import Store
+    from graspsense.store.recover import recover_file, recover_store
+    from graspsense.store.store import Store
 
     if Path(source).is_dir():
         if out is not None:

@@ -48,8 +48,8 @@ def replay(recording: str, pipeline: str | None, options: tuple[str, ...], as_js
 
 def _settings(recording: str, pipeline: str | None, options: tuple[str, ...]) -> Settings:
     from graspsense.core.config import Flag, resolve
-    from graspsense.trials.replay import KINDS, kind_and_name
-    from graspsense.trials.stored import own_settings
+    from graspsense.sources.replay import KINDS, kind_and_name
+    from graspsense.store.trial_ref import own_settings
 
     kind, name = kind_and_name(recording)
     if kind not in KINDS and "#" in recording:

@@ -90,9 +90,9 @@ def _kept(
 ) -> tuple[Trial, dict[str, Any]]:
     """Grasp and keep the trial; return it with what is printed of its keeping."""
     from graspsense.core.plugins import installed
-    from graspsense.trials.keeping import kept_grasp
-    from graspsense.trials.labels import labels_of
-    from graspsense.trials.store import Store
+    from graspsense.store.labels import labels_of
+    from graspsense.store.record_grasp import kept_grasp
+    from graspsense.store.store import Store
 
     labels = {} if label is None else labels_of(label)
     with Store.open(save) as store:

@@ -87,7 +87,7 @@ def classifier_option(command: CommandT) -> CommandT:
 
 def is_csv(source: str) -> bool:
     """Whether this source is a file of features."""
-    from graspsense.trials.source import kind_of
+    from graspsense.sources.trial_source import kind_of
 
     return kind_of(source) == "CSV"
 
@@ -100,7 +100,7 @@ def trials_of(source: str, progress: Progress, given: Mapping[str, Any]) -> Labe
     from graspsense.cli.output import talk
     from graspsense.core.errors import ConfigError
     from graspsense.core.strict import Misfit, structured
-    from graspsense.trials.source import Source, kind_of, labelled_trials
+    from graspsense.sources.trial_source import Source, kind_of, labelled_trials
 
     kind = kind_of(source)
     _refuse_misplaced(kind)
@@ -134,7 +134,7 @@ def trials_of(source: str, progress: Progress, given: Mapping[str, Any]) -> Labe
 
 def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) -> Chosen:
     """Return the classifier that is to learn: by its name, or that of the pipeline where there is one."""
-    from graspsense.trials.source import kind_of
+    from graspsense.sources.trial_source import kind_of
 
     if kind_of(source) == SIMULATED:
         chosen = _settings(given, classifier).classifier

@@ -87,7 +87,7 @@ def train(
     )
     write_model(path, model)
     if keep:
-        from graspsense.trials.features_csv import write_labelled
+        from graspsense.sources.features_csv import write_labelled
 
         write_labelled(Path(keep), labelled)
     for note in labelled.notes:

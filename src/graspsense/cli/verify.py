@@ -17,7 +17,7 @@ EXIT_DAMAGED = 5
 def verify(source: str, as_json: bool) -> None:
     """Check the store DIR with all its recordings, or one recording FILE. Exit code 5 means damage."""
     from graspsense.cli.progress import Progress
-    from graspsense.trials.verify import verify_file, verify_store
+    from graspsense.store.verify import verify_file, verify_store
 
     if Path(source).is_dir():
         with Progress() as progress:

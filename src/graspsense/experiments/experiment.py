@@ -19,7 +19,7 @@ from graspsense.core.plugins import installed
 from graspsense.core.strict import Misfit, Problem, plain, structured
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.task import Task
-from graspsense.trials.source import Source
+from graspsense.sources.trial_source import Source
 
 PIPELINE_TABLES: Final = (*(one for one in TABLE_OF_ROLE.values() if one != "classifier"), "run")
 SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
@@ -80,7 +80,7 @@ class Experiment:
     sweep: Mapping[str, Any] = field(factory=dict)
     """Keys, as `controller.probing_force_n`, each with a list of values: every combination is a case."""
     data: Mapping[str, Any] = field(factory=dict)
-    """Keys of `graspsense.trials.source.Source`."""
+    """Keys of `graspsense.sources.trial_source.Source`."""
     test: Mapping[str, Any] = field(factory=dict)
     """Other trials to judge on, in place of a cross validation."""
     judge: Mapping[str, Any] = field(factory=dict)

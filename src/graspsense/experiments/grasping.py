@@ -18,8 +18,8 @@ from graspsense.core.roles import BatchBackend
 from graspsense.core.signals import Phase
 from graspsense.core.strict import structured
 from graspsense.report.grasps import grasp_as_json
-from graspsense.trials.simulated import THINGS_PER_SEED, TRIALS_PER_SEED
-from graspsense.trials.source import Source, groups_of
+from graspsense.sources.simulated import THINGS_PER_SEED, TRIALS_PER_SEED
+from graspsense.sources.trial_source import Source, groups_of
 
 if TYPE_CHECKING:
     from graspsense.core.trace import Trace

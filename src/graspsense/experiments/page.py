@@ -15,11 +15,11 @@ from graspsense.experiments.findings import MARKDOWN, Findings, write_markdown
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.results import EXPERIMENT, Results
 from graspsense.experiments.summary import Arm, Summary
-from graspsense.report.felt import features_by_class, one_grasp, traces_by_class
-from graspsense.report.honest import TARGETS, control_words, protocol_words
+from graspsense.report.evaluation_sections import code, confusion_section, controls_section, tree_section
 from graspsense.report.html import Page, Section, bullets, facts, folded, pair, paragraph, table
-from graspsense.report.judged import code, confusion_section, controls_section, tree_section
 from graspsense.report.rates import RateRow, rates_over, rates_picture, rates_table
+from graspsense.report.traces import features_by_class, one_grasp, traces_by_class
+from graspsense.report.wording import TARGETS, control_words, protocol_words
 from graspsense.report.write import write_html
 
 NAME: Final = "report.html"

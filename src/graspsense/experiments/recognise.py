@@ -19,7 +19,7 @@ from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.evaluate import Evaluation, evaluate, rate_as_json
 from graspsense.evaluation.intervals import Rate
 from graspsense.report.grasps import grasp_as_json
-from graspsense.trials.source import Source, labelled_trials
+from graspsense.sources.trial_source import Source, labelled_trials
 
 if TYPE_CHECKING:
     from graspsense.core.labelled import Labelled, Target

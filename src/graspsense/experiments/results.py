@@ -28,8 +28,8 @@ from graspsense.core.strict import plain
 from graspsense.experiments.experiment import PipelineOf, Planned
 from graspsense.experiments.task import Done
 from graspsense.experiments.versions import versions
-from graspsense.trials.provenance import of_this_process
-from graspsense.trials.recorder import NotKept
+from graspsense.recording.provenance import of_this_process
+from graspsense.recording.recorder import NotKept
 
 EXPERIMENT: Final = "experiment.toml"
 PIPELINES: Final = "pipelines"

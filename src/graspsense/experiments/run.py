@@ -14,7 +14,7 @@ from graspsense.experiments.results import Results
 from graspsense.experiments.task import Done
 from graspsense.experiments.timing import TimeLeft
 from graspsense.experiments.versions import differences, versions
-from graspsense.trials.recorder import NotKept
+from graspsense.recording.recorder import NotKept
 
 
 @frozen(kw_only=True)

@@ -17,7 +17,7 @@ from attrs import field, frozen
 from graspsense.core.errors import GraspsenseError, named
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.versions import versions
-from graspsense.trials.provenance import json_text
+from graspsense.recording.provenance import json_text
 
 State = Literal["done", "failed"]
 

@@ -65,8 +65,8 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
     """Return the gripper that is a recording."""
     yield SensorBackendEntry(
         name="replay",
-        target="graspsense.trials.replay:ReplayBackend",
-        config="graspsense.trials.replay:ReplayConfig",
+        target="graspsense.sources.replay:ReplayBackend",
+        config="graspsense.sources.replay:ReplayConfig",
         summary="a recording instead of a gripper; a channel it lacks is NaN",
         channels=tuple(Channel(name, unit) for name, unit in CHANNELS.items()),
         accepts=("effort", "velocity", "position", "force"),
@@ -96,12 +96,12 @@ def graspsense_datasets() -> Iterable[DatasetEntry]:
     """Return the readers of other people's recordings."""
     yield DatasetEntry(
         name="icub",
-        target="graspsense.trials.icub_features:read_dataset",
+        target="graspsense.sources.icub_dataset:read_dataset",
         summary="iCub Grasp Dataset (Soh, Su and Demiris 2012), as icub:FOLDER",
     )
     yield DatasetEntry(
         name="store",
-        target="graspsense.trials.store_table:read_dataset",
+        target="graspsense.store.dataset:read_dataset",
         summary="labelled trials of a store, as store:FOLDER",
     )
 

@@ -10,19 +10,19 @@ from graspsense.core.config import Chosen, create_chosen
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import in_words
 from graspsense.evaluation.evaluate import Evaluation, evaluate
-from graspsense.report.felt import features_by_class, one_grasp, traces_by_class
+from graspsense.recording.reader import read_recorded
+from graspsense.report.evaluation_sections import code, confusion_section, controls_section, tree_section
 from graspsense.report.grasps import grasp_as_json
-from graspsense.report.honest import TARGETS, control_words, protocol_words
 from graspsense.report.html import Page, Section, bullets, facts, folded, paragraph, table
-from graspsense.report.judged import code, confusion_section, controls_section, tree_section
 from graspsense.report.rates import RateRow
-from graspsense.trials.recorded import read_recorded
-from graspsense.trials.store import Store
-from graspsense.trials.store_table import labelled_store
+from graspsense.report.traces import features_by_class, one_grasp, traces_by_class
+from graspsense.report.wording import TARGETS, control_words, protocol_words
+from graspsense.store.dataset import labelled_store
+from graspsense.store.store import Store
 
 if TYPE_CHECKING:
     from graspsense.core.labelled import Labelled, Target
-    from graspsense.trials.store import Kept, Listed
+    from graspsense.store.store import Kept, Listed
 
 GRASPS: Final = 3
 """Of each label, drawn over each other."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from graspsense.recording.recorder import NotKept
 from graspsense.report.html import Page
-from graspsense.trials.recorder import NotKept
 
 
 def write_html(path: Path, page: Page) -> None:

@@ -32,8 +32,8 @@ from graspsense.core.plugins import installed
 from graspsense.core.signals import Command, Frame, Outcome, Pads, Phase
 from graspsense.core.trial import GraspEvent, Trial
 from graspsense.plugin_api import DeviceLost, NoDevice, create
-from graspsense.trials.keeping import kept_grasp
-from graspsense.trials.store import Store
+from graspsense.store.record_grasp import kept_grasp
+from graspsense.store.store import Store
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.discovery import on_the_bus
 from graspsense_pr2_gripper.emulator import board, uhid, vhci  # noqa: F401 (for those that are forked)

@@ -17,7 +17,7 @@ def main() -> None:
 
     from graspsense.experiments.task import run_task
     from graspsense.experiments.versions import versions
-    from graspsense.trials.provenance import json_text
+    from graspsense.recording.provenance import json_text
 
     def answer(text: str) -> None:
         try:

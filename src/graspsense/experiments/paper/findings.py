@@ -17,10 +17,10 @@ from graspsense.experiments.paper.claims import Claim, claims, curve
 from graspsense.experiments.paper.published import Published, published
 from graspsense.experiments.paper.rows import HEADER, Row, arm_of, people_beside_robot, rows
 from graspsense.experiments.summary import Summary
-from graspsense.report.felt import one_grasp
 from graspsense.report.html import Section, bullets, figure, pair, panels, paragraph
 from graspsense.report.matrix import confusion_table
 from graspsense.report.svg import INKS, Picture, reaching
+from graspsense.report.traces import one_grasp
 from graspsense.report.tree import tree_list
 
 

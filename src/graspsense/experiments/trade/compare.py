@@ -19,8 +19,8 @@ from graspsense.experiments.trade.judging import (
     learners_of,
     settings_of,
 )
-from graspsense.trials.simulated import simulated
-from graspsense.trials.source import Source, groups_of
+from graspsense.sources.simulated import simulated
+from graspsense.sources.trial_source import Source, groups_of
 
 
 @frozen(kw_only=True)

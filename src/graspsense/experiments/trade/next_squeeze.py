@@ -22,8 +22,8 @@ from graspsense.evaluation.evaluate import INSTANCE_HELD_OUT
 from graspsense.evaluation.folds import instance_held_out
 from graspsense.experiments.trade.costs import CostOnly
 from graspsense.experiments.trade.judging import aimed, entry, learners_of
-from graspsense.trials.simulated import simulated
-from graspsense.trials.source import Source, groups_of
+from graspsense.sources.simulated import simulated
+from graspsense.sources.trial_source import Source, groups_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

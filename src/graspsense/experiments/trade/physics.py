@@ -14,8 +14,8 @@ from graspsense.core.strict import structured
 from graspsense.experiments.recognise import TEST_SEED_OFFSET
 from graspsense.experiments.trade.costs import CostOnly
 from graspsense.experiments.trade.judging import aimed, entry, learners_of, settings_of
-from graspsense.trials.simulated import simulated
-from graspsense.trials.source import Source, groups_of
+from graspsense.sources.simulated import simulated
+from graspsense.sources.trial_source import Source, groups_of
 
 
 @frozen(kw_only=True)

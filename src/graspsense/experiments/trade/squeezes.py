@@ -15,9 +15,9 @@ from graspsense.evaluation.evaluate import INSTANCE_HELD_OUT
 from graspsense.evaluation.folds import instance_held_out
 from graspsense.experiments.trade.costs import CostOnly, seconds
 from graspsense.experiments.trade.judging import FOLDS, aimed, entry, groups_of, learners_of, settings_of
-from graspsense.trials.simulated import simulated
-from graspsense.trials.source import Source
-from graspsense.trials.source import groups_of as groups_of_source
+from graspsense.sources.simulated import simulated
+from graspsense.sources.trial_source import Source
+from graspsense.sources.trial_source import groups_of as groups_of_source
 
 LEAST = 1e-3
 """A label that a tree gives no trial may still be the right one."""

@@ -19,7 +19,7 @@ from graspsense.core.roles import BatchBackend, Controller, FeatureSet, SensorBa
 from graspsense.core.runner import run_grasp
 from graspsense.core.strict import plain
 from graspsense.core.wiring import check
-from graspsense.trials.before_contact import before_contact
+from graspsense.recording.before_contact import before_contact
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings

@@ -12,30 +12,30 @@ from attrs.validators import instance_of
 from graspsense.core.errors import DeviceLost, RecordingEnded, suggestion
 from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
 from graspsense.core.signals import EFFORT, Command, Pads
-from graspsense.trials.icub import read_recording
-from graspsense.trials.recording import Recording
+from graspsense.recording.replayable import Recording
+from graspsense.sources.icub import read_recording
 
 
 def _mcap(name: str) -> Recording:
-    from graspsense.trials.recorded import read_recorded
+    from graspsense.recording.reader import read_recorded
 
     return read_recorded(name).recording()
 
 
 def _stored(name: str) -> Recording:
-    from graspsense.trials.stored import stored_recording
+    from graspsense.store.trial_ref import stored_recording
 
     return stored_recording(name)
 
 
 def _csv(name: str) -> Recording:
-    from graspsense.trials.csv_squeeze import read_squeeze
+    from graspsense.sources.grasp_csv import read_squeeze
 
     return read_squeeze(name)
 
 
 def _bag(name: str) -> Recording:
-    from graspsense.trials.rosbag import read_bag
+    from graspsense.sources.rosbag import read_bag
 
     return read_bag(name)
 

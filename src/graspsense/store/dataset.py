@@ -16,9 +16,9 @@ import numpy as np
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import FeatureTable
 from graspsense.core.labelled import Control, Labelled
-from graspsense.trials.before_contact import SPAN_S
-from graspsense.trials.provenance import recipe
-from graspsense.trials.store import COUNTS, Store
+from graspsense.recording.before_contact import SPAN_S
+from graspsense.recording.provenance import recipe
+from graspsense.store.store import COUNTS, Store
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -22,7 +22,7 @@ from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.roles import Reading
 from graspsense.core.signals import CELLS, NO_PADS, Frame, Pads
 from graspsense.core.trace import SI_UNITS, Trace, trace_of
-from graspsense.trials.layout import (
+from graspsense.recording.layout import (
     CDR_HEADER,
     DEVICE,
     PADS,
@@ -36,7 +36,7 @@ from graspsense.trials.layout import (
     TICK_TOPIC,
     VERSION,
 )
-from graspsense.trials.recording import Recording
+from graspsense.recording.replayable import Recording
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

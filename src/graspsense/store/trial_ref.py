@@ -7,10 +7,10 @@ import tomllib
 from graspsense.core.config import NONE
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.layers import Layer
-from graspsense.trials.content import beginning_in
-from graspsense.trials.recorded import RecordedGrasp, read_recorded
-from graspsense.trials.recording import Recording
-from graspsense.trials.store import Store
+from graspsense.recording.reader import RecordedGrasp, read_recorded
+from graspsense.recording.replayable import Recording
+from graspsense.recording.trial_record import beginning_in
+from graspsense.store.store import Store
 
 
 def folder_and_number(name: str) -> tuple[str, int]:

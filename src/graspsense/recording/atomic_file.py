@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from graspsense.core.errors import ConfigError
-from graspsense.trials.recorder import NotKept
+from graspsense.recording.recorder import NotKept
 
 
 def write_whole(path: Path, data: bytes) -> None:

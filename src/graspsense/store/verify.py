@@ -10,10 +10,10 @@ from typing import Any
 from attrs import frozen
 
 from graspsense.core.errors import DataDamaged, GraspsenseError
-from graspsense.trials.layout import PART
-from graspsense.trials.recorded import read_recorded
-from graspsense.trials.recover import CUT
-from graspsense.trials.store import Store, integrity, stored_rows
+from graspsense.recording.layout import PART
+from graspsense.recording.reader import read_recorded
+from graspsense.store.recover import CUT
+from graspsense.store.store import Store, integrity, stored_rows
 
 Progress = Callable[[int, int], None]
 

@@ -23,7 +23,7 @@ from attrs import frozen
 
 from graspsense.core.errors import GraspsenseError
 from graspsense.core.signals import Command, Frame, Pads
-from graspsense.trials.layout import (
+from graspsense.recording.layout import (
     IS_END,
     IS_METADATA,
     IS_PADS,
@@ -87,7 +87,7 @@ class Recorder:
     def __init__(self, path: Path) -> None:
         self.path = path
         # -P: a file mcap.py in the folder where the user stands is not ours.
-        command = [sys.executable, "-P", "-m", "graspsense.trials.recording_process", str(path)]
+        command = [sys.executable, "-P", "-m", "graspsense.recording.writer_process", str(path)]
         try:
             self._process = subprocess.Popen(
                 command,

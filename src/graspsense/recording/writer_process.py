@@ -3,7 +3,7 @@
 It is another process because a thread that compresses a chunk holds the interpreter for milliseconds. It reads
 every 10 ms instead of at every tick, so that it does not wake up in the middle of the control loop's work.
 
-    python -m graspsense.trials.recording_process FILE.mcap
+    python -m graspsense.recording.writer_process FILE.mcap
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 from typing import Final
 
-from graspsense.trials.layout import (
+from graspsense.recording.layout import (
     IS_END,
     IS_METADATA,
     IS_PADS,
@@ -26,7 +26,7 @@ from graspsense.trials.layout import (
     READY,
     TICK_WIRE,
 )
-from graspsense.trials.recording_file import RecordingFile
+from graspsense.recording.writer import RecordingFile
 
 READ_EVERY_S: Final = 0.01
 READ_BYTES: Final = 1 << 20

@@ -27,7 +27,7 @@ from graspsense.core.calibration import Cells, edge_force, masked, pad_force, ta
 from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable, TareRefused
 from graspsense.core.roles import Reading
 from graspsense.core.signals import CELLS, NO_PADS, Frame, Pads
-from graspsense.trials.recording import Recording
+from graspsense.recording.replayable import Recording
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.trace import PAD_COLUMNS, TICK_COLUMNS
-from graspsense.trials.content import beginning_in
-from graspsense.trials.export_table import parquet
-from graspsense.trials.layout import PADS_FIELDS, TICK_FIELDS
-from graspsense.trials.whole_file import write_whole
+from graspsense.recording.atomic_file import write_whole
+from graspsense.recording.layout import PADS_FIELDS, TICK_FIELDS
+from graspsense.recording.parquet import parquet
+from graspsense.recording.trial_record import beginning_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.trials.recorded import RecordedGrasp
+    from graspsense.recording.reader import RecordedGrasp
 
 
 def write_csv(path: Path, grasp: RecordedGrasp) -> None:

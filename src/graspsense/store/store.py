@@ -30,10 +30,10 @@ from attrs import frozen
 
 from graspsense import __version__
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.trials.content import Beginning, Ending
-from graspsense.trials.provenance import json_text, recipe
-from graspsense.trials.recorder import NotKept
-from graspsense.trials.schema import APPLICATION_ID, NEWEST, expected, found, migrate
+from graspsense.recording.provenance import json_text, recipe
+from graspsense.recording.recorder import NotKept
+from graspsense.recording.trial_record import Beginning, Ending
+from graspsense.store.schema import APPLICATION_ID, NEWEST, expected, found, migrate
 
 FILE: Final = "store.sqlite"
 RECORDINGS: Final = "recordings"

@@ -18,9 +18,9 @@ from attrs import field, frozen
 from graspsense.core.config import to_toml
 from graspsense.core.errors import DataDamaged
 from graspsense.core.trial import trial_as_json
-from graspsense.trials.before_contact import before_contact
-from graspsense.trials.layout import DEVICE, START, TRIAL, VERSION
-from graspsense.trials.provenance import json_text, provenance
+from graspsense.recording.before_contact import before_contact
+from graspsense.recording.layout import DEVICE, START, TRIAL, VERSION
+from graspsense.recording.provenance import json_text, provenance
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from attrs import frozen
 
 from graspsense.core.pipeline import grasp_with
-from graspsense.trials.content import DEVICE, START, TRIAL, Origin, beginning, device_metadata, ending
-from graspsense.trials.recorder import NotKept, Recorder
-from graspsense.trials.store import RecordingFacts, Store
+from graspsense.recording.recorder import NotKept, Recorder
+from graspsense.recording.trial_record import DEVICE, START, TRIAL, Origin, beginning, device_metadata, ending
+from graspsense.store.store import RecordingFacts, Store
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings

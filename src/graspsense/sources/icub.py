@@ -25,7 +25,7 @@ from attrs import frozen
 from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.roles import Reading
 from graspsense.core.signals import NO_PADS, Frame
-from graspsense.trials.recording import Recording
+from graspsense.recording.replayable import Recording
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -13,19 +13,16 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.errors import ConfigError, PluginUnavailable
-from graspsense.trials.store import Store
-from graspsense.trials.store_table import feature_table
-from graspsense.trials.whole_file import write_whole
+from graspsense.core.errors import ConfigError
+from graspsense.recording.atomic_file import write_whole
+from graspsense.recording.parquet import parquet
+from graspsense.store.dataset import feature_table
+from graspsense.store.store import Store
 
 if TYPE_CHECKING:
     from graspsense.core.features import FeatureTable
 
 ABOUT: Final = ("trial", "made_at", "label", "instance", "outcome", "origin", "device", "recording")
-PARQUET_HINT: Final = (
-    'Parquet needs pyarrow.\n  in a clone: pip install -e ".[parquet]"     published: '
-    'pip install "graspsense[parquet]"'
-)
 
 
 @frozen(kw_only=True, eq=False)
@@ -116,24 +113,6 @@ def write_parquet(path: Path, table: TrialTable) -> None:
         values = [None if math.isnan(value) else value for value in features.values[:, k].tolist()]
         columns[name] = (values, unit)
     write_whole(path, parquet(columns))
-
-
-def parquet(columns: Mapping[str, tuple[Any, str]]) -> bytes:
-    """Return a Parquet file of these columns, each with its unit. Raises PluginUnavailable without pyarrow."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError as error:
-        raise PluginUnavailable(PARQUET_HINT) from error
-    arrays = {name: pyarrow.array(values) for name, (values, _) in columns.items()}
-    fields = [
-        pyarrow.field(name, array.type, metadata={"unit": columns[name][1]} if columns[name][1] else None)
-        for name, array in arrays.items()
-    ]
-    table = pyarrow.Table.from_arrays(list(arrays.values()), schema=pyarrow.schema(fields))
-    out = pyarrow.BufferOutputStream()
-    pyarrow.parquet.write_table(table, out)
-    return bytes(out.getvalue())
 
 
 WRITERS: Final[Mapping[str, Callable[[Path, TrialTable], None]]] = {

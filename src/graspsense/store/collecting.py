@@ -15,11 +15,11 @@ from attrs import define, field, frozen
 
 from graspsense.core.errors import ConfigError, NoDevice
 from graspsense.core.signals import Outcome
-from graspsense.trials.keeping import KeptGrasp, kept_grasp
-from graspsense.trials.labels import labels_of
-from graspsense.trials.provenance import recipe
-from graspsense.trials.recorder import NotKept
-from graspsense.trials.store import Kept, Listed, Store
+from graspsense.recording.provenance import recipe
+from graspsense.recording.recorder import NotKept
+from graspsense.store.labels import labels_of
+from graspsense.store.record_grasp import KeptGrasp, kept_grasp
+from graspsense.store.store import Kept, Listed, Store
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings

@@ -22,7 +22,7 @@ from graspsense.core.labelled import Control, Labelled
 from graspsense.core.roles import FeatureSet
 from graspsense.core.signals import APPROACH
 from graspsense.core.trace import SI_UNITS, Trace, trace_of
-from graspsense.trials.icub import (
+from graspsense.sources.icub import (
     DATA_FOLDER,
     FINGER_FLEXION,
     FINGERS,

@@ -20,8 +20,8 @@ from urllib.parse import parse_qsl, urlencode
 from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.roles import Reading
 from graspsense.core.signals import NO_PADS, Frame
-from graspsense.trials.features_csv import Columns
-from graspsense.trials.recording import Recording
+from graspsense.recording.replayable import Recording
+from graspsense.sources.features_csv import Columns
 
 NEEDED: Final = ("time", "gap", "force")
 KNOWN: Final = (*NEEDED, "effort", "velocity")

@@ -20,14 +20,14 @@ from graspsense.core.config import build
 from graspsense.core.errors import ConfigError, DataDamaged, GraspsenseError
 from graspsense.core.features import Features
 from graspsense.core.plugins import installed
-from graspsense.trials.before_contact import before_contact
-from graspsense.trials.content import Ending, Row, beginning_in, ending_in
-from graspsense.trials.layout import DEVICE, PART, START, TICK
-from graspsense.trials.layout import PADS as PADS_STRUCT
-from graspsense.trials.recorded import RecordedGrasp, read_recorded
-from graspsense.trials.recorder import NotKept
-from graspsense.trials.recording_file import RecordingFile, Written
-from graspsense.trials.store import RecordingFacts, Store
+from graspsense.recording.before_contact import before_contact
+from graspsense.recording.layout import DEVICE, PART, START, TICK
+from graspsense.recording.layout import PADS as PADS_STRUCT
+from graspsense.recording.reader import RecordedGrasp, read_recorded
+from graspsense.recording.recorder import NotKept
+from graspsense.recording.trial_record import Ending, Row, beginning_in, ending_in
+from graspsense.recording.writer import RecordingFile, Written
+from graspsense.store.store import RecordingFacts, Store
 
 if TYPE_CHECKING:
     from graspsense.core.trace import Trace

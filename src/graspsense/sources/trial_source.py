@@ -10,7 +10,7 @@ from attrs import fields_dict, frozen
 
 from graspsense.core.errors import ConfigError, PluginUnavailable
 from graspsense.core.labelled import Labelled
-from graspsense.trials.simulated import Group, simulated
+from graspsense.sources.simulated import Group, simulated
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings
@@ -99,7 +99,7 @@ def groups_of(source: Source) -> tuple[Group, ...]:
 
 
 def _csv(source: Source) -> Labelled:
-    from graspsense.trials.features_csv import read_labelled
+    from graspsense.sources.features_csv import read_labelled
 
     if not source.label:
         raise ConfigError(f"which column of {source.source} holds the label? Name it: --label COLUMN")

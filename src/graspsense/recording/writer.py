@@ -18,7 +18,7 @@ from attrs import frozen
 from mcap.writer import CompressionType, Writer
 
 from graspsense import __version__
-from graspsense.trials.layout import CDR_HEADER, PADS_TOPIC, PART, SCHEMAS, TICK_TOPIC
+from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, PART, SCHEMAS, TICK_TOPIC
 
 CHUNK_NS: Final = 50_000_000
 

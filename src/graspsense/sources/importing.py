@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 from graspsense.core.pipeline import grasp_with
 from graspsense.core.signals import APPROACH
-from graspsense.trials.content import DEVICE, START, TRIAL, beginning, device_metadata, ending
-from graspsense.trials.layout import PADS, TICK
-from graspsense.trials.recorder import NotKept
-from graspsense.trials.recording_file import RecordingFile, Written
-from graspsense.trials.replay import KINDS, kind_and_name
-from graspsense.trials.store import RecordingFacts
+from graspsense.recording.layout import PADS, TICK
+from graspsense.recording.recorder import NotKept
+from graspsense.recording.trial_record import DEVICE, START, TRIAL, beginning, device_metadata, ending
+from graspsense.recording.writer import RecordingFile, Written
+from graspsense.sources.replay import KINDS, kind_and_name
+from graspsense.store.store import RecordingFacts
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from graspsense.core.config import Settings
     from graspsense.core.plugins import Plugins
     from graspsense.core.trial import Trial
-    from graspsense.trials.recording import Recording
-    from graspsense.trials.store import Store
+    from graspsense.recording.replayable import Recording
+    from graspsense.store.store import Store
 
 
 def import_recording(

@@ -1,0 +1,1 @@
+"""Where trials come from besides a gripper: the iCub data set, CSV files, ROS bags, simulation, stored trials."""

@@ -1,1 +1,0 @@
-"""Grasps that were made elsewhere or earlier: recordings and what replays them."""
