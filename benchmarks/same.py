@@ -1,0 +1,356 @@
+"""Compare two versions of the project to the last bit, and their speed in turn. Simulated grasps.
+
+    python benchmarks/same.py BASE [--scenes 60] [--rounds 9] [--only NAME ...] [--keep FOLDER] [--json]
+
+BASE is a commit, or a folder with a checkout. It is compared with the checkout that this file belongs to, which the
+running interpreter has installed. BASE gets an environment of its own: the `.venv` of its checkout, or a new one with
+the same packages (some minutes; `--keep FOLDER` keeps it for the next time). Compiled code and chosen models are cached
+apart for each version.
+
+Compared are the traces, outcomes and features of every object of the catalogue under three controllers, with ideal
+sensors and with pads, one grasp at a time and as a batch; sixty random scenes of `benchmarks/selection.py`, with the
+spread of friction and without; an emulated PR2 gripper; the trees of the C4.5 oracles by both engines; and the default
+model, as shipped and trained again. Two numbers are the same where all their bits are; NaN equals NaN. Whatever differs
+is listed with the largest difference, and the exit code is then 1. Times are processor times of one thread; the two
+versions are timed in turn, and the table gives the median ratio of the rounds with its range.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from datetime import date
+from pathlib import Path
+from typing import IO, Any, Final
+
+import numpy as np
+from attrs import field, frozen
+
+ROOT: Final = Path(__file__).resolve().parent.parent
+PROBE: Final = Path(__file__).with_name("same_probe.py")
+COMPARED: Final = (
+    "catalogue, single",
+    "catalogue, batch",
+    "random scenes",
+    "emulated PR2",
+    "C4.5 oracles",
+    "default model",
+)
+PACKAGES: Final = ("numpy", "numba", "llvmlite", "scipy", "scikit-learn")
+LISTED: Final = 12
+"""Differences of one group that are listed by name."""
+
+
+@frozen(kw_only=True)
+class Version:
+    """A checkout and the interpreter that has it installed."""
+
+    name: str
+    checkout: Path
+    python: Path
+
+
+class Probe:
+    """A process of one version that answers requests."""
+
+    def __init__(self, version: Version, cache: Path) -> None:
+        self.name = version.name
+        # The same single thread and no cache of another version's models or compiled code.
+        environment = {**os.environ, "XDG_CACHE_HOME": str(cache), "OMP_NUM_THREADS": "1"}
+        environment.pop("PYTHONPATH", None)
+        self._process = subprocess.Popen(
+            [str(version.python), "-P", str(PROBE)],
+            cwd=version.checkout,
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def __enter__(self) -> Probe:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+    def send(self, request: Mapping[str, Any]) -> None:
+        to: IO[str] | None = self._process.stdin
+        assert to is not None
+        print(json.dumps(request), file=to, flush=True)
+
+    def answer(self) -> dict[str, Any]:
+        """Return the answer to the request before. Raises SystemExit where the process has ended."""
+        of: IO[str] | None = self._process.stdout
+        assert of is not None
+        line = of.readline()
+        if not line:
+            raise SystemExit(f"same: the process of {self.name} ended; its error is above")
+        answer: dict[str, Any] = json.loads(line)
+        return answer
+
+    def ask(self, request: Mapping[str, Any]) -> dict[str, Any]:
+        self.send(request)
+        return self.answer()
+
+
+@frozen(kw_only=True)
+class Difference:
+    """One array that is not the same in both versions."""
+
+    name: str
+    what: str
+    largest: float = field(default=float("nan"))
+
+
+def difference(name: str, before: np.ndarray | None, after: np.ndarray | None) -> Difference | None:
+    """Return how an array differs between the versions; None where every bit is the same."""
+    if before is None or after is None:
+        return Difference(name=name, what="only in BASE" if after is None else "only in this checkout")
+    if before.shape != after.shape:
+        return Difference(name=name, what=f"shape {before.shape} became {after.shape}")
+    if before.dtype.kind in "US" or after.dtype.kind in "US":
+        same = bool(np.array_equal(before, after))
+        return None if same else Difference(name=name, what=f"{before.tolist()} became {after.tolist()}")
+    old, new = before.astype(float), after.astype(float)
+    unlike = (old.view(np.int64) != new.view(np.int64)) & ~(np.isnan(old) & np.isnan(new))
+    if not unlike.any():
+        return None
+    first = int(np.flatnonzero(unlike.ravel())[0])
+    largest = float(np.nanmax(np.abs(new - old)))
+    what = (
+        f"{int(unlike.sum())} of {unlike.size} numbers, the first at index {first}: "
+        f"{old.ravel()[first]!r} became {new.ravel()[first]!r}"
+    )
+    return Difference(name=name, what=what, largest=largest)
+
+
+def differences(before: Path, after: Path) -> tuple[int, list[Difference]]:
+    """Return how many arrays were compared and those that differ."""
+    with np.load(before) as old, np.load(after) as new:
+        names = list(dict.fromkeys([*old.files, *new.files]))
+        pairs = [
+            (name, old[name] if name in old.files else None, new[name] if name in new.files else None)
+            for name in names
+        ]
+    compared = [difference(name.replace("|", "/"), *pair) for name, *pair in pairs]
+    return len(names), [one for one in compared if one is not None]
+
+
+def run(*words: str | Path, cwd: Path = ROOT) -> str:
+    return subprocess.run(
+        [str(word) for word in words], cwd=cwd, check=True, stdout=subprocess.PIPE, text=True
+    ).stdout
+
+
+def base_version(base: str, keep: Path) -> Version:
+    """Return BASE with an environment that has it installed, made in `keep` where there is none yet."""
+    if Path(base).is_dir():
+        checkout, name = Path(base).resolve(), base
+        home = keep / "environment"
+    else:
+        name = run("git", "rev-parse", "--short=12", f"{base}^{{commit}}").strip()
+        home = keep / name
+        checkout = home / "checkout"
+        if not checkout.exists():
+            checkout.mkdir(parents=True)
+            archive = home / "checkout.tar"
+            run("git", "archive", "--output", archive, name)
+            shutil.unpack_archive(archive, checkout, filter="data")
+            archive.unlink()
+    own = checkout / ".venv" / "bin" / "python"
+    if own.exists():
+        return Version(name=name, checkout=checkout, python=own)
+    python = home / "environment" / "bin" / "python"
+    if not python.exists():
+        print(f"same: installing {name} (some minutes)", file=sys.stderr)
+        run(sys.executable, "-m", "venv", python.parent.parent)
+        run(python, "-m", "pip", "install", "--quiet", "-r", "requirements-dev.txt", cwd=checkout)
+    return Version(name=name, checkout=checkout, python=python)
+
+
+def catalogue() -> list[str]:
+    """Return the names of all objects of the catalogue, each in each of its states."""
+    (path,) = (ROOT / "plugins" / "sim_gripper" / "src").rglob("catalogue.toml")
+    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    names = []
+    for name, table in tables.items():
+        states = table.get("states")
+        names += [f"{name}:{state}" for state in states] if states else [name]
+    return names
+
+
+def scene_files(count: int, folder: Path) -> list[dict[str, Any]]:
+    """Write random scenes of `benchmarks/selection.py` as files; return each with its gripper settings and speed."""
+    from selection import scene_of
+
+    scenes = []
+    for number in range(count):
+        scene = scene_of(number)
+        path = folder / f"scene{number}.toml"
+        lines = [
+            f"width_m = {scene.spec.width_m!r}",
+            f"offset_m = {scene.spec.offset_m!r}",
+            f"mass_kg = {scene.spec.mass_kg!r}",
+            f"held = {str(scene.spec.held).lower()}",
+        ]
+        for kind, parameters in scene.spec.terms:
+            lines += ["", "[[terms]]", f'type = "{kind}"']
+            lines += [f"{key} = {float(value)!r}" for key, value in parameters.items()]
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        keys = (
+            "open_gap_m",
+            "damping_n_s_m",
+            "skin_n_m",
+            "skin_damping_n_s_m",
+            "skin_creep_n_m",
+            "skin_creep_s",
+        )
+        config = {key: float(getattr(scene.config, key)) for key in keys} | {"sensor": "ideal"}
+        scenes.append({"file": str(path), "config": config, "speed_m_s": scene.speed_m_s})
+    return scenes
+
+
+def versions_of(version: Version) -> dict[str, str]:
+    """Return the versions of the packages that decide bits."""
+    code = (
+        "import json, platform, importlib.metadata as m; "
+        f"print(json.dumps({{'python': platform.python_version(), **{{n: m.version(n) for n in {PACKAGES!r}}}}}))"
+    )
+    found: dict[str, str] = json.loads(run(version.python, "-c", code))
+    return found
+
+
+def compare(
+    probes: Sequence[Probe], names: Sequence[str], request: dict[str, Any], folder: Path
+) -> list[dict[str, Any]]:
+    """Record each group in both versions, side by side, and return what differs."""
+    groups = []
+    for name in names:
+        files = [folder / f"{k}.npz" for k in range(2)]
+        for probe, path in zip(probes, files, strict=True):
+            probe.send({**request, "record": name, "to": str(path)})
+        for probe in probes:
+            probe.answer()
+        count, unlike = differences(*files)
+        groups.append({"group": name, "compared": count, "different": unlike})
+        print(f"same: {name}: {len(unlike)} of {count} differ", file=sys.stderr)
+    return groups
+
+
+def time_in_turn(probes: Sequence[Probe], request: dict[str, Any], rounds: int) -> list[dict[str, Any]]:
+    """Return the ratio of times, this checkout over BASE, of each thing that is timed."""
+    names, _ = [probe.ask({**request, "prepare": True})["timings"] for probe in probes]
+    rows = []
+    for name in names:
+        pairs = [[probe.ask({"time": name})["s"] for probe in probes] for _ in range(rounds)]
+        ratios = sorted(after / before for before, after in pairs)
+        rows.append(
+            {
+                "timed": name,
+                "base_s": statistics.median(before for before, _ in pairs),
+                "here_s": statistics.median(after for _, after in pairs),
+                "ratio": statistics.median(ratios),
+                "ratio_least": ratios[0],
+                "ratio_most": ratios[-1],
+            }
+        )
+    return rows
+
+
+def text_of(result: Mapping[str, Any]) -> str:
+    """Return the result as a person reads it."""
+    lines = [
+        f"{result['base']} (BASE) and {result['here']} (this checkout), {result['date']}, {result['machine']}",
+        "",
+    ]
+    if result["versions_base"] != result["versions_here"]:
+        lines += [f"Packages differ: {result['versions_base']} and {result['versions_here']}.", ""]
+    lines.append(f"{'group':<20} {'compared':>9} {'different':>9}")
+    for group in result["groups"]:
+        lines.append(f"{group['group']:<20} {group['compared']:>9} {len(group['different']):>9}")
+    for group in result["groups"]:
+        for one in group["different"][:LISTED]:
+            lines.append(f"  {group['group']}: {one.name}: {one.what} (largest {one.largest:g})")
+        if len(group["different"]) > LISTED:
+            lines.append(f"  {group['group']}: and {len(group['different']) - LISTED} more")
+    if result["times"]:
+        lines += ["", f"{'processor time':<22} {'BASE s':>9} {'here s':>9} {'ratio':>6}  range"]
+    for row in result["times"]:
+        lines.append(
+            f"{row['timed']:<22} {row['base_s']:>9.4f} {row['here_s']:>9.4f} {row['ratio']:>6.3f}"
+            f"  {row['ratio_least']:.3f} to {row['ratio_most']:.3f}"
+        )
+    return "\n".join(lines)
+
+
+def parsed() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description="Compare two versions of the project to the last bit.")
+    parser.add_argument("base", help="a commit, or a folder with a checkout")
+    parser.add_argument("--scenes", type=int, default=60, help="how many random scenes (60)")
+    parser.add_argument(
+        "--rounds", type=int, default=9, help="how often each version is timed (9); 0: not at all"
+    )
+    parser.add_argument(
+        "--only", nargs="+", choices=COMPARED, default=COMPARED, help="the groups that are compared"
+    )
+    parser.add_argument(
+        "--keep", type=Path, help="folder that keeps the environment of BASE for the next time"
+    )
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    return parser.parse_args()
+
+
+def main() -> int:
+    """Compare, print, and return 1 where something differs."""
+    given = parsed()
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="graspsense-same.")))
+        keep = folder if given.keep is None else given.keep.resolve()
+        keep.mkdir(parents=True, exist_ok=True)
+        here = Version(name="here", checkout=ROOT, python=Path(sys.executable))
+        base = base_version(given.base, keep)
+        request = {
+            "objects": catalogue(),
+            "c45": str(ROOT / "plugins" / "c45" / "tests" / "weka"),
+            "folder": str(folder),
+            "scenes": scene_files(given.scenes, folder) if "random scenes" in given.only else [],
+            "spring": str(ROOT / "benchmarks" / "spring.toml"),
+            "linear": {"transmission": "straight", "breakaway_n": 7.0},
+        }
+        probes = [
+            stack.enter_context(Probe(version, folder / f"cache{k}"))
+            for k, version in enumerate((base, here))
+        ]
+        result = {
+            "base": base.name,
+            "here": run("git", "describe", "--always", "--dirty").strip(),
+            "date": date.today().isoformat(),
+            "machine": f"{platform.machine()}, {os.cpu_count()} processors, {platform.system()}",
+            "versions_base": versions_of(base),
+            "versions_here": versions_of(here),
+            "groups": compare(probes, given.only, request, folder),
+            "times": time_in_turn(probes, request, given.rounds) if given.rounds else [],
+        }
+    if given.json:
+        from attrs import asdict
+
+        groups = [{**one, "different": [asdict(d) for d in one["different"]]} for one in result["groups"]]
+        print(json.dumps({**result, "groups": groups}, indent=1))
+    else:
+        print(text_of(result))
+    return 1 if any(group["different"] for group in result["groups"]) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

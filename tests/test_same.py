@@ -1,0 +1,50 @@
+"""What `benchmarks/same.py` calls the same: every bit, with NaN equal to NaN."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from same import catalogue, difference, differences
+
+ONE = np.array([1.0, math.nan, -0.0])
+
+
+def test_equal_bits_and_nan_are_the_same():
+    assert difference("a", ONE, ONE.copy()) is None
+
+
+@pytest.mark.parametrize(
+    "after", [[np.nextafter(1.0, 2.0), math.nan, -0.0], [1.0, 0.0, -0.0], [1.0, math.nan, 0.0]]
+)
+def test_the_last_bit_a_lost_nan_and_the_sign_of_zero_are_differences(after):
+    assert difference("a", ONE, np.array(after)) is not None
+
+
+def test_another_shape_and_a_missing_array_are_differences():
+    assert difference("a", ONE, ONE[:2]).what == "shape (3,) became (2,)"
+    assert difference("a", None, ONE).what == "only in this checkout"
+    assert difference("a", ONE, None).what == "only in BASE"
+
+
+def test_the_largest_difference_is_reported():
+    assert difference("a", np.array([1.0, 2.0]), np.array([1.0, 2.5])).largest == 0.5
+
+
+def test_recordings_are_compared_by_name(tmp_path: Path):
+    np.savez(tmp_path / "before.npz", **{"hybrid|gap": ONE, "hybrid|outcome": np.array([1])})
+    np.savez(tmp_path / "after.npz", **{"hybrid|gap": ONE, "hybrid|outcome": np.array([2])})
+
+    count, unlike = differences(tmp_path / "before.npz", tmp_path / "after.npz")
+
+    assert count == 2
+    assert [one.name for one in unlike] == ["hybrid/outcome"]
+
+
+def test_every_object_of_the_catalogue_is_compared_in_every_state():
+    names = catalogue()
+
+    assert {"odwalla:full_closed", "odwalla_worn:empty_open", "egg", "block"} <= set(names)
+    assert "odwalla" not in names
