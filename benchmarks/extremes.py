@@ -38,8 +38,9 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.kernel import NotCompilable, compiled, plant_of
 from graspsense_sim_gripper.linear import move_of
 from graspsense_sim_gripper.linear_scene import linear_of
+from graspsense_sim_gripper.objects.library import find
+from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.plant import PlantState
-from graspsense_sim_gripper.scene import ObjectSpec, find
 from graspsense_sim_gripper.setting import Setting, setting_of
 from graspsense_sim_gripper.terms.registry import laws_of
 

@@ -47,7 +47,8 @@ from graspsense.plugin_api import Classifier, Features, create, table_of
 from graspsense.sources.simulated import CONTAINERS, THINGS_PER_SEED, TRIALS_PER_SEED, Group
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.scene import ObjectSpec, catalogue
+from graspsense_sim_gripper.objects.library import catalogue
+from graspsense_sim_gripper.objects.spec import ObjectSpec
 
 TRIALS: Final = {"odwalla": (66, 12), "naked": (41, 10), "can": (42, 12), "water": (80, 16)}
 """Grasps and things of each container: section III.E of the paper."""

@@ -36,9 +36,9 @@ from graspsense_sim_gripper.common_composition import as_compiled
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.deviation import Course, deviation
 from graspsense_sim_gripper.linear_scene import linear_of
+from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.one_of_many import Composition, Done, Job, Storage, grasp_once, loop_of
 from graspsense_sim_gripper.plant import PlantState
-from graspsense_sim_gripper.scene import ObjectSpec
 from graspsense_sim_gripper.setting import Setting, setting_of
 from graspsense_sim_gripper.terms.registry import find_term, in_order
 from graspsense_sim_gripper.terms.remainder import Kept

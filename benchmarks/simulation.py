@@ -38,8 +38,8 @@ from graspsense import __version__
 from graspsense.plugin_api import APPROACH, HOLD, RunConfig, create
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.library import catalogue
 from graspsense_sim_gripper.plant import PlantParams
-from graspsense_sim_gripper.scene import catalogue
 from graspsense_sim_gripper.setting import set_scene
 
 HERE = Path(__file__).parent

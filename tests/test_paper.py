@@ -64,7 +64,7 @@ def test_numbers_of_trials_are_the_papers():
 
 
 def test_the_number_of_fitted_parameters_is_that_of_the_catalogue():
-    text = files("graspsense_sim_gripper").joinpath("catalogue.toml").read_text(encoding="utf-8")
+    text = files("graspsense_sim_gripper").joinpath("objects/catalogue.toml").read_text(encoding="utf-8")
     fresh = text[: text.index("[odwalla_worn]")] + text[text.index("[naked]") :]
     assert fresh.count('reason = "fitted') == published().fitted.count
 

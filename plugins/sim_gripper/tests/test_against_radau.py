@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.kernel import plant_of
-from graspsense_sim_gripper.scene import ObjectSpec
+from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.setting import setting_of
 from graspsense_sim_gripper.terms.registry import laws_of
 

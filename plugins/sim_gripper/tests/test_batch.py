@@ -18,9 +18,9 @@ from graspsense_sim_gripper import batch, one_of_many, plain_process
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import SLICE, WORTH_A_PROCESS, run_many
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.library import catalogue, shipped_scenes
 from graspsense_sim_gripper.one_of_many import Job, plainly
 from graspsense_sim_gripper.plain_process import NotHandedOver, PlainProcess
-from graspsense_sim_gripper.scene import catalogue, shipped_scenes
 
 HYBRID = create("controller", "hybrid")
 FEATURES = create("feature-set", "chitta")

@@ -5,13 +5,14 @@ import pytest
 
 from graspsense.core.errors import UnknownName
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.scene import find, instance_of, numbered
+from graspsense_sim_gripper.objects.instance import sample
+from graspsense_sim_gripper.objects.library import find, split_number
 from graspsense_sim_gripper.setting import set_scene
 
 
 def drawn(name, seed):
-    plain, number = numbered(name)
-    return instance_of(find(plain), np.random.default_rng(seed), number)
+    plain, number = split_number(name)
+    return sample(find(plain), np.random.default_rng(seed), number)
 
 
 def test_a_numbered_thing_is_the_same_in_every_trial_and_state_but_placed_anew():

@@ -10,7 +10,7 @@ from graspsense.plugin_api import RunConfig, create
 from graspsense_sim_gripper import checking, kept_choices
 from graspsense_sim_gripper.checking import Control, checked_choice
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.scene import ObjectSpec
+from graspsense_sim_gripper.objects.spec import ObjectSpec
 
 CONFIG = SimConfig(sensor="ideal", spread=False)
 

@@ -57,7 +57,7 @@ def test_runner_plain_loop_and_compiled_loop_give_one_trace(scene, sensor):
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", ["velocity", "force", "hybrid"])
 def test_every_object_and_law_gives_one_trace_plain_and_compiled(controller):
-    from graspsense_sim_gripper.scene import catalogue
+    from graspsense_sim_gripper.objects.library import catalogue
 
     law, names = create("controller", controller), sorted(catalogue())
     fast = run_many(SimConfig(), law, names, range(len(names)), compiled=True)

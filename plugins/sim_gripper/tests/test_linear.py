@@ -20,7 +20,7 @@ from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.linear import move_of
 from graspsense_sim_gripper.linear_modes import HALVINGS, _exponentials
 from graspsense_sim_gripper.linear_scene import linear_of
-from graspsense_sim_gripper.scene import ObjectSpec
+from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.setting import set_scene, setting_of
 from graspsense_sim_gripper.terms.registry import TERMS, laws_of
 from graspsense_sim_gripper.terms.term import OwnContact

@@ -19,7 +19,7 @@ from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.kernel import plant_of
-from graspsense_sim_gripper.scene import find, shipped_scenes
+from graspsense_sim_gripper.objects.library import find, shipped_scenes
 from graspsense_sim_gripper.setting import set_scene
 from graspsense_sim_gripper.terms.registry import laws_of
 
@@ -68,12 +68,12 @@ def test_every_shipped_scene_is_grasped_and_stays_steady(name):
         ("width_m = 0.08\noffset_m = -0.02", r"bottle.toml: offset_m: .* needs 0.12 m"),
         ("width_m = -0.01", r"bottle.toml: width_m: -0.01 is negative"),
         ("width_m = 0.0", r"bottle.toml: 'width_m' must be > 0"),
-        ("width_m = nan", r"bottle.toml: width_m: nan is no finite number"),
-        ("width_m = inf", r"bottle.toml: width_m: inf is no finite number"),
-        ("width_m = '5 cm'", r"bottle.toml: width_m: '5 cm' is no number"),
-        ("width_m = true", r"bottle.toml: width_m: True is no number"),
-        ("patch = 'face'", r"bottle.toml: width_m: is not given"),
-        ("width_m = 0.05\nheld = 1", r"bottle.toml: held: 1 is no true or false"),
+        ("width_m = nan", r"bottle.toml: width_m: nan is not a finite number"),
+        ("width_m = inf", r"bottle.toml: width_m: inf is not a finite number"),
+        ("width_m = '5 cm'", r"bottle.toml: width_m: '5 cm' is not a number"),
+        ("width_m = true", r"bottle.toml: width_m: True is not a number"),
+        ("patch = 'face'", r"bottle.toml: width_m: is missing"),
+        ("width_m = 0.05\nheld = 1", r"bottle.toml: held: 1 is not true or false"),
         ("width_m = 0.05\nwidht_m = 0.05", r"bottle.toml: widht_m: no such key.*Did you mean 'width_m'\?"),
         ("width_m = 0.05\nterms = 3", r"bottle.toml: terms: write a table \[\[terms\]\] for each"),
         (
@@ -89,7 +89,7 @@ def test_every_shipped_scene_is_grasped_and_stays_steady(name):
             "width_m = 0.05\n[[terms]]\ntype='loss'\ndamping_n_s_m=-1",
             r"bottle.toml: \[\[terms\]\] 1 \(loss\) damping_n_s_m: -1 is negative",
         ),
-        ("width_m = ", r"bottle.toml: is no TOML"),
+        ("width_m = ", r"bottle.toml: is not valid TOML"),
     ],
 )
 def test_a_file_that_makes_no_sense_is_refused_by_file_table_and_field(scene, text, says):

@@ -12,7 +12,8 @@ from click.testing import CliRunner
 
 from graspsense.cli.main import cli
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.scene import ObjectSpec, find
+from graspsense_sim_gripper.objects.library import find
+from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.setting import choice_of, setting_of
 
 CONFIG = SimConfig(sensor="ideal", spread=False)

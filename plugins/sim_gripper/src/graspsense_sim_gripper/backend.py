@@ -30,8 +30,8 @@ from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.linear import Linear, move_of
 from graspsense_sim_gripper.linear_scene import linear_of
+from graspsense_sim_gripper.objects.library import kinds_in
 from graspsense_sim_gripper.plant import PlantParams, PlantState, Squeezed
-from graspsense_sim_gripper.scene import kinds_in
 from graspsense_sim_gripper.sensing import SensorState, felt_again, sense
 from graspsense_sim_gripper.setting import CELL_OFFSET, device_info, set_scene
 from graspsense_sim_gripper.terms.registry import find_term, laws_of

@@ -22,6 +22,7 @@ from graspsense.plugin_api import BatchOptions, Controller, RunConfig
 from graspsense_sim_gripper import kernel
 from graspsense_sim_gripper.common_composition import as_compiled, compiled_kinds
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.library import kinds_in, split_number
 from graspsense_sim_gripper.one_of_many import (
     Composition,
     Done,
@@ -34,7 +35,6 @@ from graspsense_sim_gripper.one_of_many import (
     plainly,
 )
 from graspsense_sim_gripper.plain_process import NotHandedOver, PlainProcess
-from graspsense_sim_gripper.scene import kinds_in, numbered
 from graspsense_sim_gripper.setting import Chooser, Setting, set_scene
 
 WORTH_COMPILING: Final = 50
@@ -155,7 +155,7 @@ class _Batch:
 
     def _plan(self) -> None:
         """Decide what is compiled, and choose the models; names that nobody knows are refused here."""
-        names = Counter(scene if scene == "none" else numbered(scene)[0] for scene in self.scenes)
+        names = Counter(scene if scene == "none" else split_number(scene)[0] for scene in self.scenes)
         for name, n in names.items():
             self.of_kinds[compiled_kinds(kinds_in(name))] += n
         for name, n in names.items():

@@ -41,8 +41,8 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.deviation import Course, deviation
 from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, NotCompilable, grasp_of
 from graspsense_sim_gripper.linear_scene import linear_of
+from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.plant import EXPLICIT, PlantState, Steps
-from graspsense_sim_gripper.scene import ObjectSpec
 from graspsense_sim_gripper.selection import BOLD, DROPPED, FINE, FULL_LADDER, LADDER, Check, Choice, Rung
 from graspsense_sim_gripper.sensing import Bias, SensorState
 from graspsense_sim_gripper.setting import (

@@ -14,8 +14,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.library import catalogue
 from graspsense_sim_gripper.plant import PlantState
-from graspsense_sim_gripper.scene import catalogue
 from graspsense_sim_gripper.setting import Setting, setting_of
 from graspsense_sim_gripper.terms.registry import find_term, in_order
 from graspsense_sim_gripper.terms.remainder import Kept

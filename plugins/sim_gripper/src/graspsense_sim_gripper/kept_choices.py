@@ -21,8 +21,8 @@ from attrs import asdict
 import graspsense.plugin_api as plugin_api
 from graspsense.plugin_api import cache_folder
 from graspsense_sim_gripper.kernel import NotCompilable, fingerprint
+from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.plant import Steps
-from graspsense_sim_gripper.scene import ObjectSpec
 from graspsense_sim_gripper.selection import Check, Choice, Decision
 from graspsense_sim_gripper.terms.registry import laws_of
 from graspsense_sim_gripper.terms.term import WorkingPoint

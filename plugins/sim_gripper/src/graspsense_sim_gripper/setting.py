@@ -24,6 +24,9 @@ from graspsense.plugin_api import (
     straight_linkage,
 )
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.instance import Instance, cell_weights, central_cells, sample
+from graspsense_sim_gripper.objects.library import find, split_number
+from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.plant import (
     EXPLICIT,
     STIFF,
@@ -33,15 +36,6 @@ from graspsense_sim_gripper.plant import (
     Skin,
     Steps,
     Thing,
-)
-from graspsense_sim_gripper.scene import (
-    Instance,
-    ObjectSpec,
-    cell_weights,
-    find,
-    instance_of,
-    nearest_the_middle,
-    numbered,
 )
 from graspsense_sim_gripper.selection import (
     CAREFUL,
@@ -133,7 +127,7 @@ def set_scene(config: SimConfig, scene: str, seed: int, chooser: Chooser | None 
     """
     if scene == "none":
         return setting_of(config, None, seed)
-    name, number = numbered(scene)
+    name, number = split_number(scene)
     return setting_of(config, find(name), seed, number, chooser)
 
 
@@ -151,7 +145,7 @@ def setting_of(
     rng = np.random.default_rng(seed)
     instance = choice = None
     if spec is not None:
-        instance = instance_of(spec, rng if config.spread else None, number)
+        instance = sample(spec, rng if config.spread else None, number)
         _check_fit(config, instance)
         # An instance by its number is not the one that is tried.
         wanted = config if number is None or config.spread else _of_any_instance(config)
@@ -284,7 +278,7 @@ def choice_of(
         rung = WHOLE
     key = (config, id(spec), rung, force_n, speed_m_s)
     if key not in _CHOICES:
-        instance = instance_of(spec, None)
+        instance = sample(spec, None)
         link = _linkage(config)
         _, rate = gap_and_rate(link, revolutions_at(link, min(max(instance.width_m, 0.0), config.open_gap_m)))
         choice = choose(
@@ -351,7 +345,7 @@ def _sensor(config: SimConfig, instance: Instance | None, rng: np.random.Generat
     mean, spread = CELL_OFFSET
     offsets = (mean + spread * rng.standard_normal((2, CELLS))).tolist()
     weights = cell_weights(instance.spec.patch, instance.patch_row) if instance else EVEN
-    there = nearest_the_middle(config.pad_cells)
+    there = central_cells(config.pad_cells)
     weights = tuple([weight if cell in there else 0.0 for cell, weight in enumerate(weights)])
     return SensorParams(
         ideal=0,

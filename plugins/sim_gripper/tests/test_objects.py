@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from graspsense.plugin_api import ConfigError, UnknownName
-from graspsense_sim_gripper import scene
-from graspsense_sim_gripper.scene import ObjectSpec, catalogue, cell_weights, find, instance_of
+from graspsense_sim_gripper.objects.instance import cell_weights, sample
+from graspsense_sim_gripper.objects.library import catalogue, find, parse_entry
+from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.terms import NoState, Term
 from graspsense_sim_gripper.terms.registry import TERMS
 
@@ -29,7 +30,7 @@ def test_the_four_containers_have_their_states_and_the_rest_is_there():
 
 
 def test_every_figure_has_its_reason():
-    text = files("graspsense_sim_gripper").joinpath("catalogue.toml").read_text(encoding="utf-8")
+    text = files("graspsense_sim_gripper").joinpath("objects/catalogue.toml").read_text(encoding="utf-8")
 
     def figures(table):
         for value in table.values():
@@ -65,21 +66,21 @@ def test_an_unknown_object_or_state_is_answered_with_what_there_is(name, says):
 
 def test_the_same_seed_is_the_same_bottle_and_another_is_another():
     spec = find("odwalla:full_open")
-    one, again, other = (instance_of(spec, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    one, again, other = (sample(spec, np.random.default_rng(seed)) for seed in (1, 1, 2))
     assert one == again
     assert one.terms != other.terms
 
 
 def test_without_a_generator_it_is_the_catalogues_own_figures():
     spec = find("toy")
-    instance = instance_of(spec, None)
+    instance = sample(spec, None)
     assert (instance.width_m, instance.offset_m, instance.share) == (spec.width_m, 0.0, spec.share)
     assert dict(spec.terms)["elastic"]["k1_n_m"] == instance.terms[0].k1_n_m
 
 
 def test_instances_spread_as_the_catalogue_says():
     spec = find("water:empty_open")
-    many = [instance_of(spec, np.random.default_rng(seed)) for seed in range(2000)]
+    many = [sample(spec, np.random.default_rng(seed)) for seed in range(2000)]
     stiffness = np.log([i.terms[0].k1_n_m / 1300.0 for i in many])
     assert np.std(stiffness) == pytest.approx(spec.stiffness_spread, rel=0.06)
     assert np.mean(stiffness) == pytest.approx(0.0, abs=0.03)
@@ -125,8 +126,8 @@ def good():
         (lambda t: t.pop("width_m"), "missing .*width_m"),
         (lambda t: t.update(colour="red"), "colour: write"),
         (lambda t: t["width_m"].update(value=-0.01), "negative"),
-        (lambda t: t["width_m"].update(value=math.nan), "no finite number"),
-        (lambda t: t["width_m"].update(value=True), "no finite number"),
+        (lambda t: t["width_m"].update(value=math.nan), "not a finite number"),
+        (lambda t: t["width_m"].update(value=True), "not a finite number"),
         (lambda t: t["width_m"].update(value=0.0), "'width_m' must be > 0"),
         (lambda t: t["width_m"].pop("reason"), "write { value = NUMBER, reason = TEXT }"),
         (lambda t: t.update(patch="round"), "patch"),
@@ -137,10 +138,10 @@ def good():
 )
 def test_a_faulty_entry_names_the_object_and_the_key(change, says):
     table = good()
-    assert scene._catalogued("thing", table).name == "thing"
+    assert parse_entry("thing", table).name == "thing"
     change(table)
     with pytest.raises(ConfigError, match=says) as error:
-        scene._catalogued("thing", table)
+        parse_entry("thing", table)
     assert "thing" in str(error.value)
 
 
@@ -154,4 +155,4 @@ def test_a_default_written_as_a_whole_number_is_a_figure_like_others(monkeypatch
     term = Term(name="whole", summary="", params=Whole, law=lambda *_: (0.0, NoState()))
     monkeypatch.setitem(TERMS, "whole", term)
     spec = ObjectSpec(name="made up", width_m=0.05, terms=(("whole", {"k_n_m": 100}),))
-    assert [type(value) for value in instance_of(spec, None).terms[0]] == [float, float]
+    assert [type(value) for value in sample(spec, None).terms[0]] == [float, float]

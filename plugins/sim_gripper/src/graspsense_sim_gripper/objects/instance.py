@@ -1,0 +1,99 @@
+"""One sampled instance of an object, and how its contact loads the cells of a pad."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+from attrs import frozen
+
+from graspsense_sim_gripper.objects.spec import ObjectSpec
+
+GRAVITY_M_S2: Final = 9.80665
+PAD_CELLS: Final = 15
+"""Cells of the gripping face: five rows of three, the row at the tip first."""
+ROW_MM: Final = 6.0
+COLUMN_MM: Final = 5.6
+"""Distances between the centres of neighbouring cells."""
+
+
+@frozen(kw_only=True)
+class Instance:
+    """One object in its place: sampled from its spec, or with the nominal figures where nothing varies."""
+
+    spec: ObjectSpec
+    width_m: float
+    offset_m: float
+    share: float
+    table_n: float
+    """Friction of the table that a finger has to overcome to push it."""
+    kinds: tuple[str, ...]
+    terms: tuple[Any, ...]
+    """The parameters of its terms."""
+    patch_row: float
+    """Position of the contact on the pad, in rows from its middle."""
+
+
+def sample(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None = None) -> Instance:
+    """Return an instance drawn from the spec's spreads; without a generator, the nominal figures, centred.
+
+    With a number it is one particular object: its stiffness and width follow from the kind and the number, the same
+    in every state and every trial, and only its placement is drawn from `rng`.
+    """
+    draws = rng.standard_normal(5).tolist() if rng is not None else [0.0] * 5
+    if rng is not None and number is not None:
+        letters = spec.name.partition(":")[0].encode()
+        draws[:2] = np.random.default_rng([number, *letters]).standard_normal(2).tolist()
+    # Lognormal, so that no draw makes a stiffness negative. The others are cut off at two standard deviations.
+    stiffness_factor = math.exp(spec.stiffness_spread * draws[0])
+    clipped = [min(max(draw, -2.0), 2.0) for draw in draws]
+    terms = tuple(
+        params._make(
+            [
+                value * stiffness_factor if stiff else value
+                for value, stiff in zip(params, is_stiffness, strict=True)
+            ]
+        )
+        for params, is_stiffness in spec.nominal_terms
+    )
+    return Instance(
+        spec=spec,
+        width_m=spec.width_m + spec.width_spread_m * clipped[1],
+        offset_m=spec.offset_m + spec.offset_spread_m * clipped[2],
+        share=min(spec.share + spec.share_spread * clipped[3], 1.0),
+        table_n=spec.friction * spec.mass_kg * GRAVITY_M_S2,
+        kinds=spec.kinds,
+        terms=terms,
+        patch_row=0.7 * clipped[4],
+    )
+
+
+def cell_weights(patch: str, row: float) -> tuple[float, ...]:
+    """Return the part of the pad's force that each of its fifteen cells carries, tip row first; they sum to 1.
+
+    A line lies across the pad (an upright bottle): its pressure falls off over about a row. A face loads all
+    cells alike. A point loads the cells around it.
+    """
+    weights = []
+    for i in range(PAD_CELLS):
+        r, c = i // 3 - 2 - row, i % 3 - 1
+        if patch == "face":
+            weights.append(1.0)
+        elif patch == "line":
+            weights.append(math.exp(-r * r))
+        else:
+            weights.append(math.exp(-(r * r + c * c) / 0.5))
+    total = sum(weights)
+    return tuple(weight / total for weight in weights)
+
+
+@cache
+def central_cells(count: int) -> frozenset[int]:
+    """Return the indices of the `count` cells of the gripping face that are nearest to its middle."""
+    return frozenset(
+        sorted(range(PAD_CELLS), key=lambda i: math.hypot(ROW_MM * (i // 3 - 2), COLUMN_MM * (i % 3 - 1)))[
+            :count
+        ]
+    )

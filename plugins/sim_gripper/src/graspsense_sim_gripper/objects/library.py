@@ -1,0 +1,154 @@
+"""The objects known by name: those of the catalogue, the scenes that are shipped, and scene files of the user's.
+
+In the catalogue every figure has its reason beside it; a scene file needs none.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from attrs import fields_dict
+
+from graspsense.plugin_api import ConfigError, UnknownName, suggestion
+from graspsense_sim_gripper.objects.spec import ObjectSpec, parse_scene, parse_term, spec_with_sorted_terms
+
+
+@cache
+def catalogue() -> Mapping[str, ObjectSpec]:
+    """Return every object of the catalogue in every state, by name (`odwalla:full_open`, `block`)."""
+    text = files("graspsense_sim_gripper.objects").joinpath("catalogue.toml").read_text(encoding="utf-8")
+    specs: dict[str, ObjectSpec] = {}
+    for name, table in tomllib.loads(text).items():
+        states = table.pop("states", None)
+        if states is None:
+            specs[name] = parse_entry(name, table)
+            continue
+        for state, extra in states.items():
+            both = {**table, **extra, "terms": [*table.get("terms", []), *extra.get("terms", [])]}
+            specs[f"{name}:{state}"] = parse_entry(f"{name}:{state}", both)
+    return specs
+
+
+@cache
+def shipped_scenes() -> Mapping[str, str]:
+    """Return the text of each scene that is installed with the simulator, by name; `specs/scenes` of a checkout."""
+    folder = files("graspsense_sim_gripper.objects").joinpath("scenes")
+    return {
+        file.name.removesuffix(".toml"): file.read_text(encoding="utf-8")
+        for file in sorted(folder.iterdir(), key=lambda file: file.name)
+        if file.name.endswith(".toml")
+    }
+
+
+def split_number(name: str) -> tuple[str, int | None]:
+    """Return the name without the number of its instance, and that number; `can:full_open#3` is one particular can.
+
+    Raises UnknownName where the text after `#` is not a whole number.
+    """
+    plain, mark, number = name.partition("#")
+    if not mark:
+        return plain, None
+    if not (number.isascii() and number.isdigit()):
+        raise UnknownName(f"object {name!r}: the number of an instance follows #, as in {plain}#3")
+    return plain, int(number)
+
+
+def find(name: str) -> ObjectSpec:
+    """Return the object of this name, or that of a file whose name ends in `.toml`.
+
+    A name is looked up in the catalogue, then among the shipped scenes. Raises UnknownName with the known names,
+    ConfigError for a file that cannot be read as an object.
+    """
+    if name.endswith(".toml"):
+        return _read_scene(Path(name))
+    known = catalogue()
+    if name in known:
+        return known[name]
+    kind, _, state = name.partition(":")
+    states = [n.partition(":")[2] for n in known if n.startswith(f"{kind}:")]
+    if kind in known:
+        raise UnknownName(f"object {kind!r} has no states, but {name!r} names one. Write --object {kind}")
+    if states and not state:
+        raise UnknownName(
+            f"object {kind!r} needs a state: {', '.join(states)}. Write --object {kind}:{states[0]}"
+        )
+    if states:
+        raise UnknownName(
+            f"object {kind!r} has no state {state!r}. Known: {', '.join(states)}.{suggestion(state, states)}"
+        )
+    shipped = shipped_scenes()
+    if name in shipped:
+        return parse_scene(shipped[name], name, f"scene {name}")
+    kinds = sorted({n.partition(":")[0] for n in known} | shipped.keys())
+    raise UnknownName(f"no object named {kind!r}. Known: {', '.join(kinds)}.{suggestion(kind, kinds)}")
+
+
+def kinds_in(scene: str) -> tuple[str, ...]:
+    """Return the kinds of the terms of a scene's object; none for `none`. Raises UnknownName and ConfigError."""
+    if scene == "none":
+        return ()
+    return find(split_number(scene)[0]).kinds
+
+
+def _read_scene(path: Path) -> ObjectSpec:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ConfigError(f"no scene file {str(path)!r} (looked in {Path.cwd()})") from None
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not UTF-8 text ({error})") from error
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    return parse_scene(text, path.stem, str(path))
+
+
+def parse_entry(name: str, table: Mapping[str, Any]) -> ObjectSpec:
+    """Return an entry of the catalogue, in which every figure has its reason and no key is left out.
+
+    Raises ConfigError with the object's name and the key.
+    """
+    reasons: dict[str, str] = {}
+
+    def figure(where: str, entry: Any) -> float:
+        return _figure(where, entry, reasons)
+
+    values: dict[str, Any] = {"name": name}
+    for key, entry in table.items():
+        if key != "terms":
+            values[key] = entry if key in ("summary", "patch") else figure(f"{name}.{key}", entry)
+    fields = fields_dict(ObjectSpec)
+    unknown = values.keys() - fields.keys()
+    missing = fields.keys() - values.keys() - {"terms", "reasons", "offset_m", "held", "file"}
+    if unknown or missing:
+        raise ConfigError(f"object {name!r}: unknown {sorted(unknown)}, missing {sorted(missing)}")
+    problems: list[str] = []
+    terms = []
+    for entry in table.get("terms", []):
+        kind = entry.get("type")
+        term = parse_term(entry, f"object {name!r}, term {kind!r}", f"{name}.{kind}.", problems, figure)
+        if term is not None:
+            terms.append(term)
+    if problems:
+        raise ConfigError("\n".join(problems))
+    try:
+        return spec_with_sorted_terms({**values, "reasons": reasons}, terms)
+    except ValueError as error:
+        raise ConfigError(f"object {name!r}: {error}") from error
+
+
+def _figure(where: str, entry: Any, reasons: dict[str, str]) -> float:
+    if not isinstance(entry, Mapping) or set(entry) != {"value", "reason"} or not entry["reason"]:
+        raise ConfigError(f"{where}: write {{ value = NUMBER, reason = TEXT }}, not {entry!r}")
+    value = entry["value"]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ConfigError(f"{where}: {value!r} is not a finite number")
+    if value < 0.0:
+        raise ConfigError(f"{where}: {value!r} is negative")
+    reasons[where] = entry["reason"]
+    return float(value)

@@ -1,0 +1,201 @@
+"""The description of an object, and the strict reader of its terms.
+
+An unknown key or a number out of range is an error that names the file or object, the table and the key.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from functools import cache, cached_property
+from typing import Any, Final, NamedTuple
+
+from attrs import field, fields_dict, frozen
+from attrs.validators import ge, gt, in_, le
+
+from graspsense.plugin_api import ConfigError, UnknownName, suggestion
+from graspsense_sim_gripper.terms.registry import find_term, in_order
+
+PATCHES: Final = ("line", "face", "point")
+
+TermEntry = tuple[str, Mapping[str, float]]
+"""The kind of a term, and its parameters by name."""
+
+
+def _positive() -> float:
+    return field(validator=gt(0.0))
+
+
+def _not_negative(default: float) -> float:
+    return field(default=default, validator=ge(0.0))
+
+
+class NominalTerm(NamedTuple):
+    """The nominal parameters of a term, and which of them are stiffnesses, which vary between instances."""
+
+    params: Any
+    is_stiffness: tuple[bool, ...]
+
+
+@frozen(kw_only=True)
+class ObjectSpec:
+    """An object in one of its states, as a file describes it. SI units; spreads are standard deviations."""
+
+    name: str
+    summary: str = ""
+    patch: str = field(default="line", validator=in_(PATCHES))
+    """The shape of its contact with a pad: a line, a face or a point."""
+    width_m: float = _positive()
+    width_spread_m: float = _not_negative(0.0)
+    stiffness_spread: float = _not_negative(0.0)
+    offset_m: float = 0.0
+    """Distance from the gripper's centre line, positive towards the right finger."""
+    offset_spread_m: float = _not_negative(0.0)
+    share: float = field(default=1.0, validator=[gt(0.0), le(1.0)])
+    """The part of the force that lands on the fifteen cells of the gripping face."""
+    share_spread: float = _not_negative(0.0)
+    friction: float = _not_negative(0.3)
+    """Coefficient of friction on the table."""
+    held: bool = False
+    """Whether it is fixed in place: a finger that touches it first then presses it, and does not push it."""
+    mass_kg: float = field(default=0.1, validator=gt(0.0))
+    terms: tuple[TermEntry, ...] = ()
+    """Kind and parameters of each term, in the canonical order."""
+    reasons: Mapping[str, str] = field(factory=dict)
+    file: str = ""
+    """The file it was read from; empty for the catalogue."""
+
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of its terms."""
+        return tuple(kind for kind, _ in self.terms)
+
+    @cached_property
+    def nominal_terms(self) -> tuple[NominalTerm, ...]:
+        """The nominal parameters of each term."""
+        nominal = []
+        for kind, values in self.terms:
+            term = find_term(kind)[1]
+            # A default may be written as an integer, and compiled code distinguishes the types.
+            params = term.params._make(float(value) for value in term.params(**values))
+            nominal.append(NominalTerm(params, tuple(name in term.stiffnesses for name in params._fields)))
+        return tuple(nominal)
+
+    @cached_property
+    def content(self) -> str:
+        """All of it as text: equal for two specs that describe the same object."""
+        return repr(self)
+
+
+def spec_with_sorted_terms(values: Mapping[str, Any], terms: list[TermEntry]) -> ObjectSpec:
+    """Return the spec with these values, its terms in the canonical order. Raises ValueError as its fields do."""
+    order = in_order([kind for kind, _ in terms])
+    return ObjectSpec(**values, terms=tuple(terms[i] for i in order))
+
+
+@cache
+def parse_scene(text: str, name: str, where: str) -> ObjectSpec:
+    """Return the object that the text of a scene file describes; `where` names the file in errors.
+
+    Raises ConfigError with every problem of the file.
+    """
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{where}: is not valid TOML: {error}") from error
+    problems: list[str] = []
+    values = {"name": name, "file": where, **_scene_values(table, problems)}
+    terms = _scene_terms(table.get("terms", []), problems)
+    if not problems:
+        try:
+            return spec_with_sorted_terms(values, terms)
+        except ValueError as error:
+            problems.append(str(error.args[0]))
+    raise ConfigError("\n".join(f"{where}: {problem}" for problem in problems))
+
+
+def _scene_values(table: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
+    """Return the values of a scene's own keys, all but its terms."""
+    known = fields_dict(ObjectSpec).keys() - {"name", "reasons", "file"}
+    values: dict[str, Any] = {}
+    for key, entry in table.items():
+        if key not in known:
+            problems.append(f"{key}: no such key. Known: {', '.join(sorted(known))}.{suggestion(key, known)}")
+        elif key in ("summary", "patch", "held"):
+            expected = bool if key == "held" else str
+            if not isinstance(entry, expected):
+                problems.append(f"{key}: {entry!r} is not {'true or false' if key == 'held' else 'text'}")
+            values[key] = entry
+        elif key != "terms":
+            values[key] = _number(entry, key, problems, negative=key == "offset_m")
+    if "width_m" not in table:
+        problems.append("width_m: is missing, and every object has a width")
+    return values
+
+
+def _scene_terms(tables: Any, problems: list[str]) -> list[TermEntry]:
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        problems.append("terms: write a table [[terms]] for each")
+        return []
+
+    def number(where: str, entry: Any) -> float:
+        return _number(entry, where, problems)
+
+    terms = []
+    for i, table in enumerate(tables, 1):
+        label = f"[[terms]] {i} ({table.get('type')})"
+        term = parse_term(table, label, f"{label} ", problems, number)
+        if term is not None:
+            terms.append(term)
+    return terms
+
+
+def _number(entry: Any, label: str, problems: list[str], negative: bool = False) -> float:
+    """Return the entry as a number; what is wrong with it is added to `problems`."""
+    if isinstance(entry, bool) or not isinstance(entry, int | float):
+        problems.append(f"{label}: {entry!r} is not a number")
+    elif not math.isfinite(entry):
+        problems.append(f"{label}: {entry!r} is not a finite number")
+    elif entry < 0.0 and not negative:
+        problems.append(f"{label}: {entry!r} is negative")
+    else:
+        return float(entry)
+    return 0.0
+
+
+def parse_term(
+    table: Mapping[str, Any],
+    label: str,
+    prefix: str,
+    problems: list[str],
+    number: Callable[[str, Any], float],
+) -> TermEntry | None:
+    """Return the qualified kind of a term and its parameters, or None where it cannot be read at all.
+
+    `number` reads one value, given its place in the file: `prefix` and its key.
+    """
+    try:
+        kind, term = find_term(str(table.get("type", "")))
+    except UnknownName as error:
+        problems.append(f"{label}: {error}")
+        return None
+    names: list[str] = list(term.params._fields)
+    given = [key for key in table if key != "type"]
+    problems += [
+        f"{label}: no such key {key!r}. Known: {', '.join(names)}.{suggestion(key, names)}"
+        for key in given
+        if key not in names
+    ]
+    missing = [key for key in names if key not in table and key not in term.params._field_defaults]
+    if missing:
+        problems.append(f"{label}: missing {', '.join(missing)}")
+    before = len(problems)
+    values = {key: number(f"{prefix}{key}", table[key]) for key in given if key in names}
+    if len(problems) == before:
+        problems += [
+            f"{label} {key}: must be greater than 0"
+            for key in values
+            if key in term.positive and values[key] <= 0.0
+        ]
+    return kind, values
