@@ -128,6 +128,45 @@ def test_a_trial_that_is_kept_runs_again_from_its_recording_and_from_its_setting
         ]
 
 
+def test_the_picture_of_a_grasp_is_a_png_of_the_grasp_that_was_printed(tmp_path):
+    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
+    picture = tmp_path / "grasp.png"
+    done = graspsense("run", "--plot", str(picture))
+    assert done.returncode == 0, done.stderr
+    assert f"picture written to {picture}" in done.stderr
+    assert "prediction  odwalla:full_closed" in done.stdout
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert picture.stat().st_size < 150_000
+
+
+def test_a_recording_is_drawn_as_the_grasp_itself_was(tmp_path):
+    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
+    first, again, store = tmp_path / "first.png", tmp_path / "again.png", tmp_path / "kept"
+    done = graspsense("run", "--save", str(store), "--plot", str(first))
+    assert done.returncode == 0, done.stderr
+    done = graspsense("replay", f"{store}#1", "--plot", str(again))
+    assert done.returncode == 0, done.stderr
+    assert again.is_file()
+
+
+@pytest.mark.parametrize("arguments", [["--object", "none"], ["-o", "classifier.type=none"]])
+def test_a_grasp_without_contact_or_prediction_is_drawn_as_well(tmp_path, arguments):
+    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
+    picture = tmp_path / "grasp.png"
+    done = graspsense("run", "--json", "--plot", str(picture), *arguments)
+    assert done.returncode == 0, done.stderr
+    assert picture.is_file()
+
+
+@pytest.mark.parametrize("name", ["no_such_folder/grasp.png", "grasp.svg"])
+def test_a_picture_that_cannot_be_written_is_refused_before_the_grasp(tmp_path, name):
+    pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
+    done = graspsense("run", "--plot", str(tmp_path / name))
+    assert done.returncode == 2
+    assert "picture" in done.stderr
+    assert "approach" not in done.stderr
+
+
 def test_a_folder_that_cannot_be_written_is_found_out_before_the_grasp(tmp_path):
     (tmp_path / "file").write_text("in the way")
     done = graspsense("run", "--save", str(tmp_path / "file"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -24,14 +25,17 @@ if TYPE_CHECKING:
     multiple=True,
     help="A key of the pipeline, as in -o features.pads=left. May be given again.",
 )
+@click.option("--plot", metavar="FILE.png", help="Draw the grasp: forces, gap, phases, features, prediction.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
-def replay(recording: str, pipeline: str | None, options: tuple[str, ...], as_json: bool) -> None:
+def replay(
+    recording: str, pipeline: str | None, options: tuple[str, ...], plot: str | None, as_json: bool
+) -> None:
     """Draw features from a recording, and predict, as if the gripper felt it now; nothing moves.
 
     FILE.mcap is a recording of ours, DIR#NUMBER a trial of a store, KIND:NAME what another reader reads, as in
     icub:FOLDER/full_vitamin_water_1.txt.
     """
-    from graspsense.cli.run import print_trial
+    from graspsense.cli.run import draw_grasp, print_trial
     from graspsense.core.pipeline import grasp_with
     from graspsense.core.plugins import installed
     from graspsense.core.trial import trial_as_json
@@ -39,11 +43,17 @@ def replay(recording: str, pipeline: str | None, options: tuple[str, ...], as_js
 
     settings = _settings(recording, pipeline, options)
     check(settings)
+    if plot is not None:
+        from graspsense.report.grasp_picture import require_picture
+
+        require_picture(Path(plot))
     trial = grasp_with(settings, installed())
     if as_json:
         echo_json(trial_as_json(trial))
     else:
         print_trial(trial)
+    if plot is not None:
+        draw_grasp(trial, Path(plot))
 
 
 def _settings(recording: str, pipeline: str | None, options: tuple[str, ...]) -> Settings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -29,6 +30,7 @@ EXIT_NOT_KEPT: Final = 2
 @click.option(
     "--explain-model", is_flag=True, help="Simulated: list the size of every term. (gripper.explain)"
 )
+@click.option("--plot", metavar="FILE.png", help="Draw the grasp: forces, gap, phases, features, prediction.")
 @click.option("--dry-run", is_flag=True, help="Say what would be done; open nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
 def run(
@@ -40,6 +42,7 @@ def run(
     save: str | None,
     label: str | None,
     explain_model: bool,
+    plot: str | None,
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -63,6 +66,10 @@ def run(
         return
     if label is not None and save is None:
         raise click.UsageError("--label goes with a trial that is kept: add --save DIR")
+    if plot is not None:
+        from graspsense.report.grasp_picture import require_picture
+
+        require_picture(Path(plot))
     sinks = () if as_json else (LiveRows(),)
     kept: dict[str, Any] | None = None
     if save is None:
@@ -78,11 +85,21 @@ def run(
             print_model(trial.report["model"])
             if "selection" in trial.report:
                 print_selection(trial.report["selection"])
+    if plot is not None:
+        draw_grasp(trial, Path(plot))
     if kept is not None and kept["problem"]:
         talk(f"graspsense: {kept['problem']}")
         raise click.exceptions.Exit(EXIT_NOT_KEPT)
     if trial.outcome in (Outcome.ABORTED, Outcome.DEVICE_LOST):
         raise click.exceptions.Exit(EXIT_ABORTED)
+
+
+def draw_grasp(trial: Trial, path: Path) -> None:
+    """Draw the trial and say where the picture is. Raises PluginUnavailable, ConfigError."""
+    from graspsense.report.grasp_picture import grasp_png
+
+    grasp_png(trial, path)
+    talk(f"picture written to {path}")
 
 
 def _kept(
