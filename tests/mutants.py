@@ -24,7 +24,9 @@ from graspsense.plugin_api import (
     ClassifierConfig,
     Command,
     Features,
+    ObjectKind,
     Reading,
+    UnknownName,
 )
 from graspsense.testing.gentle import GentleState, step
 
@@ -492,6 +494,24 @@ mutant(
 class Picky(Hand):
     def expect(self, controller, run):
         raise ValueError("not that one")
+
+
+@mutant("sensor-backend", "objects-can-be-grasped", "give DeviceInfo(simulated=True, ...)")
+class Conjuring(Hand):
+    def open(self, seed):
+        return evolve(super().open(seed), simulated=False)
+
+
+@mutant("sensor-backend", "objects-can-be-grasped", "objects() gives that name")
+class Promising(Hand):
+    def with_object(self, name):
+        raise UnknownName(f"no object named {name!r}")
+
+
+@mutant("sensor-backend", "objects-can-be-grasped", "give each full name once")
+class Repeating(Hand):
+    def objects(self):
+        return (ObjectKind(name="cup"), ObjectKind(name="cup"))
 
 
 @mutant("sensor-backend", "read-keeps-its-timeout", "return None when nothing came in time")

@@ -21,11 +21,13 @@ from graspsense.plugin_api import (
     ControllerEntry,
     DeviceInfo,
     DeviceLost,
+    Feature,
     Features,
     FeatureSet,
     FeatureSetEntry,
     Frame,
     NoDevice,
+    ObjectKind,
     Prediction,
     Reading,
     SensorBackend,
@@ -82,6 +84,12 @@ class Hand(SensorBackend[HandConfig]):
 
     _bench = None
 
+    def objects(self):
+        return (ObjectKind(name="cup", states=("full", "empty")),)
+
+    def with_object(self, name):
+        return type(self)(self.config)
+
     def open(self, seed):
         if not self.config.here:
             raise NoDevice("no hand at port 7: plug it in, then `graspsense devices`")
@@ -91,6 +99,7 @@ class Hand(SensorBackend[HandConfig]):
         return DeviceInfo(
             name="hand",
             clock="virtual",
+            simulated=True,
             rate_hz=1000.0,
             effort_limit_n=100.0,
             speed_limit_m_s=0.2,
@@ -204,7 +213,7 @@ ENTRIES = {
         config="parts:PeakConfig",
         summary="greatest force of the left pad",
         requires=(Channel("force_left", "N"),),
-        features=(("peak", "N"),),
+        features=(Feature("peak", "N", "largest force of the left pad"),),
     ),
     "controller": ControllerEntry(
         name="gentle",

@@ -14,11 +14,12 @@ from graspsense.core.errors import ConfigError
 from graspsense.core.plugins import Plugins, _builtin, installed_sources
 
 FEATURES = """
-    from graspsense.plugin_api import FeatureSetEntry, hookimpl
+    from graspsense.plugin_api import Feature, FeatureSetEntry, hookimpl
     GRASPSENSE_API = (1, 0)
     @hookimpl
     def graspsense_feature_sets():
-        yield FeatureSetEntry("{name}", "lab:Peak", "lab:PeakConfig", "peak", (), (("peak", "N"),))
+        peak = Feature("peak", "N", "largest force")
+        yield FeatureSetEntry("{name}", "lab:Peak", "lab:PeakConfig", "peak", (), (peak,))
 """
 
 

@@ -106,7 +106,7 @@ def test_hook_graspsense_controllers():
 def test_hook_graspsense_feature_sets():
     entry = IsolatedPlugins(example("graspsense_feature_sets")).find("feature-set", "stiffness").entry
 
-    assert entry.features == (("stiffness", "N/m"),)
+    assert [(feature.name, feature.unit) for feature in entry.features] == [("stiffness", "N/m")]
 
 
 def test_hook_graspsense_classifiers():

@@ -217,15 +217,10 @@ def test_listing_plugins_loads_no_driver_and_nothing_heavy(arguments):
     assert not loaded_after(COMMAND, *arguments) & HEAVY
 
 
-@pytest.mark.parametrize(
-    ("door", "path"),
-    [(graspsense, SOURCE / "__init__.py"), (plugin_api, SOURCE / "plugin_api.py")],
-    ids=["graspsense", "plugin_api"],
-)
-def test_what_a_door_offers_is_what_type_checkers_see_there(door, path):
+def test_what_the_users_door_offers_is_what_type_checkers_see_there():
     (block,) = [
         node
-        for node in ast.parse(path.read_text()).body
+        for node in ast.parse((SOURCE / "__init__.py").read_text()).body
         if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
     ]
     seen = {
@@ -235,8 +230,26 @@ def test_what_a_door_offers_is_what_type_checkers_see_there(door, path):
         for alias in node.names
     }
 
-    assert seen == {name: f"graspsense.core.{home}" for name, home in door._HOME_OF.items()}
-    for name in door._HOME_OF:
+    assert seen == {name: f"graspsense.core.{home}" for name, home in graspsense._HOME_OF.items()}
+
+
+def test_the_type_stub_of_plugin_api_is_the_one_its_table_gives():
+    made = subprocess.run(
+        [sys.executable, "-m", "graspsense.plugin_api"], capture_output=True, text=True, check=True
+    )
+
+    assert (SOURCE / "plugin_api.pyi").read_text() == made.stdout
+
+
+def test_plugin_api_lists_each_name_once():
+    names = [name for modules in plugin_api._TABLE.values() for part in modules.values() for name in part]
+
+    assert sorted(names) == plugin_api.__all__ == sorted(set(names))
+
+
+@pytest.mark.parametrize("door", [graspsense, plugin_api], ids=["graspsense", "plugin_api"])
+def test_every_name_of_a_door_can_be_imported(door):
+    for name in door.__all__:
         assert getattr(door, name) is not None
         assert name in dir(door)
     with pytest.raises(AttributeError, match="has no attribute 'nosuch'"):

@@ -77,14 +77,16 @@ def test_built_in_parts_need_no_metadata(site):
         "graspsense/hybrid",
         "graspsense/velocity",
     ]
-    assert plugins.find("feature-set", "chitta").entry.features == (
+    entry = plugins.find("feature-set", "chitta").entry
+    assert [(feature.name, feature.unit) for feature in entry.features] == [
         ("p_first", "m"),
         ("p_steady", "m"),
         ("f_steady", "N"),
         ("delta_t", "s"),
         ("dp_dt", "m/s"),
         ("df_dt", "N/s"),
-    )
+    ]
+    assert entry.width == "p_first"
 
 
 @pytest.mark.parametrize(

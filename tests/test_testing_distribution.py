@@ -12,7 +12,7 @@ from graspsense.testing.checks import outcome_of
 from graspsense.testing.subject import package_of
 
 HEAD = """
-    from graspsense.plugin_api import FeatureSetEntry, PipelineEntry, hookimpl
+    from graspsense.plugin_api import Feature, FeatureSetEntry, PipelineEntry, hookimpl
     GRASPSENSE_API = (1, 0)
 """
 
@@ -21,7 +21,8 @@ SOUND = (
     + """
     @hookimpl
     def graspsense_feature_sets():
-        yield FeatureSetEntry("summit", "parts:Peak", "parts:PeakConfig", "peak", (), (("peak", "N"),))
+        peak = Feature("peak", "N", "largest force")
+        yield FeatureSetEntry("summit", "parts:Peak", "parts:PeakConfig", "peak", (), (peak,))
 
     @hookimpl
     def graspsense_run_finished(run, trial):
@@ -236,12 +237,13 @@ def test_what_is_missing_from_the_wheel_is_named(site, tmp_path, packed, says):
         '[project]\nname = "lab-thing"\nversion = "0.2"\n[tool.hatch.build.targets.wheel]\n' + packed
     )
     plugin = """
-from graspsense.plugin_api import FeatureSetEntry, PipelineEntry, hookimpl
+from graspsense.plugin_api import Feature, FeatureSetEntry, PipelineEntry, hookimpl
 GRASPSENSE_API = (1, 0)
 @hookimpl
 def graspsense_feature_sets():
+    peak = Feature("peak", "N", "largest force")
     yield FeatureSetEntry(
-        "summit", "lab_thing.features:Peak", "lab_thing.features:PeakConfig", "peak", (), (("peak", "N"),)
+        "summit", "lab_thing.features:Peak", "lab_thing.features:PeakConfig", "peak", (), (peak,)
     )
 @hookimpl
 def graspsense_pipelines():

@@ -1,285 +1,199 @@
-"""The door for plugin authors: everything a component is made of, and `create` for making another one.
+"""Everything that a plugin may import from graspsense, grouped by what it is for.
 
-Names are imported when they are first used, so that a plugin's entry module, which is all that listing
-plugins imports, pulls in neither numpy nor a driver.
+A name is imported when it is first used. The entry module of a plugin, which is all that listing plugins imports,
+therefore loads neither numpy nor a driver. Type checkers read `plugin_api.pyi`, which is generated from the table
+below:
+
+    python -m graspsense.plugin_api > src/graspsense/plugin_api.pyi
+
+A test compares the two.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-if TYPE_CHECKING:
-    from graspsense.core.binding import bind as bind
-    from graspsense.core.binding import maker as maker
-    from graspsense.core.calibration import EDGE_COUNTS_PER_N as EDGE_COUNTS_PER_N
-    from graspsense.core.calibration import PAD_COUNTS_PER_N as PAD_COUNTS_PER_N
-    from graspsense.core.calibration import LoadTable as LoadTable
-    from graspsense.core.calibration import edge_force as edge_force
-    from graspsense.core.calibration import load_of as load_of
-    from graspsense.core.calibration import masked as masked
-    from graspsense.core.calibration import pad_force as pad_force
-    from graspsense.core.calibration import tare as tare
-    from graspsense.core.calibration import zero_of as zero_of
-    from graspsense.core.calibration_files import calibrations_of as calibrations_of
-    from graspsense.core.calibration_files import stored_friction as stored_friction
-    from graspsense.core.calibration_files import stored_tables as stored_tables
-    from graspsense.core.calibration_files import stored_zero as stored_zero
-    from graspsense.core.config import create as create
-    from graspsense.core.config import recipe_of as recipe_of
-    from graspsense.core.contact import CONTACT_FORCE_N as CONTACT_FORCE_N
-    from graspsense.core.contact import REST_SPEED_M_S as REST_SPEED_M_S
-    from graspsense.core.contact import REST_WINDOW_S as REST_WINDOW_S
-    from graspsense.core.contact import Stillness as Stillness
-    from graspsense.core.contact import at_rest as at_rest
-    from graspsense.core.contact import both_touch as both_touch
-    from graspsense.core.contact import first_rest as first_rest
-    from graspsense.core.contact import watch as watch
-    from graspsense.core.emulated import EmulatedDevice as EmulatedDevice
-    from graspsense.core.entries import Channel as Channel
-    from graspsense.core.entries import ClassifierEntry as ClassifierEntry
-    from graspsense.core.entries import CommandEntry as CommandEntry
-    from graspsense.core.entries import ControllerEntry as ControllerEntry
-    from graspsense.core.entries import DatasetEntry as DatasetEntry
-    from graspsense.core.entries import EmulatorEntry as EmulatorEntry
-    from graspsense.core.entries import FeatureSetEntry as FeatureSetEntry
-    from graspsense.core.entries import Finding as Finding
-    from graspsense.core.entries import FoundDevice as FoundDevice
-    from graspsense.core.entries import ModelEntry as ModelEntry
-    from graspsense.core.entries import PipelineEntry as PipelineEntry
-    from graspsense.core.entries import SensorBackendEntry as SensorBackendEntry
-    from graspsense.core.errors import ConfigError as ConfigError
-    from graspsense.core.errors import DataDamaged as DataDamaged
-    from graspsense.core.errors import DeviceLost as DeviceLost
-    from graspsense.core.errors import GraspsenseError as GraspsenseError
-    from graspsense.core.errors import NoDevice as NoDevice
-    from graspsense.core.errors import PluginUnavailable as PluginUnavailable
-    from graspsense.core.errors import RecordingEnded as RecordingEnded
-    from graspsense.core.errors import TareRefused as TareRefused
-    from graspsense.core.errors import UnknownName as UnknownName
-    from graspsense.core.errors import suggestion as suggestion
-    from graspsense.core.features import UNKNOWN as UNKNOWN
-    from graspsense.core.features import Features as Features
-    from graspsense.core.features import FeatureTable as FeatureTable
-    from graspsense.core.features import Prediction as Prediction
-    from graspsense.core.features import in_words as in_words
-    from graspsense.core.features import missing as missing
-    from graspsense.core.features import table_of as table_of
-    from graspsense.core.guard import GuardParams as GuardParams
-    from graspsense.core.guard import GuardState as GuardState
-    from graspsense.core.hookspecs import hookimpl as hookimpl
-    from graspsense.core.labelled import Control as Control
-    from graspsense.core.labelled import Labelled as Labelled
-    from graspsense.core.plugins import collect as collect
-    from graspsense.core.roles import BatchBackend as BatchBackend
-    from graspsense.core.roles import BatchOptions as BatchOptions
-    from graspsense.core.roles import Classifier as Classifier
-    from graspsense.core.roles import ClassifierConfig as ClassifierConfig
-    from graspsense.core.roles import Controller as Controller
-    from graspsense.core.roles import ControllerState as ControllerState
-    from graspsense.core.roles import DeviceInfo as DeviceInfo
-    from graspsense.core.roles import FeatureSet as FeatureSet
-    from graspsense.core.roles import Grasped as Grasped
-    from graspsense.core.roles import Reading as Reading
-    from graspsense.core.roles import SensorBackend as SensorBackend
-    from graspsense.core.roles import StepLaw as StepLaw
-    from graspsense.core.roles import Variant as Variant
-    from graspsense.core.run_config import RunConfig as RunConfig
-    from graspsense.core.runner import ended_by_itself as ended_by_itself
-    from graspsense.core.runner import overdue as overdue
-    from graspsense.core.runner import seconds_at_most as seconds_at_most
-    from graspsense.core.runner import tick_params as tick_params
-    from graspsense.core.signals import APPROACH as APPROACH
-    from graspsense.core.signals import CELLS as CELLS
-    from graspsense.core.signals import CHANNELS as CHANNELS
-    from graspsense.core.signals import CRUSHED as CRUSHED
-    from graspsense.core.signals import EFFORT as EFFORT
-    from graspsense.core.signals import FIRST_PAD_CELL as FIRST_PAD_CELL
-    from graspsense.core.signals import FORCE as FORCE
-    from graspsense.core.signals import HOLD as HOLD
-    from graspsense.core.signals import NEVER_STEADY as NEVER_STEADY
-    from graspsense.core.signals import NO_PADS as NO_PADS
-    from graspsense.core.signals import NOTHING_THERE as NOTHING_THERE
-    from graspsense.core.signals import ONE_FINGER as ONE_FINGER
-    from graspsense.core.signals import POSITION as POSITION
-    from graspsense.core.signals import RUNNING as RUNNING
-    from graspsense.core.signals import SIDE_IMPACT as SIDE_IMPACT
-    from graspsense.core.signals import SLIPPED as SLIPPED
-    from graspsense.core.signals import SQUEEZE as SQUEEZE
-    from graspsense.core.signals import STEADY as STEADY
-    from graspsense.core.signals import TOO_WIDE as TOO_WIDE
-    from graspsense.core.signals import VELOCITY as VELOCITY
-    from graspsense.core.signals import Command as Command
-    from graspsense.core.signals import CommandKind as CommandKind
-    from graspsense.core.signals import Frame as Frame
-    from graspsense.core.signals import Outcome as Outcome
-    from graspsense.core.signals import Pads as Pads
-    from graspsense.core.signals import Phase as Phase
-    from graspsense.core.tick import OPENING as OPENING
-    from graspsense.core.tick import RELEASE as RELEASE
-    from graspsense.core.tick import TARING as TARING
-    from graspsense.core.tick import Schedule as Schedule
-    from graspsense.core.tick import TickParams as TickParams
-    from graspsense.core.tick import TickState as TickState
-    from graspsense.core.tick import first_state as first_state
-    from graspsense.core.tick import tick as tick
-    from graspsense.core.trace import Trace as Trace
-    from graspsense.core.trace import TraceRecorder as TraceRecorder
-    from graspsense.core.trace import trace_of as trace_of
-    from graspsense.core.transmission import PR2_ENCODER_TICKS as PR2_ENCODER_TICKS
-    from graspsense.core.transmission import PR2_LINKAGES as PR2_LINKAGES
-    from graspsense.core.transmission import ScrewLinkage as ScrewLinkage
-    from graspsense.core.transmission import gap_and_rate as gap_and_rate
-    from graspsense.core.transmission import revolutions_at as revolutions_at
-    from graspsense.core.transmission import screw_linkage as screw_linkage
-    from graspsense.core.transmission import straight_linkage as straight_linkage
-    from graspsense.core.tree import TreeNode as TreeNode
-    from graspsense.core.trial import GraspEvent as GraspEvent
-    from graspsense.core.trial import RunInfo as RunInfo
-    from graspsense.core.trial import Trial as Trial
-    from graspsense.core.user_folders import cache_folder as cache_folder
+_TABLE: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
+    "Declaring what a plugin brings": {
+        "hookspecs": ("hookimpl",),
+        "entries": (
+            "Channel",
+            "ClassifierEntry",
+            "CommandEntry",
+            "ControllerEntry",
+            "DatasetEntry",
+            "EmulatorEntry",
+            "Feature",
+            "FeatureSetEntry",
+            "Finding",
+            "FoundDevice",
+            "ModelEntry",
+            "PipelineEntry",
+            "SensorBackendEntry",
+        ),
+        "setting_meaning": ("CHANGES_NO_RESULT", "NAMES_INPUT"),
+    },
+    "Signals: what passes between a gripper and a controller": {
+        "signals": (
+            "CELLS",
+            "CHANNELS",
+            "FIRST_PAD_CELL",
+            "NO_PADS",
+            "Command",
+            "CommandKind",
+            "Frame",
+            "Outcome",
+            "Pads",
+            "Phase",
+        ),
+    },
+    "The same kinds, phases and outcomes as plain integers, for laws that are compiled": {
+        "signals": (
+            "APPROACH",
+            "CRUSHED",
+            "EFFORT",
+            "FORCE",
+            "HOLD",
+            "NEVER_STEADY",
+            "NOTHING_THERE",
+            "ONE_FINGER",
+            "POSITION",
+            "RUNNING",
+            "SIDE_IMPACT",
+            "SLIPPED",
+            "SQUEEZE",
+            "STEADY",
+            "TOO_WIDE",
+            "VELOCITY",
+        ),
+        "tick": ("OPENING", "RELEASE", "TARING"),
+    },
+    "Sensor backends": {
+        "roles": ("DeviceInfo", "ObjectKind", "Reading", "SensorBackend"),
+    },
+    "Sensor backends that do many grasps at once": {
+        "roles": ("BatchBackend", "BatchOptions", "Grasped", "Variant"),
+    },
+    "Emulated devices": {
+        "emulated": ("EmulatedDevice",),
+    },
+    "Calibration: from cell counts to newtons": {
+        "calibration": (
+            "EDGE_COUNTS_PER_N",
+            "PAD_COUNTS_PER_N",
+            "LoadTable",
+            "edge_force",
+            "load_of",
+            "masked",
+            "pad_force",
+            "tare",
+            "zero_of",
+        ),
+        "calibration_files": ("calibrations_of", "stored_friction", "stored_tables", "stored_zero"),
+    },
+    "Transmission: from motor revolutions to the gap": {
+        "transmission": (
+            "PR2_ENCODER_TICKS",
+            "PR2_LINKAGES",
+            "ScrewLinkage",
+            "gap_and_rate",
+            "revolutions_at",
+            "screw_linkage",
+            "straight_linkage",
+        ),
+    },
+    "Controllers": {
+        "roles": ("Controller", "ControllerState", "StepLaw"),
+    },
+    "Contact and rest, the same for controllers and features": {
+        "contact": (
+            "CONTACT_FORCE_N",
+            "REST_SPEED_M_S",
+            "REST_WINDOW_S",
+            "Stillness",
+            "at_rest",
+            "both_touch",
+            "first_rest",
+            "watch",
+        ),
+    },
+    "Feature sets": {
+        "features": ("Features", "in_words", "missing"),
+        "roles": ("FeatureSet",),
+        "trace": ("Trace", "TraceRecorder", "trace_of"),
+    },
+    "Classifiers": {
+        "features": ("UNKNOWN", "FeatureTable", "Prediction", "table_of"),
+        "roles": ("Classifier", "ClassifierConfig"),
+        "tree": ("TreeNode",),
+    },
+    "Data sets": {
+        "labelled": ("Control", "Labelled"),
+    },
+    "Observers": {
+        "trial": ("GraspEvent", "RunInfo", "Trial"),
+    },
+    "The tick of the runner, for a backend that runs it compiled": {
+        "binding": ("bind", "maker"),
+        "guard": ("GuardParams", "GuardState"),
+        "run_config": ("RunConfig",),
+        "runner": ("ended_by_itself", "overdue", "seconds_at_most", "tick_params"),
+        "tick": ("Schedule", "TickParams", "TickState", "first_state", "tick"),
+    },
+    "Building other components, collecting what other plugins bring, and where to keep files": {
+        "config": ("create", "recipe_of"),
+        "plugins": ("collect",),
+        "user_folders": ("cache_folder",),
+    },
+    "Errors": {
+        "errors": (
+            "ConfigError",
+            "DataDamaged",
+            "DeviceLost",
+            "GraspsenseError",
+            "NoDevice",
+            "PluginUnavailable",
+            "RecordingEnded",
+            "TareRefused",
+            "UnknownName",
+            "suggestion",
+        ),
+    },
+}
+"""What a name is for, the module of `graspsense.core` that defines it, and the name."""
 
-_HOME_OF: Final = {
-    "bind": "binding",
-    "maker": "binding",
-    "EDGE_COUNTS_PER_N": "calibration",
-    "PAD_COUNTS_PER_N": "calibration",
-    "LoadTable": "calibration",
-    "edge_force": "calibration",
-    "load_of": "calibration",
-    "masked": "calibration",
-    "pad_force": "calibration",
-    "tare": "calibration",
-    "zero_of": "calibration",
-    "calibrations_of": "calibration_files",
-    "stored_friction": "calibration_files",
-    "stored_tables": "calibration_files",
-    "stored_zero": "calibration_files",
-    "create": "config",
-    "recipe_of": "config",
-    "CONTACT_FORCE_N": "contact",
-    "REST_SPEED_M_S": "contact",
-    "REST_WINDOW_S": "contact",
-    "Stillness": "contact",
-    "at_rest": "contact",
-    "both_touch": "contact",
-    "first_rest": "contact",
-    "watch": "contact",
-    "EmulatedDevice": "emulated",
-    "Channel": "entries",
-    "ClassifierEntry": "entries",
-    "CommandEntry": "entries",
-    "ControllerEntry": "entries",
-    "DatasetEntry": "entries",
-    "EmulatorEntry": "entries",
-    "FeatureSetEntry": "entries",
-    "Finding": "entries",
-    "FoundDevice": "entries",
-    "ModelEntry": "entries",
-    "PipelineEntry": "entries",
-    "SensorBackendEntry": "entries",
-    "ConfigError": "errors",
-    "DataDamaged": "errors",
-    "DeviceLost": "errors",
-    "GraspsenseError": "errors",
-    "NoDevice": "errors",
-    "PluginUnavailable": "errors",
-    "RecordingEnded": "errors",
-    "TareRefused": "errors",
-    "UnknownName": "errors",
-    "suggestion": "errors",
-    "UNKNOWN": "features",
-    "Features": "features",
-    "FeatureTable": "features",
-    "Prediction": "features",
-    "in_words": "features",
-    "missing": "features",
-    "table_of": "features",
-    "GuardParams": "guard",
-    "GuardState": "guard",
-    "hookimpl": "hookspecs",
-    "Control": "labelled",
-    "Labelled": "labelled",
-    "collect": "plugins",
-    "BatchBackend": "roles",
-    "BatchOptions": "roles",
-    "Classifier": "roles",
-    "ClassifierConfig": "roles",
-    "Controller": "roles",
-    "ControllerState": "roles",
-    "DeviceInfo": "roles",
-    "FeatureSet": "roles",
-    "Grasped": "roles",
-    "Reading": "roles",
-    "SensorBackend": "roles",
-    "StepLaw": "roles",
-    "Variant": "roles",
-    "RunConfig": "run_config",
-    "ended_by_itself": "runner",
-    "overdue": "runner",
-    "seconds_at_most": "runner",
-    "tick_params": "runner",
-    "APPROACH": "signals",
-    "CELLS": "signals",
-    "CHANNELS": "signals",
-    "CRUSHED": "signals",
-    "EFFORT": "signals",
-    "FIRST_PAD_CELL": "signals",
-    "FORCE": "signals",
-    "HOLD": "signals",
-    "NEVER_STEADY": "signals",
-    "NOTHING_THERE": "signals",
-    "NO_PADS": "signals",
-    "ONE_FINGER": "signals",
-    "POSITION": "signals",
-    "RUNNING": "signals",
-    "SIDE_IMPACT": "signals",
-    "SLIPPED": "signals",
-    "SQUEEZE": "signals",
-    "STEADY": "signals",
-    "TOO_WIDE": "signals",
-    "VELOCITY": "signals",
-    "Command": "signals",
-    "CommandKind": "signals",
-    "Frame": "signals",
-    "Outcome": "signals",
-    "Pads": "signals",
-    "Phase": "signals",
-    "OPENING": "tick",
-    "RELEASE": "tick",
-    "TARING": "tick",
-    "Schedule": "tick",
-    "TickParams": "tick",
-    "TickState": "tick",
-    "first_state": "tick",
-    "tick": "tick",
-    "Trace": "trace",
-    "TreeNode": "tree",
-    "TraceRecorder": "trace",
-    "trace_of": "trace",
-    "PR2_ENCODER_TICKS": "transmission",
-    "PR2_LINKAGES": "transmission",
-    "ScrewLinkage": "transmission",
-    "gap_and_rate": "transmission",
-    "revolutions_at": "transmission",
-    "screw_linkage": "transmission",
-    "straight_linkage": "transmission",
-    "GraspEvent": "trial",
-    "RunInfo": "trial",
-    "Trial": "trial",
-    "cache_folder": "user_folders",
+_MODULE_OF: Final = {
+    name: module for modules in _TABLE.values() for module, names in modules.items() for name in names
 }
 
-__all__ = sorted(_HOME_OF)
+__all__ = sorted(_MODULE_OF)
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME_OF:
+    if name not in _MODULE_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = getattr(import_module(f"graspsense.core.{_HOME_OF[name]}"), name)
-    globals()[name] = found
-    return found
+    value = getattr(import_module(f"graspsense.core.{_MODULE_OF[name]}"), name)
+    globals()[name] = value
+    return value
 
 
 def __dir__() -> list[str]:
     return __all__
+
+
+def _stub() -> str:
+    """Return the text of `plugin_api.pyi`: an import of each name, in the groups of the table."""
+    lines = [
+        '"""Generated from the table in plugin_api.py by `python -m graspsense.plugin_api`: change that."""'
+    ]
+    for purpose, modules in _TABLE.items():
+        lines += ["", f"# {purpose}"]
+        for module, names in modules.items():
+            lines += [f"from graspsense.core.{module} import {name} as {name}" for name in names]
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    print(_stub(), end="")  # noqa: T201

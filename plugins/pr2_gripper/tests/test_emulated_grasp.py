@@ -41,6 +41,19 @@ def driven(backend: Pr2Backend, run: RunConfig, controller: Any = None, **more: 
     return evolve(ended, report=dict(backend.report()))
 
 
+def test_only_an_emulated_gripper_can_be_given_an_object() -> None:
+    emulated, real = Pr2Backend(Pr2Config(transport="emulated")), Pr2Backend(Pr2Config())
+    holding = emulated.with_object("can:full_open")
+
+    assert holding.config.object == "can:full_open"
+    assert holding.open(0).simulated
+    holding.close()
+    assert any(kind.default for kind in emulated.objects())
+    assert not real.objects()
+    with pytest.raises(ConfigError, match="cannot be given the object 'can:full_open'"):
+        real.with_object("can:full_open")
+
+
 @pytest.mark.parametrize(
     ("thing", "seed"),
     [("odwalla:full_closed", 0), ("odwalla:full_open", 2), ("can:empty_open", 1), ("none", 1)],

@@ -9,11 +9,25 @@ import numpy as np
 import pytest
 
 from graspsense.plugin_api import ConfigError, UnknownName
+from graspsense_sim_gripper.backend import SimBackend
+from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.instance import cell_weights, sample
 from graspsense_sim_gripper.objects.library import catalogue, find, parse_entry
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.terms import NoState, Term
 from graspsense_sim_gripper.terms.registry import TERMS
+
+
+def test_the_backend_declares_the_papers_containers_in_all_states_as_its_default_objects():
+    kinds = SimBackend(SimConfig()).objects()
+
+    assert {kind.name: kind.states for kind in kinds if kind.default} == {
+        "odwalla": ("full_closed", "full_open", "empty_closed", "empty_open"),
+        "naked": ("full_closed", "full_open", "empty_closed", "empty_open"),
+        "can": ("full_closed", "full_open", "empty_open"),
+        "water": ("full_closed", "full_open", "empty_closed", "empty_open"),
+    }
+    assert {name for kind in kinds for name in kind.full_names} >= {*catalogue(), "sponge"}
 
 
 def test_the_four_containers_have_their_states_and_the_rest_is_there():

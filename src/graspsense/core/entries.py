@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import field, frozen
-from attrs.validators import and_, deep_iterable, ge, instance_of, matches_re
+from attrs.validators import and_, deep_iterable, ge, instance_of, matches_re, min_len
 
 from graspsense.core.errors import suggestion
 from graspsense.core.signals import CHANNELS, CommandKind
@@ -49,17 +49,6 @@ def _distinct_channels(entry: object, attribute: Attribute[Any], channels: tuple
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f"'{attribute.name}' names channel {name!r} twice")
-
-
-def _named_features(entry: object, attribute: Attribute[Any], features: tuple[tuple[str, str], ...]) -> None:
-    for feature in features:
-        if not (
-            isinstance(feature, tuple) and len(feature) == 2 and all(isinstance(x, str) for x in feature)
-        ):
-            raise ValueError(f"'features' holds {feature!r}: give (name, unit)")
-    names = [name for name, _ in features]
-    if len(set(names)) < len(names):
-        raise ValueError(f"'features' names one feature twice: {', '.join(names)}")
 
 
 _IS_NAME: Final = [instance_of(str), matches_re(r"[a-z][a-z0-9_-]*")]
@@ -124,17 +113,47 @@ class ControllerEntry:
 
 
 @frozen
+class Feature:
+    """A feature: its name, its SI unit (`1` where it has none), and in a few words what it measures.
+
+    With `width` it is the width of the object, as the gap between the fingers shows it: a classifier that has this
+    feature alone is the baseline that the whole set is compared with.
+    """
+
+    name: str = field(validator=instance_of(str))
+    unit: str = field(validator=instance_of(str))
+    meaning: str = field(validator=and_(instance_of(str), min_len(1)))
+    width: bool = field(default=False, validator=instance_of(bool))
+
+
+def _distinct_features(entry: object, attribute: Attribute[Any], features: tuple[Feature, ...]) -> None:
+    names = [feature.name for feature in features]
+    if len(set(names)) < len(names):
+        raise ValueError(f"'features' names one feature twice: {', '.join(names)}")
+    widths = [feature.name for feature in features if feature.width]
+    if len(widths) > 1:
+        raise ValueError(f"'features' marks {len(widths)} features as the width: {', '.join(widths)}")
+
+
+@frozen
 class FeatureSetEntry:
-    """A set of features: the channels it reads, the names and units of what it returns."""
+    """A set of features: the channels that it reads, and the features that it returns."""
 
     name: str = field(validator=_IS_NAME)
     target: str = field(validator=_IS_TARGET)
     config: str = field(validator=_IS_TARGET)
     summary: str = field(validator=instance_of(str))
     requires: tuple[Channel, ...] = field(validator=_ARE_CHANNELS)
-    features: tuple[tuple[str, str], ...] = field(validator=[instance_of(tuple), _named_features])
-    """`(name, unit)` in the order in which they are returned."""
+    features: tuple[Feature, ...] = field(
+        validator=[deep_iterable(instance_of(Feature), instance_of(tuple)), _distinct_features]
+    )
+    """The features in the order in which they are returned."""
     needs: str = ""
+
+    @property
+    def width(self) -> str | None:
+        """The name of the feature that is the width of the object; None where the set has none."""
+        return next((feature.name for feature in self.features if feature.width), None)
 
 
 @frozen

@@ -24,11 +24,12 @@ from graspsense.core.errors import ConfigError, DataDamaged, UnknownName
 from graspsense.core.features import UNKNOWN, Features, FeatureTable, Prediction
 from graspsense.core.firstparty import MODELS
 from graspsense.core.novelty import Novelty, novelty_from, novelty_of
+from graspsense.core.setting_meaning import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.config import Settings
+    from graspsense.core.config import Chosen, Settings
     from graspsense.core.labelled import Labelled
     from graspsense.core.plugins import Component, Plugins
     from graspsense.core.roles import Classifier, DeviceInfo
@@ -38,12 +39,6 @@ VERSION: Final = 1
 
 _EQUAL: Final = 1e-6
 
-_NOT_COMPARED: Final = frozenset(
-    {"type", "object", "recording", "model", "explain", "compile", "expected_force_n", "expected_speed_m_s"}
-)
-"""Keys that differ from grasp to grasp, say where something lies, or change what is told and not the grasp.
-
-Or not by more than its accuracy: what a simulator is told to expect."""
 _COMPARED_TABLES: Final = ("gripper", "controller", "features", "classifier")
 _UNITS: Final = (("_m_s", "mm/s", 1e3), ("_n", "N", 1.0), ("_hz", "Hz", 1.0), ("_s", "s", 1.0))
 
@@ -154,7 +149,7 @@ class Model:
     def _warnings(self, settings: Settings | None, device: DeviceInfo | None) -> Iterator[str]:
         kind = "simulated grasps" if self.simulated else "grasps"
         if self.simulated:
-            if device is not None and device.clock == "device":
+            if device is not None and device.clock == "device" and not device.simulated:
                 yield (
                     "trained on simulated grasps, but this gripper is real: expect wrong answers until a model is "
                     "trained on grasps of its own"
@@ -171,7 +166,7 @@ class Model:
             if then.get("type") != now.get("type"):
                 yield f"trained on {kind} with {table} {then.get('type')}, this one was with {now.get('type')}"
                 continue
-            for key in sorted((then.keys() & now.keys()) - _NOT_COMPARED):
+            for key in sorted((then.keys() & now.keys()) - _not_compared(getattr(settings, table))):
                 if then[key] != now[key]:
                     what, value = worded(key, then[key])
                     yield (
@@ -193,6 +188,13 @@ class Model:
             "model": self.classifier.to_json(),
         }
         return {**content, "sha256": _digest(content)}
+
+
+def _not_compared(chosen: Chosen) -> frozenset[str]:
+    """Return the settings of a component that may differ between training and use without a warning."""
+    config_class = type(chosen.config)
+    unchanging = settings_marked(config_class, CHANGES_NO_RESULT)
+    return unchanging | settings_marked(config_class, NAMES_INPUT) | {"type"}
 
 
 def train(

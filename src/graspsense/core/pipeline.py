@@ -130,5 +130,6 @@ def _undefined(settings: Settings, why: str) -> Features:
     """Return the declared features of the chosen set, all missing for this reason."""
     entry = settings.features.component.entry
     assert isinstance(entry, FeatureSetEntry)
-    names, units = zip(*entry.features, strict=True)
+    names = tuple(feature.name for feature in entry.features)
+    units = tuple(feature.unit for feature in entry.features)
     return Features(names=names, values=(nan,) * len(names), units=units, reasons=missing(names, why))

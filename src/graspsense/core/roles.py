@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, T
 
 from attrs import field, frozen
 
+from graspsense.core.errors import ConfigError
+from graspsense.core.setting_meaning import NAMES_INPUT
 from graspsense.core.signals import Command, Frame, Outcome, Pads
 
 if TYPE_CHECKING:
@@ -34,9 +36,28 @@ class Reading(NamedTuple):
 
 
 @frozen(kw_only=True)
+class ObjectKind:
+    """A kind of object that a simulated gripper can grasp.
+
+    Its full names are `name:state` for each of `states`, or `name` alone where it has no states. With `default` it
+    belongs to the set of objects that trials are simulated with where the user names none.
+    """
+
+    name: str
+    states: tuple[str, ...] = ()
+    default: bool = False
+
+    @property
+    def full_names(self) -> tuple[str, ...]:
+        """The names of this kind in each of its states."""
+        return tuple(f"{self.name}:{state}" for state in self.states) or (self.name,)
+
+
+@frozen(kw_only=True)
 class DeviceInfo:
     """A gripper as it was opened.
 
+    `simulated` is True where forces and motion come from a model, False where a physical gripper measures them.
     On a `virtual` clock, apply-then-read advances one tick and nothing waits; on a `device` clock a read waits
     for the next frame. `opening` is the command that opens the fingers and `relaxed` the one that lets go; a
     recording has no opening (None). `tare_images` is how many unloaded cell images the tare needs (0: none).
@@ -50,6 +71,7 @@ class DeviceInfo:
     serial: str = ""
     firmware: str = ""
     clock: Literal["virtual", "device"]
+    simulated: bool = False
     rate_hz: float = field(converter=float)
     effort_limit_n: float = field(converter=float)
     speed_limit_m_s: float = field(converter=float)
@@ -71,6 +93,21 @@ class SensorBackend(ABC, Generic[ConfigT]):
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config
+
+    def objects(self) -> Sequence[ObjectKind]:
+        """Return the kinds of object that this backend can simulate; empty where it grasps what is really there."""
+        return ()
+
+    def with_object(self, name: str) -> SensorBackend[ConfigT]:
+        """Return a backend with the same config, but with this object between its fingers.
+
+        `name` is a full name of `objects()`, or any other name that the backend knows. A name that it does not know
+        raises UnknownName, at the latest in `open`. Raises ConfigError where the backend cannot be given an object.
+        """
+        raise ConfigError(
+            f"{type(self).__name__} grasps what is really there, so it cannot be given the object {name!r}. "
+            "Choose a simulated gripper, as in --gripper sim"
+        )
 
     def expect(self, controller: Controller[Any], run: RunConfig) -> None:
         """Be told, before `open`, under which controller and settings it is to be opened next.
@@ -242,7 +279,7 @@ class FeatureSet(ABC, Generic[ConfigT]):
 class ClassifierConfig:
     """What every classifier's config has; a classifier's own config class extends it."""
 
-    model: str | None = None
+    model: str | None = field(default=None, metadata=NAMES_INPUT)
     """The trained model: the name of one that a plugin offers, or a .json file."""
 
 

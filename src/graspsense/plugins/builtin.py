@@ -11,6 +11,7 @@ from graspsense.plugin_api import (
     ClassifierEntry,
     ControllerEntry,
     DatasetEntry,
+    Feature,
     FeatureSetEntry,
     PipelineEntry,
     SensorBackendEntry,
@@ -50,12 +51,12 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
         summary="the six features of Table I (Chitta, Piccoli, Sturm 2010)",
         requires=(Channel("gap", "m"), *_PAD_FORCES),
         features=(
-            ("p_first", "m"),
-            ("p_steady", "m"),
-            ("f_steady", "N"),
-            ("delta_t", "s"),
-            ("dp_dt", "m/s"),
-            ("df_dt", "N/s"),
+            Feature("p_first", "m", "gap at the first contact of both fingers", width=True),
+            Feature("p_steady", "m", "gap when the fingers have come to rest"),
+            Feature("f_steady", "N", "force on the pads when the fingers have come to rest"),
+            Feature("delta_t", "s", "time from the first contact to rest"),
+            Feature("dp_dt", "m/s", "mean rate of the gap from the first contact to rest"),
+            Feature("df_dt", "N/s", "mean rate of the pad force from the first contact to rest"),
         ),
     )
 

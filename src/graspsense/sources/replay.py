@@ -11,6 +11,7 @@ from attrs.validators import instance_of
 
 from graspsense.core.errors import DeviceLost, RecordingEnded, suggestion
 from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
+from graspsense.core.setting_meaning import NAMES_INPUT
 from graspsense.core.signals import EFFORT, Command, Pads
 from graspsense.recording.replayable import Recording
 from graspsense.sources.icub import read_recording
@@ -79,7 +80,7 @@ class ReplayConfig:
     `store:DIR#NUMBER` is a trial of a store; a `FILE.mcap` of ours needs no kind.
     """
 
-    recording: str = field(validator=[instance_of(str), _known_kind])
+    recording: str = field(validator=[instance_of(str), _known_kind], metadata=NAMES_INPUT)
 
 
 @final

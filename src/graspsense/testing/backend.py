@@ -461,6 +461,33 @@ def is_told_what_to_expect(subject: Subject) -> None:
         backend.close()
 
 
+def objects_can_be_grasped(subject: Subject) -> None:
+    """An object that it declares can be put between its fingers, and only a simulated gripper declares one."""
+    kinds = subject.create().objects()
+    if not kinds:
+        raise CheckSkipped("it grasps what is really there")
+    names = [name for kind in kinds for name in kind.full_names]
+    twice = {name for name in names if names.count(name) > 1}
+    demand(not twice, f"objects() gives {', '.join(sorted(twice))} twice: give each full name once")
+    for kind in kinds:
+        name = kind.full_names[0]
+        try:
+            backend = subject.create().with_object(name)
+            try:
+                simulated = backend.open(0).simulated
+            finally:
+                backend.close()
+        except Exception as error:
+            raise CheckFailed(
+                f"with_object({name!r}) cannot be opened: {named(error)}. objects() gives that name"
+            ) from error
+        demand(
+            simulated,
+            f"objects() gives {name!r}, but the opened gripper is not simulated: give DeviceInfo(simulated=True, ...), "
+            "or no objects",
+        )
+
+
 def does_a_whole_grasp(subject: Subject) -> None:
     """The runner can do a grasp with it: open, tare, close, hold, open again, let go."""
     kind = kind_of(subject.entry.accepts)
@@ -596,6 +623,7 @@ CHECKS: Final = (
         closes_in_any_state,
         same_seed_same_frames,
         is_told_what_to_expect,
+        objects_can_be_grasped,
         does_a_whole_grasp,
         reports_plain_values,
         stands_in_with_the_same_commands,

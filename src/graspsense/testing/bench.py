@@ -52,6 +52,7 @@ class Bench(SensorBackend[None]):
         return DeviceInfo(
             name="bench",
             clock="virtual",
+            simulated=True,
             rate_hz=1.0 / DT_S,
             effort_limit_n=EFFORT_LIMIT_N,
             speed_limit_m_s=SPEED_LIMIT_M_S,

@@ -50,7 +50,7 @@ def _same(a: Features, b: Features) -> bool:
 
 def gives_what_it_declares(subject: Subject) -> None:
     """The names and units are those of the entry, in its order, on every trace."""
-    declared = subject.entry.features
+    declared = tuple((feature.name, feature.unit) for feature in subject.entry.features)
     for of, trace in {"a whole grasp": squeeze(), **odd_traces()}.items():
         features = _features(subject, trace, of)
         given = tuple(zip(features.names, features.units, strict=True))

@@ -155,6 +155,7 @@ def a_trial() -> Trial:
         device=DeviceInfo(
             name="bench",
             clock="virtual",
+            simulated=True,
             rate_hz=RATE_HZ,
             effort_limit_n=100.0,
             speed_limit_m_s=0.2,

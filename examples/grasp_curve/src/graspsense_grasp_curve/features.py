@@ -42,8 +42,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-NAMES: Final = tuple(name for name, _ in CURVE)
-UNITS: Final = tuple(unit for _, unit in CURVE)
+NAMES: Final = tuple(feature.name for feature in CURVE)
+UNITS: Final = tuple(feature.unit for feature in CURVE)
 IMAGE: Final = NAMES[5:]
 LEAST_TRAVEL_M: Final = 2e-4
 LEAST_LOSS: Final = 0.02

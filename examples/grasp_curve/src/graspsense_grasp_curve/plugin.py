@@ -4,27 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.plugin_api import Channel, FeatureSetEntry, hookimpl
+from graspsense.plugin_api import Channel, Feature, FeatureSetEntry, hookimpl
 
 GRASPSENSE_API = (1, 0)
 
 SIX = (
-    ("p_first", "m"),
-    ("p_steady", "m"),
-    ("f_steady", "N"),
-    ("delta_t", "s"),
-    ("dp_dt", "m/s"),
-    ("df_dt", "N/s"),
+    Feature("p_first", "m", "gap at the first contact of both fingers", width=True),
+    Feature("p_steady", "m", "gap when the fingers have come to rest"),
+    Feature("f_steady", "N", "force on the pads when the fingers have come to rest"),
+    Feature("delta_t", "s", "time from the first contact to rest"),
+    Feature("dp_dt", "m/s", "mean rate of the gap from the first contact to rest"),
+    Feature("df_dt", "N/s", "mean rate of the pad force from the first contact to rest"),
 )
 CURVE = (
-    ("peak_force", "N"),
-    ("gap_at_peak", "m"),
-    ("stiffness_ratio", "1"),
-    ("hysteresis", "1"),
-    ("relaxation_time", "s"),
-    ("contact_area", "cells"),
-    ("contact_row", "rows"),
-    ("contact_spread", "rows"),
+    Feature("peak_force", "N", "largest mean force of the pads, from contact to the end of the hold"),
+    Feature("gap_at_peak", "m", "gap at the largest force"),
+    Feature(
+        "stiffness_ratio",
+        "1",
+        "slope of force over gap in the second half of the squeeze, over that in the first",
+    ),
+    Feature("hysteresis", "1", "share of the work of the squeeze that the release does not give back"),
+    Feature("relaxation_time", "s", "time from the peak until 63 % of the relaxation of the hold has passed"),
+    Feature("contact_area", "cells", "cells of a pad above a tenth of the fullest cell, at the peak"),
+    Feature("contact_row", "rows", "centre of the contact along the pad, at the peak"),
+    Feature("contact_spread", "rows", "standard deviation of the contact along the pad, at the peak"),
 )
 
 

@@ -103,6 +103,7 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
         return DeviceInfo(
             name="Robotiq 2F-85" if self._fake is None else "fake Robotiq 2F-85",
             clock="device",
+            simulated=self._fake is not None,
             rate_hz=RATE_HZ,
             effort_limit_n=FORCES_N[1],
             speed_limit_m_s=SPEEDS_M_S[1],

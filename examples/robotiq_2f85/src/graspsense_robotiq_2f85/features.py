@@ -37,7 +37,7 @@ class WithoutPads(FeatureSet[WithoutPadsConfig]):
             rest_speed_m_s=config.rest_speed_m_s,
             rest_window_s=config.rest_window_s,
         ).extract(evolve(trace, force_left_n=trace.effort_n, force_right_n=trace.effort_n))
-        names = tuple(name for name, _ in FEATURES)
+        names = tuple(feature.name for feature in FEATURES)
         return Features(
             names=names,
             values=tuple(six[name] for name in names),

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from graspsense.plugin_api import (
     Channel,
     ControllerEntry,
+    Feature,
     FeatureSetEntry,
     PipelineEntry,
     SensorBackendEntry,
@@ -16,7 +17,12 @@ from graspsense.plugin_api import (
 GRASPSENSE_API = (1, 0)
 
 RATE_HZ = 100.0
-FEATURES = (("p_first", "m"), ("p_steady", "m"), ("delta_t", "s"), ("dp_dt", "m/s"))
+FEATURES = (
+    Feature("p_first", "m", "gap at contact", width=True),
+    Feature("p_steady", "m", "gap when the fingers have come to rest"),
+    Feature("delta_t", "s", "time from contact to rest"),
+    Feature("dp_dt", "m/s", "mean rate of the gap from contact to rest"),
+)
 """Four of the six features of Table I; for f_steady and df_dt one needs a force, and the 2F-85 has none."""
 
 

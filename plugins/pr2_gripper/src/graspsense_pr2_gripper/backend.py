@@ -14,6 +14,7 @@ from graspsense.plugin_api import (
     Command,
     DeviceInfo,
     DeviceLost,
+    ObjectKind,
     Pads,
     Reading,
     SensorBackend,
@@ -23,6 +24,7 @@ from graspsense.plugin_api import (
     stored_zero,
 )
 from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.emulation import emulated_body
 from graspsense_pr2_gripper.link import LockStepLink
 from graspsense_pr2_gripper.measure import Measure
 from graspsense_pr2_gripper.opening import Opened, open_board
@@ -56,6 +58,16 @@ class Pr2Backend(SensorBackend[Pr2Config]):
     _lost_serial = ""
     _stands_in = False
     _sent = _echo = _heard_us = 0
+
+    def objects(self) -> Sequence[ObjectKind]:
+        """Return what the emulated gripper's body can simulate; a real gripper simulates nothing."""
+        return emulated_body(self.config).objects() if self.config.transport == "emulated" else ()
+
+    def with_object(self, name: str) -> SensorBackend[Pr2Config]:
+        """Return this gripper with another object between its fingers. Raises ConfigError for a real one."""
+        if self.config.transport != "emulated":
+            return super().with_object(name)
+        return Pr2Backend(evolve(self.config, object=name))
 
     def open(self, seed: int) -> DeviceInfo:
         """Open the gripper; a seed matters to an emulated one alone.
@@ -174,6 +186,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             serial=identity.serial,
             firmware=".".join(map(str, identity.firmware)),
             clock="virtual" if isinstance(opened.link, LockStepLink) and not self._stands_in else "device",
+            simulated=emulation is not None and emulation.body_info.simulated,
             rate_hz=identity.report_rate_hz,
             effort_limit_n=self._effort_limit_n,
             speed_limit_m_s=identity.speed_limit_um_s / 1e6,

@@ -8,6 +8,8 @@ from typing import Any, Literal
 from attrs import field, frozen
 from attrs.validators import and_, ge, gt, in_, le, max_len
 
+from graspsense.plugin_api import NAMES_INPUT
+
 _USB_ID = and_(ge(0), le(0xFFFF))
 _PROBABILITY = and_(ge(0.0), le(1.0))
 
@@ -75,7 +77,7 @@ class Pr2Config:
     """What the emulated board drives: any gripper backend with a virtual clock."""
     body_config: dict[str, Any] = field(factory=dict)
     """Keys of that backend, as under its own [gripper]."""
-    object: str | None = None
+    object: str | None = field(default=None, metadata=NAMES_INPUT)
     """What stands between the emulated gripper's fingers; None leaves it to the body."""
     transmission: Literal["pr2", "pr2_2009", "pr2_paper"] = field(
         default="pr2", validator=in_(("pr2", "pr2_2009", "pr2_paper"))

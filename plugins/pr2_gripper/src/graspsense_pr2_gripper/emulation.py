@@ -26,12 +26,18 @@ class Emulation(NamedTuple):
     body_info: DeviceInfo
 
 
-def emulated_board(config: Pr2Config, seed: int) -> Emulation:
-    """Return a board over the body that the settings name, which is opened. Raises ConfigError."""
+def emulated_body(config: Pr2Config) -> SensorBackend[Any]:
+    """Return the backend that the emulated board drives, not yet opened. Raises ConfigError."""
     values = dict(config.body_config)
     if config.object is not None:
         values["object"] = config.object
     body: SensorBackend[Any] = create("sensor-backend", config.body, **values)
+    return body
+
+
+def emulated_board(config: Pr2Config, seed: int) -> Emulation:
+    """Return a board over the body that the settings name, which is opened. Raises ConfigError."""
+    body = emulated_body(config)
     info = body.open(seed)
     if info.clock != "virtual":
         raise ConfigError(

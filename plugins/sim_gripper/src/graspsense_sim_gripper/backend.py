@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, Unpack
 
+from attrs import evolve
+
 from graspsense.plugin_api import (
     CELLS,
     NO_PADS,
@@ -16,6 +18,7 @@ from graspsense.plugin_api import (
     DeviceInfo,
     Frame,
     Grasped,
+    ObjectKind,
     Pads,
     Reading,
     RunConfig,
@@ -30,7 +33,7 @@ from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.linear import Linear, move_of
 from graspsense_sim_gripper.linear_scene import linear_of
-from graspsense_sim_gripper.objects.library import kinds_in
+from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
 from graspsense_sim_gripper.plant import PlantParams, PlantState, Squeezed
 from graspsense_sim_gripper.sensing import SensorState, felt_again, sense
 from graspsense_sim_gripper.setting import CELL_OFFSET, device_info, set_scene
@@ -49,6 +52,14 @@ class SimBackend(BatchBackend[SimConfig]):
     def __init__(self, config: SimConfig) -> None:
         super().__init__(config)
         self._control: Control | None = None
+
+    def objects(self) -> tuple[ObjectKind, ...]:
+        """Return the objects of the catalogue and of the shipped scenes."""
+        return object_kinds()
+
+    def with_object(self, name: str) -> SimBackend:
+        """Return this gripper with another object in it: a name of the catalogue, or a scene file."""
+        return SimBackend(evolve(self.config, object=name))
 
     def expect(self, controller: Controller[Any], run: RunConfig) -> None:
         """Take the controller for which the model of the object is to be chosen."""

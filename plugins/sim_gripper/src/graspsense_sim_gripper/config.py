@@ -8,6 +8,8 @@ from typing import Literal
 from attrs import field, frozen
 from attrs.validators import and_, ge, gt, in_, instance_of, le, lt, optional
 
+from graspsense.plugin_api import CHANGES_NO_RESULT, NAMES_INPUT
+
 FIDELITIES = ("scene", "full", "reference")
 NOT_NEGATIVE = and_(ge(0.0), lt(math.inf))
 POSITIVE = and_(gt(0.0), lt(math.inf))
@@ -19,7 +21,7 @@ LINKAGES = ("pr2", "pr2_2009", "pr2_paper", "straight")
 class SimConfig:
     """A PR2 gripper as a model: what stands in it, its drive, its sensors. SI units."""
 
-    object: str = "odwalla:full_closed"
+    object: str = field(default="odwalla:full_closed", metadata=NAMES_INPUT)
     """Name in the catalogue, with its state: `odwalla:full_closed`, `can:empty_open`, `block`; `none`: nothing.
 
     Or a scene file, as in `my_bottle.toml`.
@@ -32,11 +34,15 @@ class SimConfig:
     """Error that features, peak and trace may have, as a share; model and steps follow from it."""
     fidelity: Literal["scene", "full", "reference"] = field(default="scene", validator=in_(FIDELITIES))
     """`scene`: what the scene needs. `full`: every term. `reference`: that in steps halved until all stands still."""
-    expected_force_n: float | None = field(default=None, validator=optional(POSITIVE))
+    expected_force_n: float | None = field(
+        default=None, validator=optional(POSITIVE), metadata=CHANGES_NO_RESULT
+    )
     """The force that the grasp goes up to, and how fast the fingers touch: what the choice of the model rests on.
 
     Not set: as in a trial grasp under the controller."""
-    expected_speed_m_s: float | None = field(default=None, validator=optional(POSITIVE))
+    expected_speed_m_s: float | None = field(
+        default=None, validator=optional(POSITIVE), metadata=CHANGES_NO_RESULT
+    )
     scheme: Literal["auto", "explicit", "implicit"] = field(default="auto", validator=in_(SCHEMES))
     """Forces the scheme of the steps, for a study."""
     step_s: float | None = field(default=None, validator=optional(gt(0.0)))
@@ -75,10 +81,10 @@ class SimConfig:
     drive_lag_s: float = field(default=0.0, validator=NOT_NEGATIVE)
     """Time constant with which the effort follows the command; 0: at once."""
     compile: Literal["worth", "always", "never"] = field(
-        default="worth", validator=in_(("worth", "always", "never"))
+        default="worth", validator=in_(("worth", "always", "never")), metadata=CHANGES_NO_RESULT
     )
     """Many grasps: whether the loop is compiled where that takes less time than it saves, always, or never."""
-    explain: bool = False
+    explain: bool = field(default=False, metadata=CHANGES_NO_RESULT)
     """Whether the report lists how much each term of the object did (`--explain-model`)."""
     noise_counts: float = field(default=15.0, validator=NOT_NEGATIVE)
     """Noise of a cell, standard deviation: margins of 125 to 225 counts are in use on the robot."""

@@ -11,12 +11,15 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from attrs import fields_dict
 
-from graspsense.plugin_api import ConfigError, UnknownName, suggestion
+from graspsense.plugin_api import ConfigError, ObjectKind, UnknownName, suggestion
 from graspsense_sim_gripper.objects.spec import ObjectSpec, parse_scene, parse_term, spec_with_sorted_terms
+
+CONTAINERS: Final = ("odwalla", "naked", "can", "water")
+"""The containers of Chitta, Piccoli and Sturm (ICRA 2010), section III.E: trials are simulated with them by default."""
 
 
 @cache
@@ -44,6 +47,18 @@ def shipped_scenes() -> Mapping[str, str]:
         for file in sorted(folder.iterdir(), key=lambda file: file.name)
         if file.name.endswith(".toml")
     }
+
+
+def object_kinds() -> tuple[ObjectKind, ...]:
+    """Return the kinds of the catalogue with their states, in its order, and then the shipped scenes."""
+    states: dict[str, list[str]] = {}
+    for full_name in catalogue():
+        name, colon, state = full_name.partition(":")
+        states.setdefault(name, []).extend([state] if colon else [])
+    kinds = [
+        ObjectKind(name=name, states=tuple(of), default=name in CONTAINERS) for name, of in states.items()
+    ]
+    return (*kinds, *(ObjectKind(name=name) for name in shipped_scenes() if name not in states))
 
 
 def split_number(name: str) -> tuple[str, int | None]:
