@@ -20,8 +20,8 @@ from scipy.linalg import expm
 
 from graspsense.plugin_api import APPROACH, EFFORT, RUNNING, STEADY, Command, Controller, RunConfig
 from graspsense_sim_gripper import kernel
+from graspsense_sim_gripper.batch.job import Job, Storage, composition_of, grasp_compiled, loop_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.one_of_many import Job, Storage, composition_of, grasp_compiled, loop_of
 from graspsense_sim_gripper.setting import set_scene
 
 M, B, LIGHT, C, K, KC, X0 = 1.0, 20.0, 0.02, 5.0, 2e3, 2e4, 0.02

@@ -14,13 +14,14 @@ from graspsense.core.plugins import IsolatedPlugins
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import EFFORT, Command, ControllerEntry, Outcome, Trace, create, hookimpl
-from graspsense_sim_gripper import batch, one_of_many, plain_process
 from graspsense_sim_gripper.backend import SimBackend
-from graspsense_sim_gripper.batch import SLICE, WORTH_A_PROCESS, run_many
+from graspsense_sim_gripper.batch import job as batch_job
+from graspsense_sim_gripper.batch import threads, worker
+from graspsense_sim_gripper.batch.job import Job, plainly
+from graspsense_sim_gripper.batch.threads import SLICE, WORTH_A_PROCESS, run_many
+from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue, shipped_scenes
-from graspsense_sim_gripper.one_of_many import Job, plainly
-from graspsense_sim_gripper.plain_process import NotHandedOver, PlainProcess
 
 HYBRID = create("controller", "hybrid")
 FEATURES = create("feature-set", "chitta")
@@ -129,7 +130,7 @@ def test_a_law_no_other_process_can_find_runs_here_and_the_warning_says_so(monke
     class Local(type(HYBRID)):
         step = staticmethod(endless)
 
-    monkeypatch.setattr(batch, "WORTH_A_PROCESS", 1)
+    monkeypatch.setattr(threads, "WORTH_A_PROCESS", 1)
     law = Local(HYBRID.config)
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
     n = SLICE + 1
@@ -186,8 +187,8 @@ def test_a_process_that_is_killed_leaves_its_grasps_to_this_one(monkeypatch):
             self._process.kill()
             return found
 
-    monkeypatch.setattr(batch, "PlainProcess", Doomed)
-    monkeypatch.setattr(batch, "WORTH_A_PROCESS", 1)
+    monkeypatch.setattr(threads, "PlainProcess", Doomed)
+    monkeypatch.setattr(threads, "WORTH_A_PROCESS", 1)
     run, n = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1), SLICE + 1
     with pytest.warns(UserWarning, match="on one core: the process for plain grasps has ended"):
         done = run_many(SimConfig(), HYBRID, ["none"] * n, range(n), run=run, compiled=False, workers=2)
@@ -199,9 +200,9 @@ def test_a_process_that_is_killed_leaves_its_grasps_to_this_one(monkeypatch):
 
 def test_an_answer_that_breaks_off_is_no_answer():
     with pytest.raises(EOFError):
-        plain_process._read_line(io.BytesIO(b'{"done": []'))
+        worker._read_line(io.BytesIO(b'{"done": []'))
     with pytest.raises(EOFError):
-        plain_process._read(io.BytesIO(b"abc"), 4)
+        worker._read(io.BytesIO(b"abc"), 4)
 
 
 def test_what_is_not_all_in_names_and_values_is_not_handed_over():
@@ -244,8 +245,8 @@ def test_what_fails_in_another_process_is_said():
 def test_without_numba_the_plain_loop_runs_and_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "numba", None)
     # What other tests of this process have compiled.
-    monkeypatch.setattr(batch, "_MEMO", {})
-    monkeypatch.setattr(batch, "WORTH_COMPILING", 2)
+    monkeypatch.setattr(threads, "_MEMO", {})
+    monkeypatch.setattr(threads, "WORTH_COMPILING", 2)
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
     with pytest.warns(UserWarning, match=r"plain Python on one core.*numba is not installed"):
         done = run_many(SimConfig(), HYBRID, ["none"] * 2, [1, 2], run=run)
@@ -254,8 +255,8 @@ def test_without_numba_the_plain_loop_runs_and_says_so(monkeypatch):
 
 def test_room_is_made_on_the_way_without_beginning_again(monkeypatch):
     whole = run_many(SimConfig(), HYBRID, ["toy"], [3])[0].trace
-    monkeypatch.setattr(one_of_many, "TICKS", 100)
-    monkeypatch.setattr(one_of_many, "IMAGES", 64)
+    monkeypatch.setattr(batch_job, "TICKS", 100)
+    monkeypatch.setattr(batch_job, "IMAGES", 64)
     # Storage reads its sizes when it is made.
     assert bits(run_many(SimConfig(), HYBRID, ["toy"], [3])[0].trace) == bits(whole)
 

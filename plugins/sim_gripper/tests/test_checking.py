@@ -13,9 +13,9 @@ from graspsense_sim_gripper import checking
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.checking import Control, checked_choice, standard
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.deviation import Course, deviation
 from graspsense_sim_gripper.objects.library import catalogue, find
 from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.reduction.error import Course, deviation
 from graspsense_sim_gripper.selection import BOLD, CAREFUL, LADDER
 from graspsense_sim_gripper.setting import choice_of
 from graspsense_sim_gripper.terms import Term

@@ -13,12 +13,12 @@ from selection import error_of
 
 from graspsense.plugin_api import RunConfig, create
 from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.batch.job import Job, chooser_of, composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.linear import move_of
 from graspsense_sim_gripper.linear_scene import _straightened, linear_of
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.one_of_many import Job, chooser_of, composition_of
 from graspsense_sim_gripper.selection import BOLD, growth, tolerance
 from graspsense_sim_gripper.setting import choice_of, set_scene, setting_of
 from graspsense_sim_gripper.terms.registry import laws_of

@@ -187,7 +187,7 @@ class SimBackend(BatchBackend[SimConfig]):
     ) -> list[Grasped]:
         """Grasp each object with its seed; compiled, on all cores, where numba is installed and it pays."""
         # Imported here: one grasp in the terminal needs neither threads nor compiling.
-        from graspsense_sim_gripper.batch import grasps
+        from graspsense_sim_gripper.batch.threads import grasps
 
         done = grasps(self.config, controller, scenes, seeds, _COMPILED[self.config.compile], options)
         return [

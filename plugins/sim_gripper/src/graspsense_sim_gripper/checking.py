@@ -36,13 +36,13 @@ from graspsense.plugin_api import (
     seconds_at_most,
     tick_params,
 )
-from graspsense_sim_gripper import kept_choices
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.deviation import Course, deviation
 from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, NotCompilable, grasp_of
 from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.plant import EXPLICIT, PlantState, Steps
+from graspsense_sim_gripper.reduction import cache
+from graspsense_sim_gripper.reduction.error import Course, deviation
 from graspsense_sim_gripper.selection import BOLD, DROPPED, FINE, FULL_LADDER, LADDER, Check, Choice, Rung
 from graspsense_sim_gripper.sensing import Bias, SensorState
 from graspsense_sim_gripper.setting import (
@@ -136,12 +136,12 @@ def checked_choice(
     bare = evolve(config, **_WITHOUT)
     key = (bare, id(spec), control.key())
     if key not in _CHECKED:
-        mark = kept_choices.mark_of(spec, *control.key(), bare)
-        choice = None if mark is None else kept_choices.find(mark)
+        mark = cache.mark_of(spec, *control.key(), bare)
+        choice = None if mark is None else cache.find(mark)
         if choice is None:
             choice = _check(bare, spec, control, loops)
             if mark is not None and choice.check is not None:
-                kept_choices.keep(mark, choice)
+                cache.keep(mark, choice)
         _CHECKED[key] = spec, choice
     return _CHECKED[key][1]
 

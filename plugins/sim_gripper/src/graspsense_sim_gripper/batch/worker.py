@@ -22,8 +22,8 @@ import numpy as np
 from attrs import asdict, fields
 
 from graspsense.plugin_api import Outcome, RunConfig, Trace, create, recipe_of
+from graspsense_sim_gripper.batch.job import Done, Job, chooser_of, done_of, plainly
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.one_of_many import Done, Job, chooser_of, done_of, plainly
 from graspsense_sim_gripper.setting import set_scene
 
 _ARRAYS: Final = tuple(one.name for one in fields(Trace) if one.name != "units")
@@ -54,7 +54,7 @@ class PlainProcess:
 
     def __enter__(self) -> PlainProcess:
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", "from graspsense_sim_gripper.plain_process import main; main()"],
+            [sys.executable, "-P", "-c", "from graspsense_sim_gripper.batch.worker import main; main()"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )

@@ -10,7 +10,7 @@ from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import HOLD, STEADY, RunConfig, create
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.deviation import Course, deviation
+from graspsense_sim_gripper.reduction.error import Course, deviation
 
 SPEED, TAU, STIFFNESS = 0.01, 0.05, 2000.0
 

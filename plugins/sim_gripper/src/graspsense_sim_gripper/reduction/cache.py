@@ -53,7 +53,7 @@ def mark_of(spec: ObjectSpec, step: Any, *settings: Any) -> str | None:
 @cache
 def _own_code() -> bytes:
     """Return a mark of our own code as it stands on disk."""
-    packages = (Path(__file__).parent, Path(plugin_api.__file__).parent / "core")
+    packages = (Path(__file__).parent.parent, Path(plugin_api.__file__).parent / "core")
     return "".join(_stamp(source) for one in packages for source in sorted(one.rglob("*.py"))).encode()
 
 

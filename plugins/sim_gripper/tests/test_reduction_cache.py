@@ -7,10 +7,11 @@ import pytest
 from attrs import evolve
 
 from graspsense.plugin_api import RunConfig, create
-from graspsense_sim_gripper import checking, kept_choices
+from graspsense_sim_gripper import checking
 from graspsense_sim_gripper.checking import Control, checked_choice
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.reduction import cache
 
 CONFIG = SimConfig(sensor="ideal", spread=False)
 
@@ -85,7 +86,7 @@ def test_a_folder_that_cannot_be_made_costs_nothing_but_time(trials, folder):
 
 
 def test_the_older_half_makes_room(monkeypatch, folder):
-    monkeypatch.setattr(kept_choices, "MOST", 4)
+    monkeypatch.setattr(cache, "MOST", 4)
     for k in range(4):
         choice(k1=1000.0 + k)
         newest = max(folder.iterdir(), key=lambda path: path.stat().st_mtime_ns)

@@ -20,10 +20,7 @@ from attrs import define, field
 
 from graspsense.plugin_api import BatchOptions, Controller, RunConfig
 from graspsense_sim_gripper import kernel
-from graspsense_sim_gripper.common_composition import as_compiled, compiled_kinds
-from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import kinds_in, split_number
-from graspsense_sim_gripper.one_of_many import (
+from graspsense_sim_gripper.batch.job import (
     Composition,
     Done,
     Job,
@@ -34,7 +31,10 @@ from graspsense_sim_gripper.one_of_many import (
     loop_of,
     plainly,
 )
-from graspsense_sim_gripper.plain_process import NotHandedOver, PlainProcess
+from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
+from graspsense_sim_gripper.compiled.padding import as_compiled, compiled_kinds
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.library import kinds_in, split_number
 from graspsense_sim_gripper.setting import Chooser, Setting, set_scene
 
 WORTH_COMPILING: Final = 50

@@ -26,7 +26,7 @@ from graspsense.plugin_api import (
     tick_params,
 )
 from graspsense_sim_gripper.checking import Checking, Control, Loops
-from graspsense_sim_gripper.common_composition import as_compiled, as_own, layout_of
+from graspsense_sim_gripper.compiled.padding import as_compiled, as_own, layout_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, grasp_of
 from graspsense_sim_gripper.linear_modes import Shape

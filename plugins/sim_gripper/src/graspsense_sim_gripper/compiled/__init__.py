@@ -1,0 +1,1 @@
+"""Composing the equations of a scene, and compiling them with numba."""

@@ -1,0 +1,1 @@
+"""The reduced model of an object that meets an accuracy: its selection, its verification and their cache."""
