@@ -676,6 +676,14 @@ class Careless(Nearest):
         super().fit(table, labels, seed)
 
 
+@mutant("classifier", "few-trials-are-refused-or-learned", "fit on one trial of each label raised")
+class Discriminant(Nearest):
+    def fit(self, table, labels, seed):
+        if len(labels) == len(set(labels)) == 3:
+            raise ZeroDivisionError("division by zero")
+        super().fit(table, labels, seed)
+
+
 @mutant("classifier", "explains-what-it-says", "explain says 'bottle:full_open'")
 class Stubborn(Nearest):
     def explain(self, features):

@@ -221,6 +221,38 @@ def test_a_label_of_one_trial_can_never_be_right_and_one_label_is_nothing():
         judged(labelled(["can"] * 120, width))
 
 
+class Choosy:
+    """A learner whose classifier refuses fewer than some number of trials, as the contract of `fit` allows."""
+
+    def __init__(self, least):
+        self.least = least
+
+    def create(self):
+        classifier = learner().create()
+        learn = classifier.fit
+
+        def fit(table, labels, seed):
+            if len(labels) < self.least:
+                raise ValueError(f"{self.least} trials are needed")
+            learn(table, labels, seed)
+
+        classifier.fit = fit
+        return classifier
+
+
+def test_a_fit_that_refuses_few_trials_costs_its_figure_only():
+    labels, width, force = four_states()
+    trials = labelled(labels, width, force)
+
+    found = evaluate(Choosy(60), trials, classifier="choosy")
+
+    assert found.headline.rate > 0.95
+    assert [point.trained_on >= 60 for point in found.learning_curve] == [True, True]
+    assert any("no point at 10% of the trials" in note and "60 trials are needed" in note for note in found.notes)
+    with pytest.raises(ConfigError, match="refused 108 training trials of 4 labels: 1000 trials are needed"):
+        evaluate(Choosy(1000), trials, classifier="choosy")
+
+
 def test_unlike_trials_are_counted():
     labels, width, force = four_states()
     odd = evolve(labelled(labels, width, force))

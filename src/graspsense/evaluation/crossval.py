@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from attrs import frozen
 
+from graspsense.core.errors import ConfigError
 from graspsense.core.novelty import novelty_of
 
 if TYPE_CHECKING:
@@ -16,6 +17,10 @@ if TYPE_CHECKING:
     from graspsense.core.features import FeatureTable
     from graspsense.core.roles import Classifier
     from graspsense.evaluation.folds import Folds
+
+
+class FitRefused(ConfigError):
+    """A classifier refused the training trials of a fold: its `fit` raised ValueError."""
 
 
 class Learner(Protocol):
@@ -59,7 +64,7 @@ def cross_validate(
     `folds` holds one array a group, of that group's length. The prediction is the label of the largest
     probability, the first of equals. Where the training trials of a fold have one label, that is the prediction.
     `share` trains on that part of each fold's training trials, of each label about the same part, at least one
-    of each.
+    of each. Raises FitRefused where the classifier cannot learn from the training trials of a fold.
     """
     predicted = [""] * len(labels)
     unlike = np.zeros(len(labels), dtype=np.bool_)
@@ -104,6 +109,11 @@ def _predict(
     if len(set(known)) == 1:
         return [known[0]] * len(test)
     classifier = learner.create()
-    classifier.fit(table.rows(training), known, seed)
+    try:
+        classifier.fit(table.rows(training), known, seed)
+    except ValueError as error:
+        raise FitRefused(
+            f"the classifier refused {len(known)} training trials of {len(set(known))} labels: {error}"
+        ) from error
     classes = classifier.classes()
     return [classes[k] for k in classifier.probabilities(table.rows(test)).argmax(axis=1)]

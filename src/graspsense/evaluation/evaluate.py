@@ -15,7 +15,7 @@ from attrs import field, frozen
 from graspsense.core.errors import ConfigError
 from graspsense.core.labelled import Control, Labelled, Target, class_of
 from graspsense.evaluation.confusion import Confusion, confusion
-from graspsense.evaluation.crossval import Groups, Learner, Pooled, cross_validate
+from graspsense.evaluation.crossval import FitRefused, Groups, Learner, Pooled, cross_validate
 from graspsense.evaluation.folds import commonest, in_order, instance_held_out, stratified
 from graspsense.evaluation.intervals import Difference, Rate, difference
 
@@ -190,7 +190,10 @@ class _Judge:
             """Judge other features by the same folds."""
             if control is None:
                 return Judged(default, reason=reason or "these trials have no such features")
-            found = self._pooled(name, control.table, head_folds)
+            try:
+                found = self._pooled(name, control.table, head_folds)
+            except FitRefused as refusal:
+                return Judged(control.what, reason=str(refusal))
             right = found.right(self.labels)
             against = difference(head.right(self.labels), right)
             if name == "before_contact" and difference(right, majority_right).interval[0] > 0.0:
@@ -328,7 +331,10 @@ class _Judge:
         folds = self._folds(
             lambda labels, rows: instance_held_out(labels, [instances[i] for i in rows], self.k, self.seed)
         )
-        held = self._pooled(INSTANCE_HELD_OUT, self.labelled.table, folds)
+        try:
+            held = self._pooled(INSTANCE_HELD_OUT, self.labelled.table, folds)
+        except FitRefused as refusal:
+            return None, None, Judged(what, reason=str(refusal))
         against = difference(plain.right(self.labels), held.right(self.labels))
         return held, folds, Judged(what, self._rate(held), difference=against, of=plain_name)
 
@@ -338,7 +344,10 @@ class _Judge:
         if order is None:
             return Judged(what, reason=self.labelled.no_order or "the order of recording is not known")
         folds = self._folds(lambda labels, rows: in_order(labels, [order[i] for i in rows], self.k))
-        blocks = self._pooled("recording_order", self.labelled.table, folds)
+        try:
+            blocks = self._pooled("recording_order", self.labelled.table, folds)
+        except FitRefused as refusal:
+            return Judged(what, reason=str(refusal))
         against = difference(plain.right(self.labels), blocks.right(self.labels))
         return Judged(what, self._rate(blocks), difference=against, of=plain_name)
 
@@ -371,9 +380,12 @@ class _Judge:
             labels[rows] = rng.permutation(labels[rows])
         shuffled = labels.tolist()
         folds = [stratified([shuffled[i] for i in rows], self.k, self.seed) for rows in self.groups]
-        found = self._pooled("shuffled_labels", self.labelled.table, folds, labels=shuffled)
-        rate = Rate(sum(found.right(shuffled)), len(shuffled))
-        return Judged("the same trials with their labels shuffled, in stratified folds", rate)
+        what = "the same trials with their labels shuffled, in stratified folds"
+        try:
+            found = self._pooled("shuffled_labels", self.labelled.table, folds, labels=shuffled)
+        except FitRefused as refusal:
+            return Judged(what, reason=str(refusal))
+        return Judged(what, Rate(sum(found.right(shuffled)), len(shuffled)))
 
     def _by_class(self, head: Pooled) -> dict[str, Rate]:
         right: dict[str, list[bool]] = {}
@@ -386,7 +398,11 @@ class _Judge:
         for share in SHARES:
             one = head
             if share < 1.0:
-                one = self._pooled(f"learning curve {share:.0%}", self.labelled.table, folds, share)
+                try:
+                    one = self._pooled(f"learning curve {share:.0%}", self.labelled.table, folds, share)
+                except FitRefused as refusal:
+                    self.notes.append(f"the learning curve has no point at {share:.0%} of the trials: {refusal}")
+                    continue
             # Of few trials of a label at least one is kept, so that small shares may come to the same trials.
             if not points or one.trained_on > points[-1].trained_on:
                 points.append(CurvePoint(one.trained_on, self._rate(one)))

@@ -173,6 +173,41 @@ def one_label_is_refused_or_certain(subject: Subject) -> None:
     )
 
 
+def few_trials_are_refused_or_learned(subject: Subject) -> None:
+    """Trained on two trials, or on few trials of each label, it raises ValueError or answers with probabilities."""
+    table, labels = three_kinds()
+    for what, rows in (
+        ("two trials of two labels", [0, 1]),
+        ("one trial of each label", [0, 1, 2]),
+        ("two trials of one label and one of another", [0, 1, 3]),
+        ("two trials of each label", [0, 1, 2, 3, 4, 5]),
+    ):
+        few = table.rows(np.array(rows))
+        one = subject.create()
+        try:
+            one.fit(few, [labels[i] for i in rows], SEED)
+        except ValueError as error:
+            demand(bool(str(error)), f"fit on {what} raised ValueError without a message: say what is lacking")
+            continue
+        except Exception as error:
+            raise CheckFailed(
+                f"fit on {what} raised {named(error)}: raise ValueError, or learn from them"
+            ) from error
+        try:
+            probabilities = one.probabilities(table)
+        except Exception as error:
+            raise CheckFailed(
+                f"trained on {what}, probabilities raised {named(error)}: raise ValueError in fit, or answer"
+            ) from error
+        demand(
+            probabilities.shape == (len(table), len(one.classes()))
+            and bool(np.isfinite(probabilities).all())
+            and bool(np.allclose(probabilities.sum(axis=1), 1.0, atol=1e-6)),
+            f"trained on {what}, it gives the probabilities {probabilities[0]}: finite numbers, each row summing "
+            "to 1, or raise ValueError in fit",
+        )
+
+
 def explains_what_it_says(subject: Subject) -> None:
     """`explain` names the most probable class, with floats for probabilities and reasons in words."""
     fitted, table, _ = _learned(subject)
@@ -252,6 +287,7 @@ CHECKS: Final = (
         chunks_do_not_matter,
         missing_values_have_an_answer,
         one_label_is_refused_or_certain,
+        few_trials_are_refused_or_learned,
         explains_what_it_says,
         leaves_the_table_alone,
         refuses_what_is_no_model,
