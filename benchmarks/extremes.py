@@ -33,9 +33,9 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 from selection import controller_is_stable
 
-from graspsense.plugin_api import ConfigError, bind, create
+from graspsense.plugin_api import ConfigError, NotCompilable, bind, create
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.kernel import NotCompilable, compiled, plant_of
+from graspsense_sim_gripper.kernel import compiled, plant_of
 from graspsense_sim_gripper.linear import move_of
 from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.objects.library import find
@@ -95,7 +95,7 @@ def _compiled(kinds: tuple[str, ...]) -> Callable[..., Any]:
     """Return the squeeze of an object of these terms in steps, compiled where that is to be had."""
     plain = bind(_pressing, move=plant_of(laws_of(kinds)))
     try:
-        return compiled(plain, {})
+        return compiled(plain)
     except NotCompilable:
         return plain
 

@@ -29,7 +29,7 @@ from typing import Any, Final
 import numpy as np
 from attrs import evolve, frozen
 
-from graspsense.plugin_api import HOLD, ConfigError, RunConfig, create
+from graspsense.plugin_api import HOLD, ConfigError, RunConfig, create, entry_point, first_call
 from graspsense_sim_gripper import kernel
 from graspsense_sim_gripper.batch.job import Composition, Done, Job, Storage, grasp_once, loop_of
 from graspsense_sim_gripper.checking import Control, checked_choice
@@ -209,7 +209,6 @@ class Bench:
 
     def __init__(self) -> None:
         self.compiled: dict[Composition, Any] = {}
-        self.memo: dict[Any, Any] = {}
         self.storage = Storage()
         self.choice_s = self.compile_s = 0.0
 
@@ -261,14 +260,14 @@ class Bench:
         composition = Composition(setting.kinds, shape, setting.plant.steps.settle > 0.0)
         if composition not in self.compiled:
             began = time.process_time()
-            loop = kernel.compiled(loop_of(composition, step), self.memo)
+            loop = kernel.compiled(loop_of(composition, step))
             controller = create("controller", "hybrid")
             short = RunConfig(grasp_timeout_s=0.01)
             job = Job(config=config, controller=controller, run=short, draw=None, traces=True)
-            with kernel.first_call(by_maps=by_maps is not None):
+            with first_call(slp_vectorize=by_maps is not None):
                 grasp_once(job, setting, loop, self.storage, on_arrays=True)
             # As grasps of a batch are run: without a look at the types, in storage that was there before.
-            self.compiled[composition] = kernel.entry(loop)
+            self.compiled[composition] = entry_point(loop)
             self.compile_s += time.process_time() - began
         return self.compiled[composition]
 

@@ -18,7 +18,17 @@ import numpy as np
 from attrs import frozen
 from scipy.linalg import expm
 
-from graspsense.plugin_api import APPROACH, EFFORT, RUNNING, STEADY, Command, Controller, RunConfig
+from graspsense.plugin_api import (
+    APPROACH,
+    EFFORT,
+    RUNNING,
+    STEADY,
+    Command,
+    Controller,
+    RunConfig,
+    entry_point,
+    first_call,
+)
 from graspsense_sim_gripper import kernel
 from graspsense_sim_gripper.batch.job import Job, Storage, composition_of, grasp_compiled, loop_of
 from graspsense_sim_gripper.config import SimConfig
@@ -229,11 +239,11 @@ class Ours:
         # The trace is kept: what is measured includes recording it and making its columns.
         self.job = Job(config=config, controller=self.law, run=RunConfig(hold_s=0.0), draw=None, traces=True)
         composition = composition_of(config, self.setting)
-        self.loop = kernel.compiled(loop_of(composition, type(self.law).step), _MEMO)
+        self.loop = kernel.compiled(loop_of(composition, type(self.law).step))
         self.storage = Storage()
-        with kernel.first_call(by_maps=composition.shape is not None):
+        with first_call(slp_vectorize=composition.shape is not None):
             self.once()
-        self.loop = kernel.entry(self.loop)
+        self.loop = entry_point(self.loop)
 
     def once(self) -> Run:
         """Return one run."""
@@ -252,6 +262,3 @@ class Ours:
     def run(self, repeats: int) -> Run:
         """Return the fastest of so many."""
         return min((self.once() for _ in range(repeats)), key=lambda one: one.seconds)
-
-
-_MEMO: dict[str, Any] = {}

@@ -142,6 +142,10 @@ _TABLE: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
         "runner": ("ended_by_itself", "overdue", "seconds_at_most", "tick_params"),
         "tick": ("Schedule", "TickParams", "TickState", "first_state", "tick"),
     },
+    "Compiling a function with all that it calls": {
+        "call_graph": ("NotCompilable", "fingerprint"),
+        "compiling": ("CompileOptions", "Inlining", "compile_function", "entry_point", "first_call"),
+    },
     "Building other components, collecting what other plugins bring, and where to keep files": {
         "config": ("create", "recipe_of"),
         "plugins": ("collect",),

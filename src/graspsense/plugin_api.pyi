@@ -148,6 +148,15 @@ from graspsense.core.tick import TickState as TickState
 from graspsense.core.tick import first_state as first_state
 from graspsense.core.tick import tick as tick
 
+# Compiling a function with all that it calls
+from graspsense.core.call_graph import NotCompilable as NotCompilable
+from graspsense.core.call_graph import fingerprint as fingerprint
+from graspsense.core.compiling import CompileOptions as CompileOptions
+from graspsense.core.compiling import Inlining as Inlining
+from graspsense.core.compiling import compile_function as compile_function
+from graspsense.core.compiling import entry_point as entry_point
+from graspsense.core.compiling import first_call as first_call
+
 # Building other components, collecting what other plugins bring, and where to keep files
 from graspsense.core.config import create as create
 from graspsense.core.config import recipe_of as recipe_of

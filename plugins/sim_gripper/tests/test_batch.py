@@ -244,8 +244,6 @@ def test_what_fails_in_another_process_is_said():
 
 def test_without_numba_the_plain_loop_runs_and_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "numba", None)
-    # What other tests of this process have compiled.
-    monkeypatch.setattr(threads, "_MEMO", {})
     monkeypatch.setattr(threads, "WORTH_COMPILING", 2)
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
     with pytest.warns(UserWarning, match=r"plain Python on one core.*numba is not installed"):

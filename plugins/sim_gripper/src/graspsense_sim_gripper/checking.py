@@ -28,6 +28,7 @@ from graspsense.plugin_api import (
     HOLD,
     ConfigError,
     Controller,
+    NotCompilable,
     RunConfig,
     create,
     first_state,
@@ -37,7 +38,7 @@ from graspsense.plugin_api import (
     tick_params,
 )
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, NotCompilable, grasp_of
+from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, grasp_of
 from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.plant import EXPLICIT, PlantState, Steps

@@ -1,29 +1,15 @@
 """Composing a scene's step, and compiling the whole loop where many grasps are wanted.
 
 `sum_of` makes one term of a scene's, `plant_of` binds it into the plant. Everything runs as it is in the
-interpreter. `compiled` compiles a bound function with all it reaches. This is the only module that imports numba,
-and only when a loop is compiled.
-
-numba keeps compiled code on disk under a function's file, name and argument types. Two compositions of the same
-functions share all three, so each gets a fingerprint of its code, constants and parts in its name: without it a
-composition loaded from disk can silently run another's code, and an edited helper is not noticed.
+interpreter. `compiled` compiles a bound function with all that it calls, under the options that suit the loop.
 """
 
 from __future__ import annotations
 
-import dis
-import functools
-import hashlib
-import os
-import re
-import sys
-import types
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
-from graspsense.plugin_api import TARING, Pads, bind, cache_folder, tick
+from graspsense.plugin_api import TARING, CompileOptions, Inlining, Pads, bind, compile_function, tick
 from graspsense_sim_gripper import linear, plant
 from graspsense_sim_gripper.linear_modes import Shape
 from graspsense_sim_gripper.plant import PlantParams, PlantState
@@ -234,238 +220,24 @@ def grasp_of(
 # ------------------------------------------------------------------------------------------------- compiling
 
 
-SHORT_CODE: Final = 400
-"""Bytes of byte code up to which a function is taken into all that call it."""
-LONG_CODE: Final = 2000
-"""Bytes from which on a function stays a call where it would come to stand in several places."""
-LEADING: Final = (
-    plant.move.__code__,
-    plant._driven.__code__,
-    plant._settled.__code__,
-    plant._stepped.__code__,
+COMPILE_OPTIONS: Final = CompileOptions(
+    # Nothing here creates an array, and counting references to the arrays that are passed took half of a tick.
+    counts_references=False,
+    inlining=Inlining(
+        short_code=400,
+        long_code=2000,
+        before_typing=frozenset(
+            function.__code__ for function in (plant.move, plant._driven, plant._settled, plant._stepped)
+        ),
+        cold_calls=linear.seldom,
+    ),
+    install="graspsense-sim-gripper[fast]",
 )
-"""What does little but lead to the next: taken in before types are inferred, since every level of calls has all that
-is below it compiled once more."""
 
 
-class NotCompilable(Exception):
-    """A function outside the subset that can be compiled; the text names it and the reason."""
-
-
-@contextmanager
-def first_call(*, by_maps: bool = False) -> Iterator[None]:
-    """Have a compiled loop called for the first time in here, which compiles it; `by_maps`: one with exact maps.
-
-    Raises NotCompilable where numba refuses, with the line that it names.
-    """
-    import numba
-    from numba.core.errors import NumbaError, UnsupportedBytecodeError
-
-    config: Any = numba.config
-    # Rows side by side are then one instruction; of a loop without products it only makes more instructions.
-    given = config.SLP_VECTORIZE
-    if by_maps:
-        config.SLP_VECTORIZE = 1
-    try:
-        yield
-    except (NumbaError, UnsupportedBytecodeError) as error:
-        places = re.findall(r'(?:File "|Raised from )([^"]+?)(?:", line | \()(\d+)', str(error))
-        where = ":".join(places[-1]) if places else "a place it does not name"
-        reason = next(
-            (line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__
-        )
-        raise NotCompilable(f"the compiler refuses {where}: {reason}") from error
-    finally:
-        config.SLP_VECTORIZE = given
-
-
-def compiled(function: Callable[..., Any], memo: dict[Any, Any]) -> Callable[..., Any]:
-    """Return `function` compiled with all it reaches; `memo` keeps what this process has compiled.
+def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a loop, or a part of it, compiled with all it calls; see `graspsense.plugin_api.compile_function`.
 
     Raises NotCompilable for closures and recursion, and where numba cannot be imported.
     """
-    try:
-        import numba
-    except ImportError as error:
-        raise NotCompilable('numba is not installed: pip install "graspsense-sim-gripper[fast]"') from error
-    if function in memo:
-        return memo[function]  # type: ignore[no-any-return]
-    copies: Counter[types.CodeType] = Counter()
-    _count(_plain(function), 1, (), copies)
-    memo[function] = _compiled(function, memo, numba, copies, outermost=True)
-    return memo[function]  # type: ignore[no-any-return]
-
-
-def entry(loop: Callable[..., Any]) -> Callable[..., Any]:
-    """Return the machine code of a compiled loop that has run once, for more of the same.
-
-    Called through the loop it would look at the type of each number it is given, which takes twice as long as handing
-    them over. What was compiled for several types is returned as it is.
-    """
-    overloads = list(getattr(loop, "overloads", {}).values())
-    return overloads[0].entry_point if len(overloads) == 1 else loop
-
-
-def _compiled(
-    function: Callable[..., Any],
-    memo: dict[Any, Any],
-    numba: types.ModuleType,
-    copies: Counter[types.CodeType],
-    outermost: bool,
-    places: int = 0,
-) -> Callable[..., Any]:
-    plain = _plain(function)
-    mark = fingerprint(plain)
-    key = f"{mark}{'!' if outermost else '?' if places == 0 else ''}"
-    if key not in memo:
-        counts = _places(plain.__code__)
-        seldom = linear.seldom(plain)
-        parts = {
-            name: _compiled(
-                value, memo, numba, copies, outermost=False, places=0 if name in seldom else counts[name]
-            )
-            for name, value in _functions(plain)
-        }
-        code = plain.__code__
-        # A call that stays one hands all numbers of the tuples over, which takes longer than most functions here. So
-        # what stands in one place goes there, and what is short goes everywhere.
-        once = places == 1 and (len(code.co_code) < LONG_CODE or copies[code] == 1)
-        copy = bind(plain, **parts)
-        copy.__qualname__ = f"{plain.__qualname__}_{mark}"
-        # Only the outermost is kept on disk, the rest being inside it, and only it is called from the interpreter:
-        # a wrapper for that costs more to compile than most functions here.
-        memo[key] = numba.njit(
-            copy,
-            nogil=True,
-            cache=outermost and _kept(),
-            no_cpython_wrapper=not outermost,
-            no_cfunc_wrapper=True,
-            forceinline=once or (places > 0 and len(code.co_code) <= SHORT_CODE),
-            inline="always" if places == 1 and code in LEADING else "never",
-            # Nothing here allocates, and counting references to the arrays that are handed on took half of a tick.
-            _nrt=False,
-        )
-    return memo[key]  # type: ignore[no-any-return]
-
-
-def fingerprint(function: Callable[..., Any]) -> str:
-    """Return a mark that differs where the code, a constant or a part of this function differs, however deep."""
-    digest = hashlib.sha256()
-    for item in _described(_plain(function), ()):
-        digest.update(item.encode())
-        digest.update(b"\0")
-    return digest.hexdigest()[:16]
-
-
-def _described(function: types.FunctionType, above: tuple[int, ...]) -> Iterator[str]:
-    if id(function) in above:
-        raise NotCompilable(f"{function.__module__}.{function.__qualname__} calls itself")
-    if function.__closure__:
-        raise NotCompilable(
-            f"{function.__module__}.{function.__qualname__} is a closure over "
-            f"{', '.join(function.__code__.co_freevars)}: pass those as parameters"
-        )
-    code = function.__code__
-    # The interpreter's version and the place of the source: both decide what numba finds on disk.
-    yield f"{sys.version_info[:2]} {function.__module__} {code.co_name} {code.co_varnames} {code.co_names}"
-    yield code.co_code.hex()
-    yield repr([c for c in code.co_consts if not isinstance(c, types.CodeType)])
-    yield repr(function.__defaults__)
-    for nested in _codes(code)[1:]:
-        yield nested.co_code.hex()
-        yield repr([c for c in nested.co_consts if not isinstance(c, types.CodeType)])
-    for name, value in _reached(function):
-        value = _unwrapped(value)
-        yield name
-        if isinstance(value, types.FunctionType):
-            yield from _described(value, (*above, id(function)))
-        elif isinstance(value, type) and issubclass(value, tuple):
-            fields, defaults = getattr(value, "_fields", ()), getattr(value, "_field_defaults", {})
-            yield f"{value.__module__} {value.__qualname__} {fields} {defaults}"
-        elif isinstance(value, int | float | str | bool | tuple):
-            yield repr(value)
-        else:
-            yield getattr(value, "__qualname__", getattr(value, "__name__", type(value).__qualname__))
-
-
-def _count(
-    function: types.FunctionType, copies: int, above: tuple[int, ...], found: Counter[types.CodeType]
-) -> None:
-    """Count in how many places the code of each function would stand if all were taken in."""
-    if id(function) in above:
-        raise NotCompilable(
-            f"{function.__module__}.{function.__qualname__} calls itself, which cannot be compiled"
-        )
-    found[function.__code__] += copies
-    counts = _places(function.__code__)
-    for name, value in _functions(function):
-        _count(_plain(value), copies * counts[name], (*above, id(function)), found)
-
-
-def _functions(function: types.FunctionType) -> list[tuple[str, Any]]:
-    """Return the functions that this one calls, by name."""
-    return [
-        (name, value)
-        for name, value in _reached(function)
-        if isinstance(_unwrapped(value), types.FunctionType)
-    ]
-
-
-@functools.cache
-def _places(code: types.CodeType) -> Counter[str]:
-    """Return in how many places the code reads each global name."""
-    return Counter(
-        str(one.argval)
-        for each in _codes(code)
-        for one in dis.get_instructions(each)
-        if one.opname == "LOAD_GLOBAL"
-    )
-
-
-def _reached(function: types.FunctionType) -> list[tuple[str, Any]]:
-    names: dict[str, None] = {}
-    for code in _codes(function.__code__):
-        names.update(dict.fromkeys(code.co_names))
-    return [(n, function.__globals__[n]) for n in sorted(names) if n in function.__globals__]
-
-
-def _codes(code: types.CodeType) -> list[types.CodeType]:
-    found = [code]
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            found.extend(_codes(constant))
-    return found
-
-
-def _unwrapped(value: Any) -> Any:
-    """Return the plain function of one that is already compiled by numba, anything else as it is."""
-    return getattr(value, "py_func", value)
-
-
-def _plain(function: Callable[..., Any]) -> types.FunctionType:
-    plain = _unwrapped(function)
-    if not isinstance(plain, types.FunctionType):
-        raise NotCompilable(f"{function!r} is no plain function")
-    return plain
-
-
-@functools.cache
-def _kept() -> bool:
-    """Have compiled code kept in a folder of the user's, as an installed package may not be writable.
-
-    Return whether it is: where there is no such folder each process compiles anew.
-    """
-    import numba
-
-    if "NUMBA_CACHE_DIR" in os.environ:
-        return True
-    folder = cache_folder()
-    if folder is None:
-        return False
-    folder /= "compiled"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    setattr(numba.config, "CACHE_DIR", str(folder))  # noqa: B010  numba fills its config at run time
-    return os.access(folder, os.W_OK | os.X_OK)
+    return compile_function(function, COMPILE_OPTIONS)

@@ -18,7 +18,14 @@ from typing import Any, Final, Unpack
 
 from attrs import define, field
 
-from graspsense.plugin_api import BatchOptions, Controller, RunConfig
+from graspsense.plugin_api import (
+    BatchOptions,
+    Controller,
+    NotCompilable,
+    RunConfig,
+    entry_point,
+    first_call,
+)
 from graspsense_sim_gripper import kernel
 from graspsense_sim_gripper.batch.job import (
     Composition,
@@ -46,7 +53,6 @@ AHEAD: Final = 8
 """Slices a worker that are done before one that takes long."""
 REPORT_S: Final = 0.2
 
-_MEMO: dict[str, Any] = {}
 _COMPILING: Final = threading.Lock()
 
 
@@ -184,12 +190,12 @@ class _Batch:
         ):
             return None
         try:
-            loop = kernel.compiled(loop_of(composition, step), _MEMO)
-        except kernel.NotCompilable:
+            loop = kernel.compiled(loop_of(composition, step))
+        except NotCompilable:
             return None
 
         def guarded(*given: Any) -> Any:
-            with _COMPILING, kernel.first_call():
+            with _COMPILING, first_call():
                 return loop(*given)
 
         return guarded, as_compiled(setting)
@@ -225,12 +231,12 @@ class _Batch:
             with _COMPILING:
                 try:
                     plain = loop_of(kinds, type(self.job.controller).step)
-                    loop = kernel.compiled(plain, _MEMO)
-                    with kernel.first_call(by_maps=kinds.shape is not None):
+                    loop = kernel.compiled(plain)
+                    with first_call(slp_vectorize=kinds.shape is not None):
                         one = grasp_compiled(self.job, setting, loop, self._storage())
-                    self.loops[kinds] = kernel.entry(loop)
+                    self.loops[kinds] = entry_point(loop)
                     return one
-                except kernel.NotCompilable as error:
+                except NotCompilable as error:
                     self.fast[kinds] = False
                     self._slowly(str(error))
                     return None

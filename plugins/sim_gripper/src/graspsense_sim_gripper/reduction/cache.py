@@ -19,8 +19,7 @@ from typing import Any, Final
 from attrs import asdict
 
 import graspsense.plugin_api as plugin_api
-from graspsense.plugin_api import cache_folder
-from graspsense_sim_gripper.kernel import NotCompilable, fingerprint
+from graspsense.plugin_api import NotCompilable, cache_folder, fingerprint
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.plant import Steps
 from graspsense_sim_gripper.selection import Check, Choice, Decision

@@ -1,0 +1,237 @@
+"""Compiling a function with all it calls, and keeping the machine code on disk.
+
+`compile_function` compiles a plain function, often one whose parts are filled in by `bind`, together with the Python
+functions that are its globals. numba does the work and is imported when a function is compiled. Three traps of numba's
+cache on disk are avoided here:
+
+- numba names machine code after file, function and argument types. Two compositions of the same functions share all
+  three, and one would silently run the other's code. The fingerprint of the code is therefore part of the name.
+- numba loads machine code from disk while the file of the outermost function is unchanged, although a function that it
+  calls was edited in another file. The fingerprint covers everything that is called.
+- Options of the compiler are not part of numba's key. They are part of the name as well.
+
+A function that is called has to be a global of its caller; a function of another module (`module.function`) is imported
+by name for this.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import types
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from attrs import field, frozen
+
+from graspsense.core.binding import bind
+from graspsense.core.call_graph import (
+    NO_REPLACEMENTS,
+    NotCompilable,
+    Replacements,
+    called_functions,
+    copies_if_inlined,
+    fingerprint,
+    plain_function,
+    times_read,
+)
+from graspsense.core.compiled_code_folder import compiled_code_folder
+
+MAX_COMPILED: Final = 4096
+"""Compiled functions that a process holds; at that number all are given up and compiled (or loaded) again."""
+
+
+def _no_cold_calls(function: types.FunctionType) -> tuple[str, ...]:
+    return ()
+
+
+@frozen
+class Inlining:
+    """Which calls are inlined. These are hints: they change times, not results."""
+
+    short_code: int
+    """Bytes of byte code up to which a function is inlined wherever it is called."""
+    long_code: int
+    """Bytes of byte code from which on a function is not inlined if its code would occur more than once."""
+    before_typing: frozenset[types.CodeType] = frozenset()
+    """Code that is inlined before types are inferred: functions that do little more than call another one.
+
+    Every level of calls has the code below it compiled once more, so this shortens compiling."""
+    cold_calls: Callable[[types.FunctionType], Collection[str]] = _no_cold_calls
+    """Returns the names that a function seldom calls; these remain calls."""
+
+
+@frozen
+class CompileOptions:
+    """How functions are compiled."""
+
+    counts_references: bool = True
+    """Whether arrays are reference counted. False is faster, and only for code that creates no array or list."""
+    error_model: Literal["python", "numpy"] = "python"
+    """Division by zero raises ZeroDivisionError ("python") or gives infinity or NaN ("numpy")."""
+    inlining: Inlining | None = None
+    """Which calls are inlined; by default the compiler decides."""
+    replacements: Replacements = field(default=NO_REPLACEMENTS, converter=types.MappingProxyType)
+    """Python functions, each with the function that is compiled in its place."""
+    install: str = "numba"
+    """The requirement that brings numba, named to a user who does not have it."""
+
+
+_COMPILED: dict[str, Callable[..., Any]] = {}
+"""What this process has compiled, by fingerprint, options and role, so that an entry is never out of date."""
+
+
+def compile_function(
+    function: Callable[..., Any], options: CompileOptions | None = None
+) -> Callable[..., Any]:
+    """Return `function` compiled with all the Python functions that it calls.
+
+    The machine code is made at the first call with arguments of each type, or loaded from disk; see `first_call`. It is
+    kept in the user's cache folder, or in NUMBA_CACHE_DIR where that is set. The compiled function runs without the
+    interpreter's lock.
+
+    Raises NotCompilable for closures, for recursion (which numba's cache cannot hold), for anything that is not a
+    function written in Python, and where numba cannot be imported.
+    """
+    options = options or CompileOptions()
+    try:
+        import numba
+    except ImportError as error:
+        raise NotCompilable(f'numba is not installed: pip install "{options.install}"') from error
+    if len(_COMPILED) >= MAX_COMPILED:
+        _COMPILED.clear()
+    plain = plain_function(function)
+    copies = copies_if_inlined(plain, options.replacements)
+    return _Compilation(numba, options, copies).outermost(plain)
+
+
+@contextmanager
+def first_call(*, slp_vectorize: bool = False) -> Iterator[None]:
+    """Call a compiled function for the first time inside this context, which compiles it.
+
+    `slp_vectorize`: have independent operations on neighbouring numbers compiled to vector instructions, which pays for
+    products of matrices and only lengthens other code.
+
+    Raises NotCompilable where numba refuses, with the file and line that it names.
+    """
+    import numba
+    from numba.core.errors import NumbaError, UnsupportedBytecodeError
+
+    config: Any = numba.config
+    before = config.SLP_VECTORIZE
+    if slp_vectorize:
+        config.SLP_VECTORIZE = 1
+    try:
+        yield
+    except (NumbaError, UnsupportedBytecodeError) as error:
+        places = re.findall(r'(?:File "|Raised from )([^"]+?)(?:", line | \()(\d+)', str(error))
+        where = ":".join(places[-1]) if places else "a place it does not name"
+        reason = next(
+            (line.strip() for line in str(error).splitlines() if line.strip()), type(error).__name__
+        )
+        raise NotCompilable(f"the compiler refuses {where}: {reason}") from error
+    finally:
+        config.SLP_VECTORIZE = before
+
+
+def entry_point(compiled: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the machine code of a compiled function that has been called once, for more calls of the same types.
+
+    The compiled function itself looks at the type of each number in its arguments, which takes twice as long as passing
+    them. A function that was compiled for several types is returned as it is.
+    """
+    overloads = list(getattr(compiled, "overloads", {}).values())
+    return overloads[0].entry_point if len(overloads) == 1 else compiled
+
+
+@frozen
+class _Compilation:
+    """One call of `compile_function`."""
+
+    numba: types.ModuleType
+    options: CompileOptions
+    copies: Counter[types.CodeType]
+    """How often the code of each function would occur if all calls were inlined."""
+
+    def outermost(self, function: types.FunctionType) -> Callable[..., Any]:
+        key = self._key(function, "outermost")
+        if key not in _COMPILED:
+            named = self._named(function, key)
+            # Only the outermost function is kept on disk, since the others are inside it, and only it needs the
+            # wrapper for calls from the interpreter, which takes longer to compile than most functions.
+            with _cache_folder(self.numba, function) as cache:
+                _COMPILED[key] = self.numba.njit(named, cache=cache, **self._flags())
+        return _COMPILED[key]
+
+    def _inner(self, function: types.FunctionType, n_places: int) -> Callable[..., Any]:
+        """Return a called function compiled; `n_places`: at how many places it is called, 0 where calls are cold."""
+        key = self._key(function, "inner" if n_places else "cold")
+        if key not in _COMPILED:
+            named = self._named(function, key)
+            inline = self._inline(function.__code__, n_places)
+            _COMPILED[key] = self.numba.njit(named, no_cpython_wrapper=True, **inline, **self._flags())
+        return _COMPILED[key]
+
+    def _named(self, function: types.FunctionType, key: str) -> Callable[..., Any]:
+        """Return a copy of the function that calls compiled functions, under a name that no other code has."""
+        n_places = times_read(function.__code__)
+        inlining = self.options.inlining
+        cold = inlining.cold_calls(function) if inlining else ()
+        parts = {
+            name: self._inner(called, 0 if name in cold else n_places[name])
+            for name, called in called_functions(function, self.options.replacements)
+        }
+        named = bind(function, **parts)
+        named.__qualname__ = f"{function.__qualname__}_{key.partition(' ')[0]}"
+        return named
+
+    def _key(self, function: types.FunctionType, role: str) -> str:
+        digest = hashlib.sha256(fingerprint(function, self.options.replacements).encode())
+        inlining = self.options.inlining
+        hints = () if inlining is None else (inlining.short_code, inlining.long_code)
+        versions = [version(name) for name in ("numba", "llvmlite", "numpy")]
+        digest.update(f"{self._flags()} {hints} {versions}".encode())
+        return f"{digest.hexdigest()[:16]} {role}"
+
+    def _flags(self) -> dict[str, Any]:
+        flags = {"nogil": True, "no_cfunc_wrapper": True, "error_model": self.options.error_model}
+        return flags if self.options.counts_references else {**flags, "_nrt": False}
+
+    def _inline(self, code: types.CodeType, n_places: int) -> dict[str, Any]:
+        inlining = self.options.inlining
+        if inlining is None:
+            return {}
+        size = len(code.co_code)
+        # A call that remains passes all numbers of its tuples, which takes longer than most functions here. So code
+        # that would occur once is inlined, and short code is inlined everywhere.
+        once = n_places == 1 and (size < inlining.long_code or self.copies[code] == 1)
+        return {
+            "forceinline": once or (n_places > 0 and size <= inlining.short_code),
+            "inline": "always" if n_places == 1 and code in inlining.before_typing else "never",
+        }
+
+
+@contextmanager
+def _cache_folder(numba: types.ModuleType, function: types.FunctionType) -> Iterator[bool]:
+    """Let functions that are declared inside this context be kept in the user's folder; yield whether they can be."""
+    config: Any = numba.config
+    if not Path(function.__code__.co_filename).is_file():
+        yield False
+        return
+    if config.CACHE_DIR:
+        yield True
+        return
+    folder = compiled_code_folder()
+    if folder is None:
+        yield False
+        return
+    # Set for this function alone, since other packages in this process keep their own compiled code elsewhere.
+    config.CACHE_DIR = str(folder)
+    try:
+        yield True
+    finally:
+        config.CACHE_DIR = ""

@@ -1,0 +1,296 @@
+"""Compiling a function with all it calls: what is compiled, what is refused, and what is loaded from disk."""
+
+import math
+import os
+import subprocess
+import sys
+import textwrap
+import warnings
+from enum import IntEnum
+
+import numpy as np
+import pytest
+
+from graspsense.core import compiled_code_folder as folder_module
+from graspsense.core.compiled_code_folder import compiled_code_folder, delete_older_half
+from graspsense.plugin_api import (
+    CompileOptions,
+    NotCompilable,
+    bind,
+    compile_function,
+    entry_point,
+    fingerprint,
+    first_call,
+)
+
+FACTOR = 2.0
+TABLE = np.array([1.0, 2.0])
+
+
+class Gear(IntEnum):
+    LOW = 1
+
+
+def _twice(x):
+    return 2.0 * x
+
+
+def _thrice(x):
+    return 3.0 * x
+
+
+helper = _twice
+
+
+def _scaled(x):
+    return FACTOR * helper(x)
+
+
+def _by_table(x):
+    return TABLE[0] * x
+
+
+def _in_gear(x):
+    return Gear.LOW * x
+
+
+def _by_module(x):
+    return math.pi * x
+
+
+def _countdown(n):
+    return 0 if n == 0 else _countdown(n - 1)
+
+
+def _ones(n):
+    return np.ones(n)
+
+
+def _sum_of_ones(n):
+    return _ones(n).sum()
+
+
+def _divided(x, y):
+    return x / y
+
+
+def _labelled(x):
+    # A formatted float is outside the compiler's subset.
+    return len(f"{x:.3f}")
+
+
+@pytest.fixture
+def _numba():
+    pytest.importorskip("numba", reason="compiling needs the extra `fast`")
+
+
+# ---------------------------------------------------------------------------------------------- fingerprints
+
+
+def test_a_fingerprint_changes_with_constants_called_functions_and_defaults():
+    same = bind(_scaled, FACTOR=2.0)
+    assert fingerprint(same) == fingerprint(_scaled)
+    assert fingerprint(bind(_scaled, FACTOR=3.0)) != fingerprint(_scaled)
+    assert fingerprint(bind(_scaled, FACTOR=2)) != fingerprint(_scaled)
+    assert fingerprint(bind(_scaled, helper=_thrice)) != fingerprint(_scaled)
+
+
+def test_a_fingerprint_changes_with_what_an_array_an_enumeration_or_a_module_holds():
+    # All of these are constants in the machine code.
+    assert fingerprint(bind(_by_table, TABLE=np.array([1.0, 3.0]))) != fingerprint(_by_table)
+    other = IntEnum("Gear", {"LOW": 2}, module=__name__)
+    assert fingerprint(bind(_in_gear, Gear=other)) != fingerprint(_in_gear)
+    numbers = type(math)("math")
+    numbers.pi = 3.0
+    assert fingerprint(bind(_by_module, math=numbers)) != fingerprint(_by_module)
+
+
+def test_a_fingerprint_covers_the_function_that_is_compiled_in_place_of_another():
+    assert fingerprint(_scaled, {_twice: _thrice}) == fingerprint(bind(_scaled, helper=_thrice))
+
+
+def test_closures_recursion_and_builtins_are_refused_by_name():
+    factor = 2.0
+
+    def closing_over(x):
+        return factor * x
+
+    with pytest.raises(NotCompilable, match=r"closing_over is a closure over factor"):
+        fingerprint(closing_over)
+    with pytest.raises(NotCompilable, match="_countdown calls itself"):
+        fingerprint(_countdown)
+    with pytest.raises(NotCompilable, match="len> is not a plain function"):
+        fingerprint(len)
+
+
+# ------------------------------------------------------------------------------------------------- compiling
+
+
+@pytest.mark.usefixtures("_numba")
+def test_what_cannot_be_compiled_is_refused_before_it_is_called():
+    with pytest.raises(NotCompilable, match="calls itself"):
+        compile_function(_countdown)
+    with pytest.raises(NotCompilable, match="is not a plain function"):
+        compile_function(len)
+
+
+@pytest.mark.usefixtures("_numba")
+def test_what_the_compiler_refuses_is_named_by_file_and_line():
+    compiled = compile_function(_labelled)
+    with pytest.raises(NotCompilable, match=r"test_compiling.py:\d+"), first_call():
+        compiled(1.0)
+
+
+@pytest.mark.usefixtures("_numba")
+def test_compiling_raises_no_warning_and_gives_what_the_interpreter_gives():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        compiled = compile_function(_scaled)
+        assert compiled(1.5) == _scaled(1.5) == 6.0
+    assert entry_point(compiled)(1.5) == 6.0
+    assert compile_function(_scaled) is compiled
+
+
+@pytest.mark.usefixtures("_numba")
+def test_code_compiled_under_other_options_is_other_code():
+    assert compile_function(_sum_of_ones)(3) == 3.0
+    with pytest.raises(ZeroDivisionError):
+        compile_function(_divided)(1.0, 0.0)
+    assert compile_function(_divided, CompileOptions(error_model="numpy"))(1.0, 0.0) == math.inf
+    assert compile_function(_scaled, CompileOptions(replacements={_twice: _thrice}))(1.0) == 6.0
+    assert compile_function(_scaled)(1.0) == 4.0
+
+
+def test_without_numba_the_message_names_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "numba", None)
+    with pytest.raises(NotCompilable, match=r'numba is not installed: pip install "box\[fast\]"'):
+        compile_function(_scaled, CompileOptions(install="box[fast]"))
+
+
+# --------------------------------------------------------------------------------------------- cache on disk
+
+
+COMPOSE = """
+    import sys
+    from graspsense.plugin_api import CompileOptions, bind, compile_function
+
+    part = None
+
+    def soft(x):
+        return 1.0 * x
+
+    def hard(x):
+        return 5.0 * x
+
+    def law(x, y):
+        return part(x) / y
+
+    laws = {
+        "soft": (bind(law, part=soft), CompileOptions()),
+        "hard": (bind(law, part=hard), CompileOptions()),
+        "hard, numpy": (bind(law, part=hard), CompileOptions(error_model="numpy")),
+    }
+    for name in sys.argv[1:]:
+        compiled = compile_function(*laws[name])
+        value = compiled(100.0, 0.0 if "numpy" in name else 1.0)
+        print(name, value, sum(compiled.stats.cache_hits.values()))
+"""
+
+
+def run(program, tmp_path, *arguments, **environment):
+    done = subprocess.run(
+        [sys.executable, str(program), *arguments],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **environment},
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+@pytest.mark.usefixtures("_numba")
+def test_compositions_compiled_in_three_processes_stay_themselves_in_a_fourth(tmp_path):
+    # Same functions, same types, other parts or other options: under one name, one would run the code of another.
+    program = tmp_path / "compose.py"
+    program.write_text(textwrap.dedent(COMPOSE))
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    assert run(program, tmp_path, "soft", **cache) == ["soft 100.0 0"]
+    assert run(program, tmp_path, "hard", **cache) == ["hard 500.0 0"]
+    assert run(program, tmp_path, "hard, numpy", **cache) == ["hard, numpy inf 0"]
+    assert run(program, tmp_path, "soft", "hard", "hard, numpy", **cache) == [
+        "soft 100.0 1",
+        "hard 500.0 1",
+        "hard, numpy inf 1",
+    ]
+
+
+MAIN = """
+    import numbers_of_law
+    from laws import helper
+    from graspsense.plugin_api import compile_function
+
+    def law(x):
+        return helper(x) * numbers_of_law.SCALE
+
+    compiled = compile_function(law)
+    print(compiled(1.0), sum(compiled.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.usefixtures("_numba")
+def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
+    # numba itself looks at the file of the outermost function alone.
+    main = tmp_path / "main.py"
+    main.write_text(textwrap.dedent(MAIN))
+    (tmp_path / "laws.py").write_text("def helper(x):\n    return 2.0 * x\n")
+    (tmp_path / "numbers_of_law.py").write_text("SCALE = 1.0\n")
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    assert run(main, tmp_path, **cache) == ["2.0 0"]
+    assert run(main, tmp_path, **cache) == ["2.0 1"]
+    (tmp_path / "laws.py").write_text("def helper(x):\n    return 3.0 * x\n")
+    assert run(main, tmp_path, **cache) == ["3.0 0"]
+    (tmp_path / "numbers_of_law.py").write_text("SCALE = 7.0\n")
+    assert run(main, tmp_path, **cache) == ["21.0 0"]
+
+
+@pytest.mark.usefixtures("_numba")
+def test_compiled_code_is_kept_in_the_users_cache_and_nowhere_else(tmp_path):
+    program = tmp_path / "source" / "compose.py"
+    program.parent.mkdir()
+    program.write_text(textwrap.dedent(COMPOSE))
+    cache = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "NUMBA_CACHE_DIR": ""}
+
+    assert run(program, tmp_path, "soft", **cache) == ["soft 100.0 0"]
+    assert run(program, tmp_path, "soft", **cache) == ["soft 100.0 1"]
+    assert list((tmp_path / "cache" / "graspsense" / "compiled").rglob("*.nbc"))
+    assert [path.name for path in program.parent.iterdir()] == ["compose.py"]
+
+
+@pytest.mark.usefixtures("_numba")
+def test_where_nothing_can_be_kept_functions_are_compiled_all_the_same(tmp_path):
+    program = tmp_path / "compose.py"
+    program.write_text(textwrap.dedent(COMPOSE))
+    (tmp_path / "file").touch()
+    cache = {"XDG_CACHE_HOME": str(tmp_path / "file"), "NUMBA_CACHE_DIR": ""}
+
+    assert run(program, tmp_path, "soft", **cache) == ["soft 100.0 0"]
+
+
+def test_the_older_half_of_the_compiled_code_is_deleted_where_there_is_much(tmp_path):
+    for i in range(6):
+        (tmp_path / f"{i}").touch()
+        os.utime(tmp_path / f"{i}", (i, i))
+
+    delete_older_half(tmp_path, 7)
+    assert len(list(tmp_path.iterdir())) == 6
+    delete_older_half(tmp_path, 6)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["3", "4", "5"]
+
+
+def test_a_user_without_a_home_has_no_folder_for_compiled_code(monkeypatch):
+    monkeypatch.setattr(folder_module, "cache_folder", lambda: None)
+    compiled_code_folder.cache_clear()
+    assert compiled_code_folder() is None
+    compiled_code_folder.cache_clear()
