@@ -289,6 +289,7 @@ class TestPluginsShow:
         assert "requires     gap in m, velocity in m/s, force_left in N, force_right in N\n" in ran.out
         assert "    loop: 'open' | 'closed' = \"open\"\n" in ran.out
         assert "recording: str, must be given" in run("plugins", "show", "graspsense/replay").out
+        assert "p_first in m: gap at the first contact" in run("plugins", "show", "chitta").out
 
     def test_json(self, run):
         (component,) = run("plugins", "show", "hybrid", "--json").json["components"]

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -16,7 +14,10 @@ def echo_json(value: object, long: bool = False) -> None:
 
     A long one comes in one line, which takes a fifth of the time.
     """
-    click.echo(json.dumps(_finite(value), indent=None if long else 2, ensure_ascii=False, allow_nan=False))
+    # Imported here: what is imported above is loaded by `graspsense --help`.
+    from graspsense.core.json_values import json_ready
+
+    click.echo(json.dumps(json_ready(value), indent=None if long else 2, ensure_ascii=False, allow_nan=False))
 
 
 def file_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
@@ -41,17 +42,3 @@ def echo_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     for row in (header, *rows):
         line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
         click.echo(line.rstrip())
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        if math.isfinite(value):
-            return value
-        return None if math.isnan(value) else str(value)
-    if value is None or isinstance(value, str | int):
-        return value
-    if isinstance(value, Mapping):
-        return {str(key): _finite(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(one) for one in value]
-    return value

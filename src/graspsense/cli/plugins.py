@@ -329,7 +329,8 @@ def _component_text(component: Component) -> str:
         if key in entry:
             lines.append(f"  {key:<11}  {', '.join(entry[key]) or 'none'}")
     if "features" in entry:
-        lines.append(f"  features     {', '.join(f'{name} in {unit}' for name, unit in entry['features'])}")
+        lines.append("  features, with their units and meanings:")
+        lines += [f"    {one.name} in {one.unit}: {one.meaning}" for one in entry["features"]]
     keys, reason = _keys(component)
     if reason:
         lines.append(f"  not usable here: {reason}")

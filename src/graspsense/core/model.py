@@ -23,6 +23,7 @@ from graspsense import __version__
 from graspsense.core.errors import ConfigError, DataDamaged, UnknownName
 from graspsense.core.features import UNKNOWN, Features, FeatureTable, Prediction
 from graspsense.core.firstparty import MODELS
+from graspsense.core.json_values import json_ready, settings_from_json
 from graspsense.core.novelty import Novelty, novelty_from, novelty_of
 from graspsense.core.setting_meaning import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked
 
@@ -167,7 +168,7 @@ class Model:
                 yield f"trained on {kind} with {table} {then.get('type')}, this one was with {now.get('type')}"
                 continue
             for key in sorted((then.keys() & now.keys()) - _not_compared(getattr(settings, table))):
-                if then[key] != now[key]:
+                if json_ready(then[key]) != json_ready(now[key]):
                     what, value = worded(key, then[key])
                     yield (
                         f"trained on {kind} with {what} {value}, this one was with {worded(key, now[key])[1]} "
@@ -180,10 +181,10 @@ class Model:
             "format": FORMAT,
             "version": VERSION,
             "classifier": self.component,
-            "settings": dict(self.settings),
+            "settings": json_ready(self.settings),
             "target": self.target,
             "features": [[name, unit] for name, unit in zip(self.names, self.units, strict=True)],
-            "provenance": dict(self.provenance),
+            "provenance": json_ready(self.provenance),
             "unknown": self.novelty.to_json(),
             "model": self.classifier.to_json(),
         }
@@ -272,7 +273,8 @@ def load_model(name: str, plugins: Plugins, component: Component | None = None) 
         )
     from graspsense.core.config import build
 
-    classifier = component.create(build(component, content["settings"]))
+    settings = settings_from_json(content["settings"], component.config_class())
+    classifier = component.create(build(component, settings))
     try:
         names = tuple(str(one[0]) for one in content["features"])
         units = tuple(str(one[1]) for one in content["features"])
@@ -280,7 +282,7 @@ def load_model(name: str, plugins: Plugins, component: Component | None = None) 
         return Model(
             name=name,
             component=made_by,
-            settings=content["settings"],
+            settings=settings,
             classifier=classifier,
             names=names,
             units=units,

@@ -15,9 +15,9 @@ from typing import Any, Literal
 from attrs import field, frozen
 
 from graspsense.core.errors import GraspsenseError, named
+from graspsense.core.json_values import json_text
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.versions import versions
-from graspsense.recording.provenance import json_text
 
 State = Literal["done", "failed"]
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
-import math
 import os
 import platform
 import subprocess
@@ -15,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from graspsense import __version__
+from graspsense.core.json_values import json_text
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings
@@ -51,23 +50,6 @@ def recipe(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]
         for table, keys in values.items()
         if table != "classifier"
     }
-
-
-def json_text(value: Any) -> str:
-    """Return JSON in its one canonical form; NaN becomes null, infinities `"inf"` and `"-inf"`."""
-    return json.dumps(
-        _finite(value), sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
-    )
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else str(value)
-    if isinstance(value, Mapping):
-        return {str(key): _finite(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(one) for one in value]
-    return value
 
 
 @cache

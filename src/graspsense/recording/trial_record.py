@@ -17,16 +17,18 @@ from attrs import field, frozen
 
 from graspsense.core.config import to_toml
 from graspsense.core.errors import DataDamaged
+from graspsense.core.json_values import json_text
 from graspsense.core.trial import trial_as_json
 from graspsense.recording.before_contact import before_contact
 from graspsense.recording.layout import DEVICE, START, TRIAL, VERSION
-from graspsense.recording.provenance import json_text, provenance
+from graspsense.recording.provenance import provenance
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings
     from graspsense.core.features import Features
+    from graspsense.core.json_values import json_text
     from graspsense.core.roles import DeviceInfo
-    from graspsense.core.trial import Trial
+from graspsense.core.trial import Trial
 
 Origin = Literal["run", "collect", "import"]
 ORIGINS: Final = ("run", "collect", "import")

@@ -30,7 +30,8 @@ from attrs import frozen
 
 from graspsense import __version__
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.recording.provenance import json_text, recipe
+from graspsense.core.json_values import json_text
+from graspsense.recording.provenance import recipe
 from graspsense.recording.recorder import NotKept
 from graspsense.recording.trial_record import Beginning, Ending
 from graspsense.store.schema import APPLICATION_ID, NEWEST, expected, found, migrate

@@ -1,0 +1,94 @@
+"""Infinity and NaN have one representation in JSON, and settings with them survive every file."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from math import inf, nan
+
+import pytest
+from attrs import field, frozen
+from kept import keep
+
+from graspsense.core.config import Flag, resolve, to_toml
+from graspsense.core.json_values import json_ready, json_text, settings_from_json
+from graspsense.core.model import load_model, train, write_model
+from graspsense.core.plugins import installed
+from graspsense.store.dataset import labelled_store
+from graspsense.store.store import Store
+
+
+def test_json_has_no_infinity_and_no_nan():
+    value = {"a": [inf, -inf, nan, 1.5], "b": {"c": inf}, 3: (True, None)}
+
+    assert json_ready(value) == {"a": ["inf", "-inf", None, 1.5], "b": {"c": "inf"}, "3": [True, None]}
+    assert json_text(value) == '{"3":[true,null],"a":["inf","-inf",null,1.5],"b":{"c":"inf"}}'
+
+
+@frozen(kw_only=True)
+class Cable:
+    vanishes_s: float = inf
+
+
+@frozen(kw_only=True)
+class Hand:
+    name: str = "inf"
+    limit_n: float = inf
+    floor_n: float | None = -inf
+    levels: list[float] = field(factory=lambda: [1.0, inf])
+    cable: Cable = field(factory=Cable)
+
+
+def test_settings_are_read_back_as_they_were():
+    written = json.loads(
+        json_text(
+            {
+                "name": "inf",
+                "limit_n": inf,
+                "floor_n": -inf,
+                "levels": [1.0, inf],
+                "cable": {"vanishes_s": inf},
+            }
+        )
+    )
+
+    assert settings_from_json(written, Hand) == {
+        "name": "inf",
+        "limit_n": inf,
+        "floor_n": -inf,
+        "levels": [1.0, inf],
+        "cable": {"vanishes_s": inf},
+    }
+
+
+@pytest.fixture
+def emulated():
+    """Settings of a gripper whose config has infinite defaults."""
+    return resolve(
+        flags=[Flag("--gripper", "gripper.type", "pr2")],
+        options=["gripper.transport=emulated", "classifier.type=none"],
+    )
+
+
+def test_a_model_is_trained_on_a_store_that_was_collected_with_infinite_settings(tmp_path, emulated):
+    settings = to_toml(emulated)
+    assert tomllib.loads(settings)["gripper"]["faults"]["stall_at_s"] == inf
+    with Store.open(tmp_path / "trials") as store:
+        for k in range(6):
+            label = ("can:full_open", "can:empty_open")[k % 2]
+            keep(store, label, values=(0.06 + 0.002 * (k % 2), 5.0 + k), ticks=2, settings=settings)
+    component = installed().find("classifier", "tree")
+
+    model = train(component, component.config_class()(), labelled_store(str(tmp_path / "trials")), name="m")
+    write_model(tmp_path / "m.json", model)
+    again = load_model(str(tmp_path / "m.json"), installed())
+
+    text = (tmp_path / "m.json").read_text()
+    assert (
+        json.loads(text, parse_constant=pytest.fail)["provenance"]["settings"]["gripper"]["faults"][
+            "stall_at_s"
+        ]
+        == "inf"
+    )
+    features = labelled_store(str(tmp_path / "trials")).table.row(0)
+    assert again.predict(features, emulated).warnings == model.predict(features, emulated).warnings == ()
