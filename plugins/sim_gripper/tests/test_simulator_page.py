@@ -1,0 +1,76 @@
+"""docs/simulator.md names what there is: settings, objects, terms and keys of a scene; its examples run."""
+
+import re
+from pathlib import Path
+
+import attrs
+import pytest
+
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.library import catalogue, shipped_scenes
+from graspsense_sim_gripper.objects.spec import ObjectSpec, parse_scene
+from graspsense_sim_gripper.terms.registry import TERMS
+
+PAGE = (Path(__file__).parents[3] / "docs" / "simulator.md").read_text(encoding="utf-8")
+
+
+def section(title):
+    return PAGE.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+
+
+def rows(title):
+    """The cells of each row of the section's tables, but for headers."""
+    lines = [line for line in section(title).splitlines() if line.startswith("| `")]
+    return [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
+
+
+def shown(value):
+    if value is None:
+        return "not set"
+    return f"`{str(value).lower() if isinstance(value, bool) else value}`"
+
+
+def test_the_table_of_settings_has_every_key_with_its_default():
+    defaults = {field.name: shown(field.default) for field in attrs.fields(SimConfig)}
+    assert {key.strip("`"): default for key, _, default, _ in rows("Settings")} == defaults
+
+
+def test_the_table_of_objects_has_the_whole_catalogue():
+    named = {row[0].strip("`") for row in rows("Objects")}
+    assert named == {name.partition(":")[0] for name in catalogue()} | {"none"}
+    assert all(f"`{name}`" in section("Objects") for name in shipped_scenes())
+
+
+def test_the_table_of_a_scene_has_every_key():
+    named = {key for row in rows("A scene of your own") for key in re.findall(r"`(\w+)`", row[0])}
+    assert named == {field.name for field in attrs.fields(ObjectSpec)} - {"name", "reasons", "file"}
+
+
+def test_the_table_of_terms_has_every_term():
+    assert [row[0].strip("`") for row in rows("Terms")] == list(TERMS)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_the_examples_of_a_term_run(which):
+    code = re.findall(r"```python\n(.*?)```", section("A term of your own"), re.DOTALL)[which]
+    names = {}
+    exec(compile(code, "simulator.md", "exec"), names)
+    if which == 0:
+        (term,) = names["graspsense_sim_terms"]()
+        force, _ = term.law(names["Gel"](1000.0, 0.01), term.at_rest, 0.0, 0.005, 1e-3, 5.0)
+        assert force == pytest.approx(10.0)
+    else:
+        assert names["linear"](names["Spongy"](1000.0, 500.0, 0.1)).by_speed == (500.0,)
+
+
+def test_the_example_of_many_grasps_runs():
+    (code,) = re.findall(r"```python\n(.*?)```", section("Many grasps"), re.DOTALL)
+    names = {}
+    few = code.replace("* 500", "* 1").replace("range(1000)", "range(2)")
+    exec(compile(few, "simulator.md", "exec"), names)
+    assert [one.outcome.words for one in names["done"]] == ["steady", "steady"]
+
+
+def test_the_example_of_a_scene_is_one(tmp_path):
+    (text,) = re.findall(r"```toml\n(.*?)```", section("A scene of your own"), re.DOTALL)
+    assert parse_scene(text, "my_bottle", "my_bottle.toml").held
