@@ -248,7 +248,9 @@ def test_a_fit_that_refuses_few_trials_costs_its_figure_only():
 
     assert found.headline.rate > 0.95
     assert [point.trained_on >= 60 for point in found.learning_curve] == [True, True]
-    assert any("no point at 10% of the trials" in note and "60 trials are needed" in note for note in found.notes)
+    assert any(
+        "no point at 10% of the trials" in note and "60 trials are needed" in note for note in found.notes
+    )
     with pytest.raises(ConfigError, match="refused 108 training trials of 4 labels: 1000 trials are needed"):
         evaluate(Choosy(1000), trials, classifier="choosy")
 

@@ -354,6 +354,14 @@ def test_an_experiment_on_simulated_grasps_keeps_what_was_felt(tmp_path):
     assert sum(node["trials"] for node in tree if node["parent"] == 0) == 7
 
 
+def test_an_experiment_never_opens_a_real_gripper(tmp_path):
+    path = tmp_path / "real.toml"
+    path.write_text('title = "x"\n[gripper]\ntype = "pr2"\n')
+
+    with pytest.raises(ConfigError, match="declares no objects that it can simulate, so it was not opened"):
+        read_experiment(str(path))
+
+
 def test_what_there_is(run):
     code, out, _ = run("experiment", "--json")
 

@@ -56,8 +56,30 @@ def test_a_csv_of_ours_is_a_table_to_learn_from(folder, export, tmp_path):
     found = read_labelled(
         tmp_path / "t.csv", "label", instance="instance", order="trial", features=["p_first"]
     )
-    assert found.labels == ("can:full_open", "can:it's open", "can:full_open")
+    assert found.labels == ("can:full_open", "can:it's open")
     assert found.table.units == ("m",)
+
+
+def test_an_exported_csv_comes_back_as_the_trials_of_the_store(folder, export, tmp_path):
+    export(folder, tmp_path / "t.csv")
+    found, stored = read_labelled(tmp_path / "t.csv", "label"), labelled_store(str(folder))
+
+    assert found.table.names == stored.table.names
+    assert found.table.units == stored.table.units
+    assert found.table.values.tobytes() == stored.table.values.tobytes()
+    assert (found.labels, found.instances, found.order) == (stored.labels, stored.instances, (0, 1))
+    assert found.provenance["simulated"] == stored.provenance["simulated"]
+
+
+def test_an_empty_column_of_an_export_is_not_a_feature(tmp_path, export):
+    with Store.open(tmp_path / "trials") as store:
+        for k in range(4):
+            keep(store, ("can:full", "can:empty")[k % 2], None, values=(0.05 + 0.01 * (k % 2), None))
+    export(tmp_path / "trials", tmp_path / "t.csv")
+    found = read_labelled(tmp_path / "t.csv", "label")
+
+    assert found.table.names == ("p_first", "f_steady")
+    assert found.instances is None
 
 
 def test_the_table_as_arff_is_read_by_scipy(folder, export, tmp_path):

@@ -137,7 +137,8 @@ def test_constant_and_empty_columns_are_noted(csv):
     )
 
     assert "constant, so that they tell nothing apart: same" in found.notes
-    assert "without a single value: empty, void" in found.notes
+    assert "not used, as they hold no value: empty, void (--features takes them in)" in found.notes
+    assert found.table.names == ("p", "same")
 
 
 def test_labels_that_differ_in_case_only_are_noted(csv):

@@ -215,3 +215,24 @@ def test_simulated_trials_small_and_whole(run):
     assert found["protocol"] == "instance_held_out"
     assert found["controls"]["before_contact"]["n"] == 12
     assert any("simulated" in note for note in found["notes"])
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """The list of real grippers that were opened: none may be by what is called simulated."""
+    from graspsense.core.plugins import installed
+
+    opened = []
+    backend = installed().find("sensor-backend", "pr2").component_class()
+    monkeypatch.setattr(backend, "open", lambda self, seed: opened.append(self.config))
+    return opened
+
+
+@pytest.mark.parametrize("command", ["train", "evaluate"])
+def test_simulated_trials_never_open_a_real_gripper(run, tmp_path, opened, command):
+    out = ("--out", tmp_path / "m.json") if command == "train" else ()
+    code, _, err = run(command, "simulated", "--gripper", "pr2", "--instances", "1", "--trials", "1", *out)
+
+    assert code == 2
+    assert "graspsense-pr2-gripper/pr2 declares no objects that it can simulate, so it was not opened" in err
+    assert opened == []

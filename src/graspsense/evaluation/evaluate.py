@@ -401,7 +401,9 @@ class _Judge:
                 try:
                     one = self._pooled(f"learning curve {share:.0%}", self.labelled.table, folds, share)
                 except FitRefused as refusal:
-                    self.notes.append(f"the learning curve has no point at {share:.0%} of the trials: {refusal}")
+                    self.notes.append(
+                        f"the learning curve has no point at {share:.0%} of the trials: {refusal}"
+                    )
                     continue
             # Of few trials of a label at least one is kept, so that small shares may come to the same trials.
             if not points or one.trained_on > points[-1].trained_on:

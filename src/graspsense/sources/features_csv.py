@@ -1,5 +1,8 @@
 """Tables of features as CSV: one line a trial, one column a feature, and the column that holds the label.
 
+A table that `graspsense export` wrote comes back as the trials of the store: what it says about a trial is never a
+feature, and every feature stays one, also where no trial has a value of it.
+
 Text is UTF-8. Columns are separated by commas, semicolons or tabs, whichever the header has most of; numbers have
 a decimal point. A unit may stand behind a name: `p_first [m]`. Empty, `nan`, `NA`, `null` and `?` are missing.
 """
@@ -21,6 +24,8 @@ import numpy as np
 from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.features import UNKNOWN, FeatureTable
 from graspsense.core.labelled import Control, Labelled
+from graspsense.store.export_table import ABOUT
+from graspsense.store.store import NOT_ENDED
 
 MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "?"})
 _HEADING: Final = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]")
@@ -118,6 +123,11 @@ class Columns:
         """Whether every cell of a column is missing."""
         return all(cell.lower() in MISSING for cell in self.cells[name])
 
+    def keep(self, rows: Sequence[int]) -> None:
+        """Keep these rows only."""
+        self.lines = [self.lines[i] for i in rows]
+        self.cells = {name: [cells[i] for i in rows] for name, cells in self.cells.items()}
+
     def table(self, names: Sequence[str]) -> FeatureTable:
         """Return the table of these columns."""
         values = np.array([self.numbers(name) for name in names], dtype=np.float64).T
@@ -140,17 +150,26 @@ def read_labelled(
     """Return the trials of a CSV whose column `label` names what each is of.
 
     `instance` is the column that names the very thing, `order` a column of numbers that rise in the order of
-    recording (without it, that is the order of the lines). `features` are the columns to learn from, by default
-    all that hold numbers and have no other meaning; `before` are those known before any contact, of which the
-    control from before the contact is made; they are features too unless `features` leaves them out.
+    recording (without it, that is the order of the lines). In a table that `graspsense export` wrote these are
+    known. `features` are the columns to learn from, by default all that hold numbers and have no other meaning;
+    `before` are those known before any contact, of which the control from before the contact is made; they are
+    features too unless `features` leaves them out.
 
     Raises ConfigError where a column is not there or is no label, DataDamaged where the file is not what it
     claims to be.
     """
     columns = Columns(path)
+    notes: list[str] = []
+    simulated = False
+    if _is_export(columns):
+        _keep_counted(columns, label, notes)
+        order = order or "trial"
+        if instance is None and not any(cell.lower() in MISSING for cell in columns.cells["instance"]):
+            instance = "instance"
+        features = features or columns.names[len(ABOUT) :]
+        simulated = "1" in columns.cells["simulated"]
     labels = _labels(columns, label)
     things = None if instance is None else _named(columns, instance, "the instance")
-    notes: list[str] = []
     taken = {label, *([instance] if instance else []), *([order] if order else [])}
     names = list(features) or _feature_names(columns, taken, notes)
     for name in names:
@@ -184,7 +203,7 @@ def read_labelled(
         width=Control(table=table.columns(["p_first"]), what="p_first alone") if "p_first" in names else None,
         no_width="there is no feature p_first",
         notes=tuple(notes),
-        provenance={"simulated": False},
+        provenance={"simulated": simulated},
     )
 
 
@@ -254,12 +273,33 @@ def _named(columns: Columns, name: str, what: str) -> list[str]:
     return cells
 
 
+def _is_export(columns: Columns) -> bool:
+    """Whether `graspsense export` wrote this table of a store's trials."""
+    return tuple(columns.names[: len(ABOUT)]) == ABOUT
+
+
+def _keep_counted(columns: Columns, label: str, notes: list[str]) -> None:
+    """Keep the trials that `store:` would give: labelled, and ended by themselves. Raises DataDamaged."""
+    labels, outcomes = columns.column(label, "the label"), columns.cells["outcome"]
+    named = [i for i, cell in enumerate(labels) if cell.lower() not in MISSING]
+    ended = [i for i in named if outcomes[i] not in NOT_ENDED]
+    if len(named) < len(columns):
+        notes.append(f"{len(columns) - len(named)} trials left out: they have no label")
+    if len(ended) < len(named):
+        notes.append(f"{len(named) - len(ended)} trials left out: they did not end by themselves")
+    if not ended:
+        raise DataDamaged(f"{columns.path} has no labelled trial that ended by itself")
+    columns.keep(ended)
+
+
 def _feature_names(columns: Columns, taken: set[str], notes: list[str]) -> list[str]:
-    names, left, counters = [], [], []
+    names, left, counters, blank = [], [], [], []
     for name in columns.names:
         if name in taken:
             continue
-        if not (columns.has_numbers(name) or columns.is_blank(name)):
+        if columns.is_blank(name) and not columns.units[name]:
+            blank.append(name)
+        elif not (columns.has_numbers(name) or columns.is_blank(name)):
             left.append(name)
         elif columns.rises(name):
             counters.append(name)
@@ -270,8 +310,12 @@ def _feature_names(columns: Columns, taken: set[str], notes: list[str]) -> list[
             f"not used, as they rise with every line like a counter or a time: {', '.join(counters)} "
             "(--features takes them in)"
         )
+    if blank:
+        notes.append(f"not used, as they hold no value: {', '.join(blank)} (--features takes them in)")
     if left:
         notes.append(f"not used, as they hold no numbers: {', '.join(left)}")
+    if blank and not names:
+        raise DataDamaged(f"no feature has a single value: {', '.join(blank)}")
     if not names:
         raise ConfigError(f"{columns.path} has no column of numbers besides {', '.join(sorted(taken))}")
     return names

@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from attrs import Attribute, evolve, field, fields_dict, frozen
+from attrs import Attribute, evolve, field, frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.core.features import Features, table_of
 from graspsense.core.labelled import Control, Labelled, class_of
-from graspsense.core.roles import BatchBackend, Controller, FeatureSet, SensorBackend
+from graspsense.core.roles import BatchBackend, Controller, DeviceInfo, FeatureSet, SensorBackend
 from graspsense.core.runner import run_grasp
 from graspsense.core.strict import plain
 from graspsense.core.wiring import check
@@ -109,12 +109,7 @@ def simulated(
     if not 1 <= len(dealt) <= TRIALS_PER_SEED:
         raise ConfigError(f"{len(dealt)} trials: give at least 1, and at most a million in all")
     check(settings)
-    config = settings.gripper.config
-    if "object" not in fields_dict(type(config)):
-        raise ConfigError(
-            f"gripper {settings.gripper.component.qualified} takes no object, so it cannot simulate trials. "
-            "Choose a simulated one, as in --gripper sim"
-        )
+    refuse_real_gripper(settings)
     labels = [label for label, _, _ in dealt]
     numbers = [THINGS_PER_SEED * seed + i for _, _, i in dealt]
     scenes = [f"{name}#{number}" for (_, name, _), number in zip(dealt, numbers, strict=True)]
@@ -158,6 +153,28 @@ def simulated(
             "components": {t: one for t, one in settings.components.items() if t != "classifier"},
         },
     )
+
+
+def refuse_real_gripper(settings: Settings) -> None:
+    """Raise ConfigError where the gripper of these settings does not declare objects that it can simulate.
+
+    Nothing is opened: a real gripper that simulated trials opened would move without anybody being asked.
+    """
+    if not settings.gripper.create().objects():
+        raise ConfigError(
+            f"gripper {settings.gripper.component.qualified} declares no objects that it can simulate, so it was not "
+            "opened. Simulated trials are made on a simulated gripper, as --gripper sim; trials of a real gripper are "
+            "made by `graspsense collect`"
+        )
+
+
+def _refuse_real_device(info: DeviceInfo) -> None:
+    """Raise ConfigError where what was opened says that it is real, before it is commanded anything."""
+    if not info.simulated:
+        raise ConfigError(
+            f"{info.name} was opened for simulated trials and says that it is a real gripper: it was closed again, "
+            "without a command"
+        )
 
 
 def _named(objects: Sequence[str]) -> list[str]:
@@ -222,8 +239,12 @@ def _grasps(
                 yield one.drawn, one.trace
         return
     for k, (scene, seed) in enumerate(zip(scenes, seeds, strict=True)):
-        alone = settings.gripper.component.create(evolve(settings.gripper.config, object=scene))
-        trace = run_grasp(alone, controller, evolve(settings.run, seed=seed)).trace
+        trace = run_grasp(
+            backend.with_object(scene),
+            controller,
+            evolve(settings.run, seed=seed),
+            on_open=_refuse_real_device,
+        ).trace
         yield draw(trace), trace
         if progress is not None:
             progress(k + 1, total)

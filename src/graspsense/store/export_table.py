@@ -22,7 +22,17 @@ from graspsense.store.store import Store
 if TYPE_CHECKING:
     from graspsense.core.features import FeatureTable
 
-ABOUT: Final = ("trial", "made_at", "label", "instance", "outcome", "origin", "device", "recording")
+ABOUT: Final = (
+    "trial",
+    "made_at",
+    "label",
+    "instance",
+    "outcome",
+    "origin",
+    "device",
+    "simulated",
+    "recording",
+)
 
 
 @frozen(kw_only=True, eq=False)
@@ -37,7 +47,7 @@ def trial_table(folder: str | Path) -> TrialTable:
     """Return all trials of a store that were not set aside. Raises ConfigError where there is none, DataDamaged."""
     with Store.read(folder) as store:
         rows = store.query(
-            """SELECT id, made_at, label, instance, outcome, origin, device, recording, feature_set, "values"
+            """SELECT id, made_at, label, instance, outcome, origin, device, simulated, recording, feature_set, "values"
             FROM trial WHERE set_aside IS NULL ORDER BY id"""
         )
         sets = dict(store.query("SELECT id, features FROM feature_set"))
@@ -45,9 +55,9 @@ def trial_table(folder: str | Path) -> TrialTable:
         raise ConfigError(f"the store in {folder} has no trial to export")
     columns = list(zip(*rows, strict=True))
     names: dict[tuple[str, str], None] = {}
-    for number in dict.fromkeys(columns[8]):
+    for number in dict.fromkeys(columns[-2]):
         names.update(dict.fromkeys((str(name), str(unit)) for name, unit in json.loads(sets[number])))
-    table = feature_table(str(folder), list(names), [sets[one] for one in columns[8]], columns[9])
+    table = feature_table(str(folder), list(names), [sets[one] for one in columns[-2]], columns[-1])
     return TrialTable(
         about={name: list(column) for name, column in zip(ABOUT, columns[: len(ABOUT)], strict=True)},
         features=table,

@@ -187,7 +187,9 @@ def few_trials_are_refused_or_learned(subject: Subject) -> None:
         try:
             one.fit(few, [labels[i] for i in rows], SEED)
         except ValueError as error:
-            demand(bool(str(error)), f"fit on {what} raised ValueError without a message: say what is lacking")
+            demand(
+                bool(str(error)), f"fit on {what} raised ValueError without a message: say what is lacking"
+            )
             continue
         except Exception as error:
             raise CheckFailed(
