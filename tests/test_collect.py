@@ -190,3 +190,39 @@ def test_labels_that_make_no_sense_are_told(collect, tmp_path, labels, says):
 def test_nothing_there_counts_since_it_is_an_answer_of_the_gripper(collect, tmp_path):
     done = collect(tmp_path / "t", "\n", labels="none", each=1)
     assert json.loads(done.stdout)["counts"] == {"none": 1}
+
+
+def test_the_first_trials_are_collected_for_a_model_that_does_not_exist_yet(
+    graspsense, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text('[classifier]\ntype = "knn"\nmodel = "mine.json"\n')
+    kinds = "can:full_open,can:empty_open"
+
+    valid = graspsense("config", "validate", "mine.toml")
+    assert (
+        "note: `collect` works with it, `run` does not yet: there is no model mine.json yet" in valid.stdout
+    )
+    done = graspsense(
+        *("collect", "--pipeline", "mine.toml", "--labels", kinds, "--each", "2", "--save", "t"),
+        answers="\n" * 4,
+    )
+    assert done.returncode == 0
+    assert "note: collecting without predictions: there is no model mine.json yet" in done.stderr
+    with Store.read(tmp_path / "t") as store:
+        assert sum(store.counts("collect").values()) == 4
+
+    trained = graspsense("train", "store:t", "--classifier", "knn", "--out", "mine.json")
+    assert trained.returncode == 0
+    assert "note" not in graspsense("config", "validate", "mine.toml").stdout
+
+
+def test_the_advice_on_a_missing_model_fits_the_gripper(graspsense, tmp_path):
+    real = graspsense(
+        "run", "--gripper", "pr2", "-o", "classifier.type=knn", "-o", "classifier.model=mine.json"
+    )
+
+    assert real.returncode == 2
+    assert "graspsense collect --gripper pr2 --labels" in real.stderr
+    assert "graspsense train store:trials --classifier knn --out mine.json" in real.stderr
+    assert "simulated" not in real.stderr

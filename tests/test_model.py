@@ -232,6 +232,8 @@ def test_the_model_of_another_classifier_is_refused(file):
 
 def test_a_classifier_without_a_model_says_how_to_get_one():
     settings = resolve(options=["classifier.type=forest"])
-    with pytest.raises(ConfigError, match="graspsense train simulated --classifier forest --out"):
+    with pytest.raises(
+        ConfigError, match="graspsense train simulated --gripper sim --classifier forest --out"
+    ):
         model_for(settings, installed())
     assert model_for(evolve(settings, classifier=None), installed()) is None

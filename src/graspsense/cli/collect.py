@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from graspsense.cli.options import pipeline_options, settings_of
+from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
 from graspsense.cli.output import echo_json, talk
 
 if TYPE_CHECKING:
@@ -48,6 +48,8 @@ def collect(
     Things come in rounds, so that no class is recorded in one go. It can be stopped or killed at any time and goes
     on where it was. A simulated gripper finds what the label says. Answers can come from a file or a pipe.
     """
+    from graspsense.core.errors import ConfigError
+    from graspsense.core.model import model_for
     from graspsense.core.plugins import installed
     from graspsense.core.wiring import check
     from graspsense.store.collecting import Collection, Wanted
@@ -62,6 +64,12 @@ def collect(
     )
     first = settings_of(pipeline, gripper, object_name, options, seed)
     check(first)
+    try:
+        model_for(first, installed())
+    except ConfigError as error:
+        # A pipeline may name the model that these trials are for.
+        talk(f"note: collecting without predictions: {str(error).splitlines()[0]}")
+        options = (*options, *GRIPPER_ALONE)
     finds = first.values["gripper"].get("object") is not None
 
     def settings_for(word: str, number: int) -> Settings:

@@ -50,14 +50,26 @@ def show(name: str | None, as_json: bool, **asked: Any) -> None:
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
 def validate(name: str | None, as_json: bool, **asked: Any) -> None:
     """Check that the settings are valid and that the components fit together; nothing is opened."""
+    from graspsense.core.errors import ConfigError
+    from graspsense.core.model import model_for
+    from graspsense.core.plugins import installed
     from graspsense.core.wiring import check
 
     settings = _settings(name, asked)
     check(settings)
+    notes = []
+    try:
+        model_for(settings, installed())
+    except ConfigError as error:
+        notes.append(f"`collect` works with it, `run` does not yet: {error}")
     if as_json:
-        echo_json({"valid": True, "pipeline": settings.pipeline, "components": settings.components})
+        echo_json(
+            {"valid": True, "pipeline": settings.pipeline, "components": settings.components, "notes": notes}
+        )
     else:
         click.echo(f"{settings.pipeline} is valid: {', '.join(settings.components.values())}")
+        for note in notes:
+            click.echo(f"note: {note}")
 
 
 def _settings(name: str | None, asked: Mapping[str, Any]) -> Settings:

@@ -11,6 +11,7 @@ import json
 import math
 import os
 import platform
+import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -306,10 +307,31 @@ def model_for(settings: Settings, plugins: Plugins) -> Model | None:
     if name is None:
         raise ConfigError(
             f"classifier {chosen.component.qualified} has no model (classifier.model is not given).\n"
-            f"  train one: graspsense train simulated --classifier {chosen.component.name} --out model.json\n"
-            "  then use it: -o classifier.model=model.json     or do without: -o classifier.type=none"
+            + _how_to_train(settings, "model.json")
+            + "\n  then use it: -o classifier.model=model.json     or do without: -o classifier.type=none"
+        )
+    if name.endswith(".json") and not Path(name).expanduser().exists():
+        raise ConfigError(
+            f"there is no model {name} yet (classifier.model).\n"
+            + _how_to_train(settings, name)
+            + "\n  or do without: -o classifier.type=none"
         )
     return load_model(name, plugins, chosen.component)
+
+
+def _how_to_train(settings: Settings, out: str) -> str:
+    """Return the commands that make a model for these settings: of simulated trials where the gripper is simulated."""
+    assert settings.classifier is not None
+    name = settings.classifier.component.name
+    of = f"--gripper {settings.gripper.component.name}"
+    if settings.pipeline.endswith(".toml"):
+        of = f"--pipeline {shlex.quote(settings.pipeline)}"
+    if settings.gripper.create().objects():
+        return f"  train one: graspsense train simulated {of} --classifier {name} --out {out}"
+    return (
+        f"  collect trials of this gripper: graspsense collect {of} --labels can:full,can:empty --save trials\n"
+        f"  then train: graspsense train store:trials --classifier {name} --out {out}"
+    )
 
 
 def _text(name: str, plugins: Plugins) -> bytes:
