@@ -35,12 +35,17 @@ from graspsense_sim_gripper.linear import Linear, move_of
 from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
 from graspsense_sim_gripper.plant import PlantParams, PlantState, Squeezed
-from graspsense_sim_gripper.sensing import SensorState, felt_again, sense
+from graspsense_sim_gripper.sensing import Encoder, PadBuffers, SensorState, _read_encoder, apply_tare, sense
 from graspsense_sim_gripper.setting import CELL_OFFSET, device_info, set_scene
 from graspsense_sim_gripper.terms.registry import find_term, laws_of
 
 # Where a tick runs in the interpreter, making its tuples is a good part of its cost.
-_sense = bind(sense, Frame=maker(Frame), SensorState=maker(SensorState))
+_sense = bind(
+    sense,
+    Frame=maker(Frame),
+    SensorState=maker(SensorState),
+    _read_encoder=bind(_read_encoder, Encoder=maker(Encoder)),
+)
 _reading = maker(Reading)
 _COMPILED: Mapping[str, bool | None] = {"worth": None, "always": True, "never": False}
 _PLANT_TUPLES = {"PlantState": maker(PlantState), "Squeezed": maker(Squeezed)}
@@ -83,10 +88,8 @@ class SimBackend(BatchBackend[SimConfig]):
         self._body, self._sensor = setting.body, setting.sensed
         self._ticks = 0
         zero = (CELL_OFFSET[0],) * CELLS
-        self._zero: tuple[Sequence[float], Sequence[float]] = (zero, zero)
         self._blocks = setting.noise()
-        self._noise: list[list[float]] = []
-        self._images: list[tuple[list[float], list[float]]] = []
+        self._buffers = PadBuffers(zero, zero, [], [])
         self._pads = NO_PADS
         self._effort_n: float | None = None
         self._explains = self.config.explain
@@ -108,25 +111,15 @@ class SimBackend(BatchBackend[SimConfig]):
                 # Of an object that is held fast the half that is pressed harder.
                 half = max(self._body.squeezed, self._body.right, key=lambda one: one.force_n)
                 self._pressed.append((half.compression_m, half.force_n))
-        images = self._images
-        if self._sensor.images >= len(images):
-            self._draw()
-        left, right = self._zero
+        buffers = self._buffers
+        if self._sensor.images >= len(buffers.images):
+            self._draw_noise()
         frame, self._sensor = _sense(
-            setting.sensor,
-            self._sensor,
-            self._body,
-            self._ticks * dt,
-            dt,
-            effort,
-            left,
-            right,
-            self._noise,
-            images,
+            setting.sensor, self._sensor, self._body, self._ticks * dt, dt, effort, buffers
         )
         count = self._sensor.images
         if count != self._pads.counter:
-            image = images[count - 1]
+            image = buffers.images[count - 1]
             self._pads = Pads(self._sensor.image_t_s, count, tuple(image[0]), tuple(image[1]))
         return _reading(frame, self._pads)
 
@@ -138,8 +131,9 @@ class SimBackend(BatchBackend[SimConfig]):
         """Set the cells' zero."""
         if self.config.sensor == "ideal":
             return
-        self._zero = tare(images)
-        self._sensor = felt_again(self._sensor, self._images, *self._zero)
+        left, right = tare(images)
+        self._buffers = self._buffers._replace(left_zero=left, right_zero=right)
+        self._sensor = apply_tare(self._sensor, self._buffers)
 
     def close(self) -> None:
         """Nothing to let go of."""
@@ -166,11 +160,11 @@ class SimBackend(BatchBackend[SimConfig]):
             report["model"] = explain(setting.kinds, setting.terms, setting.plant, path, forces, setting.dt_s)
         return report
 
-    def _draw(self) -> None:
-        self._noise.extend(next(self._blocks).tolist())
-        self._images.extend(
-            ([0.0] * CELLS, [0.0] * CELLS) for _ in range(len(self._noise) - len(self._images))
-        )
+    def _draw_noise(self) -> None:
+        """Draw the noise of the next images, and make room for these."""
+        noise, images = self._buffers.noise, self._buffers.images
+        noise.extend(next(self._blocks).tolist())
+        images.extend(([0.0] * CELLS, [0.0] * CELLS) for _ in range(len(noise) - len(images)))
 
     def variants(self) -> tuple[Variant, ...]:
         """Return each scheme at each fidelity, from coarse to fine."""

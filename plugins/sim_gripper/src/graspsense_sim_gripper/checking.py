@@ -38,14 +38,15 @@ from graspsense.plugin_api import (
     tick_params,
 )
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, Loop, grasp_of
+from graspsense_sim_gripper.kernel import grasp_of
 from graspsense_sim_gripper.linear_scene import linear_of
+from graspsense_sim_gripper.loop import COLUMNS, NOT_STARTED, Buffers, GraspParams, Progress, has_ended
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.plant import EXPLICIT, PlantState, Steps
+from graspsense_sim_gripper.plant import EXPLICIT, Steps
 from graspsense_sim_gripper.reduction import cache
 from graspsense_sim_gripper.reduction.error import Course, deviation
 from graspsense_sim_gripper.selection import BOLD, DROPPED, FINE, FULL_LADDER, LADDER, Check, Choice, Rung
-from graspsense_sim_gripper.sensing import Bias, SensorState
+from graspsense_sim_gripper.sensing import Bias, PadBuffers
 from graspsense_sim_gripper.setting import (
     EFFORT_LIMIT_N,
     FORCE_N,
@@ -300,12 +301,9 @@ def _way_out(can: float) -> str:
 
 
 class _Stand(NamedTuple):
-    """Where a trial grasp stands: the loop, the plant, its sensors and the controller, and what was recorded."""
+    """A trial grasp under way: its state, and what was recorded."""
 
-    loop: Loop
-    body: PlantState
-    sensed: SensorState
-    state: Any
+    progress: Progress
     rows: tuple[Any, ...]
     """The columns of `COLUMNS` and the phases behind them, piece by piece."""
     far: bool
@@ -350,21 +348,22 @@ class _Trial:
         bias = Bias(*off, setting.plant.thing.width_m)
         setting = evolve(setting, sensor=setting.sensor._replace(bias=bias))
         at_end = self._driven(setting, before.far)(
-            setting.plant.steps, before, before.loop.ticks + self._ticks(setting)
+            setting.plant.steps, before, before.progress.loop.ticks + self._ticks(setting)
         )
-        columns = np.concatenate(at_end.rows, axis=1)
+        columns, end = np.concatenate(at_end.rows, axis=1), at_end.progress
         gap_m, left_n, right_n = (
             columns[COLUMNS.index(name)] for name in ("gap_m", "force_left_n", "force_right_n")
         )
         return Course(
-            outcome=int(at_end.state.law.outcome) if at_end.state.guard.stopped == 0 else -1,
+            outcome=int(end.controller.law.outcome) if end.controller.guard.stopped == 0 else -1,
             dt_s=setting.dt_s,
-            gap_m=gap_m + (bias.from_m - np.minimum(gap_m, bias.from_m)) * bias.share / (1.0 + bias.share),
+            gap_m=gap_m
+            + (bias.from_m - np.minimum(gap_m, bias.from_m)) * bias.travel_share / (1.0 + bias.travel_share),
             speed_m_s=columns[COLUMNS.index("velocity_m_s")],
             left_n=np.where(left_n != 0.0, left_n - bias.force_n, 0.0),
             right_n=np.where(right_n != 0.0, right_n - bias.force_n, 0.0),
             ended=int(np.sum(columns[-1] <= HOLD)),
-            peak_n=at_end.body.peak_n,
+            peak_n=end.plant.peak_n,
         )
 
     def _ticks(self, setting: Setting) -> int:
@@ -384,17 +383,21 @@ class _Trial:
                 gap, rate = gap_and_rate(link, near)
                 body = body._replace(revolutions=near, gap_m=gap, rate_m_rev=rate)
             drive = self._driven(setting, far)
-            now = _Stand(NOT_BEGUN, body, setting.sensed, first_state(law.init()), (), far)
-            while not _ended(now.state) and now.loop.ticks < self._ticks(setting):
-                closing = max(-now.body.speed_rev_s * now.body.rate_m_rev, SPEED_M_S)
-                ahead = 0.5 * (now.body.gap_m - reach) / (closing * setting.dt_s)
+            state = first_state(law.init())
+            now = _Stand(Progress(NOT_STARTED, body, setting.sensed, state), (), far)
+            while not has_ended(now.progress.controller):
+                ticks, plant = now.progress.loop.ticks, now.progress.plant
+                if ticks >= self._ticks(setting):
+                    break
+                closing = max(-plant.speed_rev_s * plant.rate_m_rev, SPEED_M_S)
+                ahead = 0.5 * (plant.gap_m - reach) / (closing * setting.dt_s)
                 if ahead < 2.0:
                     return now
-                after = drive(steps, now, now.loop.ticks + min(int(ahead), LEAP))
-                if after.body.touched == 1:
+                after = drive(steps, now, ticks + min(int(ahead), LEAP))
+                if after.progress.plant.touched == 1:
                     return now
                 now = after
-            if _ended(now.state):
+            if has_ended(now.progress.controller):
                 break
         return now
 
@@ -410,47 +413,30 @@ class _Trial:
         on_arrays = compiled is not None
         loop, made = compiled or (None, setting)
         by_maps = linear_of(self.config, made, on_arrays=on_arrays)
-        # What a loop never looks at while its sensors are ideal, but of its own types.
-        parts: tuple[Any, ...] = (
-            *np.zeros((2, CELLS)),
-            np.zeros((1, 2 * CELLS)),
-            np.full((1, 2, CELLS), math.nan),
-            np.zeros(1),
-        )
+        # An ideal sensor reads none of these, but compiled code has them.
+        zero, noise = np.zeros((2, CELLS)), np.zeros((1, 2 * CELLS))
+        pads = PadBuffers(zero[0], zero[1], noise, np.full((1, 2, CELLS), math.nan))
+        times: Any = np.zeros(1)
         if loop is None:
             shape = None if by_maps is None else (setting.kinds, by_maps[1])
             loop = grasp_of(laws_of(setting.kinds), step, by_maps=shape)
-            parts = tuple(part.tolist() for part in parts)
+            pads, times = PadBuffers(*(part.tolist() for part in pads)), times.tolist()
 
         def drive(steps: Steps, at: _Stand, until: int) -> _Stand:
-            stands, body, sensed, state, rows, _ = at
-            if body.touched == 0:
+            progress, rows, _ = at
+            if progress.plant.touched == 0:
                 # What nothing has pressed yet, as this composition has it.
-                body = body._replace(squeezed=made.body.squeezed, right=made.body.right)
+                body = progress.plant._replace(squeezed=made.body.squeezed, right=made.body.right)
+                progress = progress._replace(plant=body)
             plant: Any = made.plant._replace(steps=steps) if by_maps is None else by_maps[0]
-            while not _ended(state) and stands.ticks < until:
-                table = np.zeros((len(COLUMNS), min(until - stands.ticks, ROOM)))
+            grasp_params = GraspParams(plant, made.sensor, params, setting.dt_s, until)
+            while not has_ended(progress.controller) and progress.loop.ticks < until:
+                table = np.zeros((len(COLUMNS), min(until - progress.loop.ticks, ROOM)))
                 numbers = np.zeros(table.shape[1], np.int64)
                 given = (table, numbers) if on_arrays else (table.tolist(), numbers.tolist())
-                stands, body, sensed, state = loop(
-                    plant,
-                    made.sensor,
-                    setting.dt_s,
-                    params,
-                    until,
-                    stands._replace(recorded=0),
-                    body,
-                    sensed,
-                    state,
-                    *parts,
-                    *given,
-                )
-                rows = (*rows, np.vstack(given)[:, : stands.recorded])
-            return _Stand(stands, body, sensed, state, rows, at.far)
+                progress = progress._replace(loop=progress.loop._replace(recorded=0))
+                progress = loop(grasp_params, progress, Buffers(pads, times, *given))
+                rows = (*rows, np.vstack(given)[:, : progress.loop.recorded])
+            return _Stand(progress, rows, at.far)
 
         return drive
-
-
-def _ended(state: Any) -> bool:
-    """Return whether the controller or the guard has ended the grasp."""
-    return bool(state.done == 1 or state.guard.stopped == 1)

@@ -7,13 +7,13 @@ interpreter. `compiled` compiles a bound function with all that it calls, under 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
-from graspsense.plugin_api import TARING, CompileOptions, Inlining, Pads, bind, compile_function, tick
+from graspsense.plugin_api import CompileOptions, Inlining, bind, compile_function, tick
 from graspsense_sim_gripper import linear, plant
 from graspsense_sim_gripper.linear_modes import Shape
+from graspsense_sim_gripper.loop import grasp
 from graspsense_sim_gripper.plant import PlantParams, PlantState
-from graspsense_sim_gripper.sensing import SensorParams, SensorState, felt_again, sense
 from graspsense_sim_gripper.terms.term import Law
 
 
@@ -82,121 +82,6 @@ def plant_of(
     stepped = bind(plant._stepped, _step=step)
     driven = plant._settled if settles else plant._driven
     return bind(plant.move, _driven=bind(driven, _stepped=stepped, _glide=glide))
-
-
-move: Any = _nothing
-control: Any = _nothing
-
-
-COLUMNS: Final = (
-    "t_s",
-    "gap_m",
-    "velocity_m_s",
-    "effort_n",
-    "force_left_n",
-    "force_right_n",
-    "edge_left_n",
-    "edge_right_n",
-    "command",
-)
-"""The rows of the recorded table, one a column of the trace; the phases are whole numbers and stand beside it."""
-
-
-class Loop(NamedTuple):
-    """Where the loop stands between two calls: ticks done and recorded, the images of before the taring."""
-
-    ticks: int
-    recorded: int
-    phase: int
-    untared: int
-    effort_n: float
-
-
-NOT_BEGUN: Final = Loop(0, 0, -1, 0, 0.0)
-NOT_NEGATIVE: Final = 0x3FFFFFFF
-"""An index with this mask is known not to be negative, which compiled code else asks of each array."""
-
-
-def grasp(
-    plant_params: PlantParams,
-    sensor_params: SensorParams,
-    dt: float,
-    tick_params: Any,
-    most_ticks: int,
-    loop: Loop,
-    body: PlantState,
-    sensor: SensorState,
-    state: Any,
-    left_zero: Any,
-    right_zero: Any,
-    noise: Any,
-    images: Any,
-    image_times: Any,
-    columns: Any,
-    phases: Any,
-) -> tuple[Loop, PlantState, SensorState, Any]:
-    """Run a grasp to its end, for `most_ticks`, or until there is no more room; return where everything stands.
-
-    The runner's loop on arrays: `left_zero` and `right_zero` (22,) hold the zero before the tare and become the
-    tare; `images` (k, 2, 22), the last one NaN at first, and `image_times` (k,) are filled; `columns` (9, n) and
-    `phases` (n,) get a number each a tick from the approach on: of the frame without its `dt_s` and status, of which a
-    simulated gripper has none, and of what is commanded. Where `images` or `columns` are full it is called again, with
-    larger ones that begin alike and with what it returned.
-    """
-    ticks, recorded, phase, untared, effort = loop
-    room = len(columns[0])
-    times, gaps, velocities, efforts = columns[0], columns[1], columns[2], columns[3]
-    lefts, rights, left_edges, right_edges = columns[4], columns[5], columns[6], columns[7]
-    commands = columns[8]
-    count = sensor.images
-    pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
-    while ticks < most_ticks and recorded < room and sensor.images < len(images):
-        frame, sensor = sense(
-            sensor_params, sensor, body, ticks * dt, dt, effort, left_zero, right_zero, noise, images
-        )
-        if sensor.images != count:
-            count = sensor.images
-            image_times[count - 1] = sensor.image_t_s
-            pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
-        command, state = control(tick_params, state, frame, pads)
-        stepped = phase != TARING
-        if state.phase != phase:
-            if phase == TARING and count > untared:
-                _tare(images, untared, count, left_zero, right_zero)
-                sensor = felt_again(sensor, images, left_zero, right_zero)
-            phase = state.phase
-            untared = count
-        effort = command.value
-        if phase > TARING and stepped:
-            row = recorded & NOT_NEGATIVE
-            times[row] = frame.t_s
-            gaps[row] = frame.gap_m
-            velocities[row] = frame.velocity_m_s
-            efforts[row] = frame.effort_n
-            lefts[row] = frame.force_left_n
-            rights[row] = frame.force_right_n
-            left_edges[row] = frame.edge_left_n
-            right_edges[row] = frame.edge_right_n
-            phases[row] = phase
-            commands[row] = effort
-            recorded += 1
-        ticks += 1
-        if state.done == 1 or state.guard.stopped == 1:
-            break
-        body = move(plant_params, body, effort, dt)
-    return Loop(ticks, recorded, phase, untared, effort), body, sensor, state
-
-
-def _tare(images: Any, begin: int, end: int, left_zero: Any, right_zero: Any) -> None:
-    """Make the mean of images `begin` to `end` the zero, summed in the order in which they came."""
-    for i in range(len(left_zero)):
-        left = images[begin][0][i]
-        right = images[begin][1][i]
-        for k in range(begin + 1, end):
-            left += images[k][0][i]
-            right += images[k][1][i]
-        left_zero[i] = left / (end - begin)
-        right_zero[i] = right / (end - begin)
 
 
 def grasp_of(

@@ -1,11 +1,11 @@
-"""What the gripper feels of the plant: a quantised encoder with its filter, and 22 cells a fingertip.
+"""The sensors of the gripper: a quantised encoder with a velocity filter, and 22 pressure cells a fingertip.
 
-The encoder counts motor ticks; the gap is their image through the transmission, its rate a difference with a
-first-order filter. A cell image is taken every 41 ms, or as the settings say, beside frames at the control rate: the
-force that lands on the gripping face is spread over its fifteen cells by the patch of contact, the rest lands beside
-them; each cell has an offset of its own, noise, whole counts and 16 bits. The ideal sensor gives gap, rate and force
-exactly, at every tick, and has no cells. An image can be told to arrive later than it was taken, as over a bus that
-carries it in pieces.
+The encoder counts ticks of the motor; the gap follows from them through the linkage, and its rate is a difference
+with a first-order low-pass filter. Cell images are taken every 41 ms, or as the settings say, beside frames at the
+control rate. The force on the gripping face is distributed over its fifteen cells by the patch of contact, and the rest
+lands beside them. Each cell has an offset of its own, noise, integer counts and 16 bits. An image may arrive later
+than it was taken, as over a bus that transmits it in parts. The ideal sensor gives gap, rate and force exactly, at
+every tick, and has no cells.
 """
 
 from __future__ import annotations
@@ -27,45 +27,74 @@ from graspsense.plugin_api import (
 from graspsense_sim_gripper.plant import PlantState
 
 VELOCITY_FILTER_S: Final = 0.003
-"""Time constant of the rate's filter: below 10 ms, or the velocity loop becomes a limit cycle."""
+"""Time constant of the velocity filter. From 10 ms on the velocity loop runs into a limit cycle."""
 LARGEST_COUNT: Final = 65535.0
+CLOCK_TOLERANCE_S: Final = 1e-10
+"""Ticks and image times are sums of different steps, and differ by rounding."""
+
+CellColumn = Any
+"""A number for each cell: an array in compiled code, a list or tuple in the interpreter."""
 
 
 class Bias(NamedTuple):
-    """By what an ideal sensor is made wrong, to see whether a grasp hangs on so little."""
+    """An error added to the ideal sensor, to test how sensitive a grasp is to errors this small."""
 
     force_n: float
-    """On a pad that is touched."""
-    share: float
-    """Of the way that the fingers have come beyond `from_m`."""
+    """Added to the force on a pad that touches the object."""
+    travel_share: float
+    """Relative error of the distance that the fingers have moved beyond `from_m`."""
     from_m: float
 
 
 UNBIASED: Final = Bias(0.0, 0.0, 0.0)
 
 
-class SensorParams(NamedTuple):
-    """The sensing chain of one grasp. `share` is the part of the force that lands on the fifteen cells.
+class ImageClock(NamedTuple):
+    """When cell images are taken, and how long afterwards they arrive."""
 
-    A cell of the gripping face whose weight is 0 is not there: it reads its offset, always.
-    """
+    phase_s: float
+    period_s: float
+    delay_s: float
+
+
+class PadCells(NamedTuple):
+    """The cells of one fingertip."""
+
+    weights: CellColumn
+    """(15,) The part of the force on the gripping face that each of its cells carries. A cell of weight 0 is missing:
+    it always reads its offset."""
+    offset: CellColumn
+    """(22,) Counts of the unloaded cells."""
+
+
+class SensorParams(NamedTuple):
+    """The sensors of one grasp."""
 
     ideal: int
     link: ScrewLinkage
-    pad_phase_s: float
-    pad_period_s: float
-    pad_delay_s: float
+    clock: ImageClock
     share: float
+    """The part of the force on a pad that lands on the fifteen cells of its gripping face."""
     noise_counts: float
-    left_weights: Any
-    right_weights: Any
-    left_offset: Any
-    right_offset: Any
+    left: PadCells
+    right: PadCells
     bias: Bias = UNBIASED
 
 
-class Felt(NamedTuple):
-    """Forces of the last cell image, N."""
+class PadBuffers(NamedTuple):
+    """The cell images of a grasp: arrays in compiled code, lists in the interpreter, which are written in place."""
+
+    left_zero: CellColumn
+    right_zero: CellColumn
+    """(22,) Counts that are taken as no force."""
+    noise: Any
+    """(k, 44) Standard normal numbers for each image."""
+    images: Any
+    """(k, 2, 22) Counts of the left and the right fingertip in each image."""
+
+
+class PadForces(NamedTuple):
+    """Forces of a cell image, in newtons: on the gripping faces, and on the cells around them."""
 
     left_n: float
     right_n: float
@@ -73,28 +102,40 @@ class Felt(NamedTuple):
     right_edge_n: float
 
 
-class SensorState(NamedTuple):
-    """What was last read: encoder, gap and its rate, how many images so far, the forces of the last.
-
-    `under_way` is 1 while an image is taken and has not arrived; `taken_*` are the forces on the pads it shows.
-    """
+class Encoder(NamedTuple):
+    """The last reading of the encoder, with the gap and the filtered rate that follow from it."""
 
     ticks: float
     gap_m: float
     velocity_m_s: float
+
+
+class Pending(NamedTuple):
+    """The cell image that was taken and has not arrived: whether there is one, and the forces on the pads then."""
+
+    waiting: int
+    left_n: float
+    right_n: float
+
+
+class SensorState(NamedTuple):
+    """What was read last."""
+
+    encoder: Encoder
     images: int
+    """Number of cell images so far."""
     image_t_s: float
-    felt: Felt
-    under_way: int
-    taken_left_n: float
-    taken_right_n: float
+    """When the last of them was taken."""
+    forces: PadForces
+    """Those of the last image."""
+    pending: Pending
 
 
-def first_sensed(params: SensorParams, plant: PlantState) -> SensorState:
-    """Return the sensor before the first tick; the filter starts at rest."""
+def initial_sensor(params: SensorParams, plant: PlantState) -> SensorState:
+    """Return the sensor's state before the first tick; the velocity filter starts at rest."""
     ticks = float(math.floor(plant.revolutions * PR2_ENCODER_TICKS))
     gap, _ = gap_and_rate(params.link, ticks / PR2_ENCODER_TICKS)
-    return SensorState(ticks, gap, 0.0, 0, 0.0, Felt(0.0, 0.0, 0.0, 0.0), 0, 0.0, 0.0)
+    return SensorState(Encoder(ticks, gap, 0.0), 0, 0.0, PadForces(0.0, 0.0, 0.0, 0.0), Pending(0, 0.0, 0.0))
 
 
 def sense(
@@ -104,91 +145,88 @@ def sense(
     t_s: float,
     dt_s: float,
     effort_n: float,
-    left_zero: Any,
-    right_zero: Any,
-    noise: Any,
-    images: Any,
+    pads: PadBuffers,
 ) -> tuple[Frame, SensorState]:
-    """Return this tick's frame and the sensor's state.
-
-    `noise[k]` holds 44 standard normal numbers for image k; a new image is written to `images[k][0]` (left)
-    and `images[k][1]` (right).
-    """
+    """Return the frame of this tick and the sensor's state; a new image is written to `pads.images`."""
     if params.ideal == 1:
         velocity = plant.speed_rev_s * plant.rate_m_rev
         gap, left_n, right_n = plant.gap_m, plant.left_n, plant.right_n
-        off_n, off_share, from_m = params.bias
-        if off_n != 0.0:
-            gap += off_share * min(gap - from_m, 0.0)
-            left_n += off_n if left_n > 0.0 else 0.0
-            right_n += off_n if right_n > 0.0 else 0.0
-        frame = Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, 0.0, 0.0, 0)
-        return frame, state
+        force_error_n, travel_share, from_m = params.bias
+        if force_error_n != 0.0:
+            gap += travel_share * min(gap - from_m, 0.0)
+            left_n += force_error_n if left_n > 0.0 else 0.0
+            right_n += force_error_n if right_n > 0.0 else 0.0
+        return Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, 0.0, 0.0, 0), state
 
-    ticks, gap, velocity, count, image_t, felt, under_way, taken_left, taken_right = state
+    encoder = _read_encoder(state.encoder, plant, dt_s)
+    count, image_t, forces, pending = state.images, state.image_t_s, state.forces, state.pending
+    due_s = params.clock.phase_s + count * params.clock.period_s - CLOCK_TOLERANCE_S
+    if pending.waiting == 0 and t_s >= due_s:
+        pending = Pending(1, plant.left_n, plant.right_n)
+    if pending.waiting == 1 and t_s >= due_s + params.clock.delay_s:
+        image, noise = pads.images[count], pads.noise[count]
+        _write_image(params, params.left, pending.left_n, noise, 0, image[0])
+        _write_image(params, params.right, pending.right_n, noise, CELLS, image[1])
+        forces = image_forces(image[0], image[1], pads)
+        count, image_t = count + 1, t_s - params.clock.delay_s
+        pending = Pending(0, pending.left_n, pending.right_n)
+    frame = Frame(
+        t_s,
+        dt_s,
+        encoder.gap_m,
+        encoder.velocity_m_s,
+        effort_n,
+        forces.left_n,
+        forces.right_n,
+        forces.left_edge_n,
+        forces.right_edge_n,
+        0,
+    )
+    return frame, SensorState(encoder, count, image_t, forces, pending)
+
+
+def _read_encoder(last: Encoder, plant: PlantState, dt_s: float) -> Encoder:
+    ticks, gap, velocity = last
     now = float(math.floor(plant.revolutions * PR2_ENCODER_TICKS))
     moved = 0.0
     if now != ticks:
         ticks = now
         before = gap
-        # Within a tick the transmission is straight to a tenth of a picometre.
+        # Within an encoder tick the linkage is linear to a tenth of a picometre.
         gap = plant.gap_m - plant.rate_m_rev * (plant.revolutions - ticks / PR2_ENCODER_TICKS)
         moved = gap - before
     velocity += dt_s / (VELOCITY_FILTER_S + dt_s) * (moved / dt_s - velocity)
-
-    # A tenth of a nanosecond of grace, as ticks and image times are sums of different steps.
-    due_s = params.pad_phase_s + count * params.pad_period_s - 1e-10
-    if under_way == 0 and t_s >= due_s:
-        under_way, taken_left, taken_right = 1, plant.left_n, plant.right_n
-    if under_way == 1 and t_s >= due_s + params.pad_delay_s:
-        left, right, drawn = images[count][0], images[count][1], noise[count]
-        _image(params, params.left_weights, params.left_offset, taken_left, drawn, 0, left)
-        _image(params, params.right_weights, params.right_offset, taken_right, drawn, CELLS, right)
-        felt = feel(left, right, left_zero, right_zero)
-        count, image_t, under_way = count + 1, t_s - params.pad_delay_s, 0
-    frame = Frame(
-        t_s, dt_s, gap, velocity, effort_n, felt.left_n, felt.right_n, felt.left_edge_n, felt.right_edge_n, 0
-    )
-    return frame, SensorState(ticks, gap, velocity, count, image_t, felt, under_way, taken_left, taken_right)
+    return Encoder(ticks, gap, velocity)
 
 
-def feel(left: Any, right: Any, left_zero: Any, right_zero: Any) -> Felt:
-    """Return the forces of one cell image of both fingertips over their zeros."""
-    return Felt(
-        pad_force(left, left_zero),
-        pad_force(right, right_zero),
-        edge_force(left, left_zero),
-        edge_force(right, right_zero),
+def image_forces(left: CellColumn, right: CellColumn, pads: PadBuffers) -> PadForces:
+    """Return the forces of one cell image of both fingertips, relative to their zeros."""
+    return PadForces(
+        pad_force(left, pads.left_zero),
+        pad_force(right, pads.right_zero),
+        edge_force(left, pads.left_zero),
+        edge_force(right, pads.right_zero),
     )
 
 
-def felt_again(state: SensorState, images: Any, left_zero: Any, right_zero: Any) -> SensorState:
-    """Return the sensor with the last image's forces taken over a new zero."""
-    last = images[state.images - 1]
-    felt = feel(last[0], last[1], left_zero, right_zero)
-    return SensorState(
-        state.ticks,
-        state.gap_m,
-        state.velocity_m_s,
-        state.images,
-        state.image_t_s,
-        felt,
-        state.under_way,
-        state.taken_left_n,
-        state.taken_right_n,
-    )
+def apply_tare(state: SensorState, pads: PadBuffers) -> SensorState:
+    """Return the sensor's state with the forces of the last image relative to the present zeros."""
+    last = pads.images[state.images - 1]
+    forces = image_forces(last[0], last[1], pads)
+    return SensorState(state.encoder, state.images, state.image_t_s, forces, state.pending)
 
 
-def _image(
-    params: SensorParams, weights: Any, offset: Any, force_n: float, noise: Any, first: int, cells: Any
+def _write_image(
+    params: SensorParams, pad: PadCells, force_n: float, noise: CellColumn, first: int, cells: CellColumn
 ) -> None:
+    """Write the counts of one fingertip under this force to `cells`; its noise begins at `noise[first]`."""
     counts = force_n * params.share * PAD_COUNTS_PER_N
     spread = params.noise_counts
     for i in range(CELLS):
-        value = offset[i] + spread * noise[first + i]
+        value = pad.offset[i] + spread * noise[first + i]
         if i >= FIRST_PAD_CELL:
-            weight = weights[i - FIRST_PAD_CELL]
-            value = value + counts * weight if weight > 0.0 else offset[i]
+            weight = pad.weights[i - FIRST_PAD_CELL]
+            value = value + counts * weight if weight > 0.0 else pad.offset[i]
         value = float(math.floor(value + 0.5))
         if value < 0.0:
             value = 0.0

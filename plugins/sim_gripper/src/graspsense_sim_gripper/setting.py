@@ -48,7 +48,7 @@ from graspsense_sim_gripper.selection import (
     untouched,
     whole,
 )
-from graspsense_sim_gripper.sensing import SensorParams, SensorState, first_sensed
+from graspsense_sim_gripper.sensing import ImageClock, PadCells, SensorParams, SensorState, initial_sensor
 
 EFFORT_LIMIT_N: Final = 100.0
 SPEED_LIMIT_M_S: Final = 0.2
@@ -159,7 +159,7 @@ def setting_of(
         plant=plant,
         body=body,
         sensor=sensor,
-        sensed=first_sensed(sensor, body),
+        sensed=initial_sensor(sensor, body),
         dt_s=1.0 / config.rate_hz,
         choice=choice,
         drawn=rng,
@@ -330,34 +330,22 @@ def _rotor(config: SimConfig) -> float:
 def _sensor(config: SimConfig, instance: Instance | None, rng: np.random.Generator) -> SensorParams:
     """Return the sensing chain; the cells' offsets and the phase of the pads' clock are drawn here."""
     if config.sensor == "ideal":
-        return SensorParams(
-            ideal=1,
-            link=_linkage(config),
-            pad_phase_s=0.0,
-            pad_period_s=float(config.pad_period_s),
-            pad_delay_s=0.0,
-            share=1.0,
-            noise_counts=0.0,
-            left_weights=EVEN,
-            right_weights=EVEN,
-            left_offset=UNLOADED,
-            right_offset=UNLOADED,
-        )
+        cells = PadCells(EVEN, UNLOADED)
+        clock = ImageClock(0.0, float(config.pad_period_s), 0.0)
+        return SensorParams(1, _linkage(config), clock, 1.0, 0.0, cells, cells)
     mean, spread = CELL_OFFSET
     offsets = (mean + spread * rng.standard_normal((2, CELLS))).tolist()
     weights = cell_weights(instance.spec.patch, instance.patch_row) if instance else EVEN
-    there = central_cells(config.pad_cells)
-    weights = tuple([weight if cell in there else 0.0 for cell, weight in enumerate(weights)])
+    present = central_cells(config.pad_cells)
+    weights = tuple([weight if cell in present else 0.0 for cell, weight in enumerate(weights)])
+    left, right = (PadCells(weights, tuple(offset)) for offset in offsets)
+    period = float(config.pad_period_s)
     return SensorParams(
         ideal=0,
         link=_linkage(config),
-        pad_phase_s=float(rng.random()) * float(config.pad_period_s),
-        pad_period_s=float(config.pad_period_s),
-        pad_delay_s=float(config.pad_delay_s),
+        clock=ImageClock(float(rng.random()) * period, period, float(config.pad_delay_s)),
         share=float(instance.share) if instance else 1.0,
         noise_counts=float(config.noise_counts),
-        left_weights=weights,
-        right_weights=weights,
-        left_offset=tuple(offsets[0]),
-        right_offset=tuple(offsets[1]),
+        left=left,
+        right=right,
     )

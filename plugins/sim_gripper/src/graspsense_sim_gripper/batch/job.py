@@ -28,10 +28,19 @@ from graspsense.plugin_api import (
 from graspsense_sim_gripper.checking import Checking, Control, Loops
 from graspsense_sim_gripper.compiled.padding import as_compiled, as_own, layout_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.kernel import COLUMNS, NOT_BEGUN, grasp_of
+from graspsense_sim_gripper.kernel import grasp_of
 from graspsense_sim_gripper.linear_modes import Shape
 from graspsense_sim_gripper.linear_scene import linear_of
+from graspsense_sim_gripper.loop import (
+    COLUMNS,
+    NOT_STARTED,
+    Buffers,
+    GraspParams,
+    Progress,
+    has_ended,
+)
 from graspsense_sim_gripper.plant import PlantState
+from graspsense_sim_gripper.sensing import PadBuffers
 from graspsense_sim_gripper.setting import CELL_OFFSET, Chooser, Setting, device_info, set_scene
 from graspsense_sim_gripper.terms.registry import laws_of
 
@@ -84,15 +93,25 @@ class Job:
         return first_state(self.controller.init())
 
 
+def _new_buffers() -> Buffers:
+    return Buffers(
+        pads=PadBuffers(
+            left_zero=np.zeros(CELLS),
+            right_zero=np.zeros(CELLS),
+            noise=np.zeros((IMAGES, 2 * CELLS)),
+            images=np.full((IMAGES, 2, CELLS), np.nan),
+        ),
+        image_times=np.zeros(IMAGES),
+        columns=np.zeros((len(COLUMNS), TICKS)),
+        phases=np.zeros(TICKS, np.int64),
+    )
+
+
 @define(eq=False)
 class Storage:
-    """What the compiled loop writes into, used again by one grasp after the other."""
+    """The buffers of a thread, which its grasps use one after the other."""
 
-    noise: Any = field(factory=lambda: np.zeros((IMAGES, 2 * CELLS)))
-    cells: Any = field(factory=lambda: np.full((IMAGES, 2, CELLS), np.nan))
-    times: Any = field(factory=lambda: np.zeros(IMAGES))
-    columns: Any = field(factory=lambda: np.zeros((len(COLUMNS), TICKS)))
-    phases: Any = field(factory=lambda: np.zeros(TICKS, np.int64))
+    buffers: Buffers = field(factory=_new_buffers)
 
 
 class Composition(NamedTuple):
@@ -139,55 +158,62 @@ def grasp_once(
 
     `own`: the same grasp with the object's own terms, where the setting is that of another composition.
     """
-    most = math.ceil(seconds_at_most(job.run) / setting.dt_s)
-    body, sensor, state, stands = setting.body, setting.sensed, job.begins, NOT_BEGUN
-    blocks, ideal = setting.noise(), setting.sensor.ideal == 1
-    if not ideal:
-        _draw(storage.noise, blocks, 0)
-    zeros = np.full((2, CELLS), CELL_OFFSET[0])
-    storage.cells[-1] = math.nan
-    parts: tuple[Any, ...] = (
-        *zeros,
-        storage.noise,
-        storage.cells,
-        storage.times,
-        storage.columns,
-        storage.phases,
-    )
-    if not on_arrays:
-        # Lists are what plain Python indexes quickly.
-        parts = tuple(part.tolist() for part in parts)
-    found = linear_of(job.config, setting, on_arrays=on_arrays)
-    plant = setting.plant if found is None else found[0]
-    while True:
-        stands, body, sensor, state = loop(
-            plant, setting.sensor, setting.dt_s, job.params, most, stands, body, sensor, state, *parts
-        )
-        if state.done == 1 or state.guard.stopped == 1 or stands.ticks >= most:
-            break
-        parts = _more_room(parts, blocks, on_arrays, ideal)
-    _, _, noise, cells, times, columns, phases = parts
+    end, buffers = _run(job, setting, loop, storage, on_arrays)
     if on_arrays:
-        storage.noise, storage.cells, storage.times = noise, cells, times
-        storage.columns, storage.phases = columns, phases
-    if own is not None:
-        body = as_own(body, own)
-    outcome, reason = ended_by_itself(state)
-    if state.done == 0 and state.guard.stopped == 0:
+        storage.buffers = buffers
+    body = end.plant if own is None else as_own(end.plant, own)
+    outcome, reason = ended_by_itself(end.controller)
+    if not has_ended(end.controller):
         outcome, reason = Outcome.ABORTED, overdue(job.run)
     if not job.traces and job.draw is None:
         return done_of(job, outcome, reason, body, None)
-    n = stands.recorded
+    n, k = end.loop.recorded, end.sensor.images
+    columns, phases = buffers.columns, buffers.phases
     table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
-    cells, times = cells[: sensor.images], times[: sensor.images]
+    images, times = buffers.pads.images[:k], buffers.image_times[:k]
     if job.traces and 2 * n < len(columns[0]):
-        return done_of(job, outcome, reason, body, _trace(table.copy(), numbers.copy(), cells, times))
-    # What fills most of the storage, or is only drawn from, is not copied: what keeps some of it keeps the storage.
-    held = sys.getrefcount(columns), sys.getrefcount(phases)
-    done = done_of(job, outcome, reason, body, _trace(table, numbers, cells, times))
-    if (sys.getrefcount(columns), sys.getrefcount(phases)) != held:
-        storage.columns, storage.phases = np.empty_like(storage.columns), np.empty_like(storage.phases)
+        return done_of(job, outcome, reason, body, _trace(table.copy(), numbers.copy(), images, times))
+    # A trace that fills most of the buffers, or that only features are extracted from, is a view of them. Whoever
+    # keeps a column of it keeps those buffers, and the next grasps have new ones.
+    references = sys.getrefcount(columns), sys.getrefcount(phases)
+    done = done_of(job, outcome, reason, body, _trace(table, numbers, images, times))
+    if on_arrays and (sys.getrefcount(columns), sys.getrefcount(phases)) != references:
+        storage.buffers = buffers._replace(columns=np.empty_like(columns), phases=np.empty_like(phases))
     return done
+
+
+def _run(
+    job: Job, setting: Setting, loop: Callable[..., Any], storage: Storage, on_arrays: bool
+) -> tuple[Progress, Buffers]:
+    """Run the loop to the end of the grasp, with longer buffers where those of the storage do not suffice."""
+    blocks, ideal = setting.noise(), setting.sensor.ideal == 1
+    buffers = storage.buffers
+    if not ideal:
+        _draw(buffers.pads.noise, blocks, 0)
+    buffers.pads.images[-1] = math.nan
+    zeros = np.full((2, CELLS), CELL_OFFSET[0])
+    buffers = buffers._replace(pads=buffers.pads._replace(left_zero=zeros[0], right_zero=zeros[1]))
+    if not on_arrays:
+        # The interpreter indexes lists faster than arrays.
+        buffers = as_lists(buffers)
+    exact = linear_of(job.config, setting, on_arrays=on_arrays)
+    params = GraspParams(
+        plant=setting.plant if exact is None else exact[0],
+        sensor=setting.sensor,
+        controller=job.params,
+        dt_s=setting.dt_s,
+        max_ticks=math.ceil(seconds_at_most(job.run) / setting.dt_s),
+    )
+    progress = Progress(NOT_STARTED, setting.body, setting.sensed, job.begins)
+    while True:
+        progress = loop(params, progress, buffers)
+        if has_ended(progress.controller) or progress.loop.ticks >= params.max_ticks:
+            return progress, buffers
+        buffers = _doubled(buffers)
+        if not ideal:
+            _draw(buffers.pads.noise, blocks, len(buffers.pads.noise) // 2)
+        if not on_arrays:
+            buffers = as_lists(buffers)
 
 
 def done_of(job: Job, outcome: Outcome, reason: str, body: PlantState, trace: Trace | None) -> Done:
@@ -222,23 +248,29 @@ def _draw(noise: Any, blocks: Iterator[Any], begin: int) -> int:
     return begin
 
 
-def _more_room(
-    parts: tuple[Any, ...], blocks: Iterator[Any], on_arrays: bool, ideal: bool
-) -> tuple[Any, ...]:
-    """Return the storage of a grasp under way, twice as large and beginning alike, with the noise for it."""
-    left_zero, right_zero, noise, cells, times, columns, phases = (np.asarray(part) for part in parts)
-    had = len(noise)
-    noise, cells, times, phases = (_doubled(part) for part in (noise, cells, times, phases))
-    columns = np.concatenate([columns, np.zeros_like(columns)], axis=1)
-    cells[-1] = math.nan
-    if not ideal:
-        _draw(noise, blocks, had)
-    more = (left_zero, right_zero, noise, cells, times, columns, phases)
-    return more if on_arrays else tuple(part.tolist() for part in more)
+def as_lists(buffers: Buffers) -> Buffers:
+    """Return the same buffers as lists."""
+    pads = PadBuffers(*(array.tolist() for array in buffers.pads))
+    return Buffers(pads, *(array.tolist() for array in buffers[1:]))
 
 
-def _doubled(part: Any) -> Any:
-    return np.concatenate([part, np.zeros_like(part)])
+def _doubled(buffers: Buffers) -> Buffers:
+    """Return arrays of twice the length that begin with the same values."""
+
+    def doubled(values: Any, axis: int = 0) -> Any:
+        array = np.asarray(values)
+        return np.concatenate([array, np.zeros_like(array)], axis=axis)
+
+    pads = buffers.pads
+    images = doubled(pads.images)
+    images[-1] = math.nan
+    zeros = np.asarray(pads.left_zero), np.asarray(pads.right_zero)
+    return Buffers(
+        pads=PadBuffers(*zeros, doubled(pads.noise), images),
+        image_times=doubled(buffers.image_times),
+        columns=doubled(buffers.columns, axis=1),
+        phases=doubled(buffers.phases),
+    )
 
 
 def _trace(table: Any, phases: Any, cells: Any, times: Any) -> Trace:

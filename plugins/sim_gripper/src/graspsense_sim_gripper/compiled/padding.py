@@ -16,19 +16,18 @@ import numpy as np
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue
 from graspsense_sim_gripper.plant import PlantState
+from graspsense_sim_gripper.sensing import PadCells
 from graspsense_sim_gripper.setting import Setting, setting_of
 from graspsense_sim_gripper.terms.registry import find_term, in_order
 from graspsense_sim_gripper.terms.remainder import Kept
 
 
-def _arrays(figures: Any) -> dict[str, Any]:
-    """Return the figures of a sensor's cells as arrays."""
-    names = "left_weights", "right_weights", "left_offset", "right_offset"
-    return {name: np.array(getattr(figures, name), float) for name in names}
+def _as_array(cells: PadCells) -> PadCells:
+    return PadCells(np.array(cells.weights, float), np.array(cells.offset, float))
 
 
-IDEAL: Final = _arrays(setting_of(SimConfig(sensor="ideal"), None, 0).sensor)
-"""Those of an ideal sensor, which nobody looks at."""
+IDEAL: Final = _as_array(setting_of(SimConfig(sensor="ideal"), None, 0).sensor.left)
+"""The cells of an ideal sensor, which nothing reads."""
 
 
 class Filler(NamedTuple):
@@ -96,7 +95,8 @@ def as_compiled(setting: Setting) -> Setting:
     """Return the same grasp as a compiled loop takes it: in that composition, the cells' figures as arrays."""
     # As tuples these would be handed over number by number, and looked up by a chain of comparisons.
     sensor = setting.sensor
-    sensor = sensor._replace(**(IDEAL if sensor.ideal == 1 else _arrays(sensor)))
+    cells = (IDEAL, IDEAL) if sensor.ideal == 1 else (_as_array(sensor.left), _as_array(sensor.right))
+    sensor = sensor._replace(left=cells[0], right=cells[1])
     kinds, plant, body = setting.kinds, setting.plant, setting.body
     layout = layout_of(setting)
     if kinds != layout.kinds:

@@ -1,0 +1,167 @@
+"""The loop of a whole grasp on preallocated buffers: sensors, controller and plant in turn, tick by tick.
+
+It gives what the runner (`graspsense.core.runner`) gives with the simulated backend, and can be compiled as a whole.
+`test_runner_plain_loop_and_compiled_loop_give_one_trace` holds the two equal, the tare included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+from graspsense.plugin_api import TARING, Command, Frame, Pads, TickParams, TickState
+from graspsense_sim_gripper.plant import PlantState
+from graspsense_sim_gripper.sensing import PadBuffers, SensorParams, SensorState, apply_tare, sense
+
+COLUMNS: Final = (
+    "t_s",
+    "gap_m",
+    "velocity_m_s",
+    "effort_n",
+    "force_left_n",
+    "force_right_n",
+    "edge_left_n",
+    "edge_right_n",
+    "command",
+)
+"""The rows of the recorded table, each a column of the trace. The phases are integers and are kept beside it."""
+
+PlantModel = Any
+"""`PlantParams`, or `Linear` where exact discretisation advances the plant."""
+Table = Any
+"""Rows of numbers: an array in compiled code, a list of lists in the interpreter."""
+
+
+class GraspParams(NamedTuple):
+    """What does not change during a grasp."""
+
+    plant: PlantModel
+    sensor: SensorParams
+    controller: TickParams
+    dt_s: float
+    max_ticks: int
+
+
+class LoopState(NamedTuple):
+    """The loop's own state between two ticks."""
+
+    ticks: int
+    recorded: int
+    phase: int
+    tare_from: int
+    """The image with which the phase began: the tare is the mean from there on."""
+    effort_n: float
+
+
+class Progress(NamedTuple):
+    """All state of a grasp between two ticks."""
+
+    loop: LoopState
+    plant: PlantState
+    sensor: SensorState
+    controller: TickState
+
+
+class Buffers(NamedTuple):
+    """What the loop writes: arrays in compiled code, lists in the interpreter."""
+
+    pads: PadBuffers
+    """The zero before the tare, which the tare replaces; the noise; the images, of which the last is NaN at first."""
+    image_times: Any
+    """(k,)"""
+    columns: Table
+    """(9, n) The values of `COLUMNS` at each tick from the approach on."""
+    phases: Any
+    """(n,)"""
+
+
+NOT_STARTED: Final = LoopState(0, 0, -1, 0, 0.0)
+NOT_NEGATIVE: Final = 0x3FFFFFFF
+"""With this mask the compiler knows that an index is not negative, and omits the test at each array."""
+
+
+def _move_unbound(plant: PlantModel, state: PlantState, effort_n: float, dt_s: float) -> PlantState:
+    raise TypeError("the loop has no plant: compose.grasp_loop binds one")
+
+
+def _control_unbound(
+    params: TickParams, state: TickState, frame: Frame, pads: Pads
+) -> tuple[Command, TickState]:
+    raise TypeError("the loop has no controller: compose.grasp_loop binds one")
+
+
+move: Callable[[PlantModel, PlantState, float, float], PlantState] = _move_unbound
+control: Callable[[TickParams, TickState, Frame, Pads], tuple[Command, TickState]] = _control_unbound
+
+
+def grasp(params: GraspParams, progress: Progress, buffers: Buffers) -> Progress:
+    """Run a grasp to its end, for `max_ticks`, or until a buffer is full; return its state then.
+
+    Recorded are the frames without `dt_s` and status, which a simulated gripper does not vary, and the command. Where
+    `images` or `columns` are full, call it again with the state it returned and longer buffers that begin with the same
+    values.
+    """
+    dt_s, pad_buffers, columns = params.dt_s, buffers.pads, buffers.columns
+    images = pad_buffers.images
+    ticks, recorded, phase, tare_from, effort = progress.loop
+    plant, sensor, state = progress.plant, progress.sensor, progress.controller
+    capacity = len(columns[0])
+    count = sensor.images
+    pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
+    while ticks < params.max_ticks and recorded < capacity and sensor.images < len(images):
+        frame, sensor = sense(params.sensor, sensor, plant, ticks * dt_s, dt_s, effort, pad_buffers)
+        if sensor.images != count:
+            count = sensor.images
+            buffers.image_times[count - 1] = sensor.image_t_s
+            pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
+        command, state = control(params.controller, state, frame, pads)
+        past_tare = phase != TARING
+        if state.phase != phase:
+            if phase == TARING and count > tare_from:
+                _tare(pad_buffers, tare_from, count)
+                sensor = apply_tare(sensor, pad_buffers)
+            phase = state.phase
+            tare_from = count
+        effort = command.value
+        if phase > TARING and past_tare:
+            row = recorded & NOT_NEGATIVE
+            _record(columns, row, frame, effort)
+            buffers.phases[row] = phase
+            recorded += 1
+        ticks += 1
+        if state.done == 1 or state.guard.stopped == 1:
+            break
+        plant = move(params.plant, plant, effort, dt_s)
+    return Progress(LoopState(ticks, recorded, phase, tare_from, effort), plant, sensor, state)
+
+
+def has_ended(state: TickState) -> bool:
+    """Return whether the controller or the guard has ended the grasp."""
+    return bool(state.done == 1 or state.guard.stopped == 1)
+
+
+def _record(columns: Table, row: int, frame: Frame, command: float) -> None:
+    columns[0][row] = frame.t_s
+    columns[1][row] = frame.gap_m
+    columns[2][row] = frame.velocity_m_s
+    columns[3][row] = frame.effort_n
+    columns[4][row] = frame.force_left_n
+    columns[5][row] = frame.force_right_n
+    columns[6][row] = frame.edge_left_n
+    columns[7][row] = frame.edge_right_n
+    columns[8][row] = command
+
+
+def _tare(pads: PadBuffers, begin: int, end: int) -> None:
+    """Make the mean of the images from `begin` to `end` the zero, summed in the order in which they came.
+
+    As `graspsense.core.calibration.tare` does where every cell answers, as simulated cells do.
+    """
+    for i in range(len(pads.left_zero)):
+        left = pads.images[begin][0][i]
+        right = pads.images[begin][1][i]
+        for k in range(begin + 1, end):
+            left += pads.images[k][0][i]
+            right += pads.images[k][1][i]
+        pads.left_zero[i] = left / (end - begin)
+        pads.right_zero[i] = right / (end - begin)
