@@ -81,7 +81,7 @@ def width(kind: str) -> int:
 
 TABLES = tables()
 LAYOUTS = {
-    "Report 1, input: one each millisecond": protocol.INPUT_LAYOUT,
+    "Report 1, input: every millisecond": protocol.INPUT_LAYOUT,
     "Report 2, output: a command": protocol.OUTPUT_LAYOUT,
     "Report 3, feature: who the device is": protocol.FEATURE_LAYOUT,
 }
@@ -121,7 +121,7 @@ def value_at(data: bytes, heading: str, field: str) -> Any:
 
 @given(INPUTS)
 def test_input_fields_lie_where_the_document_says(report: InputReport) -> None:
-    data, heading = encode_input(report), "Report 1, input: one each millisecond"
+    data, heading = encode_input(report), "Report 1, input: every millisecond"
     for field in InputReport._fields:
         if field == "samples":
             assert value_at(data, heading, "sample_count") == len(report.samples)
