@@ -564,9 +564,9 @@ class Talkative(Hand):
         return {"self": self}
 
 
-@mutant("sensor-backend", "stands-in-with-the-same-commands", "return a SensorBackend or None")
+@mutant("sensor-backend", "dry-run-takes-the-same-commands", "return a SensorBackend or None")
 class Understudy(Hand):
-    def stand_in(self):
+    def dry_run_backend(self):
         return "somebody"
 
 

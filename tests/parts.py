@@ -132,7 +132,7 @@ class Hand(SensorBackend[HandConfig]):
     def report(self):
         return {"hands": 1}
 
-    def stand_in(self):
+    def dry_run_backend(self):
         return type(self)(HandConfig())
 
     def _opened(self):

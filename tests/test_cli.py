@@ -15,10 +15,10 @@ import pytest
 
 from graspsense import __version__
 from graspsense.cli.main import COMMANDS, main
-from graspsense.core import plugins as loader
 from graspsense.core.entries import CommandEntry, FoundDevice
 from graspsense.core.errors import DeviceLost, NoDevice
 from graspsense.core.plugins import IsolatedPlugins
+from graspsense.core.plugins import registry as loader
 from graspsense.plugin_api import hookimpl
 
 REPLAY = ["--gripper", "replay", "-o", "gripper.recording=icub:some/file.txt", "-o", "classifier.type=none"]

@@ -11,7 +11,7 @@ import pytest
 from graspsense.cli.plugins import _rows
 from graspsense.core.disabling import config_file, disabled_in_config, write_disabled
 from graspsense.core.errors import ConfigError
-from graspsense.core.plugins import Plugins, _builtin, installed_sources
+from graspsense.core.plugins import Plugins, builtin_source, installed_sources
 
 FEATURES = """
     from graspsense.plugin_api import Feature, FeatureSetEntry, hookimpl
@@ -105,7 +105,7 @@ def test_the_list_says_what_is_to_be_done(home, site):
     assert "lab-old: broken: it is written for plugin API 0.9" in said
     assert "upgrade lab-old" in said
     assert "lab-slow: slow: importing lab_slow_plugin takes" in said
-    assert "and brings numpy. Its author: name classes by import strings" in said
+    assert "and imports numpy. Its author: name classes by import strings" in said
     assert (
         "lab-broken: broken: ModuleNotFoundError: No module named 'no_such_driver'; `graspsense plugins show "
         "lab-broken` has the whole of it, `graspsense plugins disable lab-broken` leaves it out"
@@ -121,7 +121,7 @@ def test_a_distribution_that_is_installed_twice_is_told_of(site, tmp_path, monke
     monkeypatch.syspath_prepend(tmp_path / "second")
 
     mine = [one for one in installed_sources() if one.distribution == "lab-peak"]
-    loaded = Plugins([_builtin(), *mine], {})
+    loaded = Plugins([builtin_source(), *mine], {})
     (row,) = [one for one in _rows(loaded) if one["distribution"] == "lab-peak"]
 
     assert len(mine) == 1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.core.config import Chosen
+from graspsense.core.config import SelectedComponent
 from graspsense.core.errors import ConfigError
 from graspsense.core.features import FeatureTable
 from graspsense.core.labelled import Control, Labelled
@@ -20,7 +20,7 @@ from graspsense.evaluation.evaluate import evaluate
 
 def learner(name="c45"):
     component = installed().find("classifier", name)
-    return Chosen(component, component.config_class()())
+    return SelectedComponent(component, component.config_class()())
 
 
 def table(*columns, names=None):

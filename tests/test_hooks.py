@@ -119,7 +119,7 @@ def test_hook_graspsense_pipelines():
     plugins = IsolatedPlugins(example("graspsense_pipelines"))
 
     assert [one.name for one in plugins.pipelines()] == ["default", "lab"]
-    assert "[gripper]" in plugins.pipeline("graspsense/default").resource().read_text()
+    assert "[gripper]" in plugins.pipeline("graspsense/default").file().read_text()
 
 
 def test_hook_graspsense_models():
@@ -153,6 +153,13 @@ def test_hook_graspsense_emulators():
 
     entry = plugins.emulator("lab-hand").entry
     assert (entry.target, entry.wires, entry.options) == ("lab_hand.emulator:emulate", ("pty",), ())
+
+
+def test_hook_graspsense_conformance_checks():
+    plugins = IsolatedPlugins(example("graspsense_conformance_checks"))
+
+    (check,) = plugins.conformance_checks()
+    assert (check.name, check.entry.hook) == ("fingers-have-names", "lab_hand_fingers")
 
 
 def test_hook_graspsense_diagnose():

@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pytest
 
-from graspsense.core.config import Chosen
+from graspsense.core.config import SelectedComponent
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.plugins import installed
 from graspsense.evaluation.evaluate import evaluate
@@ -99,7 +99,7 @@ def test_a_folder_without_grasps_and_a_damaged_file(folder, tmp_path):
 def found():
     labelled = read(os.environ["GRASPSENSE_ICUB"])
     component = installed().find("classifier", "c45")
-    return evaluate(Chosen(component, component.config_class()()), labelled, classifier="c45")
+    return evaluate(SelectedComponent(component, component.config_class()()), labelled, classifier="c45")
 
 
 @real_data

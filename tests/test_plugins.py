@@ -243,7 +243,7 @@ def test_a_plugin_for_another_api_is_refused_before_its_hooks_are_looked_at(site
     [
         (
             "@hookimpl\n    def graspsense_controlers(): return []",
-            "it implements graspsense_controlers, which is no hook of graspsense 0.1.0. "
+            "it implements graspsense_controlers, which is not a hook of graspsense 0.1.0. "
             "Did you mean 'graspsense_controllers'?",
         ),
         (
@@ -367,11 +367,11 @@ def test_calls_of_hooks_are_traced_on_demand(site, capsys):
         ("import no_such_library", "ModuleNotFoundError: No module named 'no_such_library'"),
         ("1 +", "SyntaxError: invalid syntax (lab_driver.py, line 1)"),
         ("", "AttributeError: module 'lab_driver' has no attribute 'Backend'"),
-        ("class Backend: pass", "lab_driver:Backend is no subclass of SensorBackend"),
+        ("class Backend: pass", "lab_driver:Backend is not a subclass of SensorBackend"),
         (
             "from graspsense.plugin_api import SensorBackend\nclass Backend(SensorBackend):\n"
             "    def open(self, seed): ...\n    def read(self, timeout_s): ...\n    def close(self): ...",
-            "lab_driver:Backend does not implement apply, tare, which SensorBackend of plugin_api asks for",
+            "lab_driver:Backend does not implement apply, tare, which SensorBackend of plugin_api requires",
         ),
     ],
 )
@@ -391,7 +391,7 @@ def test_text_for_a_component_whose_code_cannot_be_used(site, driver, why):
 def test_a_config_must_be_an_attrs_class(site):
     site.install("lab-a", backend("a", "lab_driver"), lab_driver="class Config: pass")
 
-    with pytest.raises(PluginUnavailable, match="lab_driver:Config is no attrs class"):
+    with pytest.raises(PluginUnavailable, match="lab_driver:Config is not an attrs class"):
         site.discover().find("sensor-backend", "a").config_class()
 
 
@@ -409,7 +409,7 @@ def test_a_pipeline_file_left_out_of_the_wheel_is_named(site):
     with pytest.raises(
         PluginUnavailable, match=r"there is no file 'no/such\.toml' in the package 'graspsense'"
     ):
-        site.discover().pipeline("mine").resource()
+        site.discover().pipeline("mine").file()
 
 
 def test_isolated_plugins_do_not_discover(site):

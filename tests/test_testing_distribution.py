@@ -9,6 +9,7 @@ import pytest
 from graspsense.core.plugins import HEAVY
 from graspsense.testing import CHECKS
 from graspsense.testing.checks import outcome_of
+from graspsense.testing.conformance import checks_for
 from graspsense.testing.subject import package_of
 
 HEAD = """
@@ -37,41 +38,10 @@ SOUND = (
         yield PipelineEntry("lab", "lab_pipes:lab.toml", "a recording")
 
     @hookimpl(optionalhook=True)
-    def graspsense_sim_terms():
-        import lab_term
-        return [lab_term.TERM]
+    def graspsense_lab_parts():
+        return [1, 2, 3]
 """
 )
-
-TERM = """
-    from types import SimpleNamespace
-    from typing import NamedTuple
-
-    class Params(NamedTuple):
-        k_n_m: float
-
-    class State(NamedTuple):
-        worst_m: float
-
-    def law(params, state, d0, d1, h, v1):
-        return {force}, {after}
-
-    class Form(NamedTuple):
-        spring_n_m: float = 0.0
-        damper_n_s_m: float = 0.0
-        rates: tuple = ()
-        by_compression: tuple = ()
-        by_speed: tuple = ()
-        force: tuple = ()
-        curve: object = None
-
-    def linear(params):
-        return {form}
-
-    TERM = SimpleNamespace(name="gel", params=Params, law=law, at_rest=State(0.0), linear=linear)
-"""
-FORCE, AFTER = "params.k_n_m * d1", "State(max(d1, state.worst_m))"
-
 
 PIPELINE = """
     [gripper]
@@ -86,13 +56,12 @@ PIPELINE = """
 """
 
 
-def check(site, name, plugin=SOUND, force=FORCE, after=AFTER, features="chitta", form="Form(params.k_n_m)"):
+def check(site, name, plugin=SOUND, features="chitta"):
     site.install("lab-thing", plugin)
     (site.folder / "lab_pipes").mkdir()
     (site.folder / "lab_pipes" / "__init__.py").touch()
     (site.folder / "lab_pipes" / "lab.toml").write_text(PIPELINE.format(features=features))
     site.modules.append("lab_pipes")
-    site.write(lab_term=TERM.format(force=force, after=after, form=form))
     package = package_of("lab-thing", site.discover())
     (one,) = [one for one in CHECKS["distribution"] if one.id == name]
     return outcome_of(one, package, {})
@@ -147,51 +116,35 @@ def test_a_pipeline_that_does_not_resolve_is_caught(site):
     assert "no feature set named 'chita'" in result.text
 
 
-@pytest.mark.parametrize(
-    ("force", "after", "says"),
-    [
-        ("0", AFTER, "gives the force 0 (int)"),
-        ("1.0 / (d1 - 0.001)", AFTER, "raised ZeroDivisionError"),
-        ("float('inf')", AFTER, "a finite float"),
-        ("__import__('time').perf_counter()", AFTER, "it may know its arguments only"),
-        (FORCE, "State(1)", "its numbers of the same types"),
-    ],
-)
-def test_a_term_that_is_no_law_is_caught(site, force, after, says):
-    result = check(site, "simulator-terms-are-laws", force=force, after=after)
+OWNER = """
+    from graspsense.plugin_api import ConformanceCheckEntry, hookimpl
+    GRASPSENSE_API = (1, 0)
 
-    assert result.state == "failed"
-    assert says in result.text
-
-
-ARM = {
-    "force": "(q := (state.worst_m * (1.0 - 10.0 * h) + params.k_n_m * (d1 - d0)) / (1.0 + 10.0 * h))",
-    "after": "State(q)",
-}
-"""An arm that relaxes in 50 ms, by trapezoids."""
+    @hookimpl
+    def graspsense_conformance_checks():
+        yield ConformanceCheckEntry("parts-are-few", "lab_owner_checks:few", "graspsense_lab_parts", "few parts")
+"""
+FEW = """
+    def few(results):
+        for parts in results:
+            if len(parts) > {most}:
+                yield f"{{len(parts)}} parts: give {most} at most"
+"""
 
 
 @pytest.mark.parametrize(
-    ("law", "form", "says"),
-    [
-        ({}, "None", ""),
-        ({}, "Form(2.0 * params.k_n_m)", "the linear form of term 'gel' gives"),
-        ({}, "Form(0.0, 1.0, ((1.0, 0.0), (0.0, 1.0)))", "has 2 states and its law 1"),
-        ({}, "Form(curve=lambda d: params.k_n_m * d)", ""),
-        ({}, "Form(params.k_n_m, curve=lambda d: d * d)", "the linear form of term 'gel' gives"),
-        (ARM, "Form(0.0, 0.0, ((-20.0,),), (0.0,), (params.k_n_m,), (1.0,))", ""),
-        (
-            ARM,
-            "Form(0.0, 0.0, ((-400.0,),), (0.0,), (params.k_n_m,), (1.0,))",
-            "return None where it is not linear",
-        ),
-    ],
+    ("most", "state", "text"), [(3, "passed", ""), (2, "failed", "3 parts: give 2 at most")]
 )
-def test_a_linear_form_that_is_not_the_law_is_caught(site, law, form, says):
-    result = check(site, "simulator-terms-are-laws", form=form, **law)
+def test_the_owner_of_a_hook_contributes_checks_of_it(site, most, state, text):
+    site.install("lab-owner", OWNER, lab_owner_checks=FEW.format(most=most))
+    site.install("lab-thing", SOUND)
+    plugins = site.discover()
 
-    assert result.state == ("failed" if says else "passed"), result.text
-    assert says in result.text
+    (one,) = [one for one in checks_for(package_of("lab-thing", plugins)) if one.id == "parts-are-few"]
+    result = outcome_of(one, package_of("lab-thing", plugins), {})
+
+    assert (result.title, result.state, result.text) == ("few parts", state, text)
+    assert all(one.id != "parts-are-few" for one in checks_for(package_of("lab-owner", plugins)))
 
 
 def test_an_observer_that_raises_or_returns_is_caught(site):
@@ -205,7 +158,7 @@ def test_an_observer_that_returns_something_is_caught(site):
 
 
 def test_every_check_of_a_distribution_has_a_mutant():
-    others = {"simulator-terms-are-laws", "wheel-is-complete", "pipelines-fit-together"}
+    others = {"wheel-is-complete", "pipelines-fit-together"}
     assert {one.id for one in CHECKS["distribution"]} == set(MUTANTS) | others
     assert "numpy" in HEAVY
 

@@ -22,6 +22,7 @@ _TABLE: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
             "Channel",
             "ClassifierEntry",
             "CommandEntry",
+            "ConformanceCheckEntry",
             "ControllerEntry",
             "DatasetEntry",
             "EmulatorEntry",
@@ -74,7 +75,7 @@ _TABLE: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
         "roles": ("DeviceInfo", "ObjectKind", "Reading", "SensorBackend"),
     },
     "Sensor backends that do many grasps at once": {
-        "roles": ("BatchBackend", "BatchOptions", "Grasped", "Variant"),
+        "roles": ("BatchBackend", "BatchOptions", "Grasped", "SimulationVariant"),
     },
     "Emulated devices": {
         "emulated": ("EmulatedDevice",),

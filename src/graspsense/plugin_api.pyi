@@ -5,6 +5,7 @@ from graspsense.core.hookspecs import hookimpl as hookimpl
 from graspsense.core.entries import Channel as Channel
 from graspsense.core.entries import ClassifierEntry as ClassifierEntry
 from graspsense.core.entries import CommandEntry as CommandEntry
+from graspsense.core.entries import ConformanceCheckEntry as ConformanceCheckEntry
 from graspsense.core.entries import ControllerEntry as ControllerEntry
 from graspsense.core.entries import DatasetEntry as DatasetEntry
 from graspsense.core.entries import EmulatorEntry as EmulatorEntry
@@ -61,7 +62,7 @@ from graspsense.core.roles import SensorBackend as SensorBackend
 from graspsense.core.roles import BatchBackend as BatchBackend
 from graspsense.core.roles import BatchOptions as BatchOptions
 from graspsense.core.roles import Grasped as Grasped
-from graspsense.core.roles import Variant as Variant
+from graspsense.core.roles import SimulationVariant as SimulationVariant
 
 # Emulated devices
 from graspsense.core.emulated import EmulatedDevice as EmulatedDevice

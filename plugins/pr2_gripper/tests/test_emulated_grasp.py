@@ -11,7 +11,7 @@ import pytest
 from attrs import evolve
 
 from graspsense import load_pipeline
-from graspsense.core.rehearsal import rehearse
+from graspsense.core.dry_run import dry_run
 from graspsense.core.runner import Grasp, run_grasp
 from graspsense.plugin_api import ConfigError, GraspEvent, Outcome, Phase, RunConfig, create
 from graspsense_pr2_gripper.backend import Pr2Backend
@@ -317,11 +317,11 @@ def test_dry_run_shows_a_first_close_that_is_slow_and_weak(monkeypatch: pytest.M
     """12 N and 15 mm/s until a contact has been seen (run.first_effort_n, run.first_speed_m_s), 20 N after it."""
     looked: list[object] = []
     monkeypatch.setattr("graspsense_pr2_gripper.opening.search", looked.append)
-    rehearsal = rehearse(Pr2Backend(Pr2Config()), create("controller", "hybrid"), RunConfig())
+    rehearsed = dry_run(Pr2Backend(Pr2Config()), create("controller", "hybrid"), RunConfig())
     assert looked == [], "nothing is opened, nor looked for"
-    assert rehearsal is not None
-    assert rehearsal.outcome == "steady"
-    phases = {one.phase: one for one in rehearsal.phases}
+    assert rehearsed is not None
+    assert rehearsed.outcome == "steady"
+    phases = {one.phase: one for one in rehearsed.phases}
     assert list(phases) == ["opening", "taring", "approach", "squeeze", "hold", "release"]
     assert (phases["opening"].least_n, phases["opening"].most_n) == (-12.0, -12.0)
     assert (phases["taring"].least_n, phases["taring"].most_n) == (0.0, 0.0)
@@ -333,4 +333,4 @@ def test_dry_run_shows_a_first_close_that_is_slow_and_weak(monkeypatch: pytest.M
 
 
 def test_dry_run_of_a_gripper_without_a_stand_in_says_nothing_of_commands() -> None:
-    assert rehearse(create("sensor-backend", "sim"), create("controller", "hybrid"), RunConfig()) is None
+    assert dry_run(create("sensor-backend", "sim"), create("controller", "hybrid"), RunConfig()) is None

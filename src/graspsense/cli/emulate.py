@@ -59,17 +59,17 @@ def emulate(
 
     if gripper is not None:
         raise click.UsageError("the gripper is the argument: graspsense emulate NAME, without --gripper")
-    offer = installed().emulator(name)
-    if wire and wire not in offer.entry.wires:
+    emulator = installed().emulator(name)
+    if wire and wire not in emulator.entry.wires:
         raise ConfigError(
-            f"emulator {name} has no wire {wire!r}. Known: {', '.join(offer.entry.wires)}."
-            + suggestion(wire, offer.entry.wires)
+            f"emulator {name} has no wire {wire!r}. Known: {', '.join(emulator.entry.wires)}."
+            + suggestion(wire, emulator.entry.wires)
         )
-    backend = f"{offer.distribution}/{offer.name}"
+    backend = f"{emulator.distribution}/{emulator.name}"
     settings = settings_of(
-        pipeline, backend, object_name, (*GRIPPER_ALONE, *offer.entry.options, *options), seed
+        pipeline, backend, object_name, (*GRIPPER_ALONE, *emulator.entry.options, *options), seed
     )
-    device: EmulatedDevice = offer.load()(settings.gripper.config, wire, settings.run.seed)
+    device: EmulatedDevice = emulator.load()(settings.gripper.config, wire, settings.run.seed)
     try:
         with _ended_by_signals():
             device.tell("plug")

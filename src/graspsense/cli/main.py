@@ -88,19 +88,19 @@ def _plugin_command(name: str) -> click.Command:
     from graspsense.core.plugins import installed
 
     plugins = installed()
-    offers = plugins.commands()
-    if all(name not in (offer.name, offer.qualified) for offer in offers):
-        known = [*COMMANDS, *(offer.name for offer in offers)]
+    added = plugins.commands()
+    if all(name not in (resource.name, resource.qualified) for resource in added):
+        known = [*COMMANDS, *(resource.name for resource in added)]
         raise UnknownName(
             f"no command named {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}"
             + plugins.absences()
         )
-    offer = plugins.command(name)
-    command = offer.load()
+    resource = plugins.command(name)
+    command = resource.load()
     if not isinstance(command, click.Command):
         raise PluginUnavailable(
-            f"command {name!r} of {offer.distribution} {offer.version} cannot be used here: "
-            f"{offer.entry.target} is no click command"
+            f"command {name!r} of {resource.distribution} {resource.version} cannot be used here: "
+            f"{resource.entry.target} is no click command"
         )
     return command
 

@@ -169,21 +169,21 @@ def _shown(value: float, unit: str, reason: str) -> str:
 
 
 def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
+    from graspsense.core.dry_run import dry_run
     from graspsense.core.errors import GraspsenseError
-    from graspsense.core.rehearsal import rehearse
 
-    why_not = "this gripper has no stand-in in software"
+    why_not = "nothing emulates this gripper"
     try:
-        rehearsal = rehearse(settings.gripper.create(), settings.controller.create(), settings.run)
+        rehearsed = dry_run(settings.gripper.create(), settings.controller.create(), settings.run)
     except GraspsenseError as error:
-        rehearsal, why_not = None, str(error)
+        rehearsed, why_not = None, str(error)
     if as_json:
         plan: dict[str, Any] = {
             "dry_run": True,
             "components": dict(settings.components),
             "settings": settings.values,
-            "rehearsed_on": rehearsal.device if rehearsal else None,
-            "commands": [one._asdict() for one in rehearsal.phases] if rehearsal else None,
+            "rehearsed_on": rehearsed.device if rehearsed else None,
+            "commands": [one._asdict() for one in rehearsed.phases] if rehearsed else None,
         }
         echo_json(plan)
         return
@@ -196,10 +196,10 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
         for key, value in values.items():
             if key != "type":
                 click.echo(f"    {table}.{key} = {'not set' if value is None else toml_value(value)}")
-    if rehearsal is None:
+    if rehearsed is None:
         click.echo(f"commands: not rehearsed, {why_not}")
     else:
-        click.echo(f"would command, as rehearsed on {rehearsal.device} ({rehearsal.outcome}):")
+        click.echo(f"would command, as rehearsed on {rehearsed.device} ({rehearsed.outcome}):")
         rows = [
             (
                 one.phase,
@@ -208,7 +208,7 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
                 f"{one.fastest_m_s * 1e3:.0f} mm/s",
                 f"{one.limited} limited" if one.limited else "",
             )
-            for one in rehearsal.phases
+            for one in rehearsed.phases
         ]
         echo_table(("PHASE", "FOR", "EFFORT (+ squeezes)", "FASTEST", "BY THE GUARD"), rows)
     click.echo("nothing was opened")

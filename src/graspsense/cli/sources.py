@@ -10,7 +10,7 @@ import click
 
 if TYPE_CHECKING:
     from graspsense.cli.progress import Progress
-    from graspsense.core.config import Chosen, Settings
+    from graspsense.core.config import SelectedComponent, Settings
     from graspsense.core.labelled import Labelled
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
@@ -99,7 +99,7 @@ def trials_of(source: str, progress: Progress, given: Mapping[str, Any]) -> Labe
     """
     from graspsense.cli.output import talk
     from graspsense.core.errors import ConfigError
-    from graspsense.core.strict import Misfit, structured
+    from graspsense.core.strict import ValidationFailed, structured
     from graspsense.sources.trial_source import Source, kind_of, labelled_trials
 
     kind = kind_of(source)
@@ -119,7 +119,7 @@ def trials_of(source: str, progress: Progress, given: Mapping[str, Any]) -> Labe
     }
     try:
         described = structured(values, Source, source)
-    except Misfit as misfit:
+    except ValidationFailed as misfit:
         raise ConfigError("\n".join(f"--{one.path[0]}: {one.text}" for one in misfit.problems)) from None
     if kind == SIMULATED:
         talk("grasping; where the simulator can be compiled, the first seconds go into that")
@@ -132,7 +132,7 @@ def trials_of(source: str, progress: Progress, given: Mapping[str, Any]) -> Labe
     )
 
 
-def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) -> Chosen:
+def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) -> SelectedComponent:
     """Return the classifier that is to learn: by its name, or that of the pipeline where there is one."""
     from graspsense.sources.trial_source import kind_of
 
@@ -186,9 +186,9 @@ def _settings(given: Mapping[str, Any], classifier: str | None) -> Settings:
     return settings
 
 
-def _alone(table: str, name: str, given: Mapping[str, Any]) -> Chosen:
+def _alone(table: str, name: str, given: Mapping[str, Any]) -> SelectedComponent:
     """Return a component outside of any pipeline, with the keys that options give it."""
-    from graspsense.core.config import Chosen, build
+    from graspsense.core.config import SelectedComponent, build
     from graspsense.core.entries import TABLE_OF_ROLE
     from graspsense.core.errors import ConfigError
     from graspsense.core.layers import Merged, option_layers
@@ -209,7 +209,7 @@ def _alone(table: str, name: str, given: Mapping[str, Any]) -> Chosen:
     role = next(role for role, one in TABLE_OF_ROLE.items() if one == table)
     values = merged.values
     component = installed().find(role, str(values.pop("type", name)))
-    return Chosen(component, build(component, values))
+    return SelectedComponent(component, build(component, values))
 
 
 def _names(text: str | None) -> tuple[str, ...]:

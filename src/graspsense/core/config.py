@@ -27,23 +27,23 @@ from graspsense.core.layers import (
     read_layer,
 )
 from graspsense.core.plugins import Component, Plugins, installed
-from graspsense.core.strict import Misfit, Problem, plain, shown, structured
+from graspsense.core.strict import InvalidValue, ValidationFailed, plain, shown, structured
 from graspsense.core.toml_lines import KeyPath
 
 if TYPE_CHECKING:
     from graspsense.core.run_config import RunConfig
 
 __all__ = [
-    "Chosen",
     "Flag",
     "Layer",
+    "SelectedComponent",
     "Settings",
     "build",
     "create",
-    "create_chosen",
     "read_layer",
     "recipe_of",
     "resolve",
+    "select_component",
     "settings_from",
     "to_toml",
 ]
@@ -56,7 +56,7 @@ _TABLES: Final = (*_ROLE_OF_TABLE, "run")
 
 
 @frozen(eq=False)
-class Chosen:
+class SelectedComponent:
     """A component that was chosen, with its config."""
 
     component: Component
@@ -77,16 +77,16 @@ class Settings:
     """
 
     pipeline: str
-    gripper: Chosen
-    controller: Chosen
-    features: Chosen
-    classifier: Chosen | None
+    gripper: SelectedComponent
+    controller: SelectedComponent
+    features: SelectedComponent
+    classifier: SelectedComponent | None
     run: RunConfig
     values: dict[str, dict[str, Any]]
     origins: dict[str, str]
 
     @property
-    def chosen(self) -> tuple[Chosen, ...]:
+    def chosen(self) -> tuple[SelectedComponent, ...]:
         """Gripper, controller, features, and the classifier where there is one."""
         return tuple(
             one for one in (self.gripper, self.controller, self.features, self.classifier) if one is not None
@@ -141,7 +141,7 @@ def _laid(pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins
 
     from graspsense.core.run_config import RunConfig
 
-    chosen: dict[str, Chosen] = {}
+    chosen: dict[str, SelectedComponent] = {}
     values: dict[str, dict[str, Any]] = {}
     origins: dict[str, str] = {}
     run: RunConfig | None = None
@@ -160,7 +160,7 @@ def _laid(pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins
         config: Any
         try:
             config = structured({k: v for k, v in merged.values.items() if k != "type"}, cls, called)
-        except Misfit as misfit:
+        except ValidationFailed as misfit:
             for problem in misfit.under(table):
                 owner = merged.owner_of(problem.path)
                 complaints.append(
@@ -171,7 +171,7 @@ def _laid(pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins
             run = config
             values[table] = plain(config)
         else:
-            chosen[table] = Chosen(component, config)
+            chosen[table] = SelectedComponent(component, config)
             values[table] = {"type": component.qualified, **plain(config)}
         for path in _leaves(values[table], (table,)):
             owner = merged.owner.get(path)
@@ -197,7 +197,7 @@ def build(component: Component, values: Mapping[str, Any]) -> Any:
     """
     try:
         return structured(values, component.config_class(), component.qualified)
-    except Misfit as misfit:
+    except ValidationFailed as misfit:
         lines = [f"{dotted((component.table, *one.path))}: {one.text}" for one in misfit.problems]
         raise ConfigError(_listed(lines)) from None
 
@@ -207,13 +207,13 @@ def create(role: Role, name: str, /, **config: Any) -> Any:
 
     Raises UnknownName, PluginUnavailable, ConfigError.
     """
-    return create_chosen(role, name, **config).create()
+    return select_component(role, name, **config).create()
 
 
-def create_chosen(role: Role, name: str, **config: Any) -> Chosen:
+def select_component(role: Role, name: str, **config: Any) -> SelectedComponent:
     """Return a component by role and name with its config, not built yet. Raises as `create` does."""
     component = installed().find(role, name)
-    return Chosen(component, build(component, config))
+    return SelectedComponent(component, build(component, config))
 
 
 def recipe_of(role: Role, part: Any) -> tuple[str, dict[str, Any]]:
@@ -300,13 +300,13 @@ def _tables_only(layer: Layer, complaints: list[str]) -> Layer:
     for key, value in layer.values.items():
         if key not in _TABLES:
             text = f"there is no table {key!r}.{suggestion(key, _TABLES)} There are: {', '.join(_TABLES)}"
-            complaints.append(layer.complain(Problem((key,), text)))
+            complaints.append(layer.complain(InvalidValue((key,), text)))
         elif not isinstance(value, Mapping):
             advice = (
                 f": write {key}.type = {toml_value(value)}" if isinstance(value, str) and key != "run" else ""
             )
             complaints.append(
-                layer.complain(Problem((key,), f"expected a table, found {shown(value)}{advice}"))
+                layer.complain(InvalidValue((key,), f"expected a table, found {shown(value)}{advice}"))
             )
         else:
             values[key] = value
@@ -330,20 +330,20 @@ def _component(
         return None
     name = setter.values[table]["type"]
     if not isinstance(name, str):
-        complaints.append(setter.complain(Problem(path, f"expected text, found {shown(name)}")))
+        complaints.append(setter.complain(InvalidValue(path, f"expected text, found {shown(name)}")))
         return None
     if table == "classifier" and name == NONE:
         for layer in users:
             for key in layer.values[table]:
                 if key != "type" and (layer.final or layer is setter):
                     text = f'classifier.type is "{NONE}", so nothing takes this key'
-                    complaints.append(layer.complain(Problem((table, key), text)))
+                    complaints.append(layer.complain(InvalidValue((table, key), text)))
         return None
     try:
         component = plugins.find(role, name)
         return component, component.config_class()
     except (UnknownName, PluginUnavailable) as error:
-        complaints.append(setter.complain(Problem(path, str(error))))
+        complaints.append(setter.complain(InvalidValue(path, str(error))))
         return None
 
 

@@ -224,6 +224,22 @@ class EmulatorEntry:
 
 
 @frozen
+class ConformanceCheckEntry:
+    """A check of what other plugins return from a hook that this plugin owns.
+
+    `hook` is the name of that hook. `target` is a function that takes a list of everything that the hook of one
+    distribution returned, and yields a sentence for each defect: what is wrong, and what to do. It is called by
+    `graspsense plugins check` for each distribution that implements the hook.
+    """
+
+    name: str = field(validator=_IS_NAME)
+    target: str = field(validator=_IS_TARGET)
+    hook: str = field(validator=instance_of(str))
+    summary: str = field(validator=instance_of(str))
+    needs: str = ""
+
+
+@frozen
 class FoundDevice:
     """A device that a probe found: which backend drives it, how to name it, and whether it can be opened."""
 

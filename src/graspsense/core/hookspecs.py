@@ -15,6 +15,7 @@ import pluggy
 from graspsense.core.entries import (
     ClassifierEntry,
     CommandEntry,
+    ConformanceCheckEntry,
     ControllerEntry,
     DatasetEntry,
     EmulatorEntry,
@@ -81,6 +82,11 @@ def graspsense_commands() -> Iterable[CommandEntry]:  # type: ignore[empty-body]
 @hookspec
 def graspsense_emulators() -> Iterable[EmulatorEntry]:  # type: ignore[empty-body]
     """Return the devices that software can stand in for, as devices of the operating system."""
+
+
+@hookspec
+def graspsense_conformance_checks() -> Iterable[ConformanceCheckEntry]:  # type: ignore[empty-body]
+    """Return checks of what other plugins return from the hooks that this plugin owns."""
 
 
 @hookspec

@@ -15,7 +15,7 @@ from attrs import define, field, frozen
 
 from graspsense.core.errors import ConfigError, UnknownName
 from graspsense.core.plugins import Plugins
-from graspsense.core.strict import Problem, shown
+from graspsense.core.strict import InvalidValue, shown
 from graspsense.core.toml_lines import KeyPath, key_lines
 
 
@@ -46,7 +46,7 @@ class Layer:
                 return f"{self.label}:{self.lines[path[:end]]}"
         return self.label
 
-    def complain(self, problem: Problem) -> str:
+    def complain(self, problem: InvalidValue) -> str:
         """Return a problem in one line: where, which key, what."""
         if self.typed:
             return f"{self.typed}: {problem.text}"
@@ -142,7 +142,7 @@ def _located(asked: str, base: Path, asker: str, plugins: Plugins) -> tuple[Trav
         path = base / asked
         return path, str(path), path.parent
     try:
-        offer = plugins.pipeline(asked)
+        shipped = plugins.pipeline(asked)
     except UnknownName as error:
         hint = "\n  A file is given with its ending .toml"
         if (base / asked).is_file():
@@ -150,8 +150,12 @@ def _located(asked: str, base: Path, asker: str, plugins: Plugins) -> tuple[Trav
         elif (base / f"{asked}.toml").is_file():
             hint += f": {base / asked}.toml"
         raise UnknownName(f"{asker}{error}{hint}") from None
-    resource = offer.resource()
-    return resource, f"pipeline {offer.qualified}", resource.parent if isinstance(resource, Path) else Path()
+    resource = shipped.file()
+    return (
+        resource,
+        f"pipeline {shipped.qualified}",
+        resource.parent if isinstance(resource, Path) else Path(),
+    )
 
 
 def read_toml(source: Traversable, label: str, what: str) -> Layer:

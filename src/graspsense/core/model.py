@@ -31,7 +31,7 @@ from graspsense.core.setting_meaning import CHANGES_NO_RESULT, NAMES_INPUT, sett
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.config import Chosen, Settings
+    from graspsense.core.config import SelectedComponent, Settings
     from graspsense.core.labelled import Labelled
     from graspsense.core.plugins import Component, Plugins
     from graspsense.core.roles import Classifier, DeviceInfo
@@ -192,7 +192,7 @@ class Model:
         return {**content, "sha256": _digest(content)}
 
 
-def _not_compared(chosen: Chosen) -> frozenset[str]:
+def _not_compared(chosen: SelectedComponent) -> frozenset[str]:
     """Return the settings of a component that may differ between training and use without a warning."""
     config_class = type(chosen.config)
     unchanging = settings_marked(config_class, CHANGES_NO_RESULT)
@@ -337,7 +337,7 @@ def _how_to_train(settings: Settings, out: str) -> str:
 def _text(name: str, plugins: Plugins) -> bytes:
     if not name.endswith(".json"):
         try:
-            return plugins.model(name).resource().read_bytes()
+            return plugins.model(name).file().read_bytes()
         except UnknownName as error:
             shipped = MODELS.get(name)
             hint = f"\n  It comes with {shipped.distribution}:\n  {shipped.hint}" if shipped else ""

@@ -148,10 +148,10 @@ class SensorBackend(ABC, Generic[ConfigT]):
         """Return what the backend counted, or knows beyond its frames (a simulator knows the true force)."""
         return {}
 
-    def stand_in(self) -> SensorBackend[Any] | None:
-        """Return a gripper in software that takes the same commands, for a dry run; None where there is none.
+    def dry_run_backend(self) -> SensorBackend[Any] | None:
+        """Return an emulated gripper that takes the same commands, for a dry run; None if there is none.
 
-        It says that its clock is a `device`'s where that of the real one is, so that the same limits hold.
+        Its `DeviceInfo.clock` is `device` if that of the real gripper is, so that the same limits hold.
         """
         return None
 
@@ -172,7 +172,7 @@ class Grasped:
 
 
 @frozen(kw_only=True)
-class Variant:
+class SimulationVariant:
     """One way in which a simulated gripper can trade accuracy for time.
 
     `settings` are the keys of its own table that make it so. Those of one `method` and `fidelity` lie on one curve,
@@ -205,7 +205,7 @@ class BatchOptions(TypedDict, total=False):
 class BatchBackend(SensorBackend[ConfigT]):
     """A backend that can do many grasps at once."""
 
-    def variants(self) -> Sequence[Variant]:
+    def variants(self) -> Sequence[SimulationVariant]:
         """Return the ways in which it trades accuracy for time; none where there is nothing to trade."""
         return ()
 

@@ -27,23 +27,23 @@ _NUMBER_WITH_UNIT: Final = re.compile(r"\s*([-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)
 
 
 @frozen
-class Problem:
+class InvalidValue:
     """What is wrong with the value at `path`."""
 
     path: KeyPath
     text: str
 
 
-class Misfit(Exception):
+class ValidationFailed(Exception):
     """Values that do not make an instance; `problems` holds everything that is wrong with them."""
 
-    def __init__(self, problems: Iterable[Problem]) -> None:
+    def __init__(self, problems: Iterable[InvalidValue]) -> None:
         super().__init__()
         self.problems = tuple(problems)
 
-    def under(self, key: str | int) -> list[Problem]:
+    def under(self, key: str | int) -> list[InvalidValue]:
         """Return the problems as seen from one level further out."""
-        return [Problem((key, *one.path), one.text) for one in self.problems]
+        return [InvalidValue((key, *one.path), one.text) for one in self.problems]
 
 
 def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> ConfigT:
@@ -51,31 +51,33 @@ def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> Co
 
     Numbers, text and booleans must be what the class declares (a whole number is taken for a number), keys
     must be known, and validators keep their own words. `called` is how to name the table in errors. Raises
-    Misfit with every problem at once.
+    ValidationFailed with every problem at once.
     """
     attrs.resolve_types(cls)  # type: ignore[type-var]
     fields = {one.alias: one for one in attrs.fields(cls) if one.init}  # type: ignore[arg-type]
-    problems = [Problem((key,), _unknown(key, fields, called)) for key in values if key not in fields]
+    problems = [InvalidValue((key,), _unknown(key, fields, called)) for key in values if key not in fields]
     given: dict[str, Any] = {}
     for name, field in fields.items():
         if name not in values:
             if field.default is attrs.NOTHING:
-                problems.append(Problem((), f"{called} needs the key {name!r}, which is not given"))
+                problems.append(InvalidValue((), f"{called} needs the key {name!r}, which is not given"))
             continue
         try:
             given[name] = (
                 values[name] if field.type is None else _CONVERTER.structure(values[name], field.type)
             )
-        except Misfit as misfit:
+        except ValidationFailed as misfit:
             problems += misfit.under(name)
         except Exception as error:  # a type that is not among those below
-            problems.append(Problem((name,), f"cannot be read as {field.type}: {_words(error)}"))
+            problems.append(InvalidValue((name,), f"cannot be read as {field.type}: {_words(error)}"))
     if not problems:
         try:
             return cls(**given)
         except Exception as error:
-            raise Misfit(_complaints(cls, fields, given) or [Problem((), _words(error))]) from error
-    raise Misfit([*problems, *_complaints(cls, fields, given)])
+            raise ValidationFailed(
+                _complaints(cls, fields, given) or [InvalidValue((), _words(error))]
+            ) from error
+    raise ValidationFailed([*problems, *_complaints(cls, fields, given)])
 
 
 def plain(config: object) -> dict[str, Any]:
@@ -124,7 +126,7 @@ def _plain(value: Any) -> Any:
 
 def _complaints(
     cls: type, fields: Mapping[str, attrs.Attribute[Any]], given: Mapping[str, Any]
-) -> list[Problem]:
+) -> list[InvalidValue]:
     """Return what the validators of the given fields say, each on its own.
 
     attrs stops at the first validator that objects, so the instance is made without them. Where a value that
@@ -142,7 +144,7 @@ def _complaints(
             try:
                 field.validator(instance, field, getattr(instance, field.name))
             except Exception as error:
-                problems.append(Problem((name,), _words(error)))
+                problems.append(InvalidValue((name,), _words(error)))
     return problems
 
 
@@ -175,8 +177,8 @@ def shown(value: object) -> str:
     return "nothing" if value is None else f"{value} (a {type(value).__name__})"
 
 
-def _expected(what: str, value: object, advice: str = "") -> Misfit:
-    return Misfit([Problem((), f"expected {what}, found {shown(value)}{advice}")])
+def _expected(what: str, value: object, advice: str = "") -> ValidationFailed:
+    return ValidationFailed([InvalidValue((), f"expected {what}, found {shown(value)}{advice}")])
 
 
 def _bool(value: object, _: object) -> bool:
@@ -242,7 +244,7 @@ def _union(value: object, cls: Any) -> Any:
     for member in [*exact, *members]:
         try:
             return _CONVERTER.structure(value, member)
-        except Misfit as misfit:
+        except ValidationFailed as misfit:
             misfits.append((member, misfit))
     wanted = [misfit for member, misfit in misfits if member is not type(None)]
     if len(wanted) == 1:
@@ -258,18 +260,20 @@ def _sequence(value: object, cls: Any) -> Any:
     members: Sequence[Any] = get_args(cls)
     if kind is tuple and members and members[-1] is not Ellipsis:
         if len(value) != len(members):
-            raise Misfit([Problem((), f"expected a list of {len(members)}, found {len(value)} in it")])
+            raise ValidationFailed(
+                [InvalidValue((), f"expected a list of {len(members)}, found {len(value)} in it")]
+            )
     else:
         members = [members[0] if members else Any] * len(value)
-    problems: list[Problem] = []
+    problems: list[InvalidValue] = []
     items = []
     for index, (one, member) in enumerate(zip(value, members, strict=True)):
         try:
             items.append(_CONVERTER.structure(one, member))
-        except Misfit as misfit:
+        except ValidationFailed as misfit:
             problems += misfit.under(index)
     if problems:
-        raise Misfit(problems)
+        raise ValidationFailed(problems)
     return items if kind is list else tuple(items)
 
 
@@ -277,15 +281,15 @@ def _mapping(value: object, cls: Any) -> Any:
     if not isinstance(value, Mapping):
         raise _expected("a table", value)
     member = get_args(cls)[1] if get_args(cls) else Any
-    problems: list[Problem] = []
+    problems: list[InvalidValue] = []
     items = {}
     for key, one in value.items():
         try:
             items[key] = _CONVERTER.structure(one, member)
-        except Misfit as misfit:
+        except ValidationFailed as misfit:
             problems += misfit.under(key)
     if problems:
-        raise Misfit(problems)
+        raise ValidationFailed(problems)
     return items
 
 

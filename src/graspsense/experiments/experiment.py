@@ -16,7 +16,7 @@ from graspsense.core.errors import ConfigError, GraspsenseError, UnknownName, su
 from graspsense.core.layers import Layer, Merged, dotted, option_layers, read_toml
 from graspsense.core.model import worded
 from graspsense.core.plugins import installed
-from graspsense.core.strict import Misfit, Problem, plain, structured
+from graspsense.core.strict import InvalidValue, ValidationFailed, plain, structured
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.task import Task
 from graspsense.sources.simulated import refuse_real_gripper
@@ -174,7 +174,7 @@ def read_experiment(asked: str, options: Sequence[str] = ()) -> Planned:
     values = merged.values
     try:
         experiment = structured(values, Experiment, "an experiment")
-    except Misfit as misfit:
+    except ValidationFailed as misfit:
         for problem in misfit.problems:
             owner = merged.owner_of(problem.path) or layer
             complaints.append(owner.complain(problem))
@@ -324,7 +324,7 @@ class _Plan:
     def _keys(self, values: Mapping[str, Any], cls: type, table: str) -> Any:
         try:
             return structured(values, cls, f"[{table}]")
-        except Misfit as misfit:
+        except ValidationFailed as misfit:
             self.complaints += [self.layer.complain(problem) for problem in misfit.under(table)]
             return None
 
@@ -362,16 +362,20 @@ class _Plan:
                     config = _fresh(build(component, keys))
                 except KeyError:
                     self.complaints.append(
-                        self.layer.complain(Problem(("classifiers", index), "a classifier needs a `type`"))
+                        self.layer.complain(
+                            InvalidValue(("classifiers", index), "a classifier needs a `type`")
+                        )
                     )
                     return
                 except GraspsenseError as error:
-                    self.complaints.append(self.layer.complain(Problem(("classifiers", index), str(error))))
+                    self.complaints.append(
+                        self.layer.complain(InvalidValue(("classifiers", index), str(error)))
+                    )
                     return
                 name = ", ".join([called, *(in_a_name(path[-1], value) for path, value in point)])
                 if name in seen:
                     text = f"two classifiers are called {name!r}: give one a `name`"
-                    self.complaints.append(self.layer.complain(Problem(("classifiers", index), text)))
+                    self.complaints.append(self.layer.complain(InvalidValue(("classifiers", index), text)))
                 seen.add(name)
                 yield Learner(name=name, type=component.qualified, config=config)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from attrs import field, frozen
 from attrs.validators import ge
 
-from graspsense.core.config import Chosen, build, settings_from
+from graspsense.core.config import SelectedComponent, build, settings_from
 from graspsense.core.errors import ConfigError
 from graspsense.core.labelled import class_of
 from graspsense.core.plugins import installed
@@ -76,7 +76,7 @@ def recognise(params: Mapping[str, Any], seed: int) -> dict[str, Any]:
     judged: list[dict[str, Any]] = []
     for spec in params["learners"]:
         component = installed().find("classifier", spec["type"])
-        learner = Chosen(component, build(component, spec["config"]))
+        learner = SelectedComponent(component, build(component, spec["config"]))
         for target in judge.targets:
             if test is not None:
                 found = _on_other_trials(learner, data, test, target, seed)
@@ -133,7 +133,7 @@ def _found(found: Evaluation, protocol: str) -> dict[str, Any]:
 
 
 def _on_other_trials(
-    learner: Chosen, data: Labelled, test: Labelled, target: Target, seed: int
+    learner: SelectedComponent, data: Labelled, test: Labelled, target: Target, seed: int
 ) -> dict[str, Any]:
     """Train on one source and judge on the other, each class apart where its states are told."""
     groups = {""} if target != "state" else {one.partition(":")[0] for one in test.labels}
@@ -163,7 +163,9 @@ def _on_other_trials(
     }
 
 
-def _tree(learner: Chosen, data: Labelled, target: Target, seed: int) -> list[dict[str, Any]] | None:
+def _tree(
+    learner: SelectedComponent, data: Labelled, target: Target, seed: int
+) -> list[dict[str, Any]] | None:
     """Return the tree that the classifier grows on all trials, None where it grows none or several."""
     if target == "state" and len({class_of(label) for label in data.labels}) > 1:
         return None

@@ -16,7 +16,7 @@ import numpy as np
 from attrs import evolve, fields_dict, frozen
 
 from graspsense.core.errors import ConfigError
-from graspsense.core.roles import BatchBackend, Grasped, Variant
+from graspsense.core.roles import BatchBackend, Grasped, SimulationVariant
 from graspsense.experiments.versions import versions
 from graspsense.report.simulation import PEAK, TRACE, Point, SimulationTrade
 
@@ -115,7 +115,7 @@ class _Drawing:
 
 def _measured(
     settings: Settings,
-    variant: Variant,
+    variant: SimulationVariant,
     scenes: Sequence[str],
     seeds: Sequence[int],
     tick: Callable[[], None] | None,
@@ -152,7 +152,11 @@ def _measured(
 
 
 def _point(
-    variant: Variant, felt: Sequence[_Felt], reference: Sequence[_Felt], seconds: float, setup: float
+    variant: SimulationVariant,
+    felt: Sequence[_Felt],
+    reference: Sequence[_Felt],
+    seconds: float,
+    setup: float,
 ) -> Point:
     worst: dict[str, float] = {}
     missing = ""
@@ -185,7 +189,7 @@ def _point(
     )
 
 
-def _failed(variant: Variant, why: str) -> Point:
+def _failed(variant: SimulationVariant, why: str) -> Point:
     return Point(
         method=variant.method,
         fidelity=variant.fidelity,

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.config import Chosen, create_chosen
+from graspsense.core.config import SelectedComponent, select_component
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import in_words
 from graspsense.evaluation.evaluate import Evaluation, evaluate
@@ -61,7 +61,7 @@ def store_page(
         drawn = _drawn(store)
     labelled, why_not = _labelled(folder)
     found: Evaluation | None = None
-    learner = create_chosen("classifier", classifier)
+    learner = select_component("classifier", classifier)
     if labelled is not None:
         try:
             found = evaluate(
@@ -160,7 +160,7 @@ def _beside(found: Evaluation | None, labelled: Labelled | None, target: Target)
 
 
 def _judged(
-    found: Evaluation, learner: Chosen, labelled: Labelled, classifier: str, seed: int
+    found: Evaluation, learner: SelectedComponent, labelled: Labelled, classifier: str, seed: int
 ) -> list[Section]:
     head = found.headline
     rows = [

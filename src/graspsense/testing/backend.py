@@ -517,17 +517,20 @@ def reports_plain_values(subject: Subject) -> None:
             ) from error
 
 
-def stands_in_with_the_same_commands(subject: Subject) -> None:
-    """What stands in for a dry run is a gripper of its own, or there is none."""
-    other = subject.create().stand_in()
+def dry_run_takes_the_same_commands(subject: Subject) -> None:
+    """The gripper of a dry run is a backend of its own and takes the same kinds of command, or there is none."""
+    other = subject.create().dry_run_backend()
     if other is None:
-        raise CheckSkipped("nothing stands in for it in a dry run")
-    demand(isinstance(other, SensorBackend), f"stand_in returned {other!r}: return a SensorBackend or None")
+        raise CheckSkipped("it has no gripper for a dry run")
+    demand(
+        isinstance(other, SensorBackend),
+        f"dry_run_backend returned {other!r}: return a SensorBackend or None",
+    )
     try:
         info = other.open(0)
         demand(
             info.opening is None or KINDS[info.opening.kind] in subject.entry.accepts,
-            f"what stands in opens with {info.opening}, of a kind that the gripper does not take",
+            f"the gripper of a dry run opens with {info.opening}, of a kind that the real one does not accept",
         )
         _first_frame(other)
     finally:
@@ -626,7 +629,7 @@ CHECKS: Final = (
         objects_can_be_grasped,
         does_a_whole_grasp,
         reports_plain_values,
-        stands_in_with_the_same_commands,
+        dry_run_takes_the_same_commands,
         says_when_it_is_lost,
         says_when_it_is_not_there,
     ),

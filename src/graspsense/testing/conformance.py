@@ -23,11 +23,18 @@ CHECKS: Final[Mapping[str, tuple[Check, ...]]] = {
 }
 """The checks of each role, and of a distribution as a whole."""
 
+
+def checks_for(subject: Subject | Package) -> tuple[Check, ...]:
+    """Return the checks of the role of this part, and for a distribution those that other plugins contribute."""
+    contributed = package.contributed_checks(subject) if isinstance(subject, Package) else ()
+    return (*CHECKS[subject.role], *contributed)
+
+
 FLOOR_CASE: Final = "enough-checks-ran"
 
 
 @define(eq=False)
-class Case:
+class BoundCheck:
     """One check on one part. `run` raises what a test is to fail or to be skipped with."""
 
     check: Check
@@ -72,7 +79,7 @@ class FloorCase:
         """Fail where too few checks of the part ran."""
         import pytest
 
-        report = Report([self.examined.result(self.subject, one) for one in CHECKS[self.subject.role]])
+        report = Report([self.examined.result(self.subject, one) for one in checks_for(self.subject)])
         print(report.counts())  # noqa: T201 (pytest shows it beside a failure, and with -rP)
         text = report.below_floor(self.subject.name, self.subject.role)
         if text:
@@ -101,18 +108,18 @@ class Examined:
             return Result(subject.name, subject.role, check.id, check.title, "skipped", why)
         return outcome_of(check, subject, self.expected)  # type: ignore[arg-type]
 
-    def cases(self) -> Iterator[Case | FloorCase]:
+    def cases(self) -> Iterator[BoundCheck | FloorCase]:
         """Yield every check of every part, and after each part's whether enough of them ran."""
         for subject in self.subjects:
-            for check in CHECKS[subject.role]:
-                yield Case(check, subject, self)
+            for check in checks_for(subject):
+                yield BoundCheck(check, subject, self)
             yield FloorCase(subject, self)
 
     def report(self, told: Callable[[Result], None] = lambda _: None) -> Report:
         """Run every check and return the results; `told` hears each as it comes."""
         report = Report()
         for subject in self.subjects:
-            for check in CHECKS[subject.role]:
+            for check in checks_for(subject):
                 result = self.result(subject, check)
                 report.results.append(result)
                 told(result)
@@ -141,7 +148,9 @@ def examine(
     if whole is None and not components:
         raise plugins.unknown(name)
     expected = dict(expected_failures or {})
-    strangers = set(expected) - {one.id for checks in CHECKS.values() for one in checks}
+    known = {check.id for checks in CHECKS.values() for check in checks}
+    known |= {contributed.name for contributed in plugins.conformance_checks()}
+    strangers = set(expected) - known
     if strangers:
         raise UnknownName(f"there is no check named {', '.join(sorted(strangers))}")
 
@@ -201,7 +210,7 @@ class Conformance:
             setattr(cls, "".join(c if c.isalnum() else "_" for c in test), _test_of(case))
 
 
-def _test_of(case: Case | FloorCase) -> Callable[[Any], None]:
+def _test_of(case: BoundCheck | FloorCase) -> Callable[[Any], None]:
     def test(self: Any) -> None:
         case.run()
 

@@ -13,27 +13,30 @@ import tempfile
 import time
 import tomllib
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.metadata import PackageNotFoundError, distribution
-from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import unquote, urlparse
 
 from graspsense.core.config import resolve
-from graspsense.core.entries import CommandEntry, DatasetEntry, ModelEntry, PipelineEntry
+from graspsense.core.entries import (
+    CommandEntry,
+    ConformanceCheckEntry,
+    DatasetEntry,
+    ModelEntry,
+    PipelineEntry,
+)
 from graspsense.core.errors import GraspsenseError, named
-from graspsense.core.plugins import SLOW_IMPORT_S
+from graspsense.core.plugins import SLOW_IMPORT_S, Resource
 from graspsense.core.wiring import check as check_wiring
-from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand
+from graspsense.testing.checks import Check, CheckFailed, CheckSkipped, checks_of, demand
 from graspsense.testing.component import ADVICE_ON_IMPORTS
 from graspsense.testing.samples import a_trial, an_event
 from graspsense.testing.subject import Package
 
 OBSERVERS: Final = ("graspsense_run_starting", "graspsense_grasp_event", "graspsense_run_finished")
 PROBE_S: Final = 1.0
-TERMS_HOOK: Final = "graspsense_sim_terms"
-"""The hook of graspsense-sim-gripper, whose laws are checked here by their shape alone."""
 
 
 def plugins_load(package: Package) -> None:
@@ -95,11 +98,11 @@ def everything_declared_is_there(package: Package) -> None:
     for component in package.components:
         component.config_class()
         component.component_class()
-    for offer in package.offers:
-        if isinstance(offer.entry, PipelineEntry | ModelEntry):
-            offer.resource()
+    for resource in package.resources:
+        if isinstance(resource.entry, PipelineEntry | ModelEntry):
+            resource.file()
         else:
-            offer.load()
+            resource.load()
 
 
 def names_are_free(package: Package) -> None:
@@ -111,7 +114,7 @@ def names_are_free(package: Package) -> None:
         *package.plugins.datasets(),
         *package.plugins.commands(),
     ]
-    parts: list[Any] = [*package.components, *package.offers]
+    parts: list[Any] = [*package.components, *package.resources]
     for mine in parts:
         for other in others:
             same_kind = type(other.entry) is type(mine.entry) and other.name == mine.name
@@ -124,7 +127,7 @@ def names_are_free(package: Package) -> None:
 
 def pipelines_fit_together(package: Package) -> None:
     """Every pipeline file it ships resolves, and its components fit each other."""
-    names = [one.qualified for one in package.offers if isinstance(one.entry, PipelineEntry)]
+    names = [one.qualified for one in package.resources if isinstance(one.entry, PipelineEntry)]
     if not names:
         raise CheckSkipped("it ships no pipeline")
     for name in names:
@@ -184,109 +187,6 @@ def probe_keeps_its_time(package: Package) -> None:
     )
 
 
-def simulator_terms_are_laws(package: Package) -> None:
-    """A term of the simulator has a pure law of finite forces that keeps its state's types, and is its linear form."""
-    terms = [
-        term
-        for status in package.statuses
-        if TERMS_HOOK in status.hooks
-        for given in package.plugins.called(status, TERMS_HOOK)
-        for term in ([given] if hasattr(given, "law") else given)
-    ]
-    if not terms:
-        raise CheckSkipped("it brings no terms of the simulator")
-    for term in terms:
-        fields = term.params._fields
-        given = {name: term.params._field_defaults.get(name, 0.05) for name in fields}
-        params, state = term.params(**given), term.at_rest
-        for k in range(40):
-            d0, d1 = (0.0001 * abs(20 - abs(20 - one)) for one in (k, k + 1))
-            force, after = _stepped(term, params, state, d0, d1)
-            again = _stepped(term, params, state, d0, d1)
-            demand(
-                type(force) is float and isfinite(force),
-                f"the law of term {term.name!r} gives the force {force!r} ({type(force).__name__}) at a compression of "
-                f"{d1 * 1e3:.2g} mm with {given}: a finite float",
-            )
-            demand(
-                repr(again) == repr((force, after)),
-                f"the law of term {term.name!r} gives another force when asked again: it may know its arguments only",
-            )
-            demand(
-                type(after) is type(state) and [type(one) for one in after] == [type(one) for one in state],
-                f"the law of term {term.name!r} makes {state!r} into {after!r}: return the same named "
-                "tuple, its numbers "
-                "of the same types",
-            )
-            state = after
-        _is_its_linear_form(term, params)
-
-
-def _is_its_linear_form(term: Any, params: Any) -> None:
-    """Hold what a term says of being linear to its law, along straight pieces of path that are short for it."""
-    form = term.linear(params) if hasattr(term, "linear") else None
-    if form is None:
-        return
-    own = hasattr(form, "reach")
-    forms = (form.touching, form.parted) if own else (form,)
-    fields = len(term.at_rest)
-    for one in forms:
-        demand(
-            len(one.rates) in (0, fields),
-            f"the linear form of term {term.name!r} has {len(one.rates)} states and its law {fields}: as many, or none",
-        )
-    fastest = max((sum(map(abs, row)) for one in forms for row in one.rates), default=0.0)
-    h, speed, state = min(1e-3, 0.1 / max(fastest, 1e-9)), 0.1, term.at_rest
-    for k in range(40):
-        d0, d1 = (speed * h * one for one in (k, k + 1))
-        force, after = term.law(params, state, d0, d1, h, speed)
-        one, other = (
-            forms[own and not d + sum(a * b for a, b in zip(form.reach, s, strict=True)) > 0.0]
-            if own
-            else form
-            for d, s in ((d0, state), (d1, after))
-        )
-        said = _along(one, state if one.rates else (), d0, speed, h)
-        scale = max(abs(force), abs(one.spring_n_m) * speed * h, 1e-9)
-        demand(
-            one is not other or abs(said - force) <= 1e-3 * scale,
-            f"the linear form of term {term.name!r} gives {said:.6g} N at {d1 * 1e3:.3g} mm and its law {force:.6g} N "
-            f"with {params}: return None where it is not linear",
-        )
-        state = after
-
-
-def _along(form: Any, state: Any, d0: float, speed: float, h: float) -> float:
-    """Return the force of a linear form at the end of a straight piece of path, by many midpoints."""
-    pieces = 50
-    step, now, d = h / pieces, [float(one) for one in state], d0
-
-    def rates(s: list[float], d: float) -> list[float]:
-        return [
-            sum(a * b for a, b in zip(row, s, strict=True)) + by * d + at * speed
-            for row, by, at in zip(form.rates, form.by_compression, form.by_speed, strict=True)
-        ]
-
-    for _ in range(pieces):
-        half = [s + 0.5 * step * r for s, r in zip(now, rates(now, d), strict=True)]
-        now = [s + step * r for s, r in zip(now, rates(half, d + 0.5 * step * speed), strict=True)]
-        d += step * speed
-    own = sum(a * b for a, b in zip(form.force, now, strict=True)) if now else 0.0
-    curve = getattr(form, "curve", None)
-    return float(form.spring_n_m * d + form.damper_n_s_m * speed + own + (curve(d) if curve else 0.0))
-
-
-def _stepped(term: Any, params: Any, state: Any, d0: float, d1: float) -> tuple[Any, Any]:
-    try:
-        force, after = term.law(params, state, d0, d1, 1e-3, (d1 - d0) * 1e3)
-    except Exception as error:
-        raise CheckFailed(
-            f"the law of term {term.name!r} raised {named(error)} from {d0 * 1e3:.2g} to "
-            f"{d1 * 1e3:.2g} mm with {params}"
-        ) from error
-    return force, after
-
-
 def wheel_is_complete(package: Package) -> None:
     """What is installed holds all that is needed; of an editable installation a wheel is built to see that."""
     folder = _editable_folder(package.distribution)
@@ -305,9 +205,9 @@ def wheel_is_complete(package: Package) -> None:
                 bool({f"{path}.py", f"{path}/__init__.py"} & inside),
                 f"the wheel of {folder.name} has no module {module}: {_ADVICE}",
             )
-    for offer in package.offers:
-        if isinstance(offer.entry, PipelineEntry | ModelEntry):
-            top, _, path = offer.entry.resource.partition(":")
+    for resource in package.resources:
+        if isinstance(resource.entry, PipelineEntry | ModelEntry):
+            top, _, path = resource.entry.resource.partition(":")
             name = f"{top.replace('.', '/')}/{path}"
             demand(name in inside, f"the wheel of {folder.name} has no file {name}: {_ADVICE}")
     tops = {module.partition(".")[0] for module in _modules_of(package) if _lies_within(module, folder)}
@@ -332,9 +232,9 @@ def _modules_of(package: Package) -> Iterator[str]:
     for component in package.components:
         yield component.entry.target.partition(":")[0]
         yield component.entry.config.partition(":")[0]
-    for offer in package.offers:
-        if isinstance(offer.entry, DatasetEntry | CommandEntry):
-            yield offer.entry.target.partition(":")[0]
+    for resource in package.resources:
+        if isinstance(resource.entry, DatasetEntry | CommandEntry):
+            yield resource.entry.target.partition(":")[0]
 
 
 def _lies_within(module: str, folder: Path) -> bool:
@@ -400,5 +300,29 @@ CHECKS: Final = checks_of(
     pipelines_fit_together,
     observers_disturb_nobody,
     probe_keeps_its_time,
-    simulator_terms_are_laws,
 )
+
+
+def contributed_checks(package: Package) -> tuple[Check, ...]:
+    """Return the checks that other plugins contribute for the hooks of theirs that this distribution implements."""
+    implemented = {hook for status in package.statuses for hook in status.hooks}
+    return tuple(
+        Check(contributed.name, contributed.entry.summary, _check_of(contributed))
+        for contributed in package.plugins.conformance_checks()
+        if contributed.entry.hook in implemented
+    )
+
+
+def _check_of(contributed: Resource[ConformanceCheckEntry]) -> Callable[[Package], None]:
+    def test(package: Package) -> None:
+        hook = contributed.entry.hook
+        results = [
+            result
+            for status in package.statuses
+            if hook in status.hooks
+            for result in package.plugins.called(status, hook)
+        ]
+        defects = list(contributed.load()(results))
+        demand(not defects, "\n    ".join(defects))
+
+    return test

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from attrs import define, field
 
 from graspsense.core.config import build
-from graspsense.core.plugins import Component, Offer, Plugins, PluginStatus, canonical
+from graspsense.core.plugins import Component, Plugins, PluginStatus, Resource, canonical
 
 if TYPE_CHECKING:
     from graspsense.testing.session import Session
@@ -70,7 +70,7 @@ class Package:
     version: str
     statuses: tuple[PluginStatus, ...]
     components: tuple[Component, ...]
-    offers: tuple[Offer[Any], ...]
+    resources: tuple[Resource[Any], ...]
     plugins: Plugins
     builds: bool = True
     """Whether a wheel is built to see that nothing is missing from it."""
@@ -89,18 +89,20 @@ def package_of(distribution: str, plugins: Plugins, *, builds: bool = True) -> P
     statuses = tuple(one for one in plugins.statuses if one.distribution == name)
     if not statuses:
         return None
-    offers: list[Offer[Any]] = [
+    resources: list[Resource[Any]] = [
         *plugins.pipelines(),
         *plugins.models(),
         *plugins.datasets(),
         *plugins.commands(),
+        *plugins.emulators(),
+        *plugins.conformance_checks(),
     ]
     return Package(
         distribution=name,
         version=statuses[0].version,
         statuses=statuses,
         components=tuple(one for one in plugins.components() if one.distribution == name),
-        offers=tuple(one for one in offers if one.distribution == name),
+        resources=tuple(one for one in resources if one.distribution == name),
         plugins=plugins,
         builds=builds,
     )

@@ -190,7 +190,7 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
         """Return how many frames came, and how many exchanges had to be repeated."""
         return {"frames": getattr(self, "_frames", 0), "repeated": getattr(self, "_retries", 0)}
 
-    def stand_in(self) -> Robotiq2F85:
+    def dry_run_backend(self) -> Robotiq2F85:
         """Return the fake one."""
         return Robotiq2F85(Robotiq2F85Config(port="fake", newtons_per_ampere=self.config.newtons_per_ampere))
 

@@ -154,7 +154,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             return self._counted(self._opened)
         return self._report or {}
 
-    def stand_in(self) -> Pr2Backend:
+    def dry_run_backend(self) -> Pr2Backend:
         """Return an emulated gripper with the limits that hold for a real one at its first use."""
         emulated = evolve(self.config, transport="emulated", pace="lock-step", calibration=UNCALIBRATED)
         backend = Pr2Backend(emulated)

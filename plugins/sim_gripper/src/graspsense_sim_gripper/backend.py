@@ -22,7 +22,7 @@ from graspsense.plugin_api import (
     Pads,
     Reading,
     RunConfig,
-    Variant,
+    SimulationVariant,
     bind,
     maker,
     tare,
@@ -166,7 +166,7 @@ class SimBackend(BatchBackend[SimConfig]):
         noise.extend(next(self._blocks).tolist())
         images.extend(([0.0] * CELLS, [0.0] * CELLS) for _ in range(len(noise) - len(images)))
 
-    def variants(self) -> tuple[Variant, ...]:
+    def variants(self) -> tuple[SimulationVariant, ...]:
         """Return each scheme at each fidelity, from coarse to fine."""
         from graspsense_sim_gripper.variants import variants
 

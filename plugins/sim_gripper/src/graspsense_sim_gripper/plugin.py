@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.plugin_api import Channel, ModelEntry, SensorBackendEntry, hookimpl
+from graspsense.plugin_api import Channel, ConformanceCheckEntry, ModelEntry, SensorBackendEntry, hookimpl
 
 GRASPSENSE_API = (1, 0)
 
@@ -40,4 +40,15 @@ def graspsense_models() -> Iterable[ModelEntry]:
         name="default",
         resource="graspsense_sim_gripper:models/default.json",
         summary="C4.5 on simulated grasps of the paper's containers, at 20 N and 10 mm/s",
+    )
+
+
+@hookimpl
+def graspsense_conformance_checks() -> Iterable[ConformanceCheckEntry]:
+    """Return the check of terms that other distributions contribute through `graspsense_sim_terms`."""
+    yield ConformanceCheckEntry(
+        name="simulator-terms-are-laws",
+        target="graspsense_sim_gripper.conformance:check_terms",
+        hook="graspsense_sim_terms",
+        summary="A term of the simulator has a pure law with finite forces, and its linear form agrees with the law",
     )

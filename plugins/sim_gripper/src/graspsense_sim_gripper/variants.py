@@ -7,7 +7,7 @@ from typing import Final
 
 from attrs import evolve
 
-from graspsense.plugin_api import Variant
+from graspsense.plugin_api import SimulationVariant
 
 ACCURACIES: Final = (0.3, 0.1, 0.03, 0.01, 0.001, 1e-4)
 STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)
@@ -15,7 +15,7 @@ FINE_S: Final = 2e-5
 """Steps so short that what is left is the model's own error."""
 
 _FORMS: Final = (
-    Variant(
+    SimulationVariant(
         method="halved steps",
         fidelity="full",
         step="until all stands still",
@@ -23,7 +23,7 @@ _FORMS: Final = (
         role="reference",
     ),
     *(
-        Variant(
+        SimulationVariant(
             method="steps by their error",
             fidelity=fidelity,
             step=f"{accuracy:g}",
@@ -33,7 +33,7 @@ _FORMS: Final = (
         for accuracy in ACCURACIES
     ),
     *(
-        Variant(
+        SimulationVariant(
             method=f"even steps, {scheme}",
             fidelity="full",
             step=f"{step_s * 1e3:g} ms",
@@ -42,14 +42,14 @@ _FORMS: Final = (
         for scheme in ("explicit", "implicit")
         for step_s in STEPS_S
     ),
-    Variant(
+    SimulationVariant(
         method="in the interpreter",
         fidelity="scene",
         step="0.01",
         settings={"fidelity": "scene", "accuracy": 0.01, "compile": "never"},
     ),
     *(
-        Variant(
+        SimulationVariant(
             method="even steps, explicit",
             fidelity=f"scene at {accuracy:g}",
             step=f"{FINE_S * 1e3:g} ms",
@@ -61,7 +61,7 @@ _FORMS: Final = (
 )
 
 
-def variants() -> tuple[Variant, ...]:
+def variants() -> tuple[SimulationVariant, ...]:
     """Return each scheme at each fidelity, from coarse to fine; compiled where that can be done."""
     compiled = "always" if find_spec("numba") is not None else "never"
     return tuple(evolve(one, settings={"compile": compiled, **one.settings}) for one in _FORMS)

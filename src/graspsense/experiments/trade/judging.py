@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from graspsense.core.config import Chosen, build, settings_from
+from graspsense.core.config import SelectedComponent, build, settings_from
 from graspsense.core.labelled import Target, class_of
 from graspsense.core.plugins import installed
 from graspsense.evaluation.confusion import confusion
@@ -30,12 +30,12 @@ def settings_of(params: Mapping[str, Any]) -> Settings:
     return settings_from(params["settings"], "the settings of the task")
 
 
-def learners_of(params: Mapping[str, Any]) -> dict[str, Chosen]:
+def learners_of(params: Mapping[str, Any]) -> dict[str, SelectedComponent]:
     """Return the classifiers of a task by name."""
     found = {}
     for spec in params["learners"]:
         component = installed().find("classifier", spec["type"])
-        found[str(spec["name"])] = Chosen(component, build(component, spec["config"]))
+        found[str(spec["name"])] = SelectedComponent(component, build(component, spec["config"]))
     return found
 
 
@@ -59,7 +59,7 @@ def dealt(labels: Sequence[str], target: Target, seed: int) -> list[Folds]:
 
 
 def answers(
-    learner: Chosen,
+    learner: SelectedComponent,
     table: FeatureTable,
     labels: Sequence[str],
     target: Target,

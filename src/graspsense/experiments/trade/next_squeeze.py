@@ -28,7 +28,7 @@ from graspsense.sources.trial_source import Source, groups_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from graspsense.core.config import Chosen
+    from graspsense.core.config import SelectedComponent
     from graspsense.core.features import FeatureTable
 
     Floats = NDArray[np.float64]
@@ -190,7 +190,7 @@ def fixed_name(force: float) -> str:
 
 
 def _answers(
-    learner: Chosen,
+    learner: SelectedComponent,
     table: FeatureTable,
     training: NDArray[np.int64],
     known: Sequence[str],
@@ -207,7 +207,7 @@ def _answers(
 
 
 def _promise(
-    learner: Chosen,
+    learner: SelectedComponent,
     table: FeatureTable,
     training: NDArray[np.int64],
     known: Sequence[str],

@@ -1,4 +1,4 @@
-"""A dry run: the grasp on a stand-in in software, to see what would be commanded. No gripper is opened."""
+"""A dry run: a grasp with an emulated gripper, which shows what would be commanded. No real gripper is opened."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from graspsense.core.trial import GraspEvent
 
 
 class PhaseCommands(NamedTuple):
-    """What was commanded in one phase: extremes of the effort in N, positive squeezes, and the speed that came of it.
+    """The commands of one phase: the extremes of the effort (N, positive squeezes), and the largest speed.
 
-    `limited` is on how many ticks the command stood at the limit of a first use, or at the gripper's own.
+    `limited` is the number of ticks in which the command was at the limit of a first use, or at that of the gripper.
     """
 
     phase: str
@@ -26,29 +26,29 @@ class PhaseCommands(NamedTuple):
     limited: int
 
 
-class Rehearsal(NamedTuple):
-    """The phases of a grasp on a stand-in, and how it ended there."""
+class DryRun(NamedTuple):
+    """The emulated gripper of a dry run, the outcome of the grasp, and its phases."""
 
     device: str
     outcome: str
     phases: tuple[PhaseCommands, ...]
 
 
-def rehearse(backend: SensorBackend[Any], controller: Controller[Any], run: RunConfig) -> Rehearsal | None:
-    """Return what this gripper would be commanded, or None where it has no stand-in.
+def dry_run(backend: SensorBackend[Any], controller: Controller[Any], run: RunConfig) -> DryRun | None:
+    """Return what this gripper would be commanded, or None if nothing emulates it.
 
-    Raises what opening the stand-in raises.
+    Raises what opening the emulated gripper raises.
     """
-    stand_in = backend.stand_in()
-    if stand_in is None:
+    emulated = backend.dry_run_backend()
+    if emulated is None:
         return None
-    witness = _Witness(stand_in, run)
-    grasp = run_grasp(witness, controller, run, on_event=witness.begin)
-    return Rehearsal(grasp.device.name, grasp.outcome.words, tuple(witness.phases()))
+    recorder = _CommandRecorder(emulated, run)
+    grasp = run_grasp(recorder, controller, run, on_event=recorder.begin)
+    return DryRun(grasp.device.name, grasp.outcome.words, tuple(recorder.phases()))
 
 
-class _Witness(SensorBackend[None]):
-    """A gripper, with a record of what it was commanded in each phase."""
+class _CommandRecorder(SensorBackend[None]):
+    """A gripper that records what it is commanded in each phase."""
 
     def __init__(self, gripper: SensorBackend[Any], run: RunConfig) -> None:
         super().__init__(None)
@@ -61,20 +61,20 @@ class _Witness(SensorBackend[None]):
         self._limits_n: list[float] = []
 
     def begin(self, event: GraspEvent) -> None:
-        """Take the runner's word that a phase has begun.
+        """Note that a phase has begun.
 
-        A law commands for its new phase at once; the runner's own phases begin with the next command.
+        A command of a controller belongs to the new phase at once; a phase of the runner begins one command later.
         """
         self._next = self._seen.setdefault(event.phase.name.lower(), [])
         if event.phase in (Phase.OPENING, Phase.SQUEEZE, Phase.HOLD):
             self._now = self._next
 
     def phases(self) -> list[PhaseCommands]:
-        """Return the phases in their order."""
-        found = []
+        """Return the phases in order."""
+        phases = []
         for phase, ticks in self._seen.items():
             efforts = [effort for effort, _, _ in ticks] or [0.0]
-            found.append(
+            phases.append(
                 PhaseCommands(
                     phase,
                     len(ticks) / self._rate_hz,
@@ -84,14 +84,14 @@ class _Witness(SensorBackend[None]):
                     sum(limited for _, _, limited in ticks),
                 )
             )
-        return found
+        return phases
 
     def expect(self, controller: Controller[Any], run: RunConfig) -> None:
-        """Tell the gripper."""
+        """Pass the controller and the settings on to the gripper."""
         self._gripper.expect(controller, run)
 
     def open(self, seed: int) -> DeviceInfo:
-        """Open the gripper and keep its limits."""
+        """Open the gripper and note its limits."""
         info = self._gripper.open(seed)
         self._rate_hz = info.rate_hz
         self._limits_n = [info.effort_limit_n]
@@ -100,14 +100,14 @@ class _Witness(SensorBackend[None]):
         return info
 
     def read(self, timeout_s: float) -> Reading | None:
-        """Read the gripper and keep its speed."""
+        """Read the gripper and note its speed."""
         reading = self._gripper.read(timeout_s)
         if reading is not None:
             self._speed_m_s = abs(reading.frame.velocity_m_s)
         return reading
 
     def apply(self, command: Command) -> None:
-        """Keep the command and pass it on."""
+        """Note the command and pass it on."""
         if command.kind == EFFORT:
             at_limit = abs(command.value) in self._limits_n
             self._now.append((command.value, self._speed_m_s, at_limit))

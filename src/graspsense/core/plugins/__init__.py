@@ -1,0 +1,30 @@
+"""Finding and loading plugins, isolating those that fail, and selecting a component by role and name.
+
+- `parts`: what a plugin brings, as the registry holds it.
+- `discovery`: which plugins are installed, and which may be loaded.
+- `isolation`: one plugin at a time, when it is loaded and when its hooks are called.
+- `registry`: the plugins of a process.
+"""
+
+from graspsense.core.plugins.discovery import PluginSource, builtin_source, installed_sources
+from graspsense.core.plugins.isolation import HEAVY, SLOW_IMPORT_S
+from graspsense.core.plugins.parts import Component, Diagnosis, PluginStatus, Probe, Resource, canonical
+from graspsense.core.plugins.registry import IsolatedPlugins, Plugins, collect, installed
+
+__all__ = [
+    "HEAVY",
+    "SLOW_IMPORT_S",
+    "Component",
+    "Diagnosis",
+    "IsolatedPlugins",
+    "PluginSource",
+    "PluginStatus",
+    "Plugins",
+    "Probe",
+    "Resource",
+    "builtin_source",
+    "canonical",
+    "collect",
+    "installed",
+    "installed_sources",
+]

@@ -1,0 +1,218 @@
+"""What a plugin brings, as the registry holds it: its status, its components and its resources.
+
+The code behind a component or resource is imported when a method asks for it, not before.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any, Final, Generic, Literal, TypeVar
+
+import attrs
+from attrs import frozen
+
+from graspsense.core.entries import (
+    TABLE_OF_ROLE,
+    CommandEntry,
+    ComponentEntry,
+    ConformanceCheckEntry,
+    DatasetEntry,
+    EmulatorEntry,
+    Finding,
+    FoundDevice,
+    ModelEntry,
+    PipelineEntry,
+    Role,
+)
+from graspsense.core.errors import PluginUnavailable
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
+
+EntryT = TypeVar(
+    "EntryT", PipelineEntry, ModelEntry, DatasetEntry, CommandEntry, EmulatorEntry, ConformanceCheckEntry
+)
+
+
+def canonical(distribution: str) -> str:
+    """Return the name of a distribution in its canonical spelling (PEP 503)."""
+    return re.sub(r"[-_.]+", "-", distribution).lower()
+
+
+@frozen
+class PluginStatus:
+    """One installed plugin: where it comes from, whether it is in use, and the reason if it is not."""
+
+    distribution: str
+    version: str
+    entry_point: str
+    module: str
+    state: Literal["loaded", "disabled", "broken"]
+    reason: str = ""
+    traceback: str = ""
+    hooks: tuple[str, ...] = ()
+    import_s: float = 0.0
+    """Processor time (s) that the import of its module took."""
+    advice: tuple[str, ...] = ()
+    """What to improve although the plugin works."""
+
+    @property
+    def absence(self) -> str:
+        """Lines that explain why the plugin is not in use, for a user who misses a name; empty for a loaded one."""
+        if self.state == "loaded":
+            return ""
+        what = f"failed to load: {self.reason}" if self.state == "broken" else f"disabled: {self.reason}"
+        return (
+            f"\n  {self.distribution} {self.version} is installed but {what}"
+            f"\n  (graspsense plugins show {self.distribution})"
+        )
+
+
+@frozen
+class Component:
+    """A component that a plugin declares."""
+
+    role: Role
+    entry: ComponentEntry
+    distribution: str
+    version: str
+
+    @property
+    def name(self) -> str:
+        """The short name, which another distribution may use too."""
+        return self.entry.name
+
+    @property
+    def qualified(self) -> str:
+        """The unique name, `distribution/name`."""
+        return f"{self.distribution}/{self.entry.name}"
+
+    @property
+    def kind(self) -> str:
+        """The role in words: `sensor backend`."""
+        return self.role.replace("-", " ")
+
+    @property
+    def table(self) -> str:
+        """The table of a pipeline file in which it is selected."""
+        return TABLE_OF_ROLE[self.role]
+
+    def config_class(self) -> type:
+        """Import and return the attrs class of its config. Raises PluginUnavailable."""
+        config_class = _imported(self, self.entry.config)
+        if not (isinstance(config_class, type) and attrs.has(config_class)):
+            raise _unavailable(self, f"{self.entry.config} is not an attrs class")
+        return config_class
+
+    def component_class(self) -> type:
+        """Import and return its class, a concrete subclass of the base class of its role. Raises PluginUnavailable."""
+        from graspsense.core import roles
+
+        component_class = _imported(self, self.entry.target)
+        base = {
+            "sensor-backend": roles.SensorBackend,
+            "controller": roles.Controller,
+            "feature-set": roles.FeatureSet,
+            "classifier": roles.Classifier,
+        }[self.role]
+        if not (isinstance(component_class, type) and issubclass(component_class, base)):
+            raise _unavailable(self, f"{self.entry.target} is not a subclass of {base.__name__}")
+        if inspect.isabstract(component_class):
+            lacking = ", ".join(sorted(component_class.__abstractmethods__))
+            raise _unavailable(
+                self,
+                f"{self.entry.target} does not implement {lacking}, which {base.__name__} of plugin_api requires",
+            )
+        return component_class
+
+    def create(self, config: object) -> Any:
+        """Return the component built from an instance of its config class."""
+        return self.component_class()(config)
+
+
+@frozen
+class Resource(Generic[EntryT]):
+    """A pipeline, model, data set, command, emulator or conformance check that a plugin declares."""
+
+    entry: EntryT
+    distribution: str
+    version: str
+
+    @property
+    def name(self) -> str:
+        """The short name, which another distribution may use too."""
+        return self.entry.name
+
+    @property
+    def qualified(self) -> str:
+        """The unique name, `distribution/name`."""
+        return f"{self.distribution}/{self.entry.name}"
+
+    @property
+    def kind(self) -> str:
+        """What it is, in words: `data set`."""
+        return _KIND_OF_ENTRY[type(self.entry)]
+
+    def load(self) -> Any:
+        """Import and return the target of an entry that is code. Raises PluginUnavailable."""
+        assert not isinstance(self.entry, PipelineEntry | ModelEntry), "pipelines and models are files"
+        return _imported(self, self.entry.target)
+
+    def file(self) -> Traversable:
+        """Return the file of a pipeline or model. Raises PluginUnavailable if its package does not contain it."""
+        assert isinstance(self.entry, PipelineEntry | ModelEntry), f"a {self.kind} is code"
+        package, _, path = self.entry.resource.partition(":")
+        try:
+            file = files(package).joinpath(path)
+        except Exception as error:
+            raise _unavailable(self, f"{type(error).__name__}: {error}") from error
+        if not file.is_file():
+            raise _unavailable(self, f"there is no file {path!r} in the package {package!r}")
+        return file
+
+
+_KIND_OF_ENTRY: Final[dict[type, str]] = {
+    PipelineEntry: "pipeline",
+    ModelEntry: "model",
+    DatasetEntry: "data set",
+    CommandEntry: "command",
+    EmulatorEntry: "emulator",
+    ConformanceCheckEntry: "conformance check",
+}
+
+
+@frozen
+class Probe:
+    """The devices that one plugin found; `error` is the reason if it could not search."""
+
+    distribution: str
+    found: tuple[FoundDevice, ...] = ()
+    error: str = ""
+
+
+@frozen
+class Diagnosis:
+    """The findings of one plugin about its devices; `error` is the reason if it could not examine them."""
+
+    distribution: str
+    findings: tuple[Finding, ...] = ()
+    error: str = ""
+
+
+def _unavailable(part: Component | Resource[Any], why: str) -> PluginUnavailable:
+    needs = getattr(part.entry, "needs", "")
+    return PluginUnavailable(
+        f"{part.kind} {part.name!r} of {part.distribution} {part.version} cannot be used here: {why}"
+        + (f"\n  needs: {needs}" if needs else "")
+    )
+
+
+def _imported(part: Component | Resource[Any], target: str) -> Any:
+    module, _, name = target.partition(":")
+    try:
+        return getattr(importlib.import_module(module), name)
+    except Exception as error:  # the import of a third party's module can raise anything
+        raise _unavailable(part, f"{type(error).__name__}: {error}") from error
