@@ -1,13 +1,15 @@
-"""Trials without a grasp: small recordings with known ticks, kept in a store, for tests."""
+"""Trials without a grasp: small recordings with known ticks, added to a store, for tests."""
 
-import json
+import tomllib
 from math import inf, nan
 
+from attrs import evolve
+
 from graspsense.core.signals import CELLS, EFFORT, Command, Frame, Pads
-from graspsense.recording.layout import DEVICE, PADS, START, TICK, TRIAL
-from graspsense.recording.trial_record import Beginning, Ending, Row
-from graspsense.recording.writer import RecordingFile
-from graspsense.store.recover import facts_of
+from graspsense.recording.layout import DEVICE, PADS, RESULT, START, TICK
+from graspsense.recording.recording_info import RecordingInfo
+from graspsense.recording.trial_record import DeviceRecord, FeatureValues, TrialRecord, TrialResult
+from graspsense.recording.writer import RecordingWriter
 
 SETTINGS = """\
 [gripper]
@@ -24,7 +26,7 @@ type = "graspsense/chitta"
 [run]
 seed = 3
 """
-DEVICE_JSON = {"name": "bench", "serial": "S1", "rate_hz": 1000.0, "clock": "device", "calibration": {}}
+BENCH = DeviceRecord(name="bench", serial="S1", rate_hz=1000.0, clock="virtual", simulated=True)
 FEATURES = (("p_first", "m"), ("f_steady", "N"))
 BEFORE = (("gap_at_start", "m"),)
 
@@ -44,38 +46,46 @@ def command(k):
     return Command(EFFORT, 0.1 * k, inf, 0.2)
 
 
-def beginning(label="can:full_open", instance=None, origin="collect", settings=SETTINGS):
+def begun(label="can:full_open", instance=None, origin="collect", settings=SETTINGS, device=BENCH):
+    """Return the record of a trial before its grasp."""
     labels = {"label": label, **({"instance": instance} if instance else {})} if label else {}
-    return Beginning(
+    return TrialRecord(
         made_at="2026-11-21T10:30:15.123+00:00",
         origin=origin,
         labels=labels,
-        settings=settings,
+        settings=tomllib.loads(settings),
         provenance={"config_sha256": "0" * 64, "seed": 3},
+        device=device,
     )
 
 
-def ending(outcome="steady", values=(0.066, 5.5)):
+def ended(outcome="steady", values=(0.066, 5.5), **more):
+    """Return the record of a trial after its grasp."""
     reasons = {name: "not there" for (name, _), value in zip(FEATURES, values, strict=True) if value is None}
-    return Ending(
-        trial={"outcome": outcome, "reason": ""},
-        features=Row(features=FEATURES, values=values, reasons=reasons),
-        before=Row(features=BEFORE, values=(0.08,)),
+    result = TrialResult(
+        outcome=outcome,
+        features=FeatureValues(features=FEATURES, values=values, reasons=reasons),
+        before_contact=FeatureValues(features=BEFORE, values=(0.08,)),
     )
+    return evolve(begun(**more), result=result)
 
 
-def write_recording(path, ticks=120, start=None, end=None, finish=True):
-    """Write a recording of so many ticks, with the metadata of this beginning and ending; return the file."""
-    file = RecordingFile(path)
-    file.metadata(START, (start or beginning()).as_metadata())
-    file.metadata(DEVICE, {"device": json.dumps(DEVICE_JSON)})
+def write_recording(path, ticks=120, record=None, finish=True, **texts):
+    """Write a recording of so many ticks, with the sections of this record; return the file.
+
+    `texts` replace those of the section START.
+    """
+    record = record or begun()
+    file = RecordingWriter(path)
+    file.metadata(START, {**record.section(START), **texts})
+    file.metadata(DEVICE, record.section(DEVICE))
     for k in range(ticks):
         image = pads(k)
         if k == 0 or pads(k - 1).counter != image.counter:
             file.pads(image.t_s, PADS.pack(image.t_s, image.counter, *image.left, *image.right))
         file.tick(frame(k).t_s, TICK.pack(*frame(k), 3, *command(k)))
-    if end is not None:
-        file.metadata(TRIAL, end.as_metadata())
+    if record.result is not None:
+        file.metadata(RESULT, record.section(RESULT))
     if finish:
         file.finish()
     return file
@@ -84,8 +94,8 @@ def write_recording(path, ticks=120, start=None, end=None, finish=True):
 def keep(
     store, label="can:full_open", instance=None, outcome="steady", values=(0.066, 5.5), ticks=120, **more
 ):
-    """Keep a small trial and return its number."""
-    start, end = beginning(label, instance, **more), ending(outcome, values)
-    path = store.new_recording(start.made_at)
-    write_recording(path, ticks, start, end)
-    return store.add(start, end, DEVICE_JSON, facts_of(path, ticks, 3))
+    """Add a small trial to the store and return its number."""
+    record = ended(outcome, values, label=label, instance=instance, **more)
+    path = store.new_recording(record.made_at)
+    write_recording(path, ticks, record)
+    return store.add(record, RecordingInfo.of(path, ticks, 3))

@@ -6,11 +6,10 @@ A tick comes in real time, and later where the writing process has not read thos
 recordings are written, and not how busy the machine is.
 
 Into the file PROGRESS goes, before each tick is handed over, the number of the trial and of the tick, and at the
-beginning of each trial the writer's process. Each trial that is kept is printed.
+start of each trial the writer process. Each stored trial is printed.
 """
 
 import fcntl
-import json
 import mmap
 import struct
 import sys
@@ -18,11 +17,11 @@ import termios
 import time
 from pathlib import Path
 
-from kept import DEVICE_JSON, beginning, command, ending, frame, pads
+from kept import command, ended, frame, pads
 
-from graspsense.recording.layout import DEVICE, START, TICK_WIRE, TRIAL
+from graspsense.recording.layout import DEVICE, RESULT, START, TICK_WIRE
 from graspsense.recording.recorder import Recorder
-from graspsense.store.store import RecordingFacts, Store
+from graspsense.store.store import Store
 
 PROGRESS = struct.Struct("<qqq")
 """Trial, tick handed over last, process id of the writer."""
@@ -40,14 +39,14 @@ def main(folder: str, progress: str, seconds: float) -> None:
         trial = 0
         while True:
             trial += 1
-            record(store, trial, seconds, shared)
+            record_trial(store, trial, seconds, shared)
 
 
-def record(store: Store, trial: int, seconds: float, shared: mmap.mmap) -> None:
-    start = beginning(instance=f"can#{trial}")
-    recorder = Recorder(store.new_recording(start.made_at))
-    recorder.metadata(START, start.as_metadata())
-    recorder.metadata(DEVICE, {"device": json.dumps(DEVICE_JSON)})
+def record_trial(store: Store, trial: int, seconds: float, shared: mmap.mmap) -> None:
+    record = ended(instance=f"can#{trial}")
+    recorder = Recorder(store.new_recording(record.made_at))
+    recorder.metadata(START, record.section(START))
+    recorder.metadata(DEVICE, record.section(DEVICE))
     recorder.wait_ready()
     began = time.perf_counter()
     for k in range(round(seconds * 1000)):
@@ -57,11 +56,8 @@ def record(store: Store, trial: int, seconds: float, shared: mmap.mmap) -> None:
             time.sleep(0.001)
         recorder.take(frame(k), pads(k), 3, command(k))
         PROGRESS.pack_into(shared, 0, trial, k, recorder._process.pid)
-    end = ending()
-    recorder.metadata(TRIAL, end.as_metadata())
-    done = recorder.finish()
-    facts = RecordingFacts(name=done.path.name, sha256=done.sha256, size=done.size, counts=done.counts)
-    store.add(start, end, DEVICE_JSON, facts)
+    recorder.metadata(RESULT, record.section(RESULT))
+    store.add(record, recorder.finish())
     sys.stdout.write(f"kept {trial}\n")
     sys.stdout.flush()
 

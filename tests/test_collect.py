@@ -57,7 +57,7 @@ def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(col
     kept = trials_in(tmp_path / "t")
     assert [number for number, _, _ in kept] == result["trials"] == [1, 2, 3, 4, 5, 6]
     assert kept[0][2] == "undone by the operator"
-    assert [why for _, _, why in kept].count("taken again") == 1
+    assert [why for _, _, why in kept].count("repeated by the operator") == 1
     assert Counter(label for _, label, why in kept if why is None) == {"can:full_open": 2, "block": 2}
     assert "Enter: grasp it" in done.stderr
     assert "next: block  (1 of 2)" in done.stderr
@@ -77,8 +77,8 @@ def test_it_goes_on_where_it_was_with_new_draws(collect, tmp_path):
     assert second["trials"] == [3, 4]
     assert second["complete"]
     with Store.read(tmp_path / "t") as store:
-        values = [store.trial(number).values for number in (1, 2, 3, 4)]
-        seeds = [store.trial(number).provenance["seed"] for number in (1, 2, 3, 4)]
+        values = [store.trial(number).result.features.values for number in (1, 2, 3, 4)]
+        seeds = [store.trial(number).record.provenance["seed"] for number in (1, 2, 3, 4)]
     assert len(set(values)) == 4
     assert seeds == [0, 1, 2, 3]
 
@@ -179,7 +179,8 @@ def test_a_label_that_the_simulator_does_not_know_is_told(collect, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("labels", "says"), [("", "nothing to collect"), ("block,block", "named twice"), ("a b", "is no label")]
+    ("labels", "says"),
+    [("", "nothing to collect"), ("block,block", "named twice"), ("a b", "is not a label")],
 )
 def test_labels_that_make_no_sense_are_told(collect, tmp_path, labels, says):
     done = collect(tmp_path / "t", "", labels=labels)

@@ -7,8 +7,8 @@ import tomllib
 from math import inf, nan
 
 import pytest
-from attrs import field, frozen
-from kept import keep
+from attrs import evolve, field, frozen
+from kept import BENCH, keep
 
 from graspsense.core.config import Flag, resolve, to_toml
 from graspsense.core.json_values import json_ready, json_text, settings_from_json
@@ -23,6 +23,9 @@ def test_json_has_no_infinity_and_no_nan():
 
     assert json_ready(value) == {"a": ["inf", "-inf", None, 1.5], "b": {"c": "inf"}, "3": [True, None]}
     assert json_text(value) == '{"3":[true,null],"a":["inf","-inf",null,1.5],"b":{"c":"inf"}}'
+
+
+REAL = evolve(BENCH, simulated=False)
 
 
 @frozen(kw_only=True)
@@ -76,7 +79,14 @@ def test_a_model_is_trained_on_a_store_that_was_collected_with_infinite_settings
     with Store.open(tmp_path / "trials") as store:
         for k in range(6):
             label = ("can:full_open", "can:empty_open")[k % 2]
-            keep(store, label, values=(0.06 + 0.002 * (k % 2), 5.0 + k), ticks=2, settings=settings)
+            keep(
+                store,
+                label,
+                values=(0.06 + 0.002 * (k % 2), 5.0 + k),
+                ticks=2,
+                settings=settings,
+                device=REAL,
+            )
     component = installed().find("classifier", "tree")
 
     model = train(component, component.config_class()(), labelled_store(str(tmp_path / "trials")), name="m")

@@ -86,7 +86,7 @@ def check(folder, announced):
     found = recovered(folder)
     assert [one for one in found if one.what == "failed"] == []
     with Store.read(folder) as store:
-        there = {one.instance or one.label for one in store.page(limit=10_000) if one.whole}
+        there = {one.instance or one.label for one in store.page(limit=10_000) if one.complete}
         assert announced <= there
     verified = verify_store(folder)
     assert verified.problems == ()
@@ -124,7 +124,7 @@ def test_a_recorder_killed_with_its_writer_loses_at_most_100_ms_of_the_running_t
             continue  # nothing was running, or a new writer had begun between the look and the kill
         with Store.read(folder) as store:
             running = [one for one in store.page(limit=1000) if one.instance == f"can#{trial}"]
-            ticks = len(read_recorded(store.recording_of(running[0].recording))) if running else 0
+            ticks = len(read_recorded(store.recording_path(running[0].recording))) if running else 0
         if ticks == 0:
             assert [one.what for one in found] in ([], ["empty"])
         missing.append((last + 1 - ticks) / 1000.0)

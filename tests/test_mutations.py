@@ -12,7 +12,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from kept import SETTINGS, beginning, ending, keep, write_recording
+from kept import SETTINGS, ended, keep, write_recording
 
 from graspsense.core.config import resolve
 from graspsense.core.errors import GraspsenseError
@@ -21,7 +21,6 @@ from graspsense.core.model import load_model, train
 from graspsense.core.plugins import installed
 from graspsense.plugin_api import create
 from graspsense.recording.reader import read_recorded
-from graspsense.recording.trial_record import beginning_in, ending_in
 from graspsense.store.dataset import labelled_store
 from graspsense.store.recover import recover_file
 from graspsense.store.store import Store
@@ -61,7 +60,7 @@ def digests(folder):
 def test_recordings(tmp_path):
     """What a strict reader gives is what was written, to the byte; salvage gives ticks that were written."""
     path = tmp_path / "g.mcap"
-    write_recording(path, 200, beginning(), ending())
+    write_recording(path, 200, ended())
     good = path.read_bytes()
     whole = read_recorded(path)
     written = {whole.ticks.tobytes()[k : k + 120] for k in range(0, 200 * 120, 120)}
@@ -72,8 +71,7 @@ def test_recordings(tmp_path):
         path.write_bytes(bad)
         try:
             found = read_recorded(path)
-            beginning_in(found.metadata, "it")
-            ending_in(found.metadata, "it")
+            found.record()
             assert found.ticks.tobytes() == whole.ticks.tobytes()
             assert found.pads.tobytes() == whole.pads.tobytes()
         except GraspsenseError:

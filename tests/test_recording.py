@@ -12,15 +12,17 @@ import time
 from itertools import pairwise
 
 import pytest
-from kept import beginning, command, ending, frame, pads, write_recording
+from kept import begun, command, ended, frame, pads, write_recording
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from graspsense import load_pipeline
 from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.recording.atomic_file import SaveFailed
+from graspsense.recording.layout import START
 from graspsense.recording.reader import read_recorded
-from graspsense.recording.recorder import NotKept, Recorder
-from graspsense.recording.writer import RecordingFile
+from graspsense.recording.recorder import Recorder
+from graspsense.recording.writer import RecordingWriter
 
 OPTIONS = ["classifier.type=none", "gripper.object=can:full_open"]
 
@@ -97,7 +99,7 @@ def test_fields_are_scalars_and_the_schema_tells_the_bytes(tmp_path):
 
 
 def test_our_reader_gives_each_tick_with_the_image_it_had(tmp_path):
-    write_recording(tmp_path / "g.mcap", ticks=120, end=ending())
+    write_recording(tmp_path / "g.mcap", ticks=120, record=ended())
     readings = read_recorded(tmp_path / "g.mcap").readings()
     assert repr([one.frame for one in readings]) == repr([frame(k) for k in range(120)])
     assert [one.pads for one in readings] == [pads(k) for k in range(120)]
@@ -116,10 +118,10 @@ def test_a_recording_is_never_written_over_another(tmp_path):
     write_recording(tmp_path / "g.mcap")
     content = (tmp_path / "g.mcap").read_bytes()
     with pytest.raises(FileExistsError):
-        RecordingFile(tmp_path / "g.mcap")
+        RecordingWriter(tmp_path / "g.mcap")
     recorder = Recorder(tmp_path / "g.mcap")
     recorder.take(frame(0), pads(0), 3, command(0))
-    with pytest.raises(NotKept, match="such a recording already"):
+    with pytest.raises(SaveFailed, match="the recording already exists"):
         recorder.finish()
     assert (tmp_path / "g.mcap").read_bytes() == content
 
@@ -127,7 +129,7 @@ def test_a_recording_is_never_written_over_another(tmp_path):
 def test_a_writer_that_does_not_follow_holds_nobody_up_and_loses_nothing(tmp_path):
     """Its process is stopped, so that the pipe fills; every message is kept and written once it goes on."""
     recorder = Recorder(tmp_path / "g.mcap")
-    recorder.metadata("graspsense", beginning().as_metadata())
+    recorder.metadata(START, begun().section(START))
     pid = recorder._process.pid
     os.kill(pid, signal.SIGSTOP)
     try:
@@ -150,7 +152,7 @@ def test_a_writer_that_has_died_does_not_stop_the_grasp(tmp_path):
     recorder._process.wait()
     trial = load_pipeline("default", options=OPTIONS).grasp(sinks=[recorder])
     assert trial.outcome.words == "steady"
-    with pytest.raises(NotKept, match="its process has died"):
+    with pytest.raises(SaveFailed, match="the writer process died"):
         recorder.finish()
 
 
@@ -171,13 +173,13 @@ def test_a_grasp_that_ends_without_a_word_leaves_what_was_felt(tmp_path):
         (lambda data: b"t,gap\n0,1\n", "not a valid MCAP file|unpack"),
         (lambda data: data[:-200], "damaged"),
         (lambda data: data[: len(data) // 2], "damaged"),
-        (lambda data: data + b"more", "behind its end"),
+        (lambda data: data + b"more", "after its end"),
         (lambda data: data[:1500] + bytes(8) + data[1508:], "damaged"),
     ],
 )
 def test_a_damaged_recording_is_told_and_not_used(tmp_path, spoil, says):
     path = tmp_path / "g.mcap"
-    write_recording(path, ticks=300, end=ending())
+    write_recording(path, ticks=300, record=ended())
     path.write_bytes(spoil(path.read_bytes()))
     with pytest.raises(DataDamaged, match=says) as told:
         read_recorded(path)
@@ -185,10 +187,10 @@ def test_a_damaged_recording_is_told_and_not_used(tmp_path, spoil, says):
 
 
 def test_a_recording_of_a_newer_layout_is_refused(tmp_path):
-    file = RecordingFile(tmp_path / "g.mcap")
-    file.metadata("graspsense", {**beginning().as_metadata(), "version": "2"})
+    file = RecordingWriter(tmp_path / "g.mcap")
+    file.metadata(START, {**begun().section(START), "version": "3"})
     file.finish()
-    with pytest.raises(DataDamaged, match="version '2'; this graspsense reads version 1"):
+    with pytest.raises(DataDamaged, match="version '3'; this graspsense reads version 2"):
         read_recorded(tmp_path / "g.mcap")
 
 
@@ -201,7 +203,7 @@ def test_somebody_else_s_mcap_is_no_recording_of_ours(tmp_path):
         channel = writer.register_channel("/imu", "json", 0)
         writer.add_message(channel, 0, json.dumps({"x": 1}).encode(), 0)
         writer.finish()
-    with pytest.raises(DataDamaged, match="it is no recording of graspsense"):
+    with pytest.raises(DataDamaged, match="it is not a recording of graspsense"):
         read_recorded(tmp_path / "g.mcap")
 
 

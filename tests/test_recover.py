@@ -6,12 +6,12 @@ import subprocess
 import sys
 
 import pytest
-from kept import beginning, ending, keep, write_recording
+from kept import begun, ended, keep, write_recording
 from mcap.reader import make_reader
 
 from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.reader import read_recorded
-from graspsense.recording.recorder import NotKept
 from graspsense.store.recover import recover_file, recover_store
 from graspsense.store.store import Store
 from graspsense.store.verify import verify_store
@@ -26,9 +26,9 @@ def store(tmp_path):
         yield store
 
 
-def part(store, name="20261121-103015-0001.mcap", ticks=200, end=None):
+def part(store, name="20261121-103015-0001.mcap", ticks=200):
     """Leave a recording as a process does that was killed: not ended, under its passing name."""
-    file = write_recording(store.recordings / name, ticks, beginning(), end, finish=False)
+    file = write_recording(store.recordings / name, ticks, begun(), finish=False)
     file._out.close()
     return store.recordings / f"{name}.part"
 
@@ -36,20 +36,27 @@ def part(store, name="20261121-103015-0001.mcap", ticks=200, end=None):
 def test_a_cut_recording_becomes_a_trial_that_does_not_count(store):
     path = part(store)
     (found,) = recover_store(store)
-    assert (found.what, found.trial) == ("saved", 1)
+    assert (found.what, found.trial) == ("recovered", 1)
     # Of 200 ticks, those of the last chunk that was closed are there: 50 ms of 1 kHz at most are missing.
     assert 150 <= found.ticks <= 200
     kept = store.trial(1)
-    assert (kept.listed.outcome, kept.listed.whole, kept.listed.label) == ("aborted", False, "can:full_open")
-    assert "were recovered" in kept.trial["reason"]
-    assert kept.features[0] == ("p_first", "m")  # drawn anew, by the settings in the recording
+    assert (kept.summary.outcome, kept.summary.complete, kept.summary.label) == (
+        "aborted",
+        False,
+        "can:full_open",
+    )
+    assert "were recovered" in kept.result.reason
+    assert kept.result.features.features[0] == (
+        "p_first",
+        "m",
+    )  # extracted with the settings in the recording
     assert len(read_recorded(kept.recording)) == found.ticks
-    with kept.recording.open("rb") as file:  # whole for anybody: it has a summary again
+    with kept.recording.open("rb") as file:  # complete for other readers: it has a summary again
         assert make_reader(file).get_summary().statistics.channel_message_counts[1] == found.ticks
     assert path.with_name("20261121-103015-0001.mcap.cut").is_file()
     assert store.counts() == {}
     assert verify_store(store.folder).as_json() == {
-        "whole": True,
+        "intact": True,
         "trials": 1,
         "recordings": 1,
         "problems": [],
@@ -66,21 +73,21 @@ def test_recovering_twice_changes_nothing(store):
 
 
 def test_a_finished_trial_that_only_lacks_its_row_counts(store):
-    write_recording(store.recordings / "a.mcap", 100, beginning(), ending())
-    file = write_recording(store.recordings / "b.mcap", 100, beginning(), ending(), finish=False)
+    write_recording(store.recordings / "a.mcap", 100, ended())
+    file = write_recording(store.recordings / "b.mcap", 100, ended(), finish=False)
     file.leave()  # ended, but not renamed
-    assert [(one.what, one.trial) for one in recover_store(store)] == [("kept", 1), ("kept", 2)]
+    assert [(one.what, one.trial) for one in recover_store(store)] == [("added", 1), ("added", 2)]
     assert store.counts() == {("can:full_open", None): 2}
-    assert store.trial(1).values == (0.066, 5.5)
-    assert store.trial(1).listed.made_at == beginning().made_at
+    assert store.trial(1).result.features.values == (0.066, 5.5)
+    assert store.trial(1).summary.made_at == begun().made_at
 
 
 def test_recovery_that_was_killed_itself_is_done_again(store):
     path = part(store)
     copy = path.with_name("20261121-103015-0001-recovered.mcap")
-    write_recording(copy, 3, beginning(), finish=False)._out.close()
+    write_recording(copy, 3, begun(), finish=False)._out.close()
     (found,) = recover_store(store)
-    assert (found.what, found.recording) == ("saved", copy)
+    assert (found.what, found.recording) == ("recovered", copy)
     assert len(read_recorded(copy)) == found.ticks > 100
     # And killed after the copy was written, before the row was.
     store._connection.execute("DELETE FROM detail")
@@ -91,11 +98,11 @@ def test_recovery_that_was_killed_itself_is_done_again(store):
 
 
 def test_a_recording_that_is_being_written_is_left_alone(store):
-    file = write_recording(store.recordings / "a.mcap", 100, beginning(), ending(), finish=False)
+    file = write_recording(store.recordings / "a.mcap", 100, ended(), finish=False)
     (found,) = recover_store(store)
     assert (found.what, found.why) == ("busy", "it is being written")
     file.finish()
-    assert [one.what for one in recover_store(store)] == ["kept"]
+    assert [one.what for one in recover_store(store)] == ["added"]
 
 
 @pytest.mark.parametrize("bytes_written", [None, 0, 5, 60])
@@ -109,35 +116,35 @@ def test_a_file_without_a_tick_makes_no_trial(store, bytes_written):
 @pytest.mark.parametrize("settings", ["no TOML at all [", "[features]\n", ""])
 def test_a_recording_with_settings_that_nobody_can_read_is_told(store, settings):
     path = store.recordings / "a.mcap"
-    write_recording(path, 100, beginning(settings=settings), ending())
+    write_recording(path, 100, ended(), settings=settings)
     (found,) = recover_store(store)
     assert found.what == "failed"
     assert path.is_file()
 
 
 def test_a_feature_set_that_is_not_installed_does_not_lose_the_trial(store):
-    settings = beginning().settings.replace("graspsense/chitta", "elsewhere/mine")
-    write_recording(store.recordings / "a.mcap", 100, beginning(settings=settings))
+    settings = begun().settings_text.replace("graspsense/chitta", "elsewhere/mine")
+    write_recording(store.recordings / "a.mcap", 100, begun(settings=settings))
     (found,) = recover_store(store)
-    assert (found.what, found.trial) == ("saved", 1)
-    assert "elsewhere/mine" in json.loads(store.query("SELECT reasons FROM detail")[0][0])[""]
+    assert (found.what, found.trial) == ("recovered", 1)
+    assert "elsewhere/mine" in json.loads(store.query("SELECT missing FROM detail")[0][0])[""]
 
 
 def test_a_lost_database_is_made_again_from_the_recordings(store):
     numbers = [keep(store, label) for label in ("can:full_open", "can:empty_open", "toy")]
-    before = [(one.label, one.outcome, store.trial(one.id).values) for one in store.page()]
+    before = [(one.label, one.outcome, store.trial(one.id).result.features.values) for one in store.page()]
     store.close()
     for one in store.folder.glob("store.sqlite*"):
         one.rename(one.with_name("old-" + one.name))
     with Store.open(store.folder) as new:
-        assert [one.what for one in recover_store(new)] == ["kept"] * len(numbers)
-        after = [(one.label, one.outcome, new.trial(one.id).values) for one in new.page()]
+        assert [one.what for one in recover_store(new)] == ["added"] * len(numbers)
+        after = [(one.label, one.outcome, new.trial(one.id).result.features.values) for one in new.page()]
     assert sorted(after) == sorted(before)
 
 
 def test_a_damaged_file_alone_is_written_anew_as_far_as_it_can_be_read(tmp_path):
     path = tmp_path / "g.mcap"
-    write_recording(path, 300, beginning(), ending())
+    write_recording(path, 300, ended())
     data = path.read_bytes()
     middle = data[: len(data) // 2] + b"\0\0\0\0" + data[len(data) // 2 + 4 :]
     path.write_bytes(middle)
@@ -149,13 +156,13 @@ def test_a_damaged_file_alone_is_written_anew_as_far_as_it_can_be_read(tmp_path)
     assert 240 <= len(again) < 300
     assert set(again.ticks["t_s"].tolist()) <= {10.0 + k * 0.001 for k in range(300)}
     assert "messages in it are lost" in found.why
-    with pytest.raises(NotKept, match="is there already"):
+    with pytest.raises(SaveFailed, match="already exists"):
         recover_file(path)
 
 
 def test_what_needs_no_recovery_or_cannot_be_recovered_is_told(tmp_path):
-    write_recording(tmp_path / "g.mcap", 30, beginning(), ending())
-    with pytest.raises(ConfigError, match="is whole: there is nothing to recover"):
+    write_recording(tmp_path / "g.mcap", 30, ended())
+    with pytest.raises(ConfigError, match="is complete: there is nothing to recover"):
         recover_file(tmp_path / "g.mcap")
     (tmp_path / "other.mcap").write_bytes(b"t,gap\n")
     with pytest.raises(DataDamaged, match="no tick can be read from"):
@@ -178,11 +185,11 @@ def test_the_commands_say_what_they_did(store):
     done = run("recover", store.folder, "--json")
     assert done.returncode == 0
     (file,) = json.loads(done.stdout)["files"]
-    assert (file["what"], file["trial"]) == ("saved", 2)
+    assert (file["what"], file["trial"]) == ("recovered", 2)
     store.trial(1).recording.unlink()
     done = run("verify", store.folder)
     assert done.returncode == 5
-    assert "is gone" in done.stdout
+    assert "is missing" in done.stdout
     done = run("replay", f"{store.folder}#1")
     assert done.returncode == 5
-    assert "has lost its recording" in done.stderr
+    assert "recording of trial 1" in done.stderr

@@ -117,7 +117,7 @@ def test_a_trial_that_is_kept_runs_again_from_its_recording_and_from_its_setting
     assert json.loads(again.stdout)["features"] == kept["features"]
     settings = tmp_path / "settings.toml"
     with Store.read(store) as opened:
-        settings.write_text(opened.trial(1).settings)
+        settings.write_text(opened.trial(1).record.settings_text)
     again = graspsense("run", "--json", "--pipeline", str(settings))
     assert json.loads(again.stdout)["features"] == kept["features"]
     graspsense("run", "--save", str(store))
@@ -171,7 +171,7 @@ def test_a_folder_that_cannot_be_written_is_found_out_before_the_grasp(tmp_path)
     (tmp_path / "file").write_text("in the way")
     done = graspsense("run", "--save", str(tmp_path / "file"))
     assert done.returncode == 2
-    assert "cannot keep a trial" in done.stderr
+    assert "cannot create a store" in done.stderr
     assert "approach" not in done.stderr
 
 

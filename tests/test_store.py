@@ -8,13 +8,14 @@ import sys
 import threading
 
 import pytest
-from kept import beginning, ending, keep, write_recording
+from kept import ended, keep, write_recording
 
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.recording.recorder import NotKept
+from graspsense.recording.atomic_file import SaveFailed
+from graspsense.recording.recording_info import RecordingInfo
 from graspsense.store import schema
 from graspsense.store.labels import labels_of
-from graspsense.store.recover import facts_of, recover_store
+from graspsense.store.recover import recover_store
 from graspsense.store.store import Store
 from graspsense.store.verify import verify_store
 
@@ -29,17 +30,16 @@ def test_a_trial_comes_back_as_it_was_kept(store):
     number = keep(store, "can:full_open", "can#2", values=(0.066, None))
     with Store.read(store.folder) as reader:
         kept = reader.trial(number)
-    assert kept.features == (("p_first", "m"), ("f_steady", "N"))
-    assert kept.values == (0.066, None)
-    assert (kept.listed.label, kept.listed.instance, kept.listed.outcome) == (
+    assert kept.result.features.features == (("p_first", "m"), ("f_steady", "N"))
+    assert kept.result.features.values == (0.066, None)
+    assert (kept.summary.label, kept.summary.instance, kept.summary.outcome) == (
         "can:full_open",
         "can#2",
         "steady",
     )
-    assert kept.labels == {"label": "can:full_open", "instance": "can#2"}
-    assert kept.listed.simulated
-    assert kept.provenance["seed"] == 3
-    assert kept.device["serial"] == kept.listed.device == "S1"
+    assert kept.record == ended(values=(0.066, None), label="can:full_open", instance="can#2")
+    assert kept.summary.simulated
+    assert kept.summary.device == "S1"
     assert kept.recipe["controller"] == {"type": "graspsense/hybrid", "probing_force_n": 20.0}
     assert "object" not in kept.recipe["gripper"]
     assert kept.recording.is_file()
@@ -47,7 +47,7 @@ def test_a_trial_comes_back_as_it_was_kept(store):
 
 def test_numbers_are_kept_to_the_last_bit(store):
     values = (0.1 + 0.2, 5e-324)
-    assert store.trial(keep(store, values=values)).values == values
+    assert store.trial(keep(store, values=values)).result.features.values == values
 
 
 def test_a_page_holds_the_newest_that_fit_newest_first(store):
@@ -69,18 +69,17 @@ def test_what_is_set_aside_stays_but_does_not_count(store):
     assert verify_store(store.folder).problems == ()
 
 
-def test_only_whole_grasps_that_ended_by_themselves_count(store):
+def test_only_complete_grasps_that_ended_by_themselves_count(store):
     for outcome in ("steady", "aborted", "device lost", "nothing there"):
         keep(store, outcome=outcome)
-    start, end = beginning(), ending()
-    path = store.new_recording(start.made_at)
-    write_recording(path, 5, start, end)
-    store.add(start, end, {}, facts_of(path, 5, 1), whole=False)
+    path = store.new_recording(ended().made_at)
+    write_recording(path, 5, ended())
+    store.add(ended(), RecordingInfo.of(path, 5, 1), complete=False)
     assert store.counts() == {("can:full_open", None): 2}
 
 
 def test_a_number_that_is_not_there_says_which_are(store):
-    with pytest.raises(ConfigError, match="it has none yet"):
+    with pytest.raises(ConfigError, match="it is empty"):
         store.trial(1)
     keep(store)
     with pytest.raises(ConfigError, match="has no trial 5: its trials are 1 to 1"):
@@ -117,11 +116,10 @@ def test_writers_wait_for_one_another(store):
 
 
 def test_a_recording_gets_one_row_whoever_writes_it(store):
-    start, end = beginning(), ending()
-    path = store.new_recording(start.made_at)
-    write_recording(path, 5, start, end)
-    facts = facts_of(path, 5, 1)
-    assert store.add(start, end, {}, facts) == store.add(start, end, {}, facts) == 1
+    path = store.new_recording(ended().made_at)
+    write_recording(path, 5, ended())
+    info = RecordingInfo.of(path, 5, 1)
+    assert store.add(ended(), info) == store.add(ended(), info) == 1
     assert len(store.page()) == 1
 
 
@@ -165,14 +163,15 @@ def test_an_older_store_is_brought_up_to_date_with_all_that_is_in_it(tmp_path, m
         keep(store)
     newer = (*older, ("ALTER TABLE trial ADD COLUMN mood TEXT", "CREATE INDEX by_mood ON trial (mood)"))
     monkeypatch.setattr(schema, "VERSIONS", newer)
-    schema.expected.cache_clear()
+    schema.tables_of_version.cache_clear()
     monkeypatch.setattr(schema, "NEWEST", len(newer))
-    monkeypatch.setattr("graspsense.store.store.NEWEST", len(newer))
+    for module in ("store", "opening"):
+        monkeypatch.setattr(f"graspsense.store.{module}.NEWEST", len(newer))
     with Store.read(tmp_path / "trials") as store:
-        assert store.trial(1).values == (0.066, 5.5)
+        assert store.trial(1).result.features.values == (0.066, 5.5)
         assert store.query("SELECT mood FROM trial") == [(None,)]
         assert store.query("PRAGMA user_version") == [(len(newer),)]
-    schema.expected.cache_clear()
+    schema.tables_of_version.cache_clear()
 
 
 def test_a_migration_that_fails_leaves_the_store_as_it_was(tmp_path, monkeypatch):
@@ -180,12 +179,12 @@ def test_a_migration_that_fails_leaves_the_store_as_it_was(tmp_path, monkeypatch
         keep(store)
     newer = (*schema.VERSIONS, ("ALTER TABLE trial ADD COLUMN mood TEXT", "CREATE TABLE trial (id)"))
     connection = sqlite3.connect(tmp_path / "trials" / "store.sqlite", isolation_level=None)
-    before = schema.found(connection)
+    before = schema.tables_in(connection)
     monkeypatch.setattr(schema, "VERSIONS", newer)
     monkeypatch.setattr(schema, "NEWEST", len(newer))
     with pytest.raises(sqlite3.OperationalError, match="already exists"):
         schema.migrate(connection, len(newer) - 1)
-    assert schema.found(connection) == before
+    assert schema.tables_in(connection) == before
     assert connection.execute("PRAGMA user_version").fetchone() == (len(newer) - 1,)
     connection.close()
 
@@ -218,7 +217,7 @@ def test_what_is_no_store_is_told_and_left_alone(store, content):
     path = store.folder / "store.sqlite"
     path.write_bytes(content)
     for opened in (Store.open, Store.read):
-        with pytest.raises(DataDamaged, match=r"recover|no store of graspsense"):
+        with pytest.raises(DataDamaged, match=r"recover|not a store of graspsense"):
             opened(store.folder)
     assert path.read_bytes() == content
 
@@ -229,7 +228,7 @@ def test_somebody_else_s_sqlite_file_is_left_alone(tmp_path):
     connection.commit()
     connection.close()
     before = (tmp_path / "store.sqlite").read_bytes()
-    with pytest.raises(DataDamaged, match="is no store of graspsense"):
+    with pytest.raises(DataDamaged, match="is not a store of graspsense"):
         Store.open(tmp_path)
     assert (tmp_path / "store.sqlite").read_bytes() == before
 
@@ -244,9 +243,9 @@ def test_reading_makes_no_store(tmp_path):
 def test_a_row_cannot_name_a_file_outside_of_the_store(store, name):
     number = keep(store)
     store._connection.execute("UPDATE trial SET recording = ? WHERE id = ?", (name, number))
-    with pytest.raises(DataDamaged, match="is no name of a recording"):
+    with pytest.raises(DataDamaged, match="is not a name of a recording"):
         store.trial(number)
-    assert any("is no name of a recording" in one for one in verify_store(store.folder).problems)
+    assert any("is not a name of a recording" in one for one in verify_store(store.folder).problems)
 
 
 @pytest.mark.parametrize(
@@ -272,10 +271,10 @@ def test_verify_finds_what_became_of_recordings(store):
     paths[1].write_bytes(paths[1].read_bytes()[:-50])
     data = paths[2].read_bytes()
     paths[2].write_bytes(data[:2000] + b"\0\0\0\0" + data[2004:])
-    write_recording(store.recordings / "loose.mcap", 5, beginning(), ending())
+    write_recording(store.recordings / "loose.mcap", 5, ended())
     found = verify_store(store.folder)
     assert [one.partition(":")[0] for one in found.problems] == ["trial 1", "trial 2", "trial 3"]
-    assert "is gone" in found.problems[0]
+    assert "is missing" in found.problems[0]
     assert "bytes and had" in found.problems[1]
     assert "damaged" in found.problems[2]
     assert found.unfinished == ("loose.mcap has no row",)
@@ -296,9 +295,9 @@ def test_a_store_on_a_read_only_disk_is_read_and_not_written(mounted, log):
         store.close()
     mounted("ro", remount=True)
     with Store.read(disk) as reader:
-        assert reader.trial(1).values == (0.066, 5.5)
+        assert reader.trial(1).result.features.values == (0.066, 5.5)
     assert verify_store(disk).problems == ()
-    with pytest.raises(NotKept, match="read-only"):
+    with pytest.raises(SaveFailed, match="read-only"):
         Store.open(disk)
 
 
@@ -306,7 +305,7 @@ def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
     disk = mounted("size=1500k")
     with Store.open(disk) as store:
         kept = 0
-        with pytest.raises((NotKept, OSError)) as told:  # noqa: PT012 - how many fit is the disk's business
+        with pytest.raises((SaveFailed, OSError)) as told:  # noqa: PT012 - how many fit is the disk's business
             while True:
                 keep(store, ticks=400)
                 kept += 1
@@ -327,7 +326,7 @@ def test_a_grasp_ends_as_it_would_have_when_the_disk_fills_up_under_it(mounted):
     mounted("size=4m", remount=True)
     with Store.open(disk) as store:
         (found,) = recover_store(store)
-        assert found.what == "saved"
+        assert found.what == "recovered"
         assert found.ticks > 500
 
 
@@ -345,7 +344,7 @@ def test_a_word_says_class_state_and_thing(word, labels):
 
 @pytest.mark.parametrize("word", ["", "a b", "can:", "can:full:open", "unknown", "unknown:x", "#2"])
 def test_a_word_that_is_no_label_is_refused(word):
-    with pytest.raises(ConfigError, match="is no label"):
+    with pytest.raises(ConfigError, match="is not a label"):
         labels_of(word)
 
 
@@ -354,10 +353,10 @@ def test_the_file_is_readable_without_us(store):
     keep(store)
     with sqlite3.connect(store.folder / "store.sqlite") as connection:
         rows = connection.execute(
-            """SELECT label, outcome, "values", json_extract(trial_json, '$.outcome')
+            """SELECT label, outcome, "values", json_extract(detail.device, '$.serial')
             FROM trial JOIN detail ON detail.trial = trial.id"""
         ).fetchall()
         (names,) = connection.execute("SELECT features FROM feature_set ORDER BY id LIMIT 1").fetchone()
     connection.close()
-    assert rows == [("can:full_open", "steady", struct.pack("<2d", 0.066, 5.5), "steady")]
+    assert rows == [("can:full_open", "steady", struct.pack("<2d", 0.066, 5.5), "S1")]
     assert json.loads(names)[0] == ["p_first", "m"]

@@ -103,7 +103,7 @@ def collect(
     done = all(n >= each for n in counts.values())
     if as_json:
         echo_json(
-            {"store": save, "trials": collection.kept, "counts": counts, "each": each, "complete": done}
+            {"store": save, "trials": collection.numbers, "counts": counts, "each": each, "complete": done}
         )
     else:
         for word, n in counts.items():

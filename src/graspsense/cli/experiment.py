@@ -65,7 +65,7 @@ def experiment(
     from graspsense.experiments.results import Results
     from graspsense.experiments.run import run_experiment
     from graspsense.experiments.summary import summarise
-    from graspsense.recording.recorder import NotKept
+    from graspsense.recording.atomic_file import SaveFailed
 
     planned = read_experiment(experiment, options)
     results = Results(Path(out or planned.name))
@@ -88,7 +88,7 @@ def experiment(
     problem = ""
     try:
         page = write_page(found, results)
-    except NotKept as error:
+    except SaveFailed as error:
         problem = str(error)
     more = found_in(found)
     if as_json:

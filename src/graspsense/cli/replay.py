@@ -59,14 +59,14 @@ def replay(
 def _settings(recording: str, pipeline: str | None, options: tuple[str, ...]) -> Settings:
     from graspsense.core.config import Flag, resolve
     from graspsense.sources.replay import KINDS, kind_and_name
-    from graspsense.store.trial_ref import own_settings
+    from graspsense.store.trial_ref import recorded_settings
 
     kind, name = kind_and_name(recording)
     if kind not in KINDS and "#" in recording:
         kind, name = "store", recording
     own: Any = None
     if pipeline is None and kind in ("store", "mcap"):
-        own = own_settings(kind, name)
+        own = recorded_settings(kind, name)
     flags = (
         Flag("--gripper", "gripper.type", "replay"),
         Flag("RECORDING", "gripper.recording", f"{kind}:{name}" if kind in KINDS else recording),

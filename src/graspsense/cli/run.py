@@ -108,12 +108,12 @@ def _kept(
     """Grasp and keep the trial; return it with what is printed of its keeping."""
     from graspsense.core.plugins import installed
     from graspsense.store.labels import labels_of
-    from graspsense.store.record_grasp import kept_grasp
+    from graspsense.store.record_grasp import record_grasp
     from graspsense.store.store import Store
 
     labels = {} if label is None else labels_of(label)
     with Store.open(save) as store:
-        grasp = kept_grasp(store, settings, installed(), labels=labels, origin="run", sinks=sinks)
+        grasp = record_grasp(store, settings, installed(), labels=labels, origin="run", sinks=sinks)
     if grasp.number is not None:
         talk(f"kept as trial {grasp.number} in {save}")
         if grasp.counts["dropped"]:

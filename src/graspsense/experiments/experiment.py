@@ -19,7 +19,7 @@ from graspsense.core.plugins import installed
 from graspsense.core.strict import InvalidValue, ValidationFailed, plain, structured
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.task import Task
-from graspsense.sources.simulated import refuse_real_gripper
+from graspsense.sources.simulated import simulated_objects
 from graspsense.sources.trial_source import SIMULATED, Source
 
 PIPELINE_TABLES: Final = (*(one for one in TABLE_OF_ROLE.values() if one != "classifier"), "run")
@@ -308,7 +308,7 @@ class _Plan:
         data = self._keys(values.get("data", {}), Source, "data")
         test = self._keys(values["test"], Source, "test") if values.get("test") else None
         if any(source is not None and source.kind == SIMULATED for source in (data, test)):
-            refuse_real_gripper(settings)
+            simulated_objects(settings)
         judge = self._keys(values.get("judge", {}), kind_of(one.kind).keys_class(), "judge")
         return Case(
             name=name,

@@ -18,7 +18,7 @@ from graspsense.core.roles import BatchBackend
 from graspsense.core.signals import Phase
 from graspsense.core.strict import structured
 from graspsense.report.grasps import grasp_as_json
-from graspsense.sources.simulated import THINGS_PER_SEED, TRIALS_PER_SEED
+from graspsense.sources.simulated import plan_trials
 from graspsense.sources.trial_source import Source, groups_of
 
 if TYPE_CHECKING:
@@ -46,14 +46,12 @@ def grasp(params: Mapping[str, Any], seed: int) -> dict[str, Any]:
     """
     judge = structured(params["judge"], Grasping, "[judge]")
     settings = settings_from(params["settings"], "the settings of the task")
-    dealt = [
-        one for group in groups_of(structured(params["data"], Source, "[data]")) for one in group.dealt()
-    ]
+    plan = plan_trials(settings, groups_of(structured(params["data"], Source, "[data]")), seed)
     backend = settings.gripper.create()
     if not isinstance(backend, BatchBackend):
-        raise ConfigError("experiments of kind grasp are made on a simulated gripper, as --gripper sim")
-    scenes = [f"{name}#{THINGS_PER_SEED * seed + i}" for _, name, i in dealt]
-    seeds = [TRIALS_PER_SEED * seed + k for k in range(len(dealt))]
+        raise ConfigError(
+            "experiments of kind grasp need a gripper that simulates batches, such as --gripper sim"
+        )
     feature_set = settings.features.create()
 
     def draw(trace: Trace) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -65,9 +63,9 @@ def grasp(params: Mapping[str, Any], seed: int) -> dict[str, Any]:
     kept: list[dict[str, Any]] = []
     count: Counter[str] = Counter()
     done = backend.run_many(
-        controller, scenes, seeds, run=evolve(settings.run, seed=seed), draw=draw, workers=1
+        controller, plan.scenes, plan.seeds, run=evolve(settings.run, seed=seed), draw=draw, workers=1
     )
-    for (label, _, _), one in zip(dealt, done, strict=True):
+    for label, one in zip(plan.labels, done, strict=True):
         drawn, course = one.drawn
         count[label] += 1
         rows.append({"label": label, "outcome": one.outcome.name.lower(), **one.report, **drawn})

@@ -33,7 +33,7 @@ ROWS: Final = 40
 
 
 def write_page(summary: Summary, results: Results) -> Path:
-    """Write `report.html` beside the results and return its path. Raises NotKept."""
+    """Write `report.html` beside the results and return its path. Raises SaveFailed."""
     path = results.folder / NAME
     write_html(path, experiment_page(summary, results))
     found = found_in(summary)

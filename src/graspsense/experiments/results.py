@@ -28,8 +28,8 @@ from graspsense.core.strict import plain
 from graspsense.experiments.experiment import PipelineOf, Planned
 from graspsense.experiments.task import Done
 from graspsense.experiments.versions import versions
-from graspsense.recording.provenance import of_this_process
-from graspsense.recording.recorder import NotKept
+from graspsense.recording.atomic_file import SaveFailed, write_or_replace
+from graspsense.recording.provenance import process_provenance
 
 EXPERIMENT: Final = "experiment.toml"
 PIPELINES: Final = "pipelines"
@@ -50,7 +50,7 @@ class Results:
         return self.folder / RESULTS / f"{key}.json"
 
     def add(self, done: Done) -> None:
-        """Keep what came of a task; when this returns the disk has it. Raises NotKept."""
+        """Keep what came of a task; when this returns the disk has it. Raises SaveFailed."""
         _write(self.path(done.key), done.to_text() + "\n")
 
     def get(self, key: str) -> Done | None:
@@ -71,7 +71,7 @@ class Results:
         return next((self.folder / RESULTS).glob("*.json"), None) is not None
 
     def begin(self, planned: Planned, command: str) -> None:
-        """Write what the results follow from beside them. Raises NotKept."""
+        """Write what the results follow from beside them. Raises SaveFailed."""
         texts = {f"{name}.toml": to_toml(one) for name, one in planned.pipelines.items()}
         for name, text in texts.items():
             _write(self.folder / PIPELINES / name, text)
@@ -86,7 +86,7 @@ class Results:
             "begun_at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
             "versions": dict(versions()),
             "files": _hashes(planned),
-            **of_this_process(),
+            **process_provenance(),
         }
         _write(self.folder / PROVENANCE, json.dumps(provenance, indent=2, ensure_ascii=False) + "\n")
 
@@ -100,13 +100,15 @@ class Results:
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Hold the folder: no other run writes here meanwhile. Raises ConfigError, NotKept."""
+        """Hold the folder: no other run writes here meanwhile. Raises ConfigError, SaveFailed."""
         try:
             (self.folder / RESULTS).mkdir(parents=True, exist_ok=True)
             (self.folder / PIPELINES).mkdir(exist_ok=True)
             lock = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
         except OSError as error:
-            raise NotKept(f"cannot write to {self.folder}: {error.strerror}. Name another --out") from error
+            raise SaveFailed(
+                f"cannot write to {self.folder}: {error.strerror}. Name another --out"
+            ) from error
         try:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -166,20 +168,4 @@ def _hashes(planned: Planned) -> dict[str, str]:
 
 
 def _write(path: Path, text: str) -> None:
-    part = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-        # The name, too, must outlive a loss of power.
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise NotKept(f"{path} cannot be written: {error.strerror}") from error
+    write_or_replace(path, text.encode(), make_folder=True)

@@ -14,7 +14,7 @@ from graspsense.experiments.results import Results
 from graspsense.experiments.task import Done
 from graspsense.experiments.timing import TimeLeft
 from graspsense.experiments.versions import differences, versions
-from graspsense.recording.recorder import NotKept
+from graspsense.recording.atomic_file import SaveFailed
 
 
 @frozen(kw_only=True)
@@ -68,7 +68,7 @@ def run_experiment(
 
     `executor` is asked for only where something is missing. Ctrl-C, the workers' end and a disk that takes no
     further result stop the run; what was done until then is kept. Raises ConfigError where there are results
-    already and `resume` is not set, NotKept where nothing can be written to begin with.
+    already and `resume` is not set, SaveFailed where nothing can be written to begin with.
     """
     tasks = list({task.key: task for task in planned.tasks()}.values())
     with results.alone():
@@ -106,7 +106,7 @@ def run_experiment(
                             progress(what, len(known) + len(came), len(tasks))
             except KeyboardInterrupt:
                 stopped = "interrupted"
-            except (ExecutorLost, NotKept) as lost:
+            except (ExecutorLost, SaveFailed) as lost:
                 stopped = str(lost)
             finally:
                 if running is not None:

@@ -1,8 +1,8 @@
-"""Features from before the contact: a control that no object can be recognised by, unless the data leak.
+"""Features from before contact: a control from which no object can be recognised, unless the data leak labels.
 
-Everything is from the first half second of the approach, a span that does not depend on how wide the thing is:
-the gap it begins at, and the means of speed, effort and both pad forces. Where a pad feels something in that time
-or shortly after it, the features are missing.
+They use the first half second of the approach, an interval that does not depend on the width of the object: the gap
+at its start, and the means of velocity, effort and both pad forces. If a pad exceeds the contact threshold in this
+time or shortly after it, the features are missing.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from graspsense.core.trace import Trace
 
 SPAN_S: Final = 0.5
 GUARD_S: Final = 0.1
-"""A cell image can be 41 ms old: what begins to be felt within this time after the span was there in it."""
+"""A pad image can be 41 ms old, so a contact within this time after the interval may already have begun in it."""
 
 NAMES: Final = (
     "gap_at_start",
@@ -32,7 +32,7 @@ _UNITS: Final = ("m", "m/s", "N", "N", "N")
 
 
 def before_contact(trace: Trace) -> Features:
-    """Return the features from before the contact, missing with a reason where it came too soon."""
+    """Return the features from before contact; they are missing, with the reason, if contact came too early."""
     approach = np.flatnonzero(trace.phase == APPROACH)
     if not len(approach):
         return _missing("there was no approach")
@@ -41,7 +41,7 @@ def before_contact(trace: Trace) -> Features:
         return _missing(f"the approach took less than {SPAN_S:g} s")
     felt = np.maximum(trace.force_left_n, trace.force_right_n) >= CONTACT_FORCE_N
     if bool((felt & (trace.t_s <= start + SPAN_S + GUARD_S)).any()):
-        return _missing(f"a pad felt something in the first {SPAN_S + GUARD_S:g} s of the approach")
+        return _missing(f"a pad felt a force in the first {SPAN_S + GUARD_S:g} s of the approach")
     span = approach[trace.t_s[approach] <= start + SPAN_S]
     means = [
         float(column[span].mean())

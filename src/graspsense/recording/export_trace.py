@@ -1,4 +1,4 @@
-"""One recorded grasp as a file for other programs: CSV, NPZ, Parquet, the recording itself, or its settings."""
+"""Exporting one recorded grasp: CSV, NPZ, Parquet, a copy of the MCAP file, or the settings as TOML."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.trace import PAD_COLUMNS, TICK_COLUMNS
-from graspsense.recording.atomic_file import write_whole
+from graspsense.recording.atomic_file import write_new
 from graspsense.recording.layout import PADS_FIELDS, TICK_FIELDS
 from graspsense.recording.parquet import parquet
-from graspsense.recording.trial_record import beginning_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,36 +23,36 @@ if TYPE_CHECKING:
 
 
 def write_csv(path: Path, grasp: RecordedGrasp) -> None:
-    """Write a line a tick, empty where a channel is missing; the cell images go to `NAME-pads.csv`."""
+    """Write one line per tick, with an empty cell for a missing channel. Pad images go to `NAME-pads.csv`."""
     if len(grasp.pads):
-        write_whole(_pads_beside(path), _csv(grasp.pads, PADS_FIELDS))
-    write_whole(path, _csv(grasp.ticks, TICK_FIELDS))
+        write_new(_pads_beside(path), _csv(grasp.pads, PADS_FIELDS))
+    write_new(path, _csv(grasp.ticks, TICK_FIELDS))
 
 
 def write_npz(path: Path, grasp: RecordedGrasp) -> None:
-    """Write the columns of the trace as arrays, as `graspsense.Trace` names them."""
+    """Write the columns of the trace as arrays with the names of `graspsense.Trace`."""
     trace, out = grasp.trace(), io.BytesIO()
     columns = {name: getattr(trace, name) for name in (*TICK_COLUMNS, *PAD_COLUMNS)}
     np.savez_compressed(out, allow_pickle=False, **columns)
-    write_whole(path, out.getvalue())
+    write_new(path, out.getvalue())
 
 
 def write_parquet(path: Path, grasp: RecordedGrasp) -> None:
-    """Write a row a tick; the cell images go to `NAME-pads.parquet`. Raises PluginUnavailable without pyarrow."""
+    """Write one row per tick. Pad images go to `NAME-pads.parquet`. Raises PluginUnavailable without pyarrow."""
     ticks = parquet({name: (grasp.ticks[name], "") for name in TICK_FIELDS})
     if len(grasp.pads):
-        write_whole(_pads_beside(path), parquet({name: (grasp.pads[name], "") for name in PADS_FIELDS}))
-    write_whole(path, ticks)
+        write_new(_pads_beside(path), parquet({name: (grasp.pads[name], "") for name in PADS_FIELDS}))
+    write_new(path, ticks)
 
 
 def write_mcap(path: Path, grasp: RecordedGrasp) -> None:
-    """Copy the recording as it is."""
-    write_whole(path, grasp.path.read_bytes())
+    """Copy the recording."""
+    write_new(path, grasp.path.read_bytes())
 
 
 def write_toml(path: Path, grasp: RecordedGrasp) -> None:
-    """Write the settings that made it: a pipeline file that runs by itself."""
-    write_whole(path, beginning_in(grasp.metadata, str(grasp.path)).settings.encode())
+    """Write the settings of the grasp as a complete pipeline file."""
+    write_new(path, grasp.record().settings_text.encode())
 
 
 WRITERS: Final[Mapping[str, Callable[[Path, RecordedGrasp], None]]] = {
@@ -63,7 +62,7 @@ WRITERS: Final[Mapping[str, Callable[[Path, RecordedGrasp], None]]] = {
     ".mcap": write_mcap,
     ".toml": write_toml,
 }
-"""Ending of a file to what writes it."""
+"""File extension to the function that writes it."""
 
 
 def _csv(rows: NDArray[np.void], fields: tuple[str, ...]) -> bytes:
@@ -71,7 +70,7 @@ def _csv(rows: NDArray[np.void], fields: tuple[str, ...]) -> bytes:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(fields)
     for row in rows.tolist():
-        writer.writerow(["" if isinstance(one, float) and math.isnan(one) else repr(one) for one in row])
+        writer.writerow(["" if isinstance(cell, float) and math.isnan(cell) else repr(cell) for cell in row])
     return out.getvalue().encode()
 
 

@@ -1,8 +1,8 @@
-"""What a recording holds: topics, fields and metadata of an MCAP file of ours, and the wire to its writer.
+"""The layout of a recording: topics, fields and metadata of its MCAP file, and the protocol to the writer process.
 
-Messages are ROS 2 messages in CDR (schema encoding `ros2msg`, message encoding `cdr`), one scalar a field, every
-field 8 bytes wide, so that a message is 4 bytes of CDR header and a packed structure. One topic holds the ticks,
-another the cell images of the pads, on their own slower clock. An image stands before the tick that first had it.
+Messages are ROS 2 messages in CDR (schema encoding `ros2msg`, message encoding `cdr`). Every field is a scalar of 8
+bytes, so a message is 4 bytes of CDR header and a packed structure. One topic holds the control ticks. Another holds
+the pad images, which come at their own, lower rate. An image precedes the first tick that used it.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from typing import Final
 
 from graspsense.core.signals import CELLS, Frame
 
-VERSION: Final = 1
-"""Of this layout; it stands in the metadata `graspsense` of every recording."""
+VERSION: Final = 2
+"""Version of this layout, stored in the metadata record `START` of every recording."""
 
 PART: Final = ".part"
-"""Behind the name of a recording that is not whole yet."""
+"""Suffix of a recording that is not complete yet."""
 
 TICK_TOPIC: Final = "/grasp/tick"
 PADS_TOPIC: Final = "/grasp/pads"
@@ -49,18 +49,19 @@ SCHEMAS: Final = {
     TICK_TOPIC: ("graspsense_msgs/msg/Tick", _schema(TICK_FIELDS)),
     PADS_TOPIC: ("graspsense_msgs/msg/Pads", _schema(PADS_FIELDS)),
 }
-"""Topic to the name of its message and its definition."""
+"""Topic to the name of its message type and the definition of that type."""
 
 TICK: Final = struct.Struct("<" + _code(TICK_FIELDS))
 PADS: Final = struct.Struct("<" + _code(PADS_FIELDS))
 
 START: Final = "graspsense"
 DEVICE: Final = "graspsense.device"
-TRIAL: Final = "graspsense.trial"
-"""Metadata records: what made the trial, which gripper it was, and, at the end, what came out. Each is a map of
-texts; all but `version` are JSON or TOML."""
+RESULT: Final = "graspsense.result"
+"""Names of the metadata records, the sections of a `TrialRecord`: how the trial was made, which gripper made it, and
+its result. Each is a map of texts. `settings` is TOML; the others are plain texts or JSON."""
 
-# To the writer's process: a byte that says what follows, then a body of fixed length, or of a length before it.
+# Protocol to the writer process: one byte for the kind of message, then a body. Ticks and images have a fixed length;
+# metadata states its length first.
 TICK_WIRE: Final = struct.Struct("<c" + _code(TICK_FIELDS))
 PADS_WIRE: Final = struct.Struct("<c" + _code(PADS_FIELDS))
 LENGTH_WIRE: Final = struct.Struct("<cI")
@@ -68,6 +69,6 @@ IS_TICK: Final = b"T"
 IS_PADS: Final = b"P"
 IS_METADATA: Final = b"M"
 IS_END: Final = b"E"
-"""The trial is over: end the file and give it its name."""
+"""The trial is over: finish the file and give it its final name."""
 READY: Final = "ready\n"
-"""What the writer's process says when the file is there; its last word is one line of JSON."""
+"""Line that the writer process prints once the file exists. Its last line is a JSON object."""

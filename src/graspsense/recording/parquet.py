@@ -1,4 +1,4 @@
-"""Columns with units as the bytes of a Parquet file, through pyarrow."""
+"""Encoding columns with units as a Parquet file, using pyarrow."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PARQUET_HINT: Final = (
 
 
 def parquet(columns: Mapping[str, tuple[Any, str]]) -> bytes:
-    """Return a Parquet file of these columns, each with its unit. Raises PluginUnavailable without pyarrow."""
+    """Return a Parquet file with these columns, given with their units. Raises PluginUnavailable without pyarrow."""
     try:
         import pyarrow
         import pyarrow.parquet

@@ -1,4 +1,4 @@
-"""What made a trial, besides its settings: versions, the commit of the code, the machine, the gripper."""
+"""Provenance of a trial besides its settings: versions, the commit of the code, and the machine."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ _WITH: Final = ("numpy", "scikit-learn", "mcap")
 
 
 def provenance(settings: Settings) -> dict[str, Any]:
-    """Return the config's hash, component and library versions, the commit, and the machine."""
+    """Return the hash of the settings, component and library versions, the commit, and the machine."""
     return {
         "config_sha256": config_sha256(settings.values),
         "components": dict(settings.components),
         "seed": settings.run.seed,
-        **of_this_process(),
+        **process_provenance(),
     }
 
 
 def config_sha256(values: Mapping[str, Any]) -> str:
-    """Return the hash of resolved settings: the same settings, the same hash."""
+    """Return a hash of resolved settings, equal for equal settings."""
     return hashlib.sha256(json_text(values).encode()).hexdigest()
 
 
 PER_GRASP: Final = (("gripper", "object"), ("gripper", "recording"), ("run", "seed"))
-"""Settings that differ from grasp to grasp of one and the same experiment."""
+"""Settings that differ between the grasps of one experiment."""
 
 
 def recipe(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Return the settings that decide what is felt: without `PER_GRASP`, the classifier, and keys that are not set."""
+    """Return the settings that affect measurements: without `PER_GRASP`, the classifier, and keys that are not set."""
     return {
         table: {
             key: value for key, value in keys.items() if value is not None and (table, key) not in PER_GRASP
@@ -53,8 +53,8 @@ def recipe(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]
 
 
 @cache
-def of_this_process() -> Mapping[str, Any]:
-    """Return library versions, the commit of the code and of the work here, and the machine."""
+def process_provenance() -> Mapping[str, Any]:
+    """Return library versions, the commits of the code and of the current folder, and the machine."""
     code, work = _commit(Path(__file__).parent), _commit(Path.cwd())
     return {
         "graspsense": __version__,
@@ -74,17 +74,17 @@ def _version(name: str) -> str | None:
 
 
 def _commit(folder: Path) -> dict[str, Any] | None:
-    """Return commit and dirty flag of the checkout this folder is in; None where it is in none."""
+    """Return commit and dirty flag of the checkout that contains this folder, or None."""
     commit = _git(folder, "rev-parse", "HEAD")
     if commit is None:
         return None
-    # Files that git ignores or does not know are not the code that ran.
+    # Ignored and untracked files are not part of the code that ran.
     changed = _git(folder, "status", "--porcelain", "--untracked-files=no")
     return {"commit": commit, "dirty": None if changed is None else bool(changed)}
 
 
 def _git(folder: Path, *arguments: str) -> str | None:
-    # A checkout's own settings may name programs to run; these are the ones that status would.
+    # The configuration of a checkout may name programs to run; disable those that `status` would run.
     command = ["git", "-c", "core.fsmonitor=false", "-c", "core.hooksPath=/dev/null", "-C", str(folder)]
     try:
         done = subprocess.run(

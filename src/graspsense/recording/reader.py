@@ -1,15 +1,14 @@
-"""Reading a recording: all of it or nothing, or what a killed writer left of it.
+"""Reading a recording: either completely, or, for recovery, as much of it as can be read.
 
-A file is somebody else's until it was read: lengths are bounded, checksums are checked, nothing in it is run.
+Files are not trusted: lengths are bounded, checksums are verified, and nothing in a file is executed.
 """
 
 from __future__ import annotations
 
-import json
 import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import zstandard
@@ -36,13 +35,14 @@ from graspsense.recording.layout import (
     TICK_TOPIC,
     VERSION,
 )
-from graspsense.recording.replayable import Recording
+from graspsense.recording.replayable import REPLAY_NOTE, Recording
+from graspsense.recording.trial_record import DeviceRecord, TrialRecord
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 LARGEST_RECORD: Final = 1 << 26
-"""No record of ours comes near it, packed or unpacked: 64 MB would be over five minutes in one chunk."""
+"""Limit on the size of a record, compressed or not; 64 MB would be a chunk of more than five minutes."""
 
 _DAMAGE: Final = (
     McapError,
@@ -62,10 +62,10 @@ _DAMAGE: Final = (
 class RecordedGrasp:
     """One recorded grasp.
 
-    `ticks` are rows of `layout.TICK_FIELDS` in the order in which they were written, `pads` rows of
-    `layout.PADS_FIELDS`, and `pads_before` says before which tick each image came. `whole` is whether the file has
-    its end; where it has not, `damage` says what is wrong with it and `lost` how many messages are known to be
-    missing between those that are there.
+    `ticks` has one row of `layout.TICK_FIELDS` per tick, in the order of writing, and `pads` one row of
+    `layout.PADS_FIELDS` per pad image. `pads_before[i]` is the index of the tick that image `i` precedes.
+    `complete` states whether the file has its end. If not, `damage` is the reason, and `lost` the number of messages
+    known to be missing between those that were read.
     """
 
     path: Path
@@ -73,12 +73,12 @@ class RecordedGrasp:
     pads: NDArray[np.void]
     pads_before: tuple[int, ...]
     metadata: Mapping[str, Mapping[str, str]]
-    whole: bool
+    complete: bool
     damage: str = ""
     lost: int = 0
     base_ns: int | None = None
-    """Wall clock at time 0 of the gripper's clock, None where there is no message."""
-    device: Mapping[str, Any] = field(factory=dict)
+    """Wall clock at time 0 of the gripper's clock; None if there is no message."""
+    device: DeviceRecord = field(factory=DeviceRecord)
 
     def __len__(self) -> int:
         """Return the number of ticks."""
@@ -86,12 +86,15 @@ class RecordedGrasp:
 
     @property
     def units(self) -> Mapping[str, str]:
-        """Unit of each channel and of `t`."""
-        given = self.device.get("units", {})
-        return {**SI_UNITS, **(given if isinstance(given, dict) else {})}
+        """Unit of each channel, and of the time `t`."""
+        return {**SI_UNITS, **self.device.units}
+
+    def record(self) -> TrialRecord:
+        """Return everything that is stored of the trial besides its ticks. Raises DataDamaged."""
+        return TrialRecord.from_sections(self.metadata, str(self.path))
 
     def trace(self) -> Trace:
-        """Return the columns."""
+        """Return the trace of the grasp."""
         frames, phases, commands = [], [], []
         for row in self.ticks.tolist():
             frames.append(Frame(*row[: len(Frame._fields)]))
@@ -100,7 +103,7 @@ class RecordedGrasp:
         return trace_of(frames, phases, commands, _images(self.pads), self.units)
 
     def readings(self) -> tuple[Reading, ...]:
-        """Return what the gripper gave, tick by tick, each with the cell image it then had."""
+        """Return the readings of the gripper, one per tick, each with its most recent pad image."""
         images = _images(self.pads)
         readings: list[Reading] = []
         image, following = NO_PADS, 0
@@ -111,29 +114,25 @@ class RecordedGrasp:
         return tuple(readings)
 
     def recording(self) -> Recording:
-        """Return it as what a gripper can replay."""
+        """Return the grasp in the form that a gripper can replay."""
         units = {name: unit for name, unit in self.units.items() if SI_UNITS.get(name) != unit}
-        notes = [str(one) for one in self.device.get("notes", ())]
         return Recording(
-            name=f"recording {self.path.name} of {self.device.get('name', 'an unknown gripper')}",
+            name=f"recording {self.path.name} of {self.device.name or 'an unknown gripper'}",
             readings=self.readings(),
-            rate_hz=float(self.device.get("rate_hz", 0.0)) or 1000.0,
+            rate_hz=self.device.rate_hz or 1000.0,
             units=units,
-            notes=(
-                *notes,
-                "the recording goes its own way: what the controller commands has no effect on it",
-            ),
+            notes=(*self.device.notes, REPLAY_NOTE),
         )
 
 
 def read_recorded(path: str | Path, *, salvage: bool = False) -> RecordedGrasp:
-    """Return the grasp in an MCAP file of ours.
+    """Return the grasp in a recording.
 
-    With `salvage` it is what can be read of a file that is damaged or has no end; without, such a file is refused.
-    Raises ConfigError where the file cannot be read, DataDamaged.
+    With `salvage`, return what can be read of a file that is damaged or has no end. Without it, such a file raises
+    DataDamaged. Raises ConfigError if the file cannot be opened.
     """
     path = Path(path).expanduser()
-    reading = _Reading(path)
+    reading = _PartialGrasp(path)
     damage = ""
     try:
         with path.open("rb") as file:
@@ -145,7 +144,7 @@ def read_recorded(path: str | Path, *, salvage: bool = False) -> RecordedGrasp:
                     if damage and not salvage:
                         break
                 if not damage and file.read(1):
-                    damage = "there is something behind its end"
+                    damage = "there is data after its end"
             except _DAMAGE as error:
                 damage = damage or f"{type(error).__name__}: {error}".removesuffix(": ")
     except FileNotFoundError:
@@ -163,8 +162,8 @@ def read_recorded(path: str | Path, *, salvage: bool = False) -> RecordedGrasp:
     return reading.grasp(damage, salvage)
 
 
-class _Reading:
-    """What was read so far."""
+class _PartialGrasp:
+    """The parts of a recording that have been read so far."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -179,31 +178,31 @@ class _Reading:
         self.ended = self.started = False
 
     def take(self, record: McapRecord) -> str:
-        """Take a record and return what is wrong with it."""
+        """Add one MCAP record. Return a description of its damage, or an empty text."""
         if isinstance(record, Header):
             self.started = True
         elif isinstance(record, Chunk):
             try:
-                for one in _unpacked(record):
-                    self._content(one)
+                for inner in _unpacked(record):
+                    self._content(inner)
             except _DAMAGE as error:
                 return f"a chunk cannot be read ({type(error).__name__}: {error})"
         elif isinstance(record, Metadata):
             self.metadata[record.name] = dict(record.metadata)
         elif isinstance(record, Message):
-            raise McapError("a message outside of any chunk is none of ours")
+            raise McapError("a message is outside of any chunk")
         elif isinstance(record, Footer | DataEnd):
             self.ended = self.ended or isinstance(record, Footer)
         return ""
 
     def shortfall(self) -> str:
-        """Return what a whole recording has and this one has not."""
+        """Return what is missing from a complete recording, or an empty text."""
         if not self.ended:
             return "it has no end"
         if self.lost:
             return f"{self.lost} messages are missing in it"
         if START not in self.metadata:
-            return "it does not say what made it: it is no recording of graspsense"
+            return "it does not say how it was made, so it is not a recording of graspsense"
         return ""
 
     def grasp(self, damage: str, salvage: bool) -> RecordedGrasp:
@@ -213,11 +212,9 @@ class _Reading:
                 f"the recording {self.path} has version {version[:20]!r}; this graspsense reads version {VERSION}"
             )
         if not self.started and not salvage:
-            raise DataDamaged(f"{self.path} is no MCAP file: {damage or 'it does not begin like one'}")
+            raise DataDamaged(f"{self.path} is not an MCAP file: {damage or 'its header is missing'}")
         try:
-            device = json.loads(self.metadata.get(DEVICE, {}).get("device", "{}"))
-            if not isinstance(device, dict):
-                raise TypeError("the description of the gripper is no table")
+            device = DeviceRecord.from_text(self.metadata.get(DEVICE, {}).get("device", "{}"))
             ticks, pads = self._rows(TICK_TOPIC), self._rows(PADS_TOPIC)
             grasp = RecordedGrasp(
                 path=self.path,
@@ -225,13 +222,12 @@ class _Reading:
                 pads=pads,
                 pads_before=tuple(self.pads_before),
                 metadata=self.metadata,
-                whole=self.ended and not damage and not self.lost,
+                complete=self.ended and not damage and not self.lost,
                 damage=damage,
                 lost=self.lost,
                 base_ns=self.base_ns,
                 device=device,
             )
-            _check_device(device)
         except _DAMAGE as error:
             raise DataDamaged(f"the recording {self.path} is damaged: {error}") from error
         return grasp
@@ -243,7 +239,7 @@ class _Reading:
             schema = self.schemas.get(record.schema_id)
             expected = SCHEMAS.get(record.topic)
             if expected is None:
-                return  # a topic of somebody else's beside ours
+                return  # a topic of another program
             if schema is None or record.message_encoding != "cdr" or schema.data != expected[1]:
                 raise ValueError(f"the fields of {record.topic} are not those of this version")
             self.topics[record.id] = record.topic
@@ -270,7 +266,7 @@ class _Reading:
 
 def _row_type(fields: tuple[str, ...], code: str) -> np.dtype[np.void]:
     kinds = {"d": "<f8", "q": "<i8"}
-    return np.dtype([(name, kinds[one]) for name, one in zip(fields, code, strict=True)])
+    return np.dtype([(name, kinds[letter]) for name, letter in zip(fields, code, strict=True)])
 
 
 _TICK_ROW: Final = _row_type(TICK_FIELDS, TICK.format.removeprefix("<"))
@@ -280,14 +276,14 @@ _COMMAND: Final = TICK_FIELDS.index("command")
 
 
 def _unpacked(chunk: Chunk) -> Sequence[McapRecord]:
-    """Return the records in a chunk. Raises ValueError, before anything large is made of a small lie."""
+    """Return the records in a chunk. Raises ValueError before a false length can allocate much memory."""
     if chunk.uncompressed_size > LARGEST_RECORD:
         raise ValueError(f"it claims to unpack to {chunk.uncompressed_size} bytes")
     if chunk.compression not in ("", "zstd"):
-        raise ValueError(f"its compression {chunk.compression[:20]!r} is none of ours")
+        raise ValueError(f"its compression {chunk.compression[:20]!r} is not supported")
     try:
         if chunk.compression and zstandard.frame_content_size(chunk.data) > LARGEST_RECORD:
-            raise ValueError("it would unpack to more than any chunk of ours")
+            raise ValueError("it would unpack to more than the largest chunk")
         return breakup_chunk(chunk, validate_crc=True)
     except zstandard.ZstdError as error:
         raise ValueError(f"it does not unpack: {error}") from error
@@ -295,12 +291,3 @@ def _unpacked(chunk: Chunk) -> Sequence[McapRecord]:
 
 def _images(pads: NDArray[np.void]) -> list[Pads]:
     return [Pads(row[0], row[1], row[2 : 2 + CELLS], row[2 + CELLS :]) for row in pads.tolist()]
-
-
-def _check_device(device: Mapping[str, Any]) -> None:
-    float(device.get("rate_hz", 0.0))
-    units, notes = device.get("units", {}), device.get("notes", [])
-    if not isinstance(units, dict) or not all(isinstance(one, str) for one in units.values()):
-        raise TypeError("the units of the gripper are no table of texts")
-    if not isinstance(notes, list):
-        raise TypeError("the notes on the gripper are no list")

@@ -1,7 +1,7 @@
-"""The sink that records: hands each tick to another process and never waits for it.
+"""The sink that records a grasp: it passes each tick to a writer process and never waits for it.
 
-A tick is one write to a pipe that does not block. What the pipe does not take is kept here and offered again with
-the next ticks; how much that was stands in `Recorded`.
+Each tick is one non-blocking write to a pipe. Messages that the pipe does not take are queued and offered again with
+the next ticks. `RecordingInfo` counts them.
 """
 
 from __future__ import annotations
@@ -19,10 +19,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
-from attrs import frozen
-
-from graspsense.core.errors import GraspsenseError
 from graspsense.core.signals import Command, Frame, Pads
+from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import (
     IS_END,
     IS_METADATA,
@@ -34,59 +32,25 @@ from graspsense.recording.layout import (
     READY,
     TICK_WIRE,
 )
+from graspsense.recording.recording_info import RecordingInfo
 
 PIPE_BYTES: Final = 1 << 20
-OFFERED_AGAIN: Final = 8
-"""Waiting messages that are offered with each new one, so that a tick stays short."""
-MOST_WAITING: Final = 500_000
-LAST_WORD_S: Final = 60.0
-
-
-class NotKept(GraspsenseError):
-    """A trial that could not be written where it was to be kept."""
-
-    exit_code = 2
-
-
-@frozen(kw_only=True)
-class Recorded:
-    """A recording that is whole on the disk, and how its writing went.
-
-    `deferred` counts the messages that the pipe did not take at once, `most_waiting` how many waited at the worst
-    moment, `dropped` those that were given up.
-    """
-
-    path: Path
-    sha256: str
-    size: int
-    ticks: int
-    images: int
-    deferred: int
-    most_waiting: int
-    dropped: int
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """The counts, for a report."""
-        return {
-            "ticks": self.ticks,
-            "images": self.images,
-            "deferred": self.deferred,
-            "most_waiting": self.most_waiting,
-            "dropped": self.dropped,
-        }
+RETRIES_PER_TICK: Final = 8
+"""Queued messages offered with each new one; the limit keeps a tick short."""
+QUEUE_LIMIT: Final = 500_000
+ANSWER_TIMEOUT_S: Final = 60.0
 
 
 class Recorder:
-    """Records one grasp into `path`; a sink of the runner.
+    """A sink of the runner that records one grasp to `path`.
 
-    Raises NotKept where the writing process cannot be started. After that nothing raises before `finish`: a disk
-    that is full must not stop a grasp.
+    Raises SaveFailed if the writer process cannot be started. After that, `take` never raises: a full disk must not
+    stop a grasp.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        # -P: a file mcap.py in the folder where the user stands is not ours.
+        # -P: do not import a file mcap.py from the current folder.
         command = [sys.executable, "-P", "-m", "graspsense.recording.writer_process", str(path)]
         try:
             self._process = subprocess.Popen(
@@ -98,7 +62,7 @@ class Recorder:
                 start_new_session=True,
             )
         except OSError as error:
-            raise NotKept(f"cannot start the process that records: {error.strerror}") from error
+            raise SaveFailed(f"cannot start the writer process: {error.strerror}") from error
         assert self._process.stdin is not None
         self._fd = self._process.stdin.fileno()
         os.set_blocking(self._fd, False)
@@ -111,7 +75,7 @@ class Recorder:
         self._deferred = self._most_waiting = self._dropped = 0
 
     def take(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
-        """Hand over one tick, and its cell image if it is a new one."""
+        """Pass on one tick, with its pad image if that is new."""
         data = TICK_WIRE.pack(IS_TICK, *frame, phase, *command)
         if pads.counter != self._counter:
             self._counter = pads.counter
@@ -119,34 +83,34 @@ class Recorder:
         self._send(data)
 
     def wait_ready(self) -> None:
-        """Wait until the writing process has its file, so that it is not behind when the fingers begin to move.
+        """Wait until the writer process has created its file, so that it keeps up when the fingers start to move.
 
-        Raises NotKept with the reason where it has none.
+        Raises SaveFailed with the reason if it could not.
         """
         assert self._process.stdout is not None
         out = self._process.stdout.fileno()
         said = b""
         while not said.endswith(b"\n"):
-            if not select.select([out], [], [], LAST_WORD_S)[0]:
-                raise NotKept(f"the process that records {self.path} does not start")
+            if not select.select([out], [], [], ANSWER_TIMEOUT_S)[0]:
+                raise SaveFailed(f"the writer process of {self.path} does not start")
             data = os.read(out, 4096)
             if not data:
-                raise NotKept(f"the process that records {self.path} has died at its start")
+                raise SaveFailed(f"the writer process of {self.path} died when it started")
             said += data
         if said.decode() != READY:
-            raise self._not_kept(json.loads(said))
+            raise self._failure(json.loads(said))
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Hand over a metadata record and wait until it is taken: not while the fingers are under control."""
+        """Pass on a metadata record and wait until the pipe has taken it. Do not call this during control."""
         body = json.dumps([name, dict(values)]).encode()
         self._drain(LENGTH_WIRE.pack(IS_METADATA, len(body)) + body)
 
-    def finish(self) -> Recorded:
-        """Wait until the recording is whole on the disk. Raises NotKept with the reason where it is not."""
-        answer = self._last_word(IS_END)
+    def finish(self) -> RecordingInfo:
+        """Wait until the recording is complete on the disk. Raises SaveFailed with the reason if it is not."""
+        answer = self._final_answer(IS_END)
         if answer is None or "sha256" not in answer:
-            raise self._not_kept(answer)
-        return Recorded(
+            raise self._failure(answer)
+        return RecordingInfo(
             path=self.path,
             sha256=answer["sha256"],
             size=answer["size"],
@@ -158,22 +122,24 @@ class Recorder:
         )
 
     def leave(self) -> None:
-        """End without a word that the trial is over: what was felt stays as `.part`, and nothing if nothing was."""
-        self._last_word(b"")
+        """Stop without ending the trial. The file remains as `.part`, or is deleted if it has no tick."""
+        self._final_answer(b"")
 
-    def _not_kept(self, answer: Mapping[str, Any] | None) -> NotKept:
-        reason = "its process has died" if answer is None else answer.get("error", "it was left")
+    def _failure(self, answer: Mapping[str, Any] | None) -> SaveFailed:
+        reason = "the writer process died" if answer is None else answer.get("error", "it was abandoned")
         part = self.path.with_name(self.path.name + PART)
         hint = (
-            f". What there is of it stands in {part.name}: see `graspsense recover`" if part.exists() else ""
+            f". {part.name} holds the part that was written: see `graspsense recover`"
+            if part.exists()
+            else ""
         )
-        return NotKept(f"the recording {self.path} could not be written: {reason}{hint}")
+        return SaveFailed(f"the recording {self.path} could not be written: {reason}{hint}")
 
     def _send(self, data: bytes) -> None:
         waiting = self._waiting
         if waiting:
             self._defer(data)
-            for _ in range(OFFERED_AGAIN):
+            for _ in range(RETRIES_PER_TICK):
                 if not waiting or not self._write(waiting[0]):
                     return
                 waiting.popleft()
@@ -181,7 +147,7 @@ class Recorder:
             self._defer(data)
 
     def _defer(self, data: bytes) -> None:
-        if len(self._waiting) >= MOST_WAITING:
+        if len(self._waiting) >= QUEUE_LIMIT:
             self._dropped += 1
             return
         self._waiting.append(data)
@@ -189,11 +155,11 @@ class Recorder:
         self._most_waiting = max(self._most_waiting, len(self._waiting))
 
     def _write(self, data: bytes) -> bool:
-        """Write to the pipe and return whether it took it; a pipe that nobody reads any more takes everything."""
+        """Write to the pipe. Return whether it took the data; a pipe without a reader counts as taking everything."""
         if self._broken:
             return True
         try:
-            os.write(self._fd, data)  # shorter than PIPE_BUF, so taken whole or not at all
+            os.write(self._fd, data)  # shorter than PIPE_BUF, so the write is atomic
         except BlockingIOError:
             return False
         except OSError:
@@ -201,8 +167,8 @@ class Recorder:
         return True
 
     def _drain(self, last: bytes) -> None:
-        """Write what waits and this, as long as somebody reads it, for at most a minute."""
-        until = time.monotonic() + LAST_WORD_S
+        """Write the queue and this message, for at most `ANSWER_TIMEOUT_S`, while the pipe has a reader."""
+        until = time.monotonic() + ANSWER_TIMEOUT_S
         view = memoryview(b"".join((*self._waiting, last)))
         self._waiting.clear()
         while view and not self._broken:
@@ -216,11 +182,11 @@ class Recorder:
             except OSError:
                 self._broken = True
 
-    def _last_word(self, word: bytes) -> dict[str, Any] | None:
-        """Send this word and return the answer; None where there is none within a minute."""
+    def _final_answer(self, word: bytes) -> dict[str, Any] | None:
+        """Send this message and return the answer, or None if none comes within `ANSWER_TIMEOUT_S`."""
         self._drain(word)
         try:
-            out, _ = self._process.communicate(timeout=LAST_WORD_S)
+            out, _ = self._process.communicate(timeout=ANSWER_TIMEOUT_S)
             answer = json.loads(out.decode().removeprefix(READY))
         except (subprocess.TimeoutExpired, ValueError):
             self._process.kill()

@@ -1,20 +1,23 @@
-"""A recorded grasp as a backend would have given it: the readings, and what their numbers mean."""
+"""A recorded grasp as a backend would have delivered it: the readings and the meaning of their numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final
 
 from attrs import field, frozen
 
 from graspsense.core.roles import Reading
 
+REPLAY_NOTE: Final = "a recording cannot react: the controller's commands have no effect on it"
+
 
 @frozen(kw_only=True, eq=False)
 class Recording:
-    """One recorded grasp.
+    """One recorded grasp that can be replayed.
 
-    `units` names the units that are not SI, `notes` says in words what a reader of the result has to know.
-    `rate_hz` is the number of frames in one unit of time.
+    `units` names the units that are not SI units. `notes` are sentences that a reader of the result needs.
+    `rate_hz` is the number of frames per unit of time.
     """
 
     name: str

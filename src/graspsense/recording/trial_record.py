@@ -1,212 +1,321 @@
-"""What is kept of a trial besides its ticks: one set of texts, the same in the recording and in the store.
+"""A trial as it is stored: everything except its ticks and pad images, in one form with one codec.
 
-The recording gets it as metadata, what is known before the grasp at its beginning and the rest at its end. The
-store's row is made from it, so that a row can be made again from a recording alone.
+A recording holds a record as MCAP metadata, in three sections that are written as they become known: `START` before
+the grasp, `DEVICE` once the gripper is open, `RESULT` after the grasp. The store holds the same texts in its columns.
+JSON texts are canonical: the same record always gives the same text.
 """
 
 from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from math import nan
-from typing import TYPE_CHECKING, Any, Final, Literal
+from math import isnan, nan
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args
 
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 
-from graspsense.core.config import to_toml
+from graspsense import __version__
+from graspsense.core.config import toml_key, toml_value
 from graspsense.core.errors import DataDamaged
 from graspsense.core.json_values import json_text
 from graspsense.core.trial import trial_as_json
 from graspsense.recording.before_contact import before_contact
-from graspsense.recording.layout import DEVICE, START, TRIAL, VERSION
+from graspsense.recording.layout import DEVICE, RESULT, START, VERSION
 from graspsense.recording.provenance import provenance
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings
     from graspsense.core.features import Features
-    from graspsense.core.json_values import json_text
     from graspsense.core.roles import DeviceInfo
-from graspsense.core.trial import Trial
+    from graspsense.core.trial import Trial
 
+T = TypeVar("T")
 Origin = Literal["run", "collect", "import"]
-ORIGINS: Final = ("run", "collect", "import")
+Metadata = Mapping[str, Mapping[str, str]]
+"""Section of a recording to its texts."""
+
+DETAILS: Final = ("prediction", "report", "counts", "events", "seconds_simulated", "seconds_wall")
+"""Keys of `graspsense run --json` that `TrialResult.details` holds; the others have fields of their own."""
+_MALFORMED: Final = (KeyError, ValueError, TypeError, AttributeError, RecursionError, struct.error)
 
 
 @frozen(kw_only=True)
-class Beginning:
-    """What is known before the grasp.
-
-    `labels` may hold `label` (`class:state`) and `instance` (the one thing that is grasped, `can#3`), and whatever
-    else the operator says. `settings` is a complete pipeline file.
-    """
-
-    made_at: str
-    origin: Origin
-    labels: Mapping[str, str]
-    settings: str
-    provenance: Mapping[str, Any]
-
-    def as_metadata(self) -> dict[str, str]:
-        """Return it as the texts of the metadata `START`."""
-        return {
-            "version": str(VERSION),
-            "made_at": self.made_at,
-            "origin": self.origin,
-            "labels": json_text(self.labels),
-            "settings": self.settings,
-            "provenance": json_text(self.provenance),
-        }
-
-
-@frozen(kw_only=True)
-class Row:
-    """The features of a trial, as both a recording's end and the store hold them: names, units, values, reasons."""
+class FeatureValues:
+    """The features of one trial: name and unit of each, its value (None if missing), and why values are missing."""
 
     features: tuple[tuple[str, str], ...]
     values: tuple[float | None, ...]
     reasons: Mapping[str, str] = field(factory=dict)
 
     @classmethod
-    def of(cls, features: Features) -> Row:
-        """Return the features as a row."""
+    def of(cls, features: Features) -> FeatureValues:
+        """Return the values of extracted features."""
         return cls(
             features=tuple(zip(features.names, features.units, strict=True)),
             values=tuple(features.as_dict().values()),
             reasons=dict(features.reasons),
         )
 
-    def as_json(self) -> dict[str, Any]:
-        """Return it as JSON values."""
-        return {
-            "features": [list(one) for one in self.features],
-            "values": list(self.values),
-            "reasons": dict(self.reasons),
-        }
+    @property
+    def names_text(self) -> str:
+        """Names and units as canonical JSON."""
+        return json_text([list(pair) for pair in self.features])
 
     def packed(self) -> bytes:
-        """Return the values as little-endian float64, NaN where missing."""
-        return struct.pack(f"<{len(self.values)}d", *(nan if one is None else one for one in self.values))
+        """Return the values as little-endian float64, with NaN for a missing value."""
+        return struct.pack(f"<{len(self.values)}d", *(nan if v is None else v for v in self.values))
+
+    def to_text(self) -> str:
+        """Return canonical JSON."""
+        return json_text(
+            {"features": self.features, "values": self.values, "reasons": self.reasons},
+        )
 
     @classmethod
-    def from_json(cls, value: Mapping[str, Any]) -> Row:
-        """Return what `as_json` gave. Raises KeyError, TypeError, ValueError."""
-        features = tuple((str(name), str(unit)) for name, unit in value["features"])
-        values = tuple(None if one is None else float(one) for one in value["values"])
-        if len(features) != len(values):
-            raise ValueError(f"{len(features)} features and {len(values)} values")
+    def from_text(cls, text: str) -> FeatureValues:
+        """Return the values that `to_text` wrote. Raises KeyError, TypeError or ValueError for any other text."""
+        value = json.loads(text)
+        return cls.checked(
+            value["features"],
+            tuple(None if v is None else float(v) for v in value["values"]),
+            value["reasons"],
+        )
+
+    @classmethod
+    def unpacked(cls, names_text: str, packed: bytes, reasons: Mapping[str, str]) -> FeatureValues:
+        """Return the values from `names_text` and `packed`. Raises TypeError, ValueError or struct.error."""
+        values = tuple(None if isnan(v) else v for (v,) in struct.iter_unpack("<d", packed))
+        return cls.checked(json.loads(names_text), values, reasons)
+
+    @classmethod
+    def checked(cls, features: Any, values: tuple[float | None, ...], reasons: Any) -> FeatureValues:
+        """Return feature values after checking that there is one value per feature. Raises TypeError, ValueError."""
+        pairs = tuple((str(name), str(unit)) for name, unit in features)
+        if len(pairs) != len(values):
+            raise ValueError(f"{len(pairs)} features and {len(values)} values")
+        return cls(features=pairs, values=values, reasons={str(k): str(v) for k, v in reasons.items()})
+
+
+@frozen(kw_only=True)
+class DeviceRecord:
+    """The gripper of a trial, as `DeviceInfo` described it when it was opened."""
+
+    name: str = ""
+    serial: str = ""
+    firmware: str = ""
+    clock: str = ""
+    simulated: bool = False
+    rate_hz: float = 0.0
+    calibration: Mapping[str, str] = field(factory=dict)
+    numbers: Mapping[str, float | str] = field(factory=dict)
+    units: Mapping[str, str] = field(factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, device: DeviceInfo) -> DeviceRecord:
+        """Return the record of an open gripper."""
+        return cls(**{name: getattr(device, name) for name in cls.__annotations__})
+
+    @property
+    def label(self) -> str:
+        """The serial number, or the name if there is none."""
+        return self.serial or self.name
+
+    def to_text(self) -> str:
+        """Return canonical JSON."""
+        return json_text({name: getattr(self, name) for name in DeviceRecord.__annotations__})
+
+    @classmethod
+    def from_text(cls, text: str) -> DeviceRecord:
+        """Return the device that `to_text` wrote. Raises TypeError or ValueError for any other text."""
+        value = json.loads(text)
+        if not isinstance(value, dict):
+            raise TypeError("the description of the gripper is not a table")
+        texts = {name: str(value.get(name, "")) for name in ("name", "serial", "firmware", "clock")}
+        units, notes = value.get("units", {}), value.get("notes", [])
+        if not isinstance(units, dict) or not all(isinstance(unit, str) for unit in units.values()):
+            raise TypeError("the units of the gripper are not a table of texts")
+        if not isinstance(notes, list):
+            raise TypeError("the notes on the gripper are not a list")
         return cls(
-            features=features, values=values, reasons={str(k): str(v) for k, v in value["reasons"].items()}
+            **texts,
+            simulated=bool(value.get("simulated", False)),
+            rate_hz=float(value.get("rate_hz", 0.0)),
+            calibration=dict(value.get("calibration", {})),
+            numbers=dict(value.get("numbers", {})),
+            units=units,
+            notes=tuple(str(note) for note in notes),
         )
 
 
 @frozen(kw_only=True)
-class Ending:
-    """What came out: the trial as `graspsense run --json` prints it, its features, those from before contact."""
+class TrialResult:
+    """The result of a grasp: its outcome, its features, and those from before contact.
 
-    trial: Mapping[str, Any]
-    features: Row
-    before: Row
+    `details` holds the prediction, the gripper's report, the runner's counts, the events and the durations, as
+    `graspsense run --json` prints them.
+    """
 
-    def as_metadata(self) -> dict[str, str]:
-        """Return it as the texts of the metadata `TRIAL`."""
-        return {
-            "trial": json_text(self.trial),
-            "features": json_text(self.features.as_json()),
-            "before": json_text(self.before.as_json()),
-        }
+    outcome: str
+    reason: str = ""
+    features: FeatureValues
+    before_contact: FeatureValues
+    details: Mapping[str, Any] = field(factory=dict)
 
-
-def beginning(settings: Settings, labels: Mapping[str, str], origin: Origin) -> Beginning:
-    """Return what is known before a grasp with these settings, now."""
-    return Beginning(
-        made_at=datetime.now(UTC).isoformat(timespec="milliseconds"),
-        origin=origin,
-        labels=dict(labels),
-        settings=to_toml(settings),
-        provenance=provenance(settings),
-    )
-
-
-def ending(trial: Trial) -> Ending:
-    """Return what is kept of a trial at its end."""
-    return Ending(
-        trial=trial_as_json(trial),
-        features=Row.of(trial.features),
-        before=Row.of(before_contact(trial.trace)),
-    )
+    @classmethod
+    def of(cls, trial: Trial) -> TrialResult:
+        """Return the result of a trial."""
+        printed = trial_as_json(trial)
+        return cls(
+            outcome=trial.outcome.words,
+            reason=trial.reason,
+            features=FeatureValues.of(trial.features),
+            before_contact=FeatureValues.of(before_contact(trial.trace)),
+            details={key: printed[key] for key in DETAILS},
+        )
 
 
-def device_metadata(device: DeviceInfo) -> dict[str, str]:
-    """Return what is kept of a gripper as the text of the metadata `DEVICE`."""
-    return {
-        "device": json_text(
-            {
-                "name": device.name,
-                "serial": device.serial,
-                "firmware": device.firmware,
-                "clock": device.clock,
-                "rate_hz": device.rate_hz,
-                "calibration": dict(device.calibration),
-                "numbers": dict(device.numbers),
-                "units": dict(device.units),
-                "notes": list(device.notes),
+@frozen(kw_only=True)
+class TrialRecord:
+    """One trial as recordings, the store, exports and replay hold it.
+
+    `made_at` is the start of the grasp in ISO 8601, UTC. `labels` may hold `label` (`class:state`), `instance` (the
+    individual object, `can#3`) and other texts of the operator. `settings` are those of a complete pipeline file,
+    without keys that are not set. `device` is None if the gripper was not opened, `result` if the grasp did not end.
+    """
+
+    made_at: str
+    origin: Origin
+    labels: Mapping[str, str]
+    settings: Mapping[str, Mapping[str, Any]]
+    provenance: Mapping[str, Any]
+    device: DeviceRecord | None = None
+    result: TrialResult | None = None
+
+    @classmethod
+    def begin(cls, settings: Settings, labels: Mapping[str, str], origin: Origin) -> TrialRecord:
+        """Return the record of a grasp that starts now, with these settings."""
+        return cls(
+            made_at=datetime.now(UTC).isoformat(timespec="milliseconds"),
+            origin=origin,
+            labels=dict(labels),
+            settings=without_none(settings.values),
+            provenance=provenance(settings),
+        )
+
+    def with_device(self, device: DeviceInfo) -> TrialRecord:
+        """Return the record with its gripper."""
+        return evolve(self, device=DeviceRecord.of(device))
+
+    def with_result(self, trial: Trial) -> TrialRecord:
+        """Return the record with its result."""
+        return evolve(self, result=TrialResult.of(trial))
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the gripper declared that its forces and motion come from a model."""
+        return self.device is not None and self.device.simulated
+
+    @property
+    def settings_text(self) -> str:
+        """The settings as a pipeline file in TOML."""
+        lines = [f"# Settings of a trial of {self.made_at}, written by graspsense {__version__}."]
+        for table, values in self.settings.items():
+            lines += ["", f"[{table}]"]
+            lines += [f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items()]
+        return "\n".join(lines) + "\n"
+
+    def section(self, name: str) -> dict[str, str]:
+        """Return the texts of one section: `START`, `DEVICE` or `RESULT`.
+
+        Raises ValueError if the record does not have this section.
+        """
+        if name == START:
+            return {
+                "version": str(VERSION),
+                "made_at": self.made_at,
+                "origin": self.origin,
+                "labels": json_text(self.labels),
+                "settings": self.settings_text,
+                "provenance": json_text(self.provenance),
             }
-        )
-    }
+        if name == DEVICE and self.device is not None:
+            return {"device": self.device.to_text()}
+        if name == RESULT and self.result is not None:
+            return {
+                "outcome": self.result.outcome,
+                "reason": self.result.reason,
+                "features": self.result.features.to_text(),
+                "before_contact": self.result.before_contact.to_text(),
+                "details": json_text(self.result.details),
+            }
+        raise ValueError(f"the record has no section {name!r}")
+
+    @classmethod
+    def from_sections(cls, metadata: Metadata, where: str) -> TrialRecord:
+        """Return the record whose texts these sections hold; `where` names the file in messages.
+
+        Raises DataDamaged if the section `START` is missing, or if any text cannot be read.
+        """
+        start = _decoded(f"{where} does not say how it was made", lambda: _start(metadata[START]))
+        device = result = None
+        if DEVICE in metadata:
+            device = _decoded(
+                f"the description of the gripper in {where} cannot be read",
+                lambda: DeviceRecord.from_text(metadata[DEVICE]["device"]),
+            )
+        if RESULT in metadata:
+            result = _decoded(f"the result in {where} cannot be read", lambda: _result(metadata[RESULT]))
+        return evolve(start, device=device, result=result)
 
 
-def beginning_in(metadata: Mapping[str, Mapping[str, str]], where: str) -> Beginning:
-    """Return the beginning that a recording's metadata hold. Raises DataDamaged."""
+def json_table(text: str) -> dict[str, Any]:
+    """Return a JSON object. Raises TypeError or ValueError if the text is anything else."""
+    value = json.loads(text)
+    if not isinstance(value, dict):
+        raise TypeError("it is not a table")
+    return value
+
+
+def _start(texts: Mapping[str, str]) -> TrialRecord:
+    datetime.fromisoformat(texts["made_at"])
+    if texts["origin"] not in get_args(Origin):
+        raise ValueError(f"origin {texts['origin'][:20]!r}")
+    settings = tomllib.loads(texts["settings"])
+    dict(settings["gripper"])  # every pipeline has this table
+    return TrialRecord(
+        made_at=texts["made_at"],
+        origin=texts["origin"],  # type: ignore[arg-type]
+        labels={key: str(value) for key, value in json_table(texts["labels"]).items()},
+        settings=settings,
+        provenance=json_table(texts["provenance"]),
+    )
+
+
+def _result(texts: Mapping[str, str]) -> TrialResult:
+    return TrialResult(
+        outcome=texts["outcome"],
+        reason=texts["reason"],
+        features=FeatureValues.from_text(texts["features"]),
+        before_contact=FeatureValues.from_text(texts["before_contact"]),
+        details=json_table(texts["details"]),
+    )
+
+
+def _decoded(problem: str, decode: Callable[[], T]) -> T:
     try:
-        given = metadata[START]
-        labels = json.loads(given["labels"])
-        made = json.loads(given["provenance"])
-        datetime.fromisoformat(given["made_at"])
-        if given["origin"] not in ORIGINS or not isinstance(made, dict):
-            raise ValueError(f"origin {given['origin'][:20]!r}")
-        return Beginning(
-            made_at=given["made_at"],
-            origin=given["origin"],  # type: ignore[arg-type]
-            labels={str(key): str(value) for key, value in labels.items()},
-            settings=given["settings"],
-            provenance=made,
-        )
-    except (KeyError, ValueError, TypeError, AttributeError) as error:
-        raise DataDamaged(f"{where} does not say what made it ({type(error).__name__}: {error})") from error
+        return decode()
+    except _MALFORMED as error:
+        raise DataDamaged(f"{problem} ({type(error).__name__}: {error})") from error
 
 
-def ending_in(metadata: Mapping[str, Mapping[str, str]], where: str) -> Ending | None:
-    """Return the ending that a recording's metadata hold, None where it was not reached. Raises DataDamaged."""
-    given = metadata.get(TRIAL)
-    if given is None:
-        return None
-    try:
-        trial = json.loads(given["trial"])
-        if not isinstance(trial, dict) or not isinstance(trial["outcome"], str):
-            raise TypeError("no outcome")
-        return Ending(
-            trial=trial,
-            features=Row.from_json(json.loads(given["features"])),
-            before=Row.from_json(json.loads(given["before"])),
-        )
-    except (KeyError, ValueError, TypeError, AttributeError) as error:
-        raise DataDamaged(
-            f"what {where} says of its outcome cannot be read ({type(error).__name__}: {error})"
-        ) from error
-
-
-__all__ = [
-    "DEVICE",
-    "START",
-    "TRIAL",
-    "Beginning",
-    "Ending",
-    "Row",
-    "beginning",
-    "beginning_in",
-    "device_metadata",
-    "ending",
-    "ending_in",
-]
+def without_none(value: Any) -> Any:
+    """Return a value without the keys whose value is None, which TOML cannot hold; tuples become lists."""
+    if isinstance(value, Mapping):
+        return {key: without_none(inner) for key, inner in value.items() if inner is not None}
+    if isinstance(value, list | tuple):
+        return [without_none(inner) for inner in value]
+    return value

@@ -1,7 +1,7 @@
-"""A recording as it is written: MCAP, a chunk every 50 ms, under the name `.part` until it is whole.
+"""Writing a recording: an MCAP file with one chunk per 50 ms, named `.part` until it is complete.
 
-What is in a chunk that was closed survives the death of this process; what was not flushed to the disk does not
-survive the loss of power before `finish`.
+Closed chunks survive the death of this process. Before `finish`, data that was not flushed to the disk does not
+survive a loss of power.
 """
 
 from __future__ import annotations
@@ -14,38 +14,30 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from attrs import frozen
 from mcap.writer import CompressionType, Writer
 
 from graspsense import __version__
+from graspsense.recording.atomic_file import sync_folder
 from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, PART, SCHEMAS, TICK_TOPIC
+from graspsense.recording.recording_info import RecordingInfo
 
 CHUNK_NS: Final = 50_000_000
 
 
-@frozen(kw_only=True)
-class Written:
-    """A finished recording: its hash, its size in bytes, and what is in it."""
+class RecordingWriter:
+    """Writes one recording.
 
-    sha256: str
-    size: int
-    ticks: int
-    images: int
-
-
-class RecordingFile:
-    """Writes one recording. Times are those of the gripper's clock, laid on the wall clock at the first of them.
-
-    `base_ns` is the wall clock at time 0 of the gripper's, where that is known already.
-    Raises OSError from every method where the disk does not take it, FileExistsError where it is there.
+    Messages are logged at the gripper's time plus `base_ns`, the wall-clock time at time 0 of the gripper's clock. If
+    `base_ns` is None, it is taken from the first message. Raises FileExistsError if the recording already exists, and
+    OSError from every method if the disk cannot be written.
     """
 
     def __init__(self, path: Path, base_ns: int | None = None) -> None:
         self.path, self.part = path, path.with_name(path.name + PART)
         if path.exists():
-            raise FileExistsError(17, "there is such a recording already", str(path))
+            raise FileExistsError(17, "the recording already exists", str(path))
         self._out = _Hashed(os.open(self.part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644))
-        # Whoever cannot get this lock leaves the file alone: it is being written.
+        # A process that cannot get this lock leaves the file alone: it is being written.
         fcntl.flock(self._out.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._mcap = Writer(
             self._out,  # type: ignore[arg-type]
@@ -69,7 +61,7 @@ class RecordingFile:
         return self._counts[TICK_TOPIC]
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Write a metadata record; it is on its way to the disk at once."""
+        """Write a metadata record, outside of any chunk."""
         self._mcap.add_metadata(name, dict(values))
 
     def tick(self, t_s: float, body: bytes) -> None:
@@ -77,16 +69,17 @@ class RecordingFile:
         self._add(TICK_TOPIC, t_s, body)
 
     def pads(self, t_s: float, body: bytes) -> None:
-        """Write a cell image, packed as `layout.PADS`."""
+        """Write a pad image, packed as `layout.PADS`."""
         self._add(PADS_TOPIC, t_s, body)
 
-    def finish(self) -> Written:
-        """End the file, wait until the disk has it, and give it its name."""
+    def finish(self) -> RecordingInfo:
+        """Finish the file, wait until the disk has it, and give it its final name."""
         self._end()
         os.replace(self.part, self.path)
-        _sync_folder(self.path.parent)
+        sync_folder(self.path.parent)
         self._out.close()
-        return Written(
+        return RecordingInfo(
+            path=self.path,
             sha256=self._out.hash.hexdigest(),
             size=self._out.size,
             ticks=self._counts[TICK_TOPIC],
@@ -94,12 +87,12 @@ class RecordingFile:
         )
 
     def leave(self) -> None:
-        """End the file as far as it goes and leave it as `.part`: nobody said that the trial is over."""
+        """Finish the file but leave it named `.part`: the trial has not ended."""
         self._end()
         self._out.close()
 
     def remove(self) -> None:
-        """Remove the file: there is nothing to keep."""
+        """Delete the unfinished file."""
         self.part.unlink(missing_ok=True)
         self._out.close()
 
@@ -123,7 +116,7 @@ class RecordingFile:
 
 
 class _Hashed:
-    """An unbuffered file that hashes what is written to it."""
+    """An unbuffered file that computes the hash of its content while it is written."""
 
     def __init__(self, fd: int) -> None:
         self.fd, self.size, self.hash = fd, 0, hashlib.sha256()
@@ -140,7 +133,7 @@ class _Hashed:
         return self.size
 
     def flush(self) -> None:
-        """Do nothing: it is written."""
+        """Do nothing: writes are not buffered."""
 
     def close(self) -> None:
         os.close(self.fd)
@@ -148,11 +141,3 @@ class _Hashed:
 
 def _ns(t_s: float) -> int:
     return round(t_s * 1e9) if abs(t_s) < 1e9 else 0
-
-
-def _sync_folder(folder: Path) -> None:
-    fd = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(fd)
-    finally:
-        os.close(fd)

@@ -1,7 +1,7 @@
-"""The process that writes a recording: reads ticks from its standard input, writes the file, says how it went.
+"""The process that writes a recording: it reads messages from standard input and writes the MCAP file.
 
-It is another process because a thread that compresses a chunk holds the interpreter for milliseconds. It reads
-every 10 ms instead of at every tick, so that it does not wake up in the middle of the control loop's work.
+It is a separate process because a thread that compresses a chunk would hold the interpreter lock for milliseconds.
+It reads every 10 ms rather than at every tick, so that it does not interrupt the control loop.
 
     python -m graspsense.recording.writer_process FILE.mcap
 """
@@ -26,21 +26,21 @@ from graspsense.recording.layout import (
     READY,
     TICK_WIRE,
 )
-from graspsense.recording.writer import RecordingFile
+from graspsense.recording.writer import RecordingWriter
 
 READ_EVERY_S: Final = 0.01
 READ_BYTES: Final = 1 << 20
 BEHIND: Final = 1 << 16
-"""After so many bytes in one read there is more to come, so there is no rest before the next."""
+"""A read of this many bytes or more is followed by the next read without a pause."""
 
 
 def main(path: str) -> int:
-    """Write the recording; print a line when ready, and one of JSON at the end: what was written, or the error."""
-    # Ctrl-C is for the program that grasps; this one ends with its input.
+    """Write the recording. Print `READY` once the file exists, and at its end the result or the error as JSON."""
+    # Ctrl-C is meant for the grasping program. This process ends when its input ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        # On Linux: its waking up then does not take the processor from the control loop. It is no nicer than that:
-        # on a busy machine a nice process falls further behind than a crash may cost.
+        # On Linux, a batch process does not preempt the control loop when it wakes up. Its nice value is unchanged: on
+        # a busy machine, a nice process would fall behind further than a crash may lose.
         if hasattr(os, "SCHED_BATCH"):
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
         answer = _write(Path(path))
@@ -52,21 +52,21 @@ def main(path: str) -> int:
 
 
 def _write(path: Path) -> dict[str, object]:
-    file = RecordingFile(path)
+    file = RecordingWriter(path)
     sys.stdout.write(READY)
     sys.stdout.flush()
     buffer = bytearray()
     while True:
         data = os.read(0, READ_BYTES)
         if not data:
-            # The program that grasps ended without a word that the trial is over.
+            # The grasping program ended without the message IS_END.
             if file.ticks:
                 file.leave()
             else:
                 file.remove()
             return {"left": True, "ticks": file.ticks}
         buffer += data
-        if _take(file, buffer):
+        if _write_messages(file, buffer):
             written = file.finish()
             return {
                 "sha256": written.sha256,
@@ -78,8 +78,8 @@ def _write(path: Path) -> dict[str, object]:
             time.sleep(READ_EVERY_S)
 
 
-def _take(file: RecordingFile, buffer: bytearray) -> bool:
-    """Write every whole message in the buffer and remove it from there; return whether the trial is over."""
+def _write_messages(file: RecordingWriter, buffer: bytearray) -> bool:
+    """Write every complete message and remove it from the buffer. Return whether the trial is over."""
     at, end = 0, len(buffer)
     try:
         while at < end:

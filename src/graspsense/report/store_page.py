@@ -22,7 +22,7 @@ from graspsense.store.store import Store
 
 if TYPE_CHECKING:
     from graspsense.core.labelled import Labelled, Target
-    from graspsense.store.store import Kept, Listed
+    from graspsense.store.rows import StoredTrial, TrialSummary
 
 GRASPS: Final = 3
 """Of each label, drawn over each other."""
@@ -50,9 +50,9 @@ def store_page(
         if not listed:
             raise ConfigError(f"the store in {folder} has no trials yet: graspsense collect --save {folder}")
         chosen = (
-            store.listed(grasp)
+            store.summary(grasp)
             if grasp is not None
-            else next((one for one in listed if one.whole and one.set_aside is None), listed[0])
+            else next((one for one in listed if one.complete and one.set_aside is None), listed[0])
         )
         kept = store.trial(chosen.id)
         groups = store.query(
@@ -112,7 +112,7 @@ def _drawn(store: Store) -> list[dict[str, Any]]:
     """Return the newest whole grasps of each label, as far as their recordings can be read."""
     rows = store.query(
         """SELECT label, id, recording FROM trial
-        WHERE whole = 1 AND set_aside IS NULL AND label IS NOT NULL ORDER BY label, id DESC"""
+        WHERE complete = 1 AND set_aside IS NULL AND label IS NOT NULL ORDER BY label, id DESC"""
     )
     count: Counter[str] = Counter()
     grasps = []
@@ -120,7 +120,7 @@ def _drawn(store: Store) -> list[dict[str, Any]]:
         if count[label] >= GRASPS:
             continue
         try:
-            trace = read_recorded(store.recording_of(recording)).trace()
+            trace = read_recorded(store.recording_path(recording)).trace()
         except (ConfigError, DataDamaged):
             continue
         count[label] += 1
@@ -187,7 +187,7 @@ def _judged(
     return sections
 
 
-def _felt(chosen: Listed, kept: Kept, drawn: Sequence[dict[str, Any]]) -> list[Section]:
+def _felt(chosen: TrialSummary, kept: StoredTrial, drawn: Sequence[dict[str, Any]]) -> list[Section]:
     sections = []
     label = chosen.label or "no label"
     try:
@@ -198,7 +198,9 @@ def _felt(chosen: Listed, kept: Kept, drawn: Sequence[dict[str, Any]]) -> list[S
         body = paragraph(f"The recording of trial {chosen.id} cannot be shown: {error}")
     values = [
         (name, "missing" if value is None else in_words(value, unit))
-        for (name, unit), value in zip(kept.features, kept.values, strict=True)
+        for (name, unit), value in zip(
+            kept.result.features.features, kept.result.features.values, strict=True
+        )
     ]
     sections.append(
         Section(id="grasp", title="One grasp, from the approach to rest", body=body + facts(values))
@@ -211,9 +213,11 @@ def _felt(chosen: Listed, kept: Kept, drawn: Sequence[dict[str, Any]]) -> list[S
     return sections
 
 
-def _made_of(folder: str, listed: Sequence[Listed], kept: Kept, groups: Sequence[tuple[Any, ...]]) -> Section:
+def _made_of(
+    folder: str, listed: Sequence[TrialSummary], kept: StoredTrial, groups: Sequence[tuple[Any, ...]]
+) -> Section:
     total = sum(int(row[3]) for row in groups)
-    made = kept.provenance
+    made = kept.record.provenance
     git = (made.get("git") or {}).get("graspsense") or {}
     pairs = [
         ("store", folder),
@@ -237,6 +241,6 @@ def _made_of(folder: str, listed: Sequence[Listed], kept: Kept, groups: Sequence
         facts(pairs)
         + table("Trials by label and outcome", ("label", "outcome", "state", "trials"), counts, 3)
         + folded(newest, table(newest, ("trial", "made", "label", "thing", "outcome", "set aside"), rows))
-        + folded(f"Settings of trial {kept.listed.id}", code("settings", kept.settings))
+        + folded(f"Settings of trial {kept.summary.id}", code("settings", kept.record.settings_text))
     )
     return Section(id="made", title="What it was made from", body=body)

@@ -23,7 +23,8 @@ import numpy as np
 
 from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.features import UNKNOWN, FeatureTable
-from graspsense.core.labelled import Control, Labelled
+from graspsense.core.labelled import Labelled
+from graspsense.recording.controls import controls
 from graspsense.store.export_table import ABOUT
 from graspsense.store.store import NOT_ENDED
 
@@ -196,12 +197,12 @@ def read_labelled(
         instances=None if things is None else tuple(things),
         no_instances="no column names the instance (--instance COLUMN)",
         order=ranks,
-        before_contact=Control(table=columns.table(list(before)), what=f"only {', '.join(before)}")
-        if before
-        else None,
-        no_before_contact="no columns are named as known before the contact (--before COLUMNS)",
-        width=Control(table=table.columns(["p_first"]), what="p_first alone") if "p_first" in names else None,
-        no_width="there is no feature p_first",
+        **controls(
+            table,
+            columns.table(list(before)) if before else None,
+            before_what=f"only {', '.join(before)}",
+            no_before="no columns are named as known before contact (--before COLUMNS)",
+        ),
         notes=tuple(notes),
         provenance={"simulated": simulated},
     )

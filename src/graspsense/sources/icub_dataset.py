@@ -22,6 +22,7 @@ from graspsense.core.labelled import Control, Labelled
 from graspsense.core.roles import FeatureSet
 from graspsense.core.signals import APPROACH
 from graspsense.core.trace import SI_UNITS, Trace, trace_of
+from graspsense.recording.controls import controls
 from graspsense.sources.icub import (
     DATA_FOLDER,
     FINGER_FLEXION,
@@ -79,13 +80,12 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
         labels=tuple(label for _, label, _ in paths),
         no_instances="every class of this set is one object, so that none can be held out",
         order=tuple(number for _, _, number in paths),
-        before_contact=Control(table=_first_frame(grasps), what="the first frame alone: its 74 raw numbers"),
-        width=Control(
-            table=table.columns(["p_first"]), what="p_first alone: how far the hand closed to contact"
-        )
-        if "p_first" in table.names
-        else None,
-        no_width="the feature set has no p_first",
+        **controls(
+            table,
+            _first_frame(grasps),
+            before_what="the first frame alone: its 74 raw numbers",
+            width_meaning="how far the hand closed until contact",
+        ),
         variants=variants,
         notes=tuple(notes),
         provenance={"simulated": False, "frames_not_seconds": True},

@@ -1,24 +1,20 @@
-"""Taking in what somebody else recorded: as a recording of ours, whole, and as a trial of a store."""
+"""Importing a recording of another program: as a complete recording of our own, and as a trial of a store."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from graspsense.core.pipeline import grasp_with
 from graspsense.core.signals import APPROACH
-from graspsense.recording.layout import PADS, TICK
-from graspsense.recording.recorder import NotKept
-from graspsense.recording.trial_record import DEVICE, START, TRIAL, beginning, device_metadata, ending
-from graspsense.recording.writer import RecordingFile, Written
+from graspsense.recording.atomic_file import SaveFailed
+from graspsense.recording.layout import DEVICE, PADS, RESULT, START, TICK
+from graspsense.recording.trial_record import TrialRecord
+from graspsense.recording.writer import RecordingWriter
 from graspsense.sources.replay import KINDS, kind_and_name
-from graspsense.store.store import RecordingFacts
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from graspsense.core.config import Settings
     from graspsense.core.plugins import Plugins
     from graspsense.core.trial import Trial
@@ -29,46 +25,36 @@ if TYPE_CHECKING:
 def import_recording(
     store: Store, settings: Settings, plugins: Plugins, labels: Mapping[str, str]
 ) -> tuple[Trial, int]:
-    """Put a recording through a pipeline whose gripper replays it, keep both, and return trial and number.
+    """Run a pipeline whose gripper replays a recording, store trial and recording, and return trial and number.
 
-    The recording is kept to its end, whenever the controller had enough. Raises ConfigError, DataDamaged, NotKept.
+    The whole recording is stored, even if the controller ended earlier. Raises ConfigError, DataDamaged, SaveFailed.
     """
-    start = beginning(settings, labels, "import")
+    record = TrialRecord.begin(settings, labels, "import")
     trial = grasp_with(settings, plugins, labels=labels)
+    record = record.with_device(trial.device).with_result(trial)
     kind, name = kind_and_name(settings.values["gripper"]["recording"])
-    path = store.new_recording(start.made_at)
+    path = store.new_recording(record.made_at)
     try:
-        file = RecordingFile(path)
+        file = RecordingWriter(path)
         try:
-            file.metadata(START, start.as_metadata())
-            described = device_metadata(trial.device)
-            file.metadata(DEVICE, described)
-            _readings(file, KINDS[kind](name))
-            end = ending(trial)
-            file.metadata(TRIAL, end.as_metadata())
-            written = file.finish()
+            file.metadata(START, record.section(START))
+            file.metadata(DEVICE, record.section(DEVICE))
+            _write_readings(file, KINDS[kind](name))
+            file.metadata(RESULT, record.section(RESULT))
+            recording = file.finish()
         except BaseException:
             file.remove()
             raise
     except OSError as error:
-        raise NotKept(f"the recording {path} could not be written: {error.strerror}") from error
-    return trial, store.add(start, end, json.loads(described["device"]), _facts(path, written))
+        raise SaveFailed(f"the recording {path} could not be written: {error.strerror}") from error
+    return trial, store.add(record, recording)
 
 
-def _readings(file: RecordingFile, recording: Recording) -> None:
+def _write_readings(file: RecordingWriter, recording: Recording) -> None:
     counter = 0
     for frame, pads in recording.readings:
         if pads.counter != counter:
             counter = pads.counter
             file.pads(pads.t_s, PADS.pack(pads.t_s, pads.counter, *pads.left, *pads.right))
-        # Nobody of ours commanded anything.
+        # The commands of the other program are not known.
         file.tick(frame.t_s, TICK.pack(*frame, APPROACH, 0, math.nan, math.nan, math.nan))
-
-
-def _facts(path: Path, written: Written) -> RecordingFacts:
-    return RecordingFacts(
-        name=path.name,
-        sha256=written.sha256,
-        size=written.size,
-        counts={"ticks": written.ticks, "images": written.images},
-    )

@@ -1,25 +1,27 @@
-"""Collecting labelled trials with an operator: what comes next, what was said of it, and what is left to do.
+"""Collecting labelled trials with an operator: which object comes next, what the operator answers, and what is left.
 
-All there is to know of a collection stands in its store, so that it goes on after a kill where it was. Things are
-taken in rounds, each round in an order of its own drawn from the seed: classes that are recorded one after the
-other differ by the time of day as well as by what they are.
+The state of a collection is in its store alone, so it continues after a kill. Objects come in rounds, each in its own
+order drawn from the seed: if all trials of one class were recorded in a row, the classes would also differ by the
+time of recording.
 """
 
 from __future__ import annotations
 
 import random
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from attrs import define, field, frozen
 
 from graspsense.core.errors import ConfigError, NoDevice
 from graspsense.core.signals import Outcome
+from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.provenance import recipe
-from graspsense.recording.recorder import NotKept
+from graspsense.recording.trial_record import DeviceRecord, without_none
 from graspsense.store.labels import labels_of
-from graspsense.store.record_grasp import KeptGrasp, kept_grasp
-from graspsense.store.store import Kept, Listed, Store
+from graspsense.store.record_grasp import RecordedTrial, record_grasp
+from graspsense.store.rows import StoredTrial, TrialSummary
+from graspsense.store.store import Store
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings
@@ -28,27 +30,27 @@ if TYPE_CHECKING:
     from graspsense.core.runner import Sink
 
 HELP: Final = (
-    "Enter: grasp it   u: undo the last   r: take the last one again   s: not this one today   q: stop"
+    "Enter: grasp it   u: undo the last trial   r: repeat the last trial   s: skip this object   q: stop"
 )
 UNDONE: Final = "undone by the operator"
-RETAKEN: Final = "taken again"
+RETAKEN: Final = "repeated by the operator"
 _COMPARED: Final = ("name", "serial", "calibration")
 
 
 @frozen(kw_only=True)
 class Wanted:
-    """What is to be collected: words as `labels_of` takes them, and how many trials of each."""
+    """What to collect: labels in the form that `labels_of` accepts, and the number of trials of each."""
 
     words: tuple[str, ...]
     each: int
     seed: int = 0
     labels: Mapping[str, str] = field(factory=dict)
-    """Further labels of every trial, such as the operator's name."""
+    """Further labels of every trial, such as the name of the operator."""
 
     def __attrs_post_init__(self) -> None:
         if not self.words:
             raise ConfigError(
-                "nothing to collect: name what there is, as in --labels can:full_open,can:empty_open"
+                "nothing to collect: name the objects, as in --labels can:full_open,can:empty_open"
             )
         if len(set(self.words)) < len(self.words):
             raise ConfigError(f"a label is named twice: {', '.join(self.words)}")
@@ -60,11 +62,11 @@ class Wanted:
 
 @define(eq=False)
 class Collection:
-    """A collection under way in a store.
+    """A collection of trials into a store.
 
-    `settings_for` gives the settings of the grasp of a word, with a seed. `ask` puts a question and returns the
-    answer, None where there will be no more; `say` tells something. `changed` allows another gripper or other
-    settings than those of the trials before.
+    `settings_for(label, seed)` returns the settings of a grasp. `ask` asks the operator a question and returns the
+    answer, or None at the end of input. `say` prints a message. `changed` allows a gripper or settings that differ
+    from those of earlier trials.
     """
 
     store: Store
@@ -76,22 +78,19 @@ class Collection:
     changed: bool = False
     sinks: Sequence[Sink] = ()
     stopping: bool = False
-    """Set it to end after the grasp that is under way."""
-    kept: list[int] = field(factory=list, init=False)
+    """Set to True to stop after the current grasp."""
+    numbers: list[int] = field(factory=list, init=False)
+    """Numbers of the trials collected so far."""
     _skipped: set[str] = field(factory=set, init=False)
 
     def counts(self) -> dict[str, int]:
-        """Return how many trials of each word count so far."""
-        have = self.store.counts("collect")
-        found = dict.fromkeys(self.wanted.words, 0)
-        for word in found:
-            labels = labels_of(word)
-            label, instance = labels["label"], labels.get("instance")
-            found[word] = have.get((label, instance), 0)
-        return found
+        """Return the number of trials of each label that count so far."""
+        stored = self.store.counts("collect")
+        labels = {word: labels_of(word) for word in self.wanted.words}
+        return {word: stored.get((of["label"], of.get("instance")), 0) for word, of in labels.items()}
 
     def following(self) -> str | None:
-        """Return the word that comes next, None where nothing is left to do."""
+        """Return the label that comes next, or None if nothing is left."""
         counts = {word: n for word, n in self.counts().items() if word not in self._skipped}
         left = [word for word, n in counts.items() if n < self.wanted.each]
         if not left:
@@ -102,10 +101,10 @@ class Collection:
         return next(word for word in order if word in left and counts[word] == number)
 
     def run(self) -> None:
-        """Collect until everything is there or the operator stops.
+        """Collect until nothing is left or the operator stops.
 
-        Raises ConfigError where the settings or the gripper are not those of the trials before, NoDevice where
-        there is no gripper to begin with, NotKept where a trial could not be kept.
+        Raises ConfigError if the settings or the gripper differ from those of earlier trials, NoDevice if there is no
+        gripper at the first grasp, SaveFailed if a trial could not be saved.
         """
         self._check_settings()
         while not self.stopping:
@@ -128,15 +127,15 @@ class Collection:
             else:
                 self.say(HELP)
 
-    def last(self) -> Listed | None:
-        """Return the newest collected trial that was not set aside."""
+    def last(self) -> TrialSummary | None:
+        """Return the newest collected trial that is not set aside."""
         newest = self.store.page(origin="collect", limit=1)
         return newest[0] if newest else None
 
     def _grasp(self, word: str) -> None:
         settings = self.settings_for(word, self.wanted.seed + self._number_of_trials())
         try:
-            grasp = kept_grasp(
+            grasp = record_grasp(
                 self.store,
                 settings,
                 self.plugins,
@@ -146,29 +145,29 @@ class Collection:
                 on_open=self._check_device,
             )
         except NoDevice as error:
-            if not self.kept:
+            if not self.numbers:
                 raise
             self.say(str(error))
             return
         if grasp.number is None:
-            raise NotKept(grasp.problem)
-        self.kept.append(grasp.number)
-        self.say(self._told(word, grasp))
+            raise SaveFailed(grasp.problem)
+        self.numbers.append(grasp.number)
+        self.say(self._report(word, grasp))
 
-    def _told(self, word: str, grasp: KeptGrasp) -> str:
+    def _report(self, word: str, grasp: RecordedTrial) -> str:
         trial, counts = grasp.trial, self.counts()
         counted = trial.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST)
         reason = f": {trial.reason}" if trial.reason else ""
         line = f"trial {grasp.number}, {word}: {trial.outcome.words}{reason}"
         if not counted:
-            line += "; it is kept, but does not count"
+            line += "; it is stored, but does not count"
         if grasp.counts["dropped"]:
-            line += f"; it does not count: the recorder lost {grasp.counts['dropped']} messages"
-        so_far = "  ".join(f"{one} {n}/{self.wanted.each}" for one, n in counts.items())
+            line += f"; it does not count, as the recorder lost {grasp.counts['dropped']} messages"
+        so_far = "  ".join(f"{label} {n}/{self.wanted.each}" for label, n in counts.items())
         return f"{line}\n  {so_far}"
 
     def _undo(self, why: str) -> str | None:
-        """Set the last collected trial aside and return its word, None where there is none."""
+        """Set the last collected trial aside and return its label, or None if there is none."""
         last = self.last()
         if last is None:
             self.say("there is no trial to undo")
@@ -183,7 +182,7 @@ class Collection:
         newest = self.store.page(set_aside=None, limit=1)
         return newest[0].id if newest else 0
 
-    def _before(self) -> Kept | None:
+    def _before(self) -> StoredTrial | None:
         last = self.last()
         return None if last is None or self.changed else self.store.trial(last.id)
 
@@ -191,13 +190,13 @@ class Collection:
         before = self._before()
         if before is None:
             return
-        now = recipe(self.settings_for(self.wanted.words[0], self.wanted.seed).values)
-        then = before.recipe
+        settings = self.settings_for(self.wanted.words[0], self.wanted.seed)
+        now, then = recipe(without_none(settings.values)), before.recipe
         differ = [
             f"{table}.{key} was {then.get(table, {}).get(key)!r} and is {now.get(table, {}).get(key)!r}"
             for table in dict.fromkeys((*then, *now))
             for key in dict.fromkeys((*then.get(table, {}), *now.get(table, {})))
-            if _plain(then.get(table, {}).get(key)) != _plain(now.get(table, {}).get(key))
+            if then.get(table, {}).get(key) != now.get(table, {}).get(key)
         ]
         if differ:
             raise ConfigError(self._refusal("settings", before, differ))
@@ -206,31 +205,18 @@ class Collection:
         before = self._before()
         if before is None:
             return
-        now: dict[str, Any] = {
-            "name": device.name,
-            "serial": device.serial,
-            "calibration": dict(device.calibration),
-        }
+        then, now = before.record.device, DeviceRecord.of(device)
         differ = [
-            f"{name} was {before.device.get(name)!r} and is {now[name]!r}"
+            f"{name} was {getattr(then, name)!r} and is {getattr(now, name)!r}"
             for name in _COMPARED
-            if before.device.get(name) != now[name]
+            if getattr(then, name) != getattr(now, name)
         ]
         if differ:
             raise ConfigError(self._refusal("gripper", before, differ))
 
-    def _refusal(self, what: str, before: Kept, differ: Sequence[str]) -> str:
-        lines = "".join(f"\n  {one}" for one in differ)
+    def _refusal(self, what: str, before: StoredTrial, differ: Sequence[str]) -> str:
+        lines = "".join(f"\n  {line}" for line in differ)
         return (
-            f"the {what} differ from trial {before.listed.id} of the store in {self.store.folder}:{lines}\n"
-            "  Put back what was, collect into another store, or say --changed if it is meant"
+            f"the {what} differ from trial {before.summary.id} of the store in {self.store.folder}:{lines}\n"
+            "  Restore them, collect into another store, or add --changed if this is intended"
         )
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as TOML has it: a list for a tuple."""
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items() if one is not None}
-    return value

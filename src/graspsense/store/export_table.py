@@ -1,4 +1,4 @@
-"""The trials of a store as one table: CSV, ARFF, NPZ, Parquet."""
+"""Exporting the trials of a store as one table: CSV, ARFF, NPZ or Parquet."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.errors import ConfigError
-from graspsense.recording.atomic_file import write_whole
+from graspsense.recording.atomic_file import write_new
 from graspsense.recording.parquet import parquet
 from graspsense.store.dataset import feature_table
 from graspsense.store.store import Store
@@ -37,14 +37,14 @@ ABOUT: Final = (
 
 @frozen(kw_only=True, eq=False)
 class TrialTable:
-    """What is known of each trial, as columns of text and numbers, beside its features."""
+    """The trials of a store: descriptive columns (`about`), and the features."""
 
     about: Mapping[str, list[Any]]
     features: FeatureTable
 
 
 def trial_table(folder: str | Path) -> TrialTable:
-    """Return all trials of a store that were not set aside. Raises ConfigError where there is none, DataDamaged."""
+    """Return all trials of a store that are not set aside. Raises ConfigError if there is none, DataDamaged."""
     with Store.read(folder) as store:
         rows = store.query(
             """SELECT id, made_at, label, instance, outcome, origin, device, simulated, recording, feature_set, "values"
@@ -57,7 +57,7 @@ def trial_table(folder: str | Path) -> TrialTable:
     names: dict[tuple[str, str], None] = {}
     for number in dict.fromkeys(columns[-2]):
         names.update(dict.fromkeys((str(name), str(unit)) for name, unit in json.loads(sets[number])))
-    table = feature_table(str(folder), list(names), [sets[one] for one in columns[-2]], columns[-1])
+    table = feature_table(str(folder), list(names), [sets[number] for number in columns[-2]], columns[-1])
     return TrialTable(
         about={name: list(column) for name, column in zip(ABOUT, columns[: len(ABOUT)], strict=True)},
         features=table,
@@ -65,7 +65,7 @@ def trial_table(folder: str | Path) -> TrialTable:
 
 
 def write_csv(path: Path, table: TrialTable) -> None:
-    """Write a line a trial, the unit behind each feature: `p_first [m]`; empty where missing."""
+    """Write one line per trial; headings give units, as in `p_first [m]`, and a missing value is an empty cell."""
     out = io.StringIO(newline="")
     writer = csv.writer(out, lineterminator="\n")
     features = table.features
@@ -73,16 +73,16 @@ def write_csv(path: Path, table: TrialTable) -> None:
     writer.writerow([*table.about, *headings])
     for about, values in zip(zip(*table.about.values(), strict=True), features.values.tolist(), strict=True):
         cells = ["" if math.isnan(value) else repr(value) for value in values]
-        writer.writerow([*("" if one is None else one for one in about), *cells])
-    write_whole(path, out.getvalue().encode())
+        writer.writerow([*("" if cell is None else cell for cell in about), *cells])
+    write_new(path, out.getvalue().encode())
 
 
 def write_arff(path: Path, table: TrialTable) -> None:
-    """Write an ARFF for Weka: the features, `?` where missing, and the label as the nominal class, last."""
+    """Write an ARFF file for Weka: the features (`?` for a missing value), and the label as the last attribute."""
     labels = table.about["label"]
-    classes = sorted({one for one in labels if one is not None})
+    classes = sorted({label for label in labels if label is not None})
     if not classes:
-        raise ConfigError("ARFF needs a class, and no trial has a label")
+        raise ConfigError("an ARFF file needs a class attribute, and no trial has a label")
     lines = ["@relation graspsense", ""]
     features = table.features
     for name, unit in zip(features.names, features.units, strict=True):
@@ -93,15 +93,15 @@ def write_arff(path: Path, table: TrialTable) -> None:
     for label, values in zip(labels, features.values.tolist(), strict=True):
         cells = ["?" if math.isnan(value) else repr(value) for value in values]
         lines.append(",".join([*cells, "?" if label is None else _arff_word(label)]))
-    write_whole(path, ("\n".join(lines) + "\n").encode())
+    write_new(path, ("\n".join(lines) + "\n").encode())
 
 
 def write_npz(path: Path, table: TrialTable) -> None:
-    """Write arrays: `values` of shape (trials, features), `features`, `units`, and a column of each other thing."""
+    """Write arrays: `values` of shape (trials, features), `features`, `units`, and one array per column of `about`."""
     out = io.BytesIO()
     features = table.features
     about = {
-        name: np.array([("" if one is None else one) for one in column])
+        name: np.array([("" if cell is None else cell) for cell in column])
         for name, column in table.about.items()
     }
     np.savez_compressed(
@@ -112,17 +112,17 @@ def write_npz(path: Path, table: TrialTable) -> None:
         units=np.array(features.units),
         **about,
     )
-    write_whole(path, out.getvalue())
+    write_new(path, out.getvalue())
 
 
 def write_parquet(path: Path, table: TrialTable) -> None:
-    """Write a Parquet file; the units stand in the fields' metadata. Raises PluginUnavailable without pyarrow."""
+    """Write a Parquet file with units in the metadata of its fields. Raises PluginUnavailable without pyarrow."""
     features = table.features
     columns: dict[str, tuple[Any, str]] = {name: (column, "") for name, column in table.about.items()}
     for k, (name, unit) in enumerate(zip(features.names, features.units, strict=True)):
         values = [None if math.isnan(value) else value for value in features.values[:, k].tolist()]
         columns[name] = (values, unit)
-    write_whole(path, parquet(columns))
+    write_new(path, parquet(columns))
 
 
 WRITERS: Final[Mapping[str, Callable[[Path, TrialTable], None]]] = {
@@ -131,7 +131,7 @@ WRITERS: Final[Mapping[str, Callable[[Path, TrialTable], None]]] = {
     ".npz": write_npz,
     ".parquet": write_parquet,
 }
-"""Ending of a file to what writes it."""
+"""File extension to the function that writes it."""
 
 
 def _arff_word(text: str) -> str:

@@ -1,4 +1,4 @@
-"""What an operator says was grasped, as one word: `CLASS:STATE`, with `#N` behind it for the very thing."""
+"""Labels as an operator types them: `CLASS:STATE`, followed by `#N` to name the individual object."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ _WORD: Final = re.compile(r"(?P<kind>[^\s:#,]+)(?P<state>:[^\s:#,]+)?(?P<number>
 
 
 def labels_of(word: str) -> dict[str, str]:
-    """Return `label`, and `instance` where the word names the very thing: `can:full_open#2` is `can#2`.
+    """Return `label`, and `instance` if the text names an individual object (`can:full_open#2`: instance `can#2`).
 
-    Raises ConfigError for what is no such word.
+    Raises ConfigError if the text is not such a label.
     """
     match = _WORD.fullmatch(word)
     if match is None:
         raise ConfigError(
-            f"{word!r} is no label: write CLASS:STATE, as in can:full_open, and #2 behind it for the second can"
+            f"{word!r} is not a label: write CLASS:STATE, as in can:full_open, or can:full_open#2 for the second can"
         )
     label = match["kind"] + (match["state"] or "")
     if match["kind"] == UNKNOWN:
-        raise ConfigError(f"{UNKNOWN!r} is no label: it is the answer to a thing unlike any other")
+        raise ConfigError(
+            f"{UNKNOWN!r} is not a label: it is the answer for an object that is unlike all known ones"
+        )
     return {"label": label, **({"instance": match["kind"] + match["number"]} if match["number"] else {})}

@@ -1,17 +1,18 @@
-"""One grasp that is kept: recorded while it lasts, and in the store when it is over."""
+"""One grasp that is recorded while it lasts and added to the store when it is over."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from attrs import frozen
 
 from graspsense.core.pipeline import grasp_with
-from graspsense.recording.recorder import NotKept, Recorder
-from graspsense.recording.trial_record import DEVICE, START, TRIAL, Origin, beginning, device_metadata, ending
-from graspsense.store.store import RecordingFacts, Store
+from graspsense.recording.atomic_file import SaveFailed
+from graspsense.recording.layout import DEVICE, RESULT, START
+from graspsense.recording.recorder import Recorder
+from graspsense.recording.trial_record import Origin, TrialRecord
+from graspsense.store.store import Store
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings
@@ -22,8 +23,11 @@ if TYPE_CHECKING:
 
 
 @frozen(kw_only=True, eq=False)
-class KeptGrasp:
-    """A grasp and its number in the store; where it could not be kept there is none, and `problem` says why."""
+class RecordedTrial:
+    """A grasp with its number in the store and the counters of its recording.
+
+    If it could not be saved, `number` is None and `problem` states why.
+    """
 
     trial: Trial
     number: int | None
@@ -31,7 +35,7 @@ class KeptGrasp:
     problem: str = ""
 
 
-def kept_grasp(
+def record_grasp(
     store: Store,
     settings: Settings,
     plugins: Plugins,
@@ -40,38 +44,34 @@ def kept_grasp(
     origin: Origin,
     sinks: Iterable[Sink] = (),
     on_open: Callable[[DeviceInfo], None] | None = None,
-) -> KeptGrasp:
-    """Do one grasp as `grasp_with` does, and keep it.
+) -> RecordedTrial:
+    """Perform one grasp as `grasp_with` does, record it, and add it to the store.
 
-    A disk that is full, or goes away, does not stop the grasp: what it did is returned, with the problem.
-    Raises what `grasp_with` raises, and NotKept where nothing can be recorded to begin with.
+    A disk that fails during the grasp does not stop it: the trial is returned with the problem. Raises what
+    `grasp_with` raises, and SaveFailed if the recording cannot be started.
     """
-    start = beginning(settings, labels, origin)
-    recorder = Recorder(store.new_recording(start.made_at))
-    described: dict[str, str] = {}
+    record = TrialRecord.begin(settings, labels, origin)
+    recorder = Recorder(store.new_recording(record.made_at))
 
     def opened(device: DeviceInfo) -> None:
+        nonlocal record
         if on_open is not None:
             on_open(device)
-        described.update(device_metadata(device))
-        recorder.metadata(DEVICE, described)
+        record = record.with_device(device)
+        recorder.metadata(DEVICE, record.section(DEVICE))
         recorder.wait_ready()
 
     try:
-        recorder.metadata(START, start.as_metadata())
+        recorder.metadata(START, record.section(START))
         trial = grasp_with(settings, plugins, labels=labels, sinks=[*sinks, recorder], on_open=opened)
-        end = ending(trial)
+        record = record.with_result(trial)
     except BaseException:
         recorder.leave()
         raise
     try:
-        recorder.metadata(TRIAL, end.as_metadata())
-        recorded = recorder.finish()
-        facts = RecordingFacts(
-            name=recorded.path.name, sha256=recorded.sha256, size=recorded.size, counts=recorded.counts
-        )
-        device = json.loads(described["device"])
-        number = store.add(start, end, device, facts, whole=not recorded.dropped)
-    except NotKept as error:
-        return KeptGrasp(trial=trial, number=None, counts={}, problem=str(error))
-    return KeptGrasp(trial=trial, number=number, counts=recorded.counts)
+        recorder.metadata(RESULT, record.section(RESULT))
+        recording = recorder.finish()
+        number = store.add(record, recording, complete=not recording.dropped)
+    except SaveFailed as error:
+        return RecordedTrial(trial=trial, number=None, counts={}, problem=str(error))
+    return RecordedTrial(trial=trial, number=number, counts=recording.counts)

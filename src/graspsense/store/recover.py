@@ -1,33 +1,32 @@
-"""Saving what a killed program left: recordings without an end, and recordings without a row.
+"""Recovering what a killed program left: recordings without an end, and recordings without a row in the store.
 
-Nothing is deleted: of a recording that was cut a whole one is written, and the cut one stays beside it as `.cut`.
+Nothing is deleted. An incomplete recording is copied into a complete one, and itself kept with the suffix `.cut`.
 """
 
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import os
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from attrs import evolve, frozen
+from attrs import asdict, evolve, frozen
 
 from graspsense.core.config import build
 from graspsense.core.errors import ConfigError, DataDamaged, GraspsenseError
 from graspsense.core.features import Features
 from graspsense.core.plugins import installed
+from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.before_contact import before_contact
 from graspsense.recording.layout import DEVICE, PART, START, TICK
 from graspsense.recording.layout import PADS as PADS_STRUCT
 from graspsense.recording.reader import RecordedGrasp, read_recorded
-from graspsense.recording.recorder import NotKept
-from graspsense.recording.trial_record import Ending, Row, beginning_in, ending_in
-from graspsense.recording.writer import RecordingFile, Written
-from graspsense.store.store import RecordingFacts, Store
+from graspsense.recording.recording_info import RecordingInfo
+from graspsense.recording.trial_record import FeatureValues, TrialRecord, TrialResult
+from graspsense.recording.writer import RecordingWriter
+from graspsense.store.store import Store
 
 if TYPE_CHECKING:
     from graspsense.core.trace import Trace
@@ -38,76 +37,74 @@ RECOVERED: Final = "-recovered.mcap"
 
 @frozen(kw_only=True)
 class Recovered:
-    """What became of one file.
+    """What was done with one file.
 
-    `kept` is a whole trial that only lacked its row, `saved` the beginning of one that was cut, `empty` a file
-    in which nothing was felt, `busy` one that is being written, `failed` one of which nothing could be saved.
+    `what` is `added` for a complete recording that only lacked its row, `recovered` for the readable part of an
+    incomplete one, `empty` for a file without a tick, `busy` for one that is being written, and `failed` if nothing
+    could be recovered. `why` gives the reason.
     """
 
     file: Path
-    what: Literal["kept", "saved", "empty", "busy", "failed"]
+    what: Literal["added", "recovered", "empty", "busy", "failed"]
     trial: int | None = None
     recording: Path | None = None
     ticks: int = 0
     why: str = ""
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as JSON values."""
+        """Return the fields as JSON values."""
         return {
+            **asdict(self),
             "file": str(self.file),
-            "what": self.what,
-            "trial": self.trial,
             "recording": None if self.recording is None else str(self.recording),
-            "ticks": self.ticks,
-            "why": self.why,
         }
 
 
 def recover_store(store: Store) -> list[Recovered]:
-    """Give every recording of a store that has none its row, cut recordings an end first. Raises NotKept."""
-    found = []
-    known = store.names()
+    """Complete every unfinished recording of a store, and add a row for each that has none. Raises SaveFailed."""
+    results = []
+    known = store.recording_names()
     folder = store.recordings
     for path in sorted(folder.glob(f"*{RECOVERED}{PART}")):
         with _locked(path) as mine:
-            if mine:  # an unfinished copy: what it is made from is still there
+            if mine:  # an unfinished copy, whose original still exists
                 path.unlink()
     for path in sorted(folder.glob("*.mcap")):
         if path.name not in known:
-            found.append(_adopted(store, path))
+            results.append(_add_row(store, path))
     for path in sorted(folder.glob(f"*.mcap{PART}")):
         with _locked(path) as mine:
             if not mine:
-                found.append(Recovered(file=path, what="busy", why="it is being written"))
+                results.append(Recovered(file=path, what="busy", why="it is being written"))
             elif path.is_file():
-                found.append(_finished(store, path))
-    return found
+                results.append(_complete(store, path))
+    return results
 
 
 def recover_file(path: str | Path, out: str | Path | None = None) -> Recovered:
-    """Write what can be read of a recording into a new one; the file itself is not touched.
+    """Copy what can be read of a recording into a new one; the original is not changed.
 
-    `out` is by default `NAME-recovered.mcap` beside it. Raises ConfigError where there is no such file or nothing
-    is to be done, DataDamaged where nothing can be read, NotKept where the new one cannot be written.
+    `out` is `NAME-recovered.mcap` in the same folder by default. Raises ConfigError if the file does not exist or is
+    complete, DataDamaged if no tick can be read, SaveFailed if the copy cannot be written.
     """
     path = Path(path).expanduser()
     with _locked(path) as mine:
         if not mine:
             raise ConfigError(f"{path} is being written")
         grasp = read_recorded(path, salvage=True)
-        if grasp.whole and not path.name.endswith(PART):
-            raise ConfigError(f"{path} is whole: there is nothing to recover")
+        if grasp.complete and not path.name.endswith(PART):
+            raise ConfigError(f"{path} is complete: there is nothing to recover")
         if not len(grasp):
-            raise DataDamaged(f"no tick can be read from {path}: {grasp.damage or 'there is none in it'}")
+            raise DataDamaged(f"no tick can be read from {path}: {grasp.damage or 'it has none'}")
         target = Path(out).expanduser() if out else _beside(path)
         with _writing(target):
-            write_again(grasp, target)
-    return Recovered(file=path, what="saved", recording=target, ticks=len(grasp), why=_why(grasp))
+            write_copy(grasp, target)
+    return Recovered(file=path, what="recovered", recording=target, ticks=len(grasp), why=_why(grasp))
 
 
-def write_again(grasp: RecordedGrasp, path: Path) -> Written:
-    """Write a recorded grasp as a new, whole recording. Raises OSError."""
-    file = RecordingFile(path, grasp.base_ns)
+def write_copy(grasp: RecordedGrasp, path: Path) -> RecordingInfo:
+    """Write a recorded grasp as a new, complete recording. Raises OSError."""
+    file = RecordingWriter(path, grasp.base_ns)
     try:
         for name in (START, DEVICE):
             if name in grasp.metadata:
@@ -127,84 +124,77 @@ def write_again(grasp: RecordedGrasp, path: Path) -> Written:
         raise
 
 
-def facts_of(path: Path, ticks: int, images: int) -> RecordingFacts:
-    """Return what the store knows of a recording that lies in its folder. Raises OSError."""
-    with path.open("rb") as file:
-        sha256 = hashlib.file_digest(file, "sha256").hexdigest()
-    return RecordingFacts(
-        name=path.name, sha256=sha256, size=path.stat().st_size, counts={"ticks": ticks, "images": images}
-    )
-
-
-def _finished(store: Store, part: Path) -> Recovered:
-    """Make a whole recording of a part, and a row of that."""
+def _complete(store: Store, part: Path) -> Recovered:
+    """Complete an unfinished recording and add its row."""
     path, copy = part.with_name(part.name.removesuffix(PART)), _beside(part)
     try:
         grasp = read_recorded(part, salvage=True)
         if not len(grasp):
             part.rename(part.with_name(path.name + CUT))
-            return Recovered(file=part, what="empty", why=grasp.damage or "no tick is in it")
-        if grasp.whole:
+            return Recovered(file=part, what="empty", why=grasp.damage or "it has no tick")
+        if grasp.complete:
             with part.open("rb") as file:
                 os.fsync(file.fileno())
             part.rename(path)
-            return evolve(_adopted(store, path), file=part)
+            return evolve(_add_row(store, path), file=part)
         if not copy.exists():
             with _writing(copy):
-                write_again(grasp, copy)
-        result = _adopted(store, copy)
+                write_copy(grasp, copy)
+        result = _add_row(store, copy)
         if result.trial is not None:
             part.rename(part.with_name(path.name + CUT))
         return evolve(result, file=part, why=result.why or _why(grasp))
-    except NotKept:
+    except SaveFailed:
         raise
     except GraspsenseError as error:
         return Recovered(file=part, what="failed", why=str(error))
 
 
-def _adopted(store: Store, path: Path) -> Recovered:
-    """Make a row of a whole recording, as far as its grasp came."""
+def _add_row(store: Store, path: Path) -> Recovered:
+    """Add a row for a complete recording. A grasp without a result counts as aborted."""
     try:
         grasp = read_recorded(path)
-        start = beginning_in(grasp.metadata, str(path))
-        end = ending_in(grasp.metadata, str(path))
-        whole = end is not None
-        if end is None:
-            end = _broken_off(grasp, start.settings)
-        facts = facts_of(path, len(grasp), len(grasp.pads))
-        number = store.add(start, end, grasp.device, facts, whole=whole)
-    except NotKept:
+        record = grasp.record()
+        complete = record.result is not None
+        if record.result is None:
+            record = evolve(record, result=_aborted(grasp, record))
+        if record.device is None:
+            record = evolve(record, device=grasp.device)
+        number = store.add(record, RecordingInfo.of(path, len(grasp), len(grasp.pads)), complete=complete)
+    except SaveFailed:
         raise
     except GraspsenseError as error:
         return Recovered(file=path, what="failed", why=str(error))
-    except (tomllib.TOMLDecodeError, KeyError, AttributeError, OSError) as error:
-        why = f"its settings cannot be read: {error}"
-        return Recovered(file=path, what="failed", recording=path, ticks=len(grasp), why=why)
+    except OSError as error:
+        return Recovered(file=path, what="failed", recording=path, why=str(error))
     return Recovered(
-        file=path, what="kept" if whole else "saved", trial=number, recording=path, ticks=len(grasp)
+        file=path, what="added" if complete else "recovered", trial=number, recording=path, ticks=len(grasp)
     )
 
 
-def _broken_off(grasp: RecordedGrasp, settings: str) -> Ending:
-    """Return the ending of a grasp that has none: aborted, with the features of what there is."""
+def _aborted(grasp: RecordedGrasp, record: TrialRecord) -> TrialResult:
+    """Return the result of a grasp that was cut off: aborted, with the features of the part that exists."""
     trace = grasp.trace()
     seconds = float(trace.t_s[-1] - trace.t_s[0]) if len(trace) else 0.0
     why = f"the program was killed; {seconds:.3f} s of the grasp were recovered"
-    features = _features(trace, settings, why)
-    return Ending(
-        trial={"outcome": "aborted", "reason": why}, features=features, before=Row.of(before_contact(trace))
+    return TrialResult(
+        outcome="aborted",
+        reason=why,
+        features=_features(trace, record, why),
+        before_contact=FeatureValues.of(before_contact(trace)),
     )
 
 
-def _features(trace: Trace, settings: str, why: str) -> Row:
-    table = tomllib.loads(settings)["features"]
+def _features(trace: Trace, record: TrialRecord, why: str) -> FeatureValues:
+    """Extract the features with the feature set that the trial was recorded with, if it is installed."""
     try:
-        component = installed().find("feature-set", table["type"])
-        config = build(component, {key: value for key, value in table.items() if key != "type"})
-        extracted: Features = component.create(config).extract(trace)
-    except GraspsenseError as error:
-        return Row(features=(), values=(), reasons={"": f"{why}; its features cannot be drawn here: {error}"})
-    return Row.of(extracted)
+        table = dict(record.settings["features"])
+        component = installed().find("feature-set", table.pop("type"))
+        extracted: Features = component.create(build(component, table)).extract(trace)
+    except (GraspsenseError, KeyError) as error:
+        reason = f"{why}; its features cannot be extracted here: {error}"
+        return FeatureValues(features=(), values=(), reasons={"": reason})
+    return FeatureValues.of(extracted)
 
 
 def _beside(path: Path) -> Path:
@@ -218,7 +208,7 @@ def _why(grasp: RecordedGrasp) -> str:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[bool]:
-    """Hold the lock that a writer of this file would hold; False where one does."""
+    """Hold the lock that the writer of this file holds; yield False if a writer has it."""
     try:
         file = path.open("rb")
     except FileNotFoundError:
@@ -239,6 +229,6 @@ def _writing(path: Path) -> Iterator[None]:
     try:
         yield
     except FileExistsError as error:
-        raise NotKept(f"{path} is there already: name another file, or move it away") from error
+        raise SaveFailed(f"{path} already exists: name another file, or move it away") from error
     except OSError as error:
-        raise NotKept(f"{path} cannot be written: {error.strerror}") from error
+        raise SaveFailed(f"{path} cannot be written: {error.strerror}") from error

@@ -1,7 +1,7 @@
 """The tables of the store's SQLite file, version by version.
 
-A version is a list of statements; a store of an older version gets those that it lacks, in one transaction. A
-statement that was once released is never changed: a new version is added.
+A version is a list of statements. Opening an older store runs the statements that it lacks, in one transaction. Once
+released, a statement never changes: a change is a new version.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from functools import cache
 from typing import Final
 
 APPLICATION_ID: Final = 0x47525350
-"""`GRSP`: what `file` and sqlite3 know our files by."""
+"""`GRSP`: the application id in the header of the SQLite file."""
 
 VERSIONS: Final[tuple[tuple[str, ...], ...]] = (
     (
@@ -26,7 +26,7 @@ VERSIONS: Final[tuple[tuple[str, ...], ...]] = (
             label TEXT,
             instance TEXT,
             outcome TEXT NOT NULL,
-            whole INTEGER NOT NULL,
+            complete INTEGER NOT NULL,
             set_aside TEXT,
             device TEXT NOT NULL,
             simulated INTEGER NOT NULL,
@@ -34,7 +34,7 @@ VERSIONS: Final[tuple[tuple[str, ...], ...]] = (
             feature_set INTEGER NOT NULL REFERENCES feature_set (id),
             "values" BLOB NOT NULL,
             before_set INTEGER NOT NULL REFERENCES feature_set (id),
-            before BLOB NOT NULL,
+            before_contact BLOB NOT NULL,
             recording TEXT NOT NULL UNIQUE,
             recording_sha256 TEXT NOT NULL,
             recording_bytes INTEGER NOT NULL,
@@ -46,32 +46,32 @@ VERSIONS: Final[tuple[tuple[str, ...], ...]] = (
             settings TEXT NOT NULL,
             provenance TEXT NOT NULL,
             device TEXT NOT NULL,
-            reasons TEXT NOT NULL,
-            trial_json TEXT NOT NULL,
+            reason TEXT NOT NULL,
+            missing TEXT NOT NULL,
+            missing_before TEXT NOT NULL,
+            details TEXT NOT NULL,
             recorder TEXT NOT NULL
         ) STRICT""",
         "CREATE INDEX trial_by_label ON trial (label, id)",
     ),
 )
-"""`trial` is what is searched and read as a table, `detail` what is read for one trial.
+"""`trial` holds what is searched and read as a table, `detail` what is read for one trial.
 
-JSON is in one canonical form. `values` and `before` are little-endian float64 in the order of their feature set,
-NaN where missing: so a hundred thousand rows are read as a table in a fraction of a second. `settings` is TOML,
-`recipe` the hash of the settings without what differs from grasp to grasp. `sha256` is of all columns of both
-tables but `id`, `set_aside` and itself.
+JSON is canonical. `"values"` and `before_contact` are little-endian float64 in the order of their feature set, with
+NaN for a missing value, so a table of a hundred thousand rows is read in a fraction of a second. `settings` is TOML,
+`recipe` the hash of the settings that the grasps of one experiment share. `reason` explains the outcome; `missing` and
+`missing_before` state why features are missing. `sha256` covers all columns of both tables except `id`, `set_aside`
+and itself.
 """
 
 NEWEST: Final = len(VERSIONS)
 
 
 def migrate(connection: sqlite3.Connection, version: int) -> None:
-    """Bring the tables from this version to the newest, or leave them as they were.
-
-    Raises sqlite3.Error.
-    """
+    """Bring the tables from this version to the newest, or leave them unchanged and raise sqlite3.Error."""
     connection.execute("BEGIN IMMEDIATE")
     try:
-        # Somebody else may have done it while this waited for the lock.
+        # Another process may have migrated the store while this one waited for the lock.
         (version,) = connection.execute("PRAGMA user_version").fetchone()
         for statements in VERSIONS[version:]:
             for statement in statements:
@@ -85,19 +85,19 @@ def migrate(connection: sqlite3.Connection, version: int) -> None:
 
 
 @cache
-def expected(version: int) -> frozenset[tuple[str, str, str]]:
-    """Return kind, name and statement of everything that a store of this version holds, and nothing else does."""
+def tables_of_version(version: int) -> frozenset[tuple[str, str, str]]:
+    """Return type, name and SQL of every table and index in a store of this version."""
     connection = sqlite3.connect(":memory:")
     try:
         for statements in VERSIONS[:version]:
             for statement in statements:
                 connection.execute(statement)
-        return found(connection)
+        return tables_in(connection)
     finally:
         connection.close()
 
 
-def found(connection: sqlite3.Connection) -> frozenset[tuple[str, str, str]]:
-    """Return the same of what this file holds. Raises sqlite3.Error."""
+def tables_in(connection: sqlite3.Connection) -> frozenset[tuple[str, str, str]]:
+    """Return type, name and SQL of every table and index in this file. Raises sqlite3.Error."""
     rows = connection.execute("SELECT type, name, sql FROM sqlite_schema WHERE name NOT LIKE 'sqlite_%'")
     return frozenset(rows.fetchall())

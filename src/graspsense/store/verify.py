@@ -1,4 +1,4 @@
-"""Whether everything that was kept is there and is what it was: every hash, every file."""
+"""Verifying stored data: the hash of every row and recording, and the checksums in every file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Progress = Callable[[int, int], None]
 
 @frozen(kw_only=True)
 class Verified:
-    """What was checked, what is wrong with it, and what only wants `recover`."""
+    """What was checked, the problems found, and the files that `graspsense recover` can complete."""
 
     trials: int
     recordings: int
@@ -28,9 +28,9 @@ class Verified:
     unfinished: tuple[str, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as JSON values."""
+        """Return the fields as JSON values."""
         return {
-            "whole": not self.problems,
+            "intact": not self.problems,
             "trials": self.trials,
             "recordings": self.recordings,
             "problems": list(self.problems),
@@ -39,28 +39,28 @@ class Verified:
 
 
 def verify_store(folder: str | Path, progress: Progress | None = None) -> Verified:
-    """Check a store: SQLite's own checks, the hash of every row, the hash of every recording.
+    """Check a store: SQLite's own checks, the hash of every row, and the hash of every recording.
 
-    Raises ConfigError where there is none, DataDamaged where it cannot be read at all.
+    Raises ConfigError if there is no store, DataDamaged if it cannot be opened.
     """
     with Store.read(folder) as store:
-        problems = [f"the database: {one}" for one in integrity(store)]
+        problems = [f"the database: {problem}" for problem in integrity(store)]
         rows = list(stored_rows(store))
         names = set()
-        for done, (number, name, sha256, size, stored, found) in enumerate(rows):
+        for done, (number, sha256, row) in enumerate(rows):
             if progress is not None:
                 progress(done, len(rows))
-            if stored != found:
+            if sha256 != row.sha256:
                 problems.append(f"trial {number}: its row was changed after it was written")
             try:
-                path = store.recording_of(str(name))
+                path = store.recording_path(str(row.trial["recording"]))
             except DataDamaged as error:
                 problems.append(f"trial {number}: {error}")
                 continue
             names.add(path.name)
-            wrong = _wrong_with(path, str(sha256), size)
-            if wrong:
-                problems.append(f"trial {number}: {wrong}")
+            problem = _problem_of(path, str(row.trial["recording_sha256"]), row.trial["recording_bytes"])
+            if problem:
+                problems.append(f"trial {number}: {problem}")
         unfinished = []
         for path in sorted(store.recordings.iterdir() if store.recordings.is_dir() else ()):
             if path.name.endswith(PART):
@@ -68,26 +68,26 @@ def verify_store(folder: str | Path, progress: Progress | None = None) -> Verifi
             elif path.suffix == ".mcap" and path.name not in names:
                 unfinished.append(f"{path.name} has no row")
             elif not path.name.endswith((".mcap", CUT)):
-                unfinished.append(f"{path.name} is no recording of the store")
+                unfinished.append(f"{path.name} is not a recording of the store")
     return Verified(
         trials=len(rows), recordings=len(names), problems=tuple(problems), unfinished=tuple(unfinished)
     )
 
 
 def verify_file(path: str | Path) -> Verified:
-    """Check a recording: its checksums, its end, that no message is missing. Raises ConfigError, DataDamaged."""
+    """Check the checksums, the end and the message numbers of a recording. Raises ConfigError, DataDamaged."""
     read_recorded(path)
     return Verified(trials=0, recordings=1, problems=(), unfinished=())
 
 
-def _wrong_with(path: Path, sha256: str, size: int) -> str:
+def _problem_of(path: Path, sha256: str, size: int) -> str:
     try:
         with path.open("rb") as file:
             if hashlib.file_digest(file, "sha256").hexdigest() == sha256:
                 return ""
         found = path.stat().st_size
     except FileNotFoundError:
-        return f"its recording {path.name} is gone"
+        return f"its recording {path.name} is missing"
     except OSError as error:
         return f"its recording {path.name} cannot be read: {error.strerror}"
     if found != size:

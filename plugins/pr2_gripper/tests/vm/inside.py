@@ -32,7 +32,7 @@ from graspsense.core.plugins import installed
 from graspsense.core.signals import Command, Frame, Outcome, Pads, Phase
 from graspsense.core.trial import GraspEvent, Trial
 from graspsense.plugin_api import DeviceLost, NoDevice, create
-from graspsense.store.record_grasp import kept_grasp
+from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.discovery import on_the_bus
@@ -319,7 +319,7 @@ def unplugged_and_kept(way: Way, device: Emulator, store: Path) -> None:
     at = At(Phase.SQUEEZE, 3, lambda: device.say("unplug"))
     settings = settings_of(None, "pr2", None, options_of(way), 0)
     with Store.open(store) as opened:
-        kept = kept_grasp(opened, settings, installed(), labels={}, origin="run", sinks=[at])
+        kept = record_grasp(opened, settings, installed(), labels={}, origin="run", sinks=[at])
     lost_in_a_grasp(way, device, "unplugged", kept.trial, at)
     check(kept.number is not None and not kept.problem, f"{way.name}: kept as trial {kept.number}")
     device.tell("plug")

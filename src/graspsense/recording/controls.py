@@ -1,0 +1,62 @@
+"""The control tables of labelled trials: the width of the object alone, and features from before contact.
+
+A classifier with one of these tables is a baseline for the full feature set.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, TypedDict
+
+from graspsense.core.entries import FeatureSetEntry
+from graspsense.core.labelled import Control
+from graspsense.core.plugins import installed
+from graspsense.recording.before_contact import SPAN_S
+
+if TYPE_CHECKING:
+    from graspsense.core.features import FeatureTable
+
+BEFORE_CONTACT: Final = f"the first {SPAN_S:g} s of the approach: gap, velocity, effort and pad forces"
+
+
+class Controls(TypedDict):
+    """The fields of `Labelled` that hold the control tables, or the reasons why there are none."""
+
+    before_contact: Control | None
+    no_before_contact: str
+    width: Control | None
+    no_width: str
+
+
+def controls(
+    table: FeatureTable,
+    before_contact: FeatureTable | None,
+    *,
+    before_what: str = BEFORE_CONTACT,
+    no_before: str = "",
+    width_meaning: str = "",
+) -> Controls:
+    """Return the controls of a table of features.
+
+    `before_contact` holds features of the same trials from before contact, None with the reason in `no_before`.
+    `before_what` says what these are, `width_meaning` what the width means in these data. The width is the feature
+    that an installed feature set declares as such.
+    """
+    name = width_feature(table.names)
+    width = None
+    if name is not None:
+        what = f"{name} alone" + (f": {width_meaning}" if width_meaning else "")
+        width = Control(table=table.columns([name]), what=what)
+    return Controls(
+        before_contact=None if before_contact is None else Control(table=before_contact, what=before_what),
+        no_before_contact=no_before if before_contact is None else "",
+        width=width,
+        no_width="" if width is not None else "none of the features is declared to be the width",
+    )
+
+
+def width_feature(names: Sequence[str]) -> str | None:
+    """Return the feature that an installed feature set declares as the width of the object, None if there is none."""
+    entries = (component.entry for component in installed().components("feature-set"))
+    widths = {entry.width for entry in entries if isinstance(entry, FeatureSetEntry)}
+    return next((name for name in names if name in widths), None)

@@ -1,0 +1,145 @@
+"""Opening the SQLite file of a store: version checks before anything is touched, and errors that a user can act on."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+from urllib.parse import quote
+
+from graspsense import __version__
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.recording.atomic_file import SaveFailed
+from graspsense.store.schema import APPLICATION_ID, NEWEST, tables_in, tables_of_version
+
+FILE: Final = "store.sqlite"
+RECORDINGS: Final = "recordings"
+BUSY_S: Final = 30.0
+"""How long a connection waits for the lock of another program."""
+
+_MAGIC: Final = b"SQLite format 3\0"
+_HEADER_BYTES: Final = 100
+_REPAIR: Final = (
+    "`graspsense verify {folder}` lists what is intact. The recordings hold everything: move "
+    + FILE
+    + " away, and `graspsense recover {folder}` builds a new one from them"
+)
+
+
+def damaged(folder: Path, problem: str) -> DataDamaged:
+    """Return the error for a damaged store, with advice on its repair."""
+    return DataDamaged(f"the store in {folder} is damaged: {problem}. {_REPAIR.format(folder=folder)}")
+
+
+def is_new(folder: Path) -> bool:
+    """Return whether the folder has no store yet.
+
+    Raises DataDamaged for a file of another program and ConfigError for a newer version, before SQLite opens the file.
+    """
+    path = folder / FILE
+    try:
+        with path.open("rb") as file:
+            header = file.read(_HEADER_BYTES)
+    except FileNotFoundError:
+        header = b""
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be read: {error.strerror}") from error
+    if not header:
+        if any((folder / RECORDINGS).glob("*.mcap")) and path.exists():
+            raise DataDamaged(f"{path} is empty, but there are recordings. {_REPAIR.format(folder=folder)}")
+        return True
+    if len(header) < _HEADER_BYTES or not header.startswith(_MAGIC):
+        raise DataDamaged(f"{path} is not an SQLite file. {_REPAIR.format(folder=folder)}")
+    version, application = (int.from_bytes(header[at : at + 4], "big") for at in (60, 68))
+    _check_version(folder, version, application)
+    return False
+
+
+def checked_version(connection: sqlite3.Connection, folder: Path) -> int:
+    """Return the version of an open store whose tables are exactly those of its version.
+
+    Raises DataDamaged otherwise: another table, trigger or view could make SQLite run code.
+    """
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    (application,) = connection.execute("PRAGMA application_id").fetchone()
+    _check_version(folder, version, application)
+    have, want = tables_in(connection), tables_of_version(version)
+    if have != want:
+        names = sorted({str(name) for _, name, _ in have ^ want})
+        raise damaged(folder, f"its tables are not those of version {version} ({', '.join(names)[:200]})")
+    return int(version)
+
+
+def make_safe(connection: sqlite3.Connection) -> None:
+    """Set the options under which SQLite does not trust the file."""
+    connection.execute("PRAGMA trusted_schema = OFF")
+    connection.execute("PRAGMA cell_size_check = ON")
+    connection.execute("PRAGMA foreign_keys = ON")
+
+
+def connect_read_only(path: Path) -> tuple[sqlite3.Connection, Path | None]:
+    """Return a read-only connection, and the folder of a temporary copy if one had to be made."""
+    name = quote(str(path.absolute()))
+    connection = sqlite3.connect(f"file:{name}?mode=ro", uri=True, timeout=BUSY_S, isolation_level=None)
+    try:
+        connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()
+        return connection, None
+    except sqlite3.OperationalError as error:
+        connection.close()
+        if error.sqlite_errorcode & 0xFF not in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY):
+            raise
+    except BaseException:
+        connection.close()
+        raise
+    # A read-only disk has no place for the shared-memory file of readers. There is no writer either, so none is needed.
+    log = path.with_name(path.name + "-wal")
+    if log.is_file() and log.stat().st_size:
+        copy = Path(tempfile.mkdtemp(prefix="graspsense-"))
+        for source in (path, log):
+            shutil.copyfile(source, copy / source.name)
+        return sqlite3.connect(copy / path.name, isolation_level=None), copy
+    return sqlite3.connect(f"file:{name}?immutable=1", uri=True, isolation_level=None), None
+
+
+@contextmanager
+def sqlite_errors(folder: Path) -> Iterator[None]:
+    """Translate errors of SQLite: SaveFailed with the reason if there is one, else DataDamaged."""
+    try:
+        yield
+    except (sqlite3.Error, UnicodeDecodeError) as error:  # SQLite may quote damaged text
+        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
+        reason = _REASONS.get(code)
+        if reason is not None:
+            raise SaveFailed(f"the store in {folder} {reason} ({error})") from error
+        raise DataDamaged(
+            f"the store in {folder} is damaged ({error}). {_REPAIR.format(folder=folder)}"
+        ) from error
+
+
+def _check_version(folder: Path, version: int, application: int) -> None:
+    if application != APPLICATION_ID:
+        raise DataDamaged(
+            f"{folder / FILE} is not a store of graspsense: its application id is {application:#x}"
+        )
+    if version > NEWEST:
+        raise ConfigError(
+            f"the store in {folder} has version {version}. This graspsense ({__version__}) knows versions up to "
+            f"{NEWEST} and does not change it. Update graspsense"
+        )
+    if version < 1:
+        raise DataDamaged(f"the store in {folder} has no version. {_REPAIR.format(folder=folder)}")
+
+
+_REASONS: Final = {
+    sqlite3.SQLITE_FULL: "cannot be written: the disk is full",
+    sqlite3.SQLITE_IOERR: "cannot be read or written: the disk reports an error or is full",
+    sqlite3.SQLITE_READONLY: "cannot be written: it is read-only",
+    sqlite3.SQLITE_CANTOPEN: "cannot be opened: check the permissions of its folder",
+    sqlite3.SQLITE_PERM: "cannot be opened: check the permissions of its folder",
+    sqlite3.SQLITE_BUSY: f"has been locked by another program for more than {BUSY_S:g} s",
+    sqlite3.SQLITE_LOCKED: "is locked by another program",
+}
