@@ -44,10 +44,10 @@ from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.folds import stratified
 from graspsense.experiments.paper.published import published
 from graspsense.plugin_api import Classifier, Features, create, table_of
-from graspsense.sources.simulated import CONTAINERS, THINGS_PER_SEED, TRIALS_PER_SEED, Group
+from graspsense.sources.simulated import OBJECTS_PER_SEED, TRIALS_PER_SEED, Group
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import catalogue
+from graspsense_sim_gripper.objects.library import catalogue, object_kinds
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 
 TRIALS: Final = {"odwalla": (66, 12), "naked": (41, 10), "can": (42, 12), "water": (80, 16)}
@@ -243,7 +243,8 @@ def grasped(kind: str, figures: Sequence[float], seeds: range) -> Trials:
     """Grasp a container with these figures as the paper did, once a seed."""
     with tempfile.TemporaryDirectory() as folder:
         named = {}
-        for state in CONTAINERS[kind]:
+        (states,) = (one.states for one in object_kinds() if one.name == kind)
+        for state in states:
             # Things are numbered by the file's name: with that of the kind they are those of the catalogue.
             path = Path(folder) / state / f"{kind}.toml"
             path.parent.mkdir()
@@ -281,17 +282,17 @@ def _run(
     first: int,
 ) -> tuple[list[str], list[list[Any]]]:
     """Return the label of each trial, and what was drawn from it at each seed."""
-    dealt = Group(named=named, total=trials[0], instances=trials[1]).dealt()
+    dealt = Group(named=named, total=trials[0], instances=trials[1]).planned(kinds=())
     scenes, numbers = [], []
     for seed in seeds:
-        scenes += [f"{path}#{THINGS_PER_SEED * seed + i}" for _, path, i in dealt]
+        scenes += [f"{one.object_name}#{OBJECTS_PER_SEED * seed + one.instance}" for one in dealt]
         numbers += [TRIALS_PER_SEED * seed + first + k for k in range(len(dealt))]
     controller = create("controller", "hybrid", probing_force_n=force_n)
     config = SimConfig(fidelity="full")
     done = run_many(config, controller, scenes, numbers, draw=draw, traces=False, compiled=True)
     drawn = [one.drawn for one in done]
     n = len(dealt)
-    return [label for label, _, _ in dealt], [drawn[n * i : n * (i + 1)] for i in range(len(seeds))]
+    return [one.label for one in dealt], [drawn[n * i : n * (i + 1)] for i in range(len(seeds))]
 
 
 def judged(features: Sequence[Features], labels: Sequence[str], seed: int) -> float:

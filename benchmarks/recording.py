@@ -30,7 +30,8 @@ from graspsense.core.runner import run_grasp
 from graspsense.core.signals import CELLS, EFFORT, Command, Frame, Pads
 from graspsense.plugin_api import create
 from graspsense.recording.layout import PADS_FIELDS, TICK_FIELDS
-from graspsense.recording.recorder import Recorded, Recorder
+from graspsense.recording.recorder import Recorder
+from graspsense.recording.recording_info import RecordingInfo
 
 RATE_HZ = 1000.0
 GOAL_US = 20.0
@@ -82,7 +83,7 @@ class Paced(SensorBackend[None]):
         pass
 
 
-def one_run(ticks: int, path: Path | None) -> tuple[list[float], Recorded | None]:
+def one_run(ticks: int, path: Path | None) -> tuple[list[float], RecordingInfo | None]:
     gripper = Paced(ticks)
     controller = create("controller", "hybrid")
     recorder = None
@@ -107,7 +108,7 @@ def main() -> None:
     given = parser.parse_args()
     ticks = round(given.seconds * RATE_HZ)
     took: dict[bool, list[list[float]]] = {False: [], True: []}
-    written: list[Recorded] = []
+    written: list[RecordingInfo] = []
     draw = random.Random(1)
     with tempfile.TemporaryDirectory() as folder:
         for k in range(given.rounds):

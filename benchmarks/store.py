@@ -26,9 +26,10 @@ from graspsense.core.errors import GraspsenseError
 from graspsense.core.model import load_model, train
 from graspsense.core.plugins import installed
 from graspsense.plugin_api import create
-from graspsense.recording.trial_record import Beginning, Ending, Row
+from graspsense.recording.recording_info import RecordingInfo
+from graspsense.recording.trial_record import DeviceRecord, FeatureValues, TrialRecord, TrialResult
 from graspsense.store.dataset import labelled_store
-from graspsense.store.store import RecordingFacts, Store
+from graspsense.store.store import Store
 
 LABELS = ("can:full_open", "can:empty_open", "odwalla:full_closed", "odwalla:full_open", "odwalla:empty_open")
 FEATURES = (
@@ -40,7 +41,6 @@ FEATURES = (
     ("df_dt", "N/s"),
 )
 BEFORE = (("gap_at_start", "m"), ("velocity_before", "m/s"), ("effort_before", "N"))
-SETTINGS = '[gripper]\ntype = "graspsense-sim-gripper/sim"\nobject = "{}"\n\n[run]\nseed = {}\n'
 REPEATS = 5
 
 
@@ -52,20 +52,25 @@ def fill(store: Store, trials: int) -> None:
     for k in range(trials):
         label = LABELS[k % len(LABELS)]
         values = tuple(draw.gauss(LABELS.index(label), 0.3) for _ in FEATURES)
-        start = Beginning(
+        record = TrialRecord(
             made_at=f"2026-{1 + k % 12:02d}-{1 + k % 28:02d}T10:00:00.000+00:00",
             origin="collect",
             labels={"label": label, "instance": f"{label.partition(':')[0]}#{k % 40}"},
-            settings=SETTINGS.format(label, k),
+            settings={
+                "gripper": {"type": "graspsense-sim-gripper/sim", "object": label},
+                "run": {"seed": k},
+            },
             provenance={"config_sha256": "0" * 64, "seed": k, "components": {}, "note": "x" * 600},
+            device=DeviceRecord(serial=f"S{k % 3}", simulated=True),
+            result=TrialResult(
+                outcome="steady" if k % 50 else "slipped",
+                features=FeatureValues(features=FEATURES, values=values),
+                before_contact=FeatureValues(features=BEFORE, values=(0.08, -0.01, 10.0)),
+                details={"events": ["x" * 60] * 20},
+            ),
         )
-        end = Ending(
-            trial={"outcome": "steady" if k % 50 else "slipped", "events": ["x" * 60] * 20},
-            features=Row(features=FEATURES, values=values),
-            before=Row(features=BEFORE, values=(0.08, -0.01, 10.0)),
-        )
-        facts = RecordingFacts(name=f"{k:08d}.mcap", sha256="0" * 64, size=300_000, counts={"ticks": 7000})
-        store.add(start, end, {"serial": f"S{k % 3}"}, facts)
+        path = store.recordings / f"{k:08d}.mcap"
+        store.add(record, RecordingInfo(path=path, sha256="0" * 64, size=300_000, ticks=7000, images=0))
 
 
 def median_s(work: Callable[[], object]) -> float:

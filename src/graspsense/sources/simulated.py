@@ -175,7 +175,7 @@ def simulated_objects(settings: Settings) -> Sequence[ObjectKind]:
 
     Raises ConfigError if it declares none: a real gripper would move if it were opened for simulated trials.
     """
-    kinds = settings.gripper.create().objects()
+    kinds: Sequence[ObjectKind] = settings.gripper.create().objects()
     if not kinds:
         raise ConfigError(
             f"gripper {settings.gripper.component.qualified} declares no objects that it can simulate, so it was not "
