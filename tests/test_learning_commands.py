@@ -50,7 +50,7 @@ def test_an_honest_rate_of_ones_own_csv_in_one_command(run, csv):
         assert f"\n{line}" in out
     assert "confusion (rows are the truth)" in out
     assert "learning curve" in out
-    assert "no columns are named as known before the contact (--before COLUMNS)" in out
+    assert "no columns are named as known before contact (--before COLUMNS)" in out
 
 
 def test_its_json(run, csv):
@@ -160,7 +160,7 @@ def test_the_picture_of_the_confusion(run, csv, tmp_path):
         ),
         (["evaluate", "x.csv", "--label", "y", "-o", "classifier.trees=3"], 2, "no key 'trees'"),
         (["evaluate", "simulated", "--instances", "0"], 2, "0 instances of an object: give 1 to 1000"),
-        (["evaluate", "simulated", "--trials", "0"], 2, "0 trials of an instance"),
+        (["evaluate", "simulated", "--trials", "0"], 2, "0 trials per instance"),
         (["evaluate", "simulated", "--objects", "canoe"], 2, "no object named 'canoe'"),
         (["evaluate", "simulated", "--objects", "can,can:full_open"], 2, "an object is named twice"),
         (["evaluate", "simulated", "--objects", "can:full_open#3"], 2, "without an instance"),
