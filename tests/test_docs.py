@@ -11,14 +11,15 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 
-def role_pages():
-    spec = importlib.util.spec_from_file_location("role_pages", ROOT / "docs" / "role_pages.py")
+def script(name):
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-PAGES = role_pages()
+PAGES = script("role_pages")
+ROOMS = script("room_drawing")
 
 
 @pytest.mark.parametrize("role", PAGES.TITLES)
@@ -35,6 +36,22 @@ def test_the_page_of_what_flows_is_what_the_code_says():
 def test_the_page_of_the_hooks_is_what_the_code_says():
     written = (ROOT / "docs" / "roles" / "hooks.md").read_text()
     assert written == PAGES.hooks_page(), "run: python docs/role_pages.py"
+
+
+def test_the_drawing_of_the_rooms_is_that_of_the_imports():
+    assert ROOMS.FILE.read_text() == ROOMS.drawing(), "run: python docs/room_drawing.py"
+
+
+def test_no_room_imports_in_a_circle():
+    for graph in (ROOMS.host_rooms(), ROOMS.simulator_rooms()):
+        assert not ROOMS.panel(graph).against
+
+
+def test_an_arrow_that_follows_from_others_is_left_out_and_a_circle_shows():
+    chain = {"a": {"b", "c"}, "b": {"c"}, "c": set()}
+    assert ROOMS.reduced(chain) == {"a": {"b"}, "b": {"c"}, "c": set()}
+    assert not ROOMS.panel(chain).against
+    assert ROOMS.panel({"a": {"b"}, "b": {"a"}}).against
 
 
 def code(page, count):
