@@ -7,7 +7,9 @@ import tomllib
 
 import pytest
 
-from graspsense.core.errors import ConfigError
+from graspsense.core.errors import ConfigError, WiringError
+from graspsense.core.pipeline import load_pipeline
+from graspsense.core.plugins import IsolatedPlugins
 from graspsense.scaffold.make import KINDS, make
 
 
@@ -52,3 +54,28 @@ def test_nothing_is_written_over(tmp_path):
 
     with pytest.raises(ConfigError, match="is there already: give another name, or --folder"):
         make("lab-thing", "observer", tmp_path / "lab-thing")
+
+
+def test_a_new_gripper_grasps_with_the_default_pipeline_at_once(tmp_path, monkeypatch):
+    make("lab-hand", "sensor-backend", tmp_path / "lab-hand")
+    monkeypatch.syspath_prepend(tmp_path / "lab-hand" / "src")
+    from lab_hand import plugin
+
+    with IsolatedPlugins() as plugins:
+        plugins.add(plugin, "lab-hand")
+        pipeline = load_pipeline(options=["gripper.type=lab-hand", "classifier.type=none"], plugins=plugins)
+        trial = pipeline.grasp()
+
+        assert pipeline.settings.values["controller"]["sends"] == "velocity"
+        assert pipeline.settings.origins["controller.sends"] == "lab-hand/lab-hand accepts velocity"
+        assert (trial.outcome.words, trial.reason) == ("steady", "")
+        features = trial.features.as_dict()
+        assert features["p_first"] == pytest.approx(0.05, abs=0.001)
+        assert features["f_steady"] == pytest.approx(20.0, abs=1.0)  # the default probing force
+        with pytest.raises(
+            WiringError, match="commands effort, which gripper lab-hand/lab-hand does not take"
+        ):
+            load_pipeline(
+                options=["gripper.type=lab-hand", "classifier.type=none", "controller.sends=effort"],
+                plugins=plugins,
+            )

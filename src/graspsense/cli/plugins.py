@@ -325,7 +325,7 @@ def _component_text(component: Component) -> str:
                 for one in entry[key]
             ]
             lines.append(f"  {key:<11}  {', '.join(names) or 'none'}")
-    for key in ("accepts", "commands"):
+    for key in ("accepts", "commands", "alternatives"):
         if key in entry:
             lines.append(f"  {key:<11}  {', '.join(entry[key]) or 'none'}")
     if "features" in entry:

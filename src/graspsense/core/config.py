@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 from attrs import frozen
 
 from graspsense import __version__
-from graspsense.core.entries import TABLE_OF_ROLE, Role
+from graspsense.core.entries import TABLE_OF_ROLE, ControllerEntry, Role
 from graspsense.core.errors import ConfigError, PluginUnavailable, UnknownName, suggestion
 from graspsense.core.layers import (
     Flag,
@@ -157,6 +157,8 @@ def _laid(pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins
             component, cls = found
             called = component.qualified
             merged = _merged(layers, table, component)
+            if table == "controller" and "gripper" in chosen:
+                _choose_sent_kind(merged, component, chosen["gripper"].component)
         config: Any
         try:
             config = structured({k: v for k, v in merged.values.items() if k != "type"}, cls, called)
@@ -188,6 +190,17 @@ def _laid(pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins
         values=values,
         origins=origins,
     )
+
+
+def _choose_sent_kind(merged: Merged, controller: Component, gripper: Component) -> None:
+    """Set the key `sends` of a controller with several kinds of command, where nothing sets it."""
+    entry, accepted = controller.entry, getattr(gripper.entry, "accepts", ())
+    if not isinstance(entry, ControllerEntry) or not entry.alternatives or "sends" in merged.values:
+        return
+    kind = next((one for one in (*entry.commands, *entry.alternatives) if one in accepted), None)
+    if kind is not None and kind not in entry.commands:
+        merged.values["sends"] = kind
+        merged.owner[controller.table, "sends"] = Layer.of({}, f"{gripper.qualified} accepts {kind}")
 
 
 def build(component: Component, values: Mapping[str, Any]) -> Any:

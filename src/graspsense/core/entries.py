@@ -108,7 +108,13 @@ class ControllerEntry:
     summary: str = field(validator=instance_of(str))
     requires: tuple[Channel, ...] = field(validator=_ARE_CHANNELS)
     commands: tuple[str, ...] = field(validator=_ARE_KINDS)
-    """Command kinds it may send."""
+    """Command kinds it may send, unless its config says otherwise by the key `sends`."""
+    alternatives: tuple[str, ...] = field(default=(), validator=_ARE_KINDS)
+    """Command kinds that it can send instead, each alone.
+
+    Its config then has a key `sends` that names one kind of `commands` or `alternatives`. Where nothing sets the
+    key, it is the first of them that the gripper accepts.
+    """
     needs: str = ""
 
 

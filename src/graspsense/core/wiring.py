@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from graspsense.core.config import Settings
+from graspsense.core.config import Chosen, Settings
 from graspsense.core.entries import Channel, ControllerEntry, FeatureSetEntry, SensorBackendEntry
 from graspsense.core.errors import WiringError
 from graspsense.core.plugins import Component
@@ -19,7 +19,7 @@ def check(settings: Settings) -> None:
     misfits = [
         *_channel_misfits(gripper, settings.controller.component),
         *_channel_misfits(gripper, settings.features.component),
-        *_command_misfits(gripper, settings.controller.component),
+        *_command_misfits(gripper, settings.controller),
     ]
     if misfits:
         head = (
@@ -45,10 +45,12 @@ def _channel_misfits(gripper: Component, user: Component) -> Iterator[str]:
             yield f"{needs}, but {_named(gripper)} gives it {rate}. {_choose(gripper, user)}"
 
 
-def _command_misfits(gripper: Component, controller: Component) -> Iterator[str]:
+def _command_misfits(gripper: Component, chosen: Chosen) -> Iterator[str]:
+    controller = chosen.component
     assert isinstance(gripper.entry, SensorBackendEntry)
     assert isinstance(controller.entry, ControllerEntry)
-    for kind in controller.entry.commands:
+    sent = (chosen.config.sends,) if controller.entry.alternatives else controller.entry.commands
+    for kind in sent:
         if kind not in gripper.entry.accepts:
             kinds = ", ".join(gripper.entry.accepts) or "none"
             yield (

@@ -38,6 +38,7 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:
             summary=summary,
             requires=(Channel("gap", "m"), Channel("velocity", "m/s"), *_PAD_FORCES),
             commands=("effort",),
+            alternatives=() if name == "force" else ("velocity",),
         )
 
 

@@ -38,7 +38,7 @@ KINDS: Final[Mapping[str, Kind]] = {
         "a gripper, here a fake one behind the place where its driver goes",
         "Gripper",
         (),
-        "graspsense run --gripper $part -o controller.type=YOURS -o features.type=YOURS",
+        "graspsense run --gripper $part",
     ),
     "controller": Kind(
         "controller",

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from attrs import field, frozen
 
-from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, Pads
+from graspsense.plugin_api import APPROACH, VELOCITY, Command, Controller, Frame, Pads
 from graspsense.plugins.controllers.force import (
     ForceLoop,
     ForceLoopConfig,
@@ -32,6 +32,7 @@ from graspsense.plugins.controllers.velocity import (
     VelocityLoop,
     VelocityLoopConfig,
     closing_effort,
+    kind_sent,
     velocity_loop,
 )
 
@@ -45,9 +46,10 @@ class HybridConfig(SupervisionConfig, ForceLoopConfig, VelocityLoopConfig):
 
 
 class HybridParams(NamedTuple):
-    """Numbers of the law."""
+    """Numbers of the law; `kind` is the command kind that it sends."""
 
     velocity: VelocityLoop
+    kind: int
     force: ForceLoop
     supervision: Supervision
     ramp_s: float
@@ -80,7 +82,12 @@ def step(params: HybridParams, state: HybridState, frame: Frame, pads: Pads) -> 
         elapsed = frame.t_s - contact_t
         if elapsed < params.ramp_s:
             effort = approach_effort + (effort - approach_effort) * (elapsed / params.ramp_s)
-    return Command(EFFORT, effort, inf, inf), HybridState(
+    value, limit = effort, inf
+    if params.kind == VELOCITY:
+        value = -params.velocity.closing_speed_m_s
+        if progress.phase != APPROACH:
+            limit = effort
+    return Command(params.kind, value, limit, inf), HybridState(
         progress.phase, progress.outcome, progress, integral, force_effort, approach_effort, contact_t
     )
 
@@ -94,6 +101,7 @@ class HybridController(Controller[HybridConfig]):
         """Return the law's numbers."""
         return HybridParams(
             velocity=velocity_loop(self.config),
+            kind=kind_sent(self.config),
             force=force_loop(self.config),
             supervision=supervision(
                 self.config, slowest_m_s=self.config.closing_speed_m_s, **settling(self.config)

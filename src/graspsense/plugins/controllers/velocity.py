@@ -7,11 +7,12 @@ the paper); the hybrid controller uses it only until both fingers touch.
 from __future__ import annotations
 
 from math import inf
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from attrs import field, frozen
+from attrs.validators import in_
 
-from graspsense.plugin_api import EFFORT, Command, Controller, Frame, Pads
+from graspsense.plugin_api import EFFORT, VELOCITY, Command, Controller, Frame, Pads
 from graspsense.plugins.controllers.supervision import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -37,6 +38,9 @@ class VelocityLoopConfig:
     integral_limit_n: float = field(default=100.0, validator=NOT_NEGATIVE)
     preload_n: float = field(default=7.0, validator=NOT_NEGATIVE)
     """Where the integral starts: the gripper's Coulomb friction (7 N is fed forward in pr2_gripper_sensor)."""
+    sends: Literal["effort", "velocity"] = field(default="effort", validator=in_(("effort", "velocity")))
+    """What is commanded. `velocity` is for a gripper with a velocity loop of its own: this loop's gains then count for
+    nothing, and the squeeze closes on with the effort as a limit."""
 
 
 @frozen(kw_only=True, slots=False)
@@ -65,6 +69,11 @@ def velocity_loop(config: VelocityLoopConfig) -> VelocityLoop:
     )
 
 
+def kind_sent(config: VelocityLoopConfig) -> int:
+    """Return the command kind of the key `sends`."""
+    return VELOCITY if config.sends == "velocity" else EFFORT
+
+
 def closing_effort(loop: VelocityLoop, integral_n: float, frame: Frame) -> tuple[float, float]:
     """Return the effort (N) that keeps the closing speed, and the integral (N) after this tick."""
     speed, gain, integral_gain, limit, _ = loop
@@ -78,9 +87,10 @@ def closing_effort(loop: VelocityLoop, integral_n: float, frame: Frame) -> tuple
 
 
 class VelocityParams(NamedTuple):
-    """Numbers of the law."""
+    """Numbers of the law; `kind` is the command kind that it sends."""
 
     loop: VelocityLoop
+    kind: int
     supervision: Supervision
 
 
@@ -98,8 +108,10 @@ def step(
 ) -> tuple[Command, VelocityState]:
     """Close at the set speed, whatever resists."""
     progress = supervise(params.supervision, state.progress, frame)
-    effort, integral = closing_effort(params.loop, state.integral_n, frame)
-    return Command(EFFORT, effort, inf, inf), VelocityState(
+    value, integral = closing_effort(params.loop, state.integral_n, frame)
+    if params.kind == VELOCITY:
+        value = -params.loop.closing_speed_m_s
+    return Command(params.kind, value, inf, inf), VelocityState(
         progress.phase, progress.outcome, progress, integral
     )
 
@@ -113,6 +125,7 @@ class VelocityController(Controller[VelocityConfig]):
         """Return the law's numbers."""
         return VelocityParams(
             loop=velocity_loop(self.config),
+            kind=kind_sent(self.config),
             supervision=supervision(self.config, slowest_m_s=self.config.closing_speed_m_s),
         )
 
