@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from graspsense.core.config import Chosen, Settings
+from graspsense.core.config import SelectedComponent, Settings
 from graspsense.core.entries import Channel, ControllerEntry, FeatureSetEntry, SensorBackendEntry
 from graspsense.core.errors import WiringError
 from graspsense.core.plugins import Component
@@ -45,7 +45,7 @@ def _channel_misfits(gripper: Component, user: Component) -> Iterator[str]:
             yield f"{needs}, but {_named(gripper)} gives it {rate}. {_choose(gripper, user)}"
 
 
-def _command_misfits(gripper: Component, chosen: Chosen) -> Iterator[str]:
+def _command_misfits(gripper: Component, chosen: SelectedComponent) -> Iterator[str]:
     controller = chosen.component
     assert isinstance(gripper.entry, SensorBackendEntry)
     assert isinstance(controller.entry, ControllerEntry)
