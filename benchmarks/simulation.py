@@ -238,9 +238,10 @@ def plant() -> dict[str, Any]:
 
 
 def contact_rate(config: SimConfig) -> tuple[float, float]:
-    from graspsense.plugin_api import PR2_LINKAGES, gap_and_rate, revolutions_at
+    from graspsense.plugin_api import gap_and_rate, revolutions_at
+    from graspsense_sim_gripper.drive_models import LINKAGES
 
-    link = PR2_LINKAGES[config.transmission]
+    link = LINKAGES[config.transmission]
     return gap_and_rate(link, revolutions_at(link, 0.05))
 
 

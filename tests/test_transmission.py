@@ -1,62 +1,16 @@
-"""The closed form of the PR2's linkage, against its published table and its own inverse."""
+"""The linkage without fingers: the map of a straight drive and its inverse."""
+
+from __future__ import annotations
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from graspsense.core.transmission import PR2_ENCODER_TICKS, PR2_LINKAGES, gap_and_rate, revolutions_at
-
-# Gap (mm), motor revolutions, mm/revolution, um/encoder tick for the delivered gripper: computed from the published
-# constants (pr2.urdf.xacro) with the published formula, in its own form (acos and sin of the finger angle).
-TABLE = [
-    (0, 0.0, 0.4637, 0.386),
-    (30, 68.3, 0.4194, 0.349),
-    (50, 117.3, 0.3975, 0.331),
-    (65, 155.8, 0.3819, 0.318),
-    (86, 212.5, 0.3586, 0.299),
-]
+from graspsense.core.transmission import gap_and_rate, revolutions_at, straight_linkage
 
 
-@pytest.mark.parametrize(("gap_mm", "revolutions", "rate", "tick_um"), TABLE)
-def test_the_delivered_gripper_matches_its_table(gap_mm, revolutions, rate, tick_um):
-    link = PR2_LINKAGES["pr2"]
-    found = revolutions_at(link, gap_mm / 1e3)
-    assert found == pytest.approx(revolutions, abs=0.06)
-    gap, slope = gap_and_rate(link, found)
-    assert gap == pytest.approx(gap_mm / 1e3, abs=1e-9)
-    assert slope * 1e3 == pytest.approx(rate, abs=6e-5)
-    assert slope * 1e6 / PR2_ENCODER_TICKS == pytest.approx(tick_um, abs=6e-4)
+@pytest.mark.parametrize("gap_m", [0.0, 0.03, 0.09])
+def test_a_straight_drive_moves_the_gap_in_proportion(gap_m):
+    link = straight_linkage(4e-4)
+    revolutions = revolutions_at(link, gap_m)
 
-
-@pytest.mark.parametrize(
-    ("name", "gap_mm", "rate"),
-    [("pr2_2009", 0, 0.263), ("pr2_2009", 50, 0.241), ("pr2_paper", 0, 0.425), ("pr2_paper", 50, 0.390)],
-)
-def test_the_sets_of_the_papers_time_have_their_own_ratios(name, gap_mm, rate):
-    link = PR2_LINKAGES[name]
-    _, slope = gap_and_rate(link, revolutions_at(link, gap_mm / 1e3))
-    assert slope * 1e3 == pytest.approx(rate, abs=6e-4)
-
-
-@given(st.sampled_from(sorted(PR2_LINKAGES)), st.floats(0.0, 0.09))
-def test_gap_to_revolutions_and_back(name, gap_m):
-    link = PR2_LINKAGES[name]
-    gap, rate = gap_and_rate(link, revolutions_at(link, gap_m))
-    assert gap == pytest.approx(gap_m, abs=1e-12)
-    assert rate > 0.0
-
-
-@given(st.sampled_from(sorted(PR2_LINKAGES)), st.floats(5.0, 200.0))
-def test_the_rate_is_the_slope_of_the_gap(name, revolutions):
-    link = PR2_LINKAGES[name]
-    h = 1e-3
-    slope = (gap_and_rate(link, revolutions + h)[0] - gap_and_rate(link, revolutions - h)[0]) / (2 * h)
-    assert gap_and_rate(link, revolutions)[1] == pytest.approx(slope, rel=1e-6)
-
-
-def test_beyond_the_ends_of_travel_it_stays_a_number():
-    for link in PR2_LINKAGES.values():
-        for revolutions in (-1e4, 1e4):
-            gap, rate = gap_and_rate(link, revolutions)
-            assert gap == gap
-            assert rate == rate
+    assert revolutions == pytest.approx(gap_m / 4e-4)
+    assert gap_and_rate(link, revolutions) == (pytest.approx(gap_m), 4e-4)

@@ -82,8 +82,6 @@ _TABLE: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
     },
     "Calibration: from cell counts to newtons": {
         "calibration": (
-            "EDGE_COUNTS_PER_N",
-            "PAD_COUNTS_PER_N",
             "LoadTable",
             "edge_force",
             "load_of",
@@ -96,8 +94,6 @@ _TABLE: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
     },
     "Transmission: from motor revolutions to the gap": {
         "transmission": (
-            "PR2_ENCODER_TICKS",
-            "PR2_LINKAGES",
             "ScrewLinkage",
             "gap_and_rate",
             "revolutions_at",

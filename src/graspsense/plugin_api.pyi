@@ -68,8 +68,6 @@ from graspsense.core.roles import SimulationVariant as SimulationVariant
 from graspsense.core.emulated import EmulatedDevice as EmulatedDevice
 
 # Calibration: from cell counts to newtons
-from graspsense.core.calibration import EDGE_COUNTS_PER_N as EDGE_COUNTS_PER_N
-from graspsense.core.calibration import PAD_COUNTS_PER_N as PAD_COUNTS_PER_N
 from graspsense.core.calibration import LoadTable as LoadTable
 from graspsense.core.calibration import edge_force as edge_force
 from graspsense.core.calibration import load_of as load_of
@@ -83,8 +81,6 @@ from graspsense.core.calibration_files import stored_tables as stored_tables
 from graspsense.core.calibration_files import stored_zero as stored_zero
 
 # Transmission: from motor revolutions to the gap
-from graspsense.core.transmission import PR2_ENCODER_TICKS as PR2_ENCODER_TICKS
-from graspsense.core.transmission import PR2_LINKAGES as PR2_LINKAGES
 from graspsense.core.transmission import ScrewLinkage as ScrewLinkage
 from graspsense.core.transmission import gap_and_rate as gap_and_rate
 from graspsense.core.transmission import revolutions_at as revolutions_at

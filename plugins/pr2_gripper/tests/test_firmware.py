@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from graspsense.plugin_api import PR2_LINKAGES, gap_and_rate
+from graspsense.plugin_api import gap_and_rate
+from graspsense_pr2_gripper.linkage import LINKAGES
 from graspsense_pr2_gripper.protocol import (
     ACCEPTED,
     CLAMPED,
@@ -37,10 +38,10 @@ def test_a_report_a_millisecond_from_power_on(board: Any) -> None:
     assert {one.status for one in reports} == {0}
 
 
-@pytest.mark.parametrize("transmission", sorted(PR2_LINKAGES))
+@pytest.mark.parametrize("transmission", sorted(LINKAGES))
 def test_encoder_tells_the_bodys_gap_through_each_linkage(board: Any, transmission: str) -> None:
     report = decode_input(board(transmission=transmission).firmware.step())
-    gap, rate = gap_and_rate(PR2_LINKAGES[transmission], report.encoder_ticks / 1200)
+    gap, rate = gap_and_rate(LINKAGES[transmission], report.encoder_ticks / 1200)
     assert gap == pytest.approx(0.086, abs=rate / 1200), "the simulated gripper stands open at 86 mm"
 
 

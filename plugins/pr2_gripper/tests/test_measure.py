@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from graspsense.plugin_api import PR2_LINKAGES, LoadTable, Pads, TareRefused, gap_and_rate, revolutions_at
+from graspsense.plugin_api import LoadTable, Pads, TareRefused, gap_and_rate, revolutions_at
 from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.linkage import LINKAGES
 from graspsense_pr2_gripper.measure import BAD_CELL, BEYOND_TABLE, Measure
 from graspsense_pr2_gripper.protocol import LEFT_ABSENT, InputReport
 from graspsense_pr2_gripper.stream import Image
@@ -37,11 +38,11 @@ def tared(identity: Any, config: Pr2Config | None = None, **more: Any) -> Measur
     return measure
 
 
-@pytest.mark.parametrize("transmission", sorted(PR2_LINKAGES))
+@pytest.mark.parametrize("transmission", sorted(LINKAGES))
 def test_gap_of_every_encoder_tick_comes_back_to_a_nanometre(transmission: str, device_identity: Any) -> None:
     """Over the stroke 0 to 90 mm: ticks to metres by the driver, metres to ticks by the inverse."""
     measure = Measure(device_identity(transmission=transmission), Pr2Config(), None, None)
-    link = PR2_LINKAGES[transmission]
+    link = LINKAGES[transmission]
     first, last = (math.ceil(revolutions_at(link, gap) * 1200) for gap in (0.0, 0.09))
     gaps = []
     for ticks in range(first, last, 97):
@@ -58,7 +59,7 @@ def test_gap_of_every_encoder_tick_comes_back_to_a_nanometre(transmission: str, 
 def test_velocity_is_the_motors_times_the_linkages_ratio(device_identity: Any) -> None:
     """pr2 linkage at 50 mm: 0.3975 mm a revolution; one revolution a second is 1200 ticks."""
     measure = Measure(device_identity(), Pr2Config(), None, None)
-    ticks = round(revolutions_at(PR2_LINKAGES["pr2"], 0.050) * 1200)
+    ticks = round(revolutions_at(LINKAGES["pr2"], 0.050) * 1200)
     frame = measure.reading(report(ticks, velocity_mtick_s=-1_200_000), None).frame
     assert frame.velocity_m_s == pytest.approx(-0.3975e-3, rel=2e-4)
 

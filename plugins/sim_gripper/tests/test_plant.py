@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graspsense.plugin_api import PR2_LINKAGES, bind, gap_and_rate, revolutions_at, straight_linkage
+from graspsense.plugin_api import bind, gap_and_rate, revolutions_at, straight_linkage
+from graspsense_sim_gripper.drive_models import LINKAGES
 from graspsense_sim_gripper.kernel import plant_of, sum_of
 from graspsense_sim_gripper.plant import (
     EXPLICIT,
@@ -40,7 +41,7 @@ from graspsense_sim_gripper.terms.surface import Surface, surface
 from graspsense_sim_gripper.terms.term import NoState
 from graspsense_sim_gripper.terms.worn import Worn
 
-LINK = PR2_LINKAGES["pr2"]
+LINK = LINKAGES["pr2"]
 TICK = 1e-3
 FINE = Steps(2e-5)
 
@@ -162,7 +163,7 @@ def test_halving_the_tick_quarters_the_error_of_a_way_in_the_free(effort):
     ("name", "closed_kg", "open_kg"), [("pr2", 73, 123), ("pr2_2009", 228, 315), ("pr2_paper", 87, 121)]
 )
 def test_the_reflected_mass_of_each_linkage(name, closed_kg, open_kg):
-    link = PR2_LINKAGES[name]
+    link = LINKAGES[name]
     masses = [
         4 * math.pi**2 * 4e-7 / gap_and_rate(link, revolutions_at(link, gap))[1] ** 2 for gap in (0.0, 0.086)
     ]

@@ -6,9 +6,6 @@ import pytest
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import (
-    PAD_COUNTS_PER_N,
-    PR2_ENCODER_TICKS,
-    PR2_LINKAGES,
     Outcome,
     Phase,
     create,
@@ -16,6 +13,8 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.drive_models import ENCODER_TICKS, LINKAGES
+from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N
 
 HYBRID = create("controller", "hybrid")
 
@@ -77,10 +76,7 @@ def test_a_saturated_cell_stays_at_its_largest_count():
 def test_the_gap_is_read_in_encoder_ticks_and_the_rate_through_its_filter():
     trace = grasp(spread=False).trace
     approaching = trace.phase == Phase.APPROACH
-    ticks = (
-        np.array([revolutions_at(PR2_LINKAGES["pr2"], gap) for gap in trace.gap_m.tolist()])
-        * PR2_ENCODER_TICKS
-    )
+    ticks = np.array([revolutions_at(LINKAGES["pr2"], gap) for gap in trace.gap_m.tolist()]) * ENCODER_TICKS
     assert ticks == pytest.approx(np.round(ticks), abs=1e-5)
     # At speed the filtered rate is the set 10 mm/s, within what one tick (0.33 um/ms) leaves through 3 ms.
     cruising = trace.velocity_m_s[approaching][500:1500]

@@ -59,9 +59,9 @@ def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
 
     with _bench(asked, replace) as bench:
         stored = stored_zero(bench.stored["tare"]) if "tare" in bench.stored else None
-        counts_per_n = float(bench.info.numbers.get("pad_counts_per_n", calibration.PAD_COUNTS_PER_N))
+        counts_per_n = _counts_per_n(bench)
         taken = unloaded_images(bench.rig, images, timeout_s=10.0 + images)
-        left, right = calibration.tare(taken, stored, counts_per_n)
+        left, right = calibration.tare(taken, counts_per_n, stored)
         if stored is None and not replace:
             bench.backend.tare(taken)
         data = {"left": list(left), "right": list(right), "images": len(taken)}
@@ -78,10 +78,7 @@ def load_cell(readings: str, replace: bool, as_json: bool, **asked: Any) -> None
     and load_n (what the load cell said).
     """
     with _bench(asked, replace) as bench:
-        from graspsense.core.calibration import PAD_COUNTS_PER_N
-
-        counts_per_n = float(bench.info.numbers.get("pad_counts_per_n", PAD_COUNTS_PER_N))
-        data = _tables(readings, counts_per_n)
+        data = _tables(readings, _counts_per_n(bench))
         _store(bench, "load-cell", data, as_json)
 
 
@@ -165,6 +162,16 @@ def _store(bench: _Bench, kind: str, data: Mapping[str, Any], as_json: bool) -> 
         talk(f"{kind} of {written.serial} kept in {path}")
     for note in bench.info.notes:
         talk(f"note: {note}")
+
+
+def _counts_per_n(bench: _Bench) -> float:
+    """Return the counts of the pad under one newton, which the gripper states. Raises ConfigError."""
+    from graspsense.core.errors import ConfigError
+
+    counts = bench.info.numbers.get("pad_counts_per_n")
+    if counts is None:
+        raise ConfigError(f"{bench.info.name} does not state the counts of its pads under one newton")
+    return float(counts)
 
 
 def _tables(path: str, counts_per_n: float) -> dict[str, Any]:

@@ -1,9 +1,8 @@
-"""From raw cell counts to newtons: the tare, the force on a fingertip, and a load cell's word on that.
+"""From raw cell counts to newtons: the tare, the force on a fingertip, and its calibration by a load cell.
 
-Raw counts have an offset of some thousands that differs by cell, finger and run, so every force is a difference
-from images taken with nothing touching. Counts per newton are those of the PR2 fingertip
-(`fingertip_pressure/fingertip_geometry.py`) where nothing else is given; the viewer and this module divide by them.
-A cell that reads 0 or 65535 does not answer (`ethercat_hardware`, wg06.cpp): it is left out of every sum.
+Raw counts have an offset of some thousands, which differs between cells, fingers and runs. Every force is therefore a
+difference from images taken with nothing touching. The counts per newton are those of the gripper, from its plugin.
+A cell that reads 0 or 65535, the ends of a 16-bit count, is dead (`ethercat_hardware`, wg06.cpp). Sums leave it out.
 """
 
 from __future__ import annotations
@@ -15,33 +14,33 @@ from typing import Final, NamedTuple
 from graspsense.core.errors import ConfigError, TareRefused
 from graspsense.core.signals import CELLS, FIRST_PAD_CELL, Pads
 
-PAD_COUNTS_PER_N: Final = 1600.0
-EDGE_COUNTS_PER_N: Final = (600.0, 400.0, 600.0, 600.0, 600.0, 600.0, 400.0)
-"""Cells 0-6: back, side, corner, tip, tip, corner, side."""
-
 TARE_SPREAD_N: Final = 0.5
-"""A tare is refused where the pad sum varies by more than this while nothing should touch."""
+"""A tare is refused if the sum of a pad varies by more than this while nothing should touch it."""
 
 TARE_DRIFT_N: Final = 3.0
-"""A tare is refused where a pad's zero lies further than this from its stored one: it is loaded.
+"""A tare is refused if the zero of a pad differs by more than this from the stored one: the pad is loaded.
 
-Offsets differ from run to run, too: by up to some hundred counts a cell, or 200 * 15 / 1600 = 1.9 N on a pad.
+Offsets also differ between runs, on the PR2 by up to some hundred counts a cell, or 200 * 15 / 1600 = 1.9 N on a pad.
 """
 LARGEST_COUNT: Final = 65535.0
+"""The largest count of 16 bits."""
 
 Cells = tuple[float, ...]
 
 
-def pad_force(cells: Cells, zero: Cells, counts_per_n: float = PAD_COUNTS_PER_N) -> float:
-    """Return the force (N) on the fifteen cells of the gripping face, edges left out."""
+def pad_force(cells: Cells, zero: Cells, counts_per_n: float) -> float:
+    """Return the force (N) on the fifteen cells of the gripping face, without the edge cells.
+
+    `counts_per_n` is the number of counts of their sum under one newton.
+    """
     total = 0.0
     for i in range(FIRST_PAD_CELL, CELLS):
         total += cells[i] - zero[i]
     return total / counts_per_n
 
 
-def edge_force(cells: Cells, zero: Cells, counts_per_n: tuple[float, ...] = EDGE_COUNTS_PER_N) -> float:
-    """Return the largest force (N) on a single edge cell (0-6)."""
+def edge_force(cells: Cells, zero: Cells, counts_per_n: tuple[float, ...]) -> float:
+    """Return the largest force (N) on a single edge cell (0-6); `counts_per_n` is given for each of them."""
     largest = (cells[0] - zero[0]) / counts_per_n[0]
     for i in range(1, FIRST_PAD_CELL):
         force = (cells[i] - zero[i]) / counts_per_n[i]
@@ -51,14 +50,14 @@ def edge_force(cells: Cells, zero: Cells, counts_per_n: tuple[float, ...] = EDGE
 
 
 def answers(count: float) -> bool:
-    """Return whether a cell with this count answers at all."""
+    """Return whether a cell with this count works."""
     return 0.0 < count < LARGEST_COUNT
 
 
 def masked(cells: Cells, zero: Cells) -> tuple[Cells, int]:
-    """Return the cells with each that does not answer at its zero, where it adds no force, and how many those are.
+    """Return the cells with each dead one set to its zero, where it adds no force, and the number of dead cells.
 
-    A cell whose zero is 0 did not answer during the tare, and stays out.
+    A cell whose zero is 0 was dead during the tare, and counts as dead afterwards.
     """
     for cell, none in zip(cells, zero, strict=True):
         if not answers(cell) or none == 0.0:
@@ -71,7 +70,7 @@ def masked(cells: Cells, zero: Cells) -> tuple[Cells, int]:
 
 
 def zero_of(images: Sequence[Cells]) -> Cells:
-    """Return the mean of these images of one fingertip, cell by cell."""
+    """Return the mean of each cell over these images of one fingertip."""
     total = images[0]
     for image in images[1:]:
         total = tuple([a + b for a, b in zip(total, image, strict=True)])
@@ -79,14 +78,14 @@ def zero_of(images: Sequence[Cells]) -> Cells:
 
 
 def tare(
-    images: Sequence[Pads], stored: tuple[Cells, Cells] | None = None, counts_per_n: float = PAD_COUNTS_PER_N
+    images: Sequence[Pads], counts_per_n: float, stored: tuple[Cells, Cells] | None = None
 ) -> tuple[Cells, Cells]:
     """Return the zero of the left and of the right fingertip from images taken with nothing touching.
 
-    The zero of a cell is the mean of the images in which it answers, 0 where it answers in none. `stored` is the
-    zero of an earlier tare, known to be unloaded. Raises TareRefused where there is no image, a value is no number,
-    a fingertip does not answer, a pad's sum varies by more than `TARE_SPREAD_N` over the images (something touches
-    or moves), or lies more than `TARE_DRIFT_N` from the stored one (something presses steadily).
+    The zero of a cell is the mean over the images in which it works, or 0 if it works in none. `stored` is the zero of
+    an earlier tare of unloaded pads. Raises TareRefused if there is no image, if a value is NaN, if all cells of a
+    fingertip are dead, if the sum of a pad varies by more than `TARE_SPREAD_N` over the images (something touches it
+    or moves), or if it differs by more than `TARE_DRIFT_N` from the stored one (something presses on it steadily).
     """
     if not images:
         raise TareRefused("no cell image came while taring: check the fingertips' cables, then try again")
@@ -96,7 +95,7 @@ def tare(
     ):
         zero = zero_of(cells)
         if any(value != value for value in zero):
-            raise TareRefused(f"the {side} fingertip gives cells that are no numbers, so it cannot be tared")
+            raise TareRefused(f"the {side} fingertip gives cells that are not numbers, so it cannot be tared")
         if not all(answers(value) for image in cells for value in image):
             zero = _zero_of_answering(cells)
             if not any(zero):
@@ -131,18 +130,18 @@ def _zero_of_answering(images: Sequence[Cells]) -> Cells:
 
 
 class LoadTable(NamedTuple):
-    """What a load cell says against what a pad says, both in N and rising, from (0, 0) on."""
+    """The force that a load cell measured (N) at each force of a pad (N); both rise, from (0, 0) on."""
 
     pad_n: tuple[float, ...]
     load_n: tuple[float, ...]
 
 
 def load_table(readings: Iterable[tuple[float, float]]) -> LoadTable:
-    """Return the table that fits these readings of (pad, load cell) in N: Fig. 4 of Chitta et al., one fingertip's.
+    """Return the table that fits these readings (pad, load cell) in N of one fingertip: Fig. 4 of Chitta et al.
 
-    Readings of one pad force are averaged; where the load would fall, neighbours are averaged until it does not
-    (pool adjacent violators). Raises ConfigError for fewer than two readings above zero, and for one that is negative
-    or no number.
+    Readings at the same pad force are averaged, and neighbours are averaged until the load rises with the pad force
+    (pool adjacent violators). Raises ConfigError for fewer than two pad forces above zero, and for a reading that is
+    negative or not a number.
     """
     sums: dict[float, list[float]] = {}
     for pad, load in readings:
@@ -166,9 +165,9 @@ def load_table(readings: Iterable[tuple[float, float]]) -> LoadTable:
 
 
 def load_of(table: LoadTable, pad_n: float) -> tuple[float, bool]:
-    """Return the load (N) at this pad force, and whether the table reaches there.
+    """Return the load (N) at this pad force, and whether this lies within the table.
 
-    Linear between the readings, hence monotone; beyond the last the last slope goes on, below zero the first.
+    The table is interpolated linearly, and extrapolated with its first slope below zero and its last slope above.
     """
     pads, loads = table
     i = min(max(bisect_right(pads, pad_n), 1), len(pads) - 1)

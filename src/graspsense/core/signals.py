@@ -11,9 +11,10 @@ import enum
 from typing import Final, NamedTuple
 
 CELLS: Final = 22
-"""Cells of a fingertip: 0 back, 1-6 round the edges, 7-21 the gripping face in five rows of three."""
+"""Number of cells of a fingertip, as the PR2 has them: 0 at the back, 1 to 6 along the edges, 7 to 21 on the gripping
+face in five rows of three. Images of any gripper have this layout so far; a cell that it lacks is NaN."""
 FIRST_PAD_CELL: Final = 7
-"""Cells from here on lie on the gripping face; those before it are edge cells."""
+"""The first cell on the gripping face of the PR2; the cells before it are edge cells."""
 
 CHANNELS: Final = {
     "gap": "m",

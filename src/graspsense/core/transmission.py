@@ -1,16 +1,15 @@
 """The closed form of a screw-driven finger linkage: motor revolutions to gap and back.
 
-The map is that of the PR2 gripper (`pr2_mechanism_model/src/pr2_gripper_transmission.cpp`): a motor turns a
-screw, the screw sets one side of a triangle with fixed sides a and b, and the triangle turns a finger of length
-r. It stands in the core because a driver (counts to metres) and a simulated gripper (reflected inertia, encoder)
-need the one law, and neither may know the other.
+A motor turns a screw, the screw sets the length of one side of a triangle whose other sides a and b are fixed, and the
+triangle turns a finger of length r (`pr2_mechanism_model/src/pr2_gripper_transmission.cpp`). Both a driver (counts to
+metres) and a simulated gripper (reflected inertia, encoder) use this map, and neither may import the other. The
+constants of a gripper belong to its plugin.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 
 class ScrewLinkage(NamedTuple):
@@ -24,10 +23,10 @@ class ScrewLinkage(NamedTuple):
     cosine_m2: float
     """1 / 2ab"""
     base_sine: float
-    """Sine of theta0 - phi0, what the finger's angle adds to the triangle's."""
+    """Sine of theta0 - phi0, the angle of the finger relative to the triangle."""
     base_cosine: float
     finger_m: float
-    """0: there is no finger, and the screw moves the jaws themselves."""
+    """0 for a linkage without fingers, whose screw moves the jaws."""
     half_gap0_m: float
 
 
@@ -44,7 +43,7 @@ def screw_linkage(
     b_mm: float,
     r_mm: float,
 ) -> ScrewLinkage:
-    """Return the linkage with these published constants (millimetres and degrees, as they are published)."""
+    """Return the linkage with these constants, in millimetres and degrees as they are usually published."""
     theta0 = math.radians(theta0_deg)
     return ScrewLinkage(
         pitch_m=screw_mm / gear / 1e3,
@@ -59,51 +58,15 @@ def screw_linkage(
 
 
 def straight_linkage(pitch_m: float) -> ScrewLinkage:
-    """Return a screw that moves both jaws straight: the gap is `pitch_m` for each revolution of the motor."""
+    """Return a screw that moves both jaws along a line: the gap changes by `pitch_m` in each motor revolution."""
     return ScrewLinkage(pitch_m, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-_ALPHA2 = {
-    "theta0_deg": 2.97571,
-    "phi0_deg": 29.98717,
-    "t0_mm": -0.19543,
-    "length0_mm": 34.70821,
-    "h_mm": 5.200,
-    "a_mm": 67.56801,
-    "b_mm": 48.97193,
-    "r_mm": 91.5,
-}
-
-PR2_LINKAGES: Final[Mapping[str, ScrewLinkage]] = {
-    # pr2_common, pr2_description/robots/pr2.urdf.xacro: the gripper as it was delivered.
-    "pr2": screw_linkage(
-        screw_mm=4.0,
-        gear=(729.0 / 25.0) * (22.0 / 16.0),
-        theta0_deg=3.6029,
-        phi0_deg=29.7089,
-        t0_mm=-0.1914,
-        length0_mm=37.5528,
-        h_mm=0.0,
-        a_mm=68.3698,
-        b_mm=43.3849,
-        r_mm=91.5,
-    ),
-    # Full-robot description of September 2009 (personalrobots-pkg), with the alpha2 linkage in code.
-    "pr2_2009": screw_linkage(screw_mm=2.0, gear=29.16, **_ALPHA2),
-    # The paper package's own launch file, sandbox/pr2_gripper_controller/launch/gripper.xml ("new gripper").
-    "pr2_paper": screw_linkage(screw_mm=4.0, gear=29.16 * 22.0 / 16.0 * 0.9, **_ALPHA2),
-}
-"""The three published sets. Which of them the paper's data were taken with is not stated."""
-
-PR2_ENCODER_TICKS: Final = 1200
-"""Encoder pulses in one motor revolution (pr2_ethercat_drivers, actuators.conf)."""
-
-
 def gap_and_rate(link: ScrewLinkage, revolutions: float) -> tuple[float, float]:
-    """Return the gap (m) at this motor angle (revolutions), and how fast it changes with it (m/revolution).
+    """Return the gap (m) at this motor angle (revolutions), and its derivative (m/revolution).
 
-    Published as gap = 2 (t0 + r (sin theta - sin theta0)) with theta = theta0 - phi0 + acos(u); the sum of angles
-    is written out here, which leaves one square root.
+    The published form is gap = 2 (t0 + r (sin theta - sin theta0)) with theta = theta0 - phi0 + acos(u). Here the sine
+    of the sum of angles is expanded, which leaves one square root.
     """
     pitch, length0, cosine0, cosine_m2, base_sine, base_cosine, finger, half_gap0 = link
     if finger == 0.0:
@@ -119,7 +82,7 @@ def gap_and_rate(link: ScrewLinkage, revolutions: float) -> tuple[float, float]:
     gap = 2.0 * (half_gap0 + finger * (base_sine * u + base_cosine * sine))
     if square < 1e-24:
         square, sine = 1e-24, 1e-12
-    # Nothing but a product and a difference waits for the root: a simulator's ticks are as long as this takes.
+    # Only a product and a difference depend on the root: the time of a simulated tick depends on this function.
     return gap, 4.0 * pitch * cosine_m2 * finger * length * (base_cosine * u / square * sine - base_sine)
 
 

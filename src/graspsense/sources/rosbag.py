@@ -36,6 +36,11 @@ SIDES: Final = {"l": "left", "r": "right"}
 TIP_FIELDS: Final = (("l_finger_tip", "r_finger_tip"), ("data0", "data1"))
 """Names of the two tips' fields, now and in 2009."""
 TARE_IMAGES: Final = 6
+PAD_COUNTS_PER_N: Final = 1600.0
+"""Counts of the sum of the fifteen cells of the gripping face under one newton (fingertip_pressure, scripts/
+fingertip_geometry.py). The driver of the gripper has the same scales: `tests/test_pr2_numbers.py`."""
+EDGE_COUNTS_PER_N: Final = (600.0, 400.0, 600.0, 600.0, 600.0, 600.0, 400.0)
+"""Counts of each of the cells 0 to 6 under one newton: back, side, corner, tip, tip, corner, side; source as above."""
 PRESSURE: Final = "/pressure/{}_gripper_motor"
 JOINT_STATES: Final = "/joint_states"
 CONTROLLER_STATE: Final = "/{}_gripper_controller/state"
@@ -213,7 +218,7 @@ def _readings(motions: Sequence[_Motion], images: Sequence[_Image], notes: list[
     pads = [Pads((one.t_ns - began_ns) * 1e-9, i, one.left, one.right) for i, one in enumerate(images, 1)]
     first = pads[:TARE_IMAGES]
     try:
-        zero = tare(first)
+        zero = tare(first, PAD_COUNTS_PER_N)
     except TareRefused as refused:
         zero = zero_of([one.left for one in first]), zero_of([one.right for one in first])
         notes.append(
@@ -243,4 +248,11 @@ def _readings(motions: Sequence[_Motion], images: Sequence[_Image], notes: list[
 def _forces(cells: Cells, zero: Cells) -> tuple[float, float]:
     """Return pad and edge force of a tip; NaN where none of its cells answers."""
     kept, bad = masked(cells, zero)
-    return (_NAN, _NAN) if bad == CELLS else (pad_force(kept, zero), edge_force(kept, zero))
+    return (
+        (_NAN, _NAN)
+        if bad == CELLS
+        else (
+            pad_force(kept, zero, PAD_COUNTS_PER_N),
+            edge_force(kept, zero, EDGE_COUNTS_PER_N),
+        )
+    )

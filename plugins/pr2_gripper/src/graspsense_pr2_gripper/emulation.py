@@ -8,6 +8,12 @@ from graspsense.plugin_api import ConfigError, DeviceInfo, SensorBackend, create
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.firmware import Firmware
+from graspsense_pr2_gripper.linkage import (
+    EDGE_COUNTS_PER_N,
+    ENCODER_TICKS,
+    PAD_COUNTS_PER_N,
+    SIDE_COUNTS_PER_N,
+)
 from graspsense_pr2_gripper.protocol import Identity
 
 EMULATED_SERIAL: Final = "EMULATED"
@@ -48,15 +54,15 @@ def emulated_board(config: Pr2Config, seed: int) -> Emulation:
         firmware=(1, 0, 0),
         serial=config.serial or EMULATED_SERIAL,
         transmission=config.transmission,
-        pad_counts_per_n=1600,
-        side_counts_per_n=400,
-        edge_counts_per_n=600,
+        pad_counts_per_n=PAD_COUNTS_PER_N,
+        side_counts_per_n=SIDE_COUNTS_PER_N,
+        edge_counts_per_n=EDGE_COUNTS_PER_N,
         effort_limit_un=EFFORT_LIMIT_UN,
         speed_limit_um_s=SPEED_LIMIT_UM_S,
         report_rate_hz=round(info.rate_hz),
         image_period_us=IMAGE_PERIOD_US,
         watchdog_ms=WATCHDOG_MS,
-        encoder_ticks_rev=1200,
+        encoder_ticks_rev=ENCODER_TICKS,
         accelerometer_g=0,
     )
     return Emulation(Wire(Firmware(body, identity), config.faults, seed), body, info)

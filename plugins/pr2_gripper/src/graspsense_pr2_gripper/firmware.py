@@ -13,7 +13,6 @@ from typing import Any, Final
 from graspsense.plugin_api import (
     CELLS,
     EFFORT,
-    PR2_LINKAGES,
     Command,
     Frame,
     Pads,
@@ -21,6 +20,7 @@ from graspsense.plugin_api import (
     gap_and_rate,
     revolutions_at,
 )
+from graspsense_pr2_gripper.linkage import LINKAGES
 from graspsense_pr2_gripper.protocol import (
     ACCEPTED,
     CLAMPED,
@@ -56,7 +56,7 @@ class Firmware:
         self.effort_un = 0
         """What the motor is given now, before the limits of speed; 0 is let go."""
         self._body = body
-        self._link = PR2_LINKAGES[identity.transmission]
+        self._link = LINKAGES[identity.transmission]
         self._period_us = round(1e6 / identity.report_rate_hz)
         self._watchdog_us = identity.watchdog_ms * 1000
         self._step = 0

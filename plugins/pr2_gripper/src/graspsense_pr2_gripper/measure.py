@@ -10,7 +10,6 @@ from graspsense.plugin_api import (
     CELLS,
     FIRST_PAD_CELL,
     NO_PADS,
-    PR2_LINKAGES,
     Frame,
     LoadTable,
     Pads,
@@ -24,6 +23,7 @@ from graspsense.plugin_api import (
     tare,
 )
 from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.linkage import LINKAGES, edge_scale
 from graspsense_pr2_gripper.protocol import LEFT_ABSENT, RIGHT_ABSENT, Identity, InputReport
 from graspsense_pr2_gripper.stream import Image
 
@@ -74,12 +74,12 @@ class Measure:
         stored: Tips | None,
         tables: tuple[LoadTable, LoadTable] | None,
     ) -> None:
-        self._link = PR2_LINKAGES[identity.transmission]
+        self._link = LINKAGES[identity.transmission]
         self._period_us = round(1e6 / identity.report_rate_hz)
         self._ticks_rev = float(identity.encoder_ticks_rev)
         self._pad_per_n = float(identity.pad_counts_per_n)
         side, edge = float(identity.side_counts_per_n), float(identity.edge_counts_per_n)
-        self._edge_per_n = (edge, side, edge, edge, edge, edge, side)
+        self._edge_per_n = edge_scale(side, edge)
         self._swap, self._mirror = config.swap_fingers, (config.mirror_left, config.mirror_right)
         self._stored, self._tables = stored, tables
         self._zero: Tips | None = stored
@@ -121,7 +121,7 @@ class Measure:
 
     def tare(self, images: Sequence[Pads]) -> None:
         """Set the zero from these images. Raises TareRefused."""
-        zero = tare(images, self._stored, self._pad_per_n)
+        zero = tare(images, self._pad_per_n, self._stored)
         if self._stored is None:
             for side, cells in zip(("left", "right"), zero, strict=True):
                 good = [cell for cell in cells[FIRST_PAD_CELL:] if cell]

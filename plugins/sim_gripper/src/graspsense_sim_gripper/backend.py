@@ -35,7 +35,15 @@ from graspsense_sim_gripper.linear import Linear, move_of
 from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
 from graspsense_sim_gripper.plant import PlantParams, PlantState, Squeezed
-from graspsense_sim_gripper.sensing import Encoder, PadBuffers, SensorState, _read_encoder, apply_tare, sense
+from graspsense_sim_gripper.sensing import (
+    PAD_COUNTS_PER_N,
+    Encoder,
+    PadBuffers,
+    SensorState,
+    _read_encoder,
+    apply_tare,
+    sense,
+)
 from graspsense_sim_gripper.setting import CELL_OFFSET, device_info, set_scene
 from graspsense_sim_gripper.terms.registry import find_term, laws_of
 
@@ -131,7 +139,7 @@ class SimBackend(BatchBackend[SimConfig]):
         """Set the cells' zero."""
         if self.config.sensor == "ideal":
             return
-        left, right = tare(images)
+        left, right = tare(images, PAD_COUNTS_PER_N)
         self._buffers = self._buffers._replace(left_zero=left, right_zero=right)
         self._sensor = apply_tare(self._sensor, self._buffers)
 

@@ -9,12 +9,12 @@ from attrs import field, frozen
 from attrs.validators import and_, ge, gt, in_, instance_of, le, lt, optional
 
 from graspsense.plugin_api import CHANGES_NO_RESULT, NAMES_INPUT
+from graspsense_sim_gripper.drive_models import LINKAGES
 
 FIDELITIES = ("scene", "full", "reference")
 NOT_NEGATIVE = and_(ge(0.0), lt(math.inf))
 POSITIVE = and_(gt(0.0), lt(math.inf))
 SCHEMES = ("auto", "explicit", "implicit")
-LINKAGES = ("pr2", "pr2_2009", "pr2_paper", "straight")
 
 
 @frozen(kw_only=True, cache_hash=True)
@@ -49,9 +49,9 @@ class SimConfig:
     """Forces steps of this length, for a study; not set: as long as the accuracy allows."""
     rate_hz: float = field(default=1000.0, validator=and_(ge(10.0), le(1e5)))
     transmission: Literal["pr2", "pr2_2009", "pr2_paper", "straight"] = field(
-        default="pr2", validator=in_(LINKAGES)
+        default="pr2", validator=in_(tuple(LINKAGES))
     )
-    """Which published linkage, see `graspsense.core.transmission`; or `straight`: jaws on a screw, a constant mass."""
+    """A drive of `drive_models`: a published linkage of the PR2, or `straight` (jaws on a screw, constant mass)."""
     moving_mass_kg: float = field(default=100.0, validator=and_(ge(1e-6), le(1e6)))
     """Mass that moves with the gap where the transmission is `straight`; `rotor_kg_m2` then counts for nothing."""
     rotor_kg_m2: float = field(default=4e-7, validator=and_(ge(1e-12), le(1.0)))

@@ -16,19 +16,23 @@ from typing import Any, Final, NamedTuple
 from graspsense.plugin_api import (
     CELLS,
     FIRST_PAD_CELL,
-    PAD_COUNTS_PER_N,
-    PR2_ENCODER_TICKS,
     Frame,
     ScrewLinkage,
     edge_force,
     gap_and_rate,
     pad_force,
 )
+from graspsense_sim_gripper.drive_models import ENCODER_TICKS
 from graspsense_sim_gripper.plant import PlantState
 
 VELOCITY_FILTER_S: Final = 0.003
 """Time constant of the velocity filter. From 10 ms on the velocity loop runs into a limit cycle."""
 LARGEST_COUNT: Final = 65535.0
+PAD_COUNTS_PER_N: Final = 1600.0
+"""Counts of the sum of the fifteen cells of the PR2's gripping face under one newton (fingertip_pressure, scripts/
+fingertip_geometry.py). The driver of the real gripper has the same scales: `tests/test_pr2_numbers.py`."""
+EDGE_COUNTS_PER_N: Final = (600.0, 400.0, 600.0, 600.0, 600.0, 600.0, 400.0)
+"""Counts of each of the cells 0 to 6 under one newton: back, side, corner, tip, tip, corner, side; source as above."""
 CLOCK_TOLERANCE_S: Final = 1e-10
 """Ticks and image times are sums of different steps, and differ by rounding."""
 
@@ -133,8 +137,8 @@ class SensorState(NamedTuple):
 
 def initial_sensor(params: SensorParams, plant: PlantState) -> SensorState:
     """Return the sensor's state before the first tick; the velocity filter starts at rest."""
-    ticks = float(math.floor(plant.revolutions * PR2_ENCODER_TICKS))
-    gap, _ = gap_and_rate(params.link, ticks / PR2_ENCODER_TICKS)
+    ticks = float(math.floor(plant.revolutions * ENCODER_TICKS))
+    gap, _ = gap_and_rate(params.link, ticks / ENCODER_TICKS)
     return SensorState(Encoder(ticks, gap, 0.0), 0, 0.0, PadForces(0.0, 0.0, 0.0, 0.0), Pending(0, 0.0, 0.0))
 
 
@@ -187,13 +191,13 @@ def sense(
 
 def _read_encoder(last: Encoder, plant: PlantState, dt_s: float) -> Encoder:
     ticks, gap, velocity = last
-    now = float(math.floor(plant.revolutions * PR2_ENCODER_TICKS))
+    now = float(math.floor(plant.revolutions * ENCODER_TICKS))
     moved = 0.0
     if now != ticks:
         ticks = now
         before = gap
         # Within an encoder tick the linkage is linear to a tenth of a picometre.
-        gap = plant.gap_m - plant.rate_m_rev * (plant.revolutions - ticks / PR2_ENCODER_TICKS)
+        gap = plant.gap_m - plant.rate_m_rev * (plant.revolutions - ticks / ENCODER_TICKS)
         moved = gap - before
     velocity += dt_s / (VELOCITY_FILTER_S + dt_s) * (moved / dt_s - velocity)
     return Encoder(ticks, gap, velocity)
@@ -202,10 +206,10 @@ def _read_encoder(last: Encoder, plant: PlantState, dt_s: float) -> Encoder:
 def image_forces(left: CellColumn, right: CellColumn, pads: PadBuffers) -> PadForces:
     """Return the forces of one cell image of both fingertips, relative to their zeros."""
     return PadForces(
-        pad_force(left, pads.left_zero),
-        pad_force(right, pads.right_zero),
-        edge_force(left, pads.left_zero),
-        edge_force(right, pads.right_zero),
+        pad_force(left, pads.left_zero, PAD_COUNTS_PER_N),
+        pad_force(right, pads.right_zero, PAD_COUNTS_PER_N),
+        edge_force(left, pads.left_zero, EDGE_COUNTS_PER_N),
+        edge_force(right, pads.right_zero, EDGE_COUNTS_PER_N),
     )
 
 

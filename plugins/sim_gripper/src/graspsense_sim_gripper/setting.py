@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from graspsense.plugin_api import (
     CELLS,
     EFFORT,
-    PR2_LINKAGES,
     Command,
     ConfigError,
     DeviceInfo,
     ScrewLinkage,
     gap_and_rate,
     revolutions_at,
-    straight_linkage,
 )
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
 from graspsense_sim_gripper.objects.instance import Instance, cell_weights, central_cells, sample
 from graspsense_sim_gripper.objects.library import find, split_number
 from graspsense_sim_gripper.objects.spec import ObjectSpec
@@ -69,12 +68,10 @@ SETTLED: Final = 1e-7
 FORCE_N: Final = 20.0
 SPEED_M_S: Final = 0.01
 """The force and the speed of a grasp that nobody says anything of: those of the paper."""
-STRAIGHT: Final = straight_linkage(4e-4)
-"""The encoder of a straight drive then sees a third of a micrometre, as a PR2's does."""
 
 
 def _linkage(config: SimConfig) -> ScrewLinkage:
-    return STRAIGHT if config.transmission == "straight" else PR2_LINKAGES[config.transmission]
+    return LINKAGES[config.transmission]
 
 
 def device_info(config: SimConfig) -> DeviceInfo:
