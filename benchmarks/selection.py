@@ -298,7 +298,6 @@ def measure(bench: Bench, numbers: range, costs: int = 0) -> dict[str, Any]:
                 grasps[name] = chosen, job
             choice = chosen.choice
             if choice is not None:
-                one["pieces"] = choice.pieces
                 one["rung"], one["made"] = choice.rung, {d.term: d.decision for d in choice.decisions}
                 one["checked"] = None if choice.check is None else choice.check.error
         if len(rows) < costs and len(grasps) == 2:
@@ -329,7 +328,6 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     steps = np.array([[case["steps"] for case in pair] for pair in both]).reshape(-1, 2)
     cost, full_cost = np.median(costs, axis=0) if both else (math.nan, math.nan)
     taken, full_taken = np.median(steps, axis=0) if both else (math.nan, math.nan)
-    by_maps = sum(row["0.01"].get("pieces", 0) > 0 for row in rows)
     return {
         "scenes": len(rows),
         "within": within,
@@ -338,7 +336,6 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "refused": refused,
         "rungs": rungs,
         "choice_ms": choice,
-        "by_maps": by_maps / len(rows),
         "costs_of": len(both),
         "cost_ratio": float(cost / full_cost),
         "cost_ratio_a_scene": float(np.median(costs[:, 0] / costs[:, 1])) if both else math.nan,
@@ -371,7 +368,7 @@ def table(result: dict[str, Any]) -> str:
         f"At 1 % a grasp in the chosen model takes {result['cost_ms']:.2f} ms of the compiled loop "
         f"({result['steps']:.0f} steps), one with every term kept {result['full_cost_ms']:.2f} ms "
         f"({result['full_steps']:.0f} steps): {result['cost_ratio']:.0%} (medians of {result['costs_of']} scenes; "
-        f"{result['cost_ratio_a_scene']:.0%} scene by scene). Exact maps take {result['by_maps']:.0%} of all scenes. "
+        f"{result['cost_ratio_a_scene']:.0%} scene by scene). "
         f"Choosing took {result['choice_ms'][0.01]:.0f} ms.",
     ]
     return "\n".join(lines)

@@ -17,11 +17,12 @@ from graspsense.plugin_api import EFFORT, Command, ControllerEntry, Outcome, Tra
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import job as batch_job
 from graspsense_sim_gripper.batch import threads, worker
-from graspsense_sim_gripper.batch.job import Job, plainly
+from graspsense_sim_gripper.batch.job import Job, chooser_of, composition_of, plainly
 from graspsense_sim_gripper.batch.threads import SLICE, WORTH_A_PROCESS, run_many
 from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue, shipped_scenes
+from graspsense_sim_gripper.setting import set_scene
 
 HYBRID = create("controller", "hybrid")
 FEATURES = create("feature-set", "chitta")
@@ -300,3 +301,42 @@ class Endless(type(HYBRID)):
 
 class Lost(type(HYBRID)):
     step = staticmethod(lost)
+
+
+THINNED = """
+summary = "a shell, and contents that are too little to matter"
+width_m = 0.05
+
+[[terms]]
+type = "elastic"
+k1_n_m = 2e4
+k3_n_m3 = 1e9
+
+[[terms]]
+type = "slosh"
+mass_kg = 1e-6
+frequency_hz = 10.0
+damping_ratio = 0.1
+
+[[terms]]
+type = "loss"
+damping_n_s_m = 500.0
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("spread", [False, True])
+def test_a_dropped_term_is_not_compiled_and_changes_no_bit(tmp_path, spread):
+    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+    path = tmp_path / "thinned.toml"
+    path.write_text(THINNED)
+    config = SimConfig(object=str(path), spread=spread, sensor="ideal")
+    job = Job(config=config, controller=HYBRID, run=RunConfig(), draw=None, traces=True)
+    setting = set_scene(config, str(path), 1, chooser_of(job))
+    assert setting.kinds == ("elastic", "loss", "slosh")
+    assert "slosh" not in composition_of(config, setting).kinds
+    plain, fast = (
+        run_many(config, HYBRID, [str(path)], [1], compiled=compiled)[0] for compiled in (False, True)
+    )
+    assert fast.body == plain.body
+    assert np.array_equal(fast.trace.force_left_n, plain.trace.force_left_n)

@@ -6,11 +6,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from attrs import evolve
+from selection import error_of
 
 from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import HOLD, ConfigError, Controller, Outcome, RunConfig, create
 from graspsense_sim_gripper import checking
 from graspsense_sim_gripper.backend import SimBackend
+from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.checking import Control, checked_choice, standard
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue, find
@@ -47,6 +49,17 @@ def test_a_checked_choice_says_what_a_trial_grasp_found(accuracy, change, part):
     assert choice.check.error <= part * accuracy
     assert choice.check.grasps >= 2
     assert choice.plain()["checked"].keys() == {"error", "quantity", "grasps"}
+
+
+@pytest.mark.parametrize("name", ["toy", "can:empty_open"])
+def test_the_model_of_a_single_instance_is_as_accurate_as_requested(name):
+    config, law = SimConfig(object=name, spread=False, sensor="ideal"), create("controller", "hybrid")
+    one, other = (
+        run_many(evolve(config, fidelity=fidelity), law, [name], [0], compiled=False)[0]
+        for fidelity in ("scene", "reference")
+    )
+    error, quantity = error_of(one, other)
+    assert error <= config.accuracy, quantity
 
 
 def test_what_the_paths_say_too_boldly_the_trial_grasp_takes_back(monkeypatch):

@@ -30,7 +30,6 @@ class Form(NamedTuple):
     by_compression: tuple = ()
     by_speed: tuple = ()
     force: tuple = ()
-    curve: object = None
 
 
 def spring(params, state, d0, d1, h, v1):
@@ -82,8 +81,6 @@ COMPRESSED_M = 0.0001 * 10
         (spring, lambda p: None, ""),
         (spring, lambda p: Form(2.0 * p.k_n_m), "the linear form of term 'gel' gives"),
         (spring, lambda p: Form(0.0, 1.0, ((1.0, 0.0), (0.0, 1.0))), "has 2 states and its law 1"),
-        (spring, lambda p: Form(curve=lambda d: p.k_n_m * d), ""),
-        (spring, lambda p: Form(p.k_n_m, curve=lambda d: d * d), "the linear form of term 'gel' gives"),
         (maxwell, lambda p: Form(0.0, 0.0, ((-20.0,),), (0.0,), (p.k_n_m,), (1.0,)), ""),
         (
             maxwell,

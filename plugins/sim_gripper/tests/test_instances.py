@@ -2,8 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from graspsense.core.errors import UnknownName
+from graspsense.plugin_api import RunConfig, create
+from graspsense_sim_gripper.batch.job import Job, chooser_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.instance import sample
 from graspsense_sim_gripper.objects.library import find, split_number
@@ -42,6 +45,16 @@ def test_the_number_changes_nothing_else_of_a_trial():
     assert with_number.plant.drive == without.plant.drive
     assert with_number.body.offset_m == without.body.offset_m
     assert with_number.plant.thing.width_m != without.plant.thing.width_m
+
+
+def test_a_numbered_instance_has_the_model_of_all_of_its_kind():
+    config = SimConfig(object="toy#2", spread=False, sensor="ideal")
+    controller = create("controller", "hybrid")
+    chooser = chooser_of(Job(config=config, controller=controller, run=RunConfig(), draw=None, traces=True))
+    numbered, again = (set_scene(config, "toy#2", seed, chooser).choice for seed in (0, 1))
+    spread = set_scene(evolve(config, spread=True), "toy", 0, chooser).choice
+    assert numbered is again
+    assert (numbered.made, numbered.steps) == (spread.made, spread.steps)
 
 
 @pytest.mark.parametrize(

@@ -190,7 +190,7 @@ def _check(bare: SimConfig, spec: ObjectSpec, control: Control, loops: Loops | N
         if edge is not None and rung.finer <= edge.finer:
             continue
         choice = chosen(bare, spec, rung=rung)
-        model = choice.made, choice.pieces, choice.steps
+        model = choice.made, choice.steps
         if model in tried:
             continue
         tried.add(model)
@@ -331,7 +331,7 @@ class _Trial:
 
         `off`: by how much (N) forces are wrong that its controller is told, and by what part the way since the touch.
         """
-        key = (choice.made, choice.pieces, choice.steps, off)
+        key = (choice.made, choice.steps, off)
         if key not in self._courses:
             try:
                 self._courses[key] = self._grasp(choice, off)

@@ -113,5 +113,4 @@ def _force_after(form: Any, state: Any, d0: float, speed: float, h: float) -> fl
         now = [s + step * r for s, r in zip(now, rates(half, d + 0.5 * step * speed), strict=True)]
         d += step * speed
     own = sum(a * b for a, b in zip(form.force, now, strict=True)) if now else 0.0
-    curve = getattr(form, "curve", None)
-    return float(form.spring_n_m * d + form.damper_n_s_m * speed + own + (curve(d) if curve else 0.0))
+    return float(form.spring_n_m * d + form.damper_n_s_m * speed + own)

@@ -7,9 +7,6 @@ The matrices of a tick and of its halves, quarters and so on are made once a sce
 tick in which nothing can happen, by a bound on what changes inside it, is one of them; where something may, it is
 looked for with pieces short against the fastest swing, and then between them by halving. What is no such motion (ends
 of travel, but for standing wide open; an object that is pushed across its table) is left to the plant.
-
-Where the object's force bends over its compression it stands in straight pieces, a set of modes each. A linkage whose
-ratio varies and friction that is greater at rest are then followed, too: as a force in the middle of each tick.
 """
 
 from __future__ import annotations
@@ -18,7 +15,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
-from graspsense.plugin_api import ScrewLinkage, bind, gap_and_rate, revolutions_at
+from graspsense.plugin_api import bind
 from graspsense_sim_gripper.linear_modes import (
     APART_M,
     FORCE,
@@ -34,8 +31,6 @@ from graspsense_sim_gripper.plant import (
     PlantParams,
     PlantState,
     Squeezed,
-    rubbing,
-    sliding_on,
 )
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import NO_STATE
@@ -50,25 +45,12 @@ PEAK_SHARE: Final = 2e-3
 """A swing inside a tick that goes beyond the greatest force by less than this share of it may be missed."""
 
 
-class Lever(NamedTuple):
-    """The mass that the maps are made for, and how much lighter what moves is at another gap, as a parabola."""
-
-    mass_kg: float
-    gap_m: float
-    first_m: float
-    second_m2: float
-
-
 class Linear(NamedTuple):
     """A plant with its modes, and room for what a tick works on."""
 
     plant: PlantParams
     look: int
     """How often a tick is halved to look for what ends a mode."""
-    lever: Lever
-    knots: Any
-    """Where the straight pieces of the object's curve begin, the last being without an end, and their slopes."""
-    slopes: Any
     maps: Any
     watched: Any
     simple: Any
@@ -77,8 +59,7 @@ class Linear(NamedTuple):
     begin: Any
     slack: Any
     room: Any
-    """The state before a piece of a tick; state and what is watched after it; what is watched before it; bounds; and on
-    which piece of its curve the object was last.
+    """The state before a piece of a tick; state and what is watched after it; what is watched before it; bounds.
 
     In one table at places known beforehand: compiled code then need not ask whether two of them are one, and keeps
     most of it in registers.
@@ -186,8 +167,8 @@ def move_of(
         puts = bind(_put_all, put=PUT[count], put_rest=puts)
         takes = bind(_take_all, take=bind(TAKE[count], made=type(state)), take_rest=takes)
     laid_out = {name.upper(): number for name, number in shape._asdict().items()}
-    places = {name: k * _room(shape) for k, name in enumerate((*PLACES, "PIECE"))}
-    now, then, was, most, by, _ = places.values()
+    places = {name: k * _room(shape) for k, name in enumerate(PLACES)}
+    now, then, was, most, by = places.values()
     watched = padded(GUARDS + shape.ends)
     mapped, parted = padded(shape.states + GUARDS + shape.ends), padded(2 * shape.states)
     modes = ((shape.parts + 1) * shape.motions) << shape.contacts
@@ -197,8 +178,6 @@ def move_of(
         "_moved": bind(_product, ROWS=mapped, COLUMNS=shape.columns, FROM=now, TO=then),
         "_seen": bind(_product, ROWS=watched, COLUMNS=shape.columns, FROM=now, TO=was),
     }
-    rubs = bind(_rubs, **here)
-    piece = bind(_piece, **here)
     swings = bind(
         _swings,
         _simply=bind(_product, ROWS=watched, TO=most, SIZES=1, **changes),
@@ -210,29 +189,25 @@ def move_of(
         _taken,
         put_states=puts,
         take_states=takes,
-        _piece=piece,
-        _quiet=bind(_quiet, _swings=swings, _rubs=rubs, **products, **here),
-        _searched=bind(_searched, _swings=swings, _rubs=rubs, _row=bind(_row, **here), **products, **here),
+        _quiet=bind(_quiet, _swings=swings, **products, **here),
+        _searched=bind(_searched, _swings=swings, _row=bind(_row, **here), **products, **here),
         **here,
         **tuples,
     )
-    return bind(move, plant_move=plant_move, _taken=taken, BENDS=shape.bends)
+    return bind(move, plant_move=plant_move, _taken=taken)
 
 
 def seldom(function: Callable[..., Any]) -> tuple[str, ...]:
-    """Return what a part of `move` seldom calls: it stays a call there, as the processor's registers are for the rest.
-
-    With curves the plant has the way to the contact.
-    """
+    """Return what a part of `move` seldom calls: compiled code keeps the call, and the registers for the rest."""
     code = function.__code__
-    if code is move.__code__ and function.__globals__["BENDS"] == 0:
+    if code is move.__code__:
         return ("plant_move",)
     return ("_searched",) if code is _taken.__code__ else ()
 
 
 def room_of(shape: Shape) -> int:
     """Return of how many numbers a tick's room is made."""
-    return len(PLACES) * _room(shape) + TOGETHER
+    return len(PLACES) * _room(shape)
 
 
 def _room(shape: Shape) -> int:
@@ -250,10 +225,10 @@ def _no_plant(params: PlantParams, state: PlantState, effort_n: float, dt: float
 plant_move: Any = _no_plant
 put_states: Any = _put_none
 take_states: Any = _take_none
-STATES = COLUMNS = PARTS = CREEPS = LAGS = MOTIONS = CONTACTS = ENDS = BENDS = MODES = ROWS = 0
+STATES = COLUMNS = PARTS = CREEPS = LAGS = MOTIONS = CONTACTS = ENDS = MODES = ROWS = 0
 WATCHED = MAPPED = PARTED = 0
 """Rows of the tables of what is watched, of the maps, and of the ways, with those that pad them."""
-NOW = THEN = WAS = MOST = BY = PIECE = FROM = TO = 0
+NOW = THEN = WAS = MOST = BY = FROM = TO = 0
 CHANGES = SIZES = 0
 """1: a product of how the state changes; of how much what is multiplied is, whichever way."""
 
@@ -301,51 +276,11 @@ def _top(before: float, rising: float, after: float, falling: float, h: float) -
     return min(before + s * (m0 + s * (3.0 * step - 2.0 * m0 - m1 + s * (m0 + m1 - 2.0 * step))), most)
 
 
-def _piece(params: Linear, compression_m: float) -> int:
-    """Return on which straight piece of its curve the object is, which is as a rule where it was."""
-    knots, room = params.knots, params.room
-    piece = int(room[PIECE]) & MOST_NUMBERS
-    while piece + 1 < len(knots) and compression_m >= knots[piece + 1]:
-        piece = (piece + 1) & MOST_NUMBERS
-    while compression_m < knots[piece]:
-        piece = (piece - 1) & MOST_NUMBERS
-    room[PIECE] = float(piece)
-    return piece
-
-
-def _in_place(link: ScrewLinkage, state: PlantState) -> PlantState:
-    """Return the plant with the motor where the linkage has it at this gap: the maps know it only as it is at one."""
-    revolutions = revolutions_at(link, state.gap_m)
-    _, rate = gap_and_rate(link, revolutions)
-    return PlantState(
-        revolutions,
-        state.speed_rev_s * state.rate_m_rev / rate,
-        state.gap_m,
-        rate,
-        state.left_n,
-        state.right_n,
-        state.offset_m,
-        state.touched,
-        state.squeezed,
-        state.peak_n,
-        state.effort_n,
-        state.right,
-        state.step_s,
-        state.steps,
-        state.unresolved,
-        state.alone_s,
-    )
-
-
 def _quiet(
     params: Linear,
     mode: int,
-    motion: int,
     standing: bool,
     top: float,
-    gap_m: float,
-    force_n: float,
-    effort_n: float,
     dt: float,
 ) -> bool:
     """Return whether nothing can end this mode within a tick, and write what the tick comes to.
@@ -369,8 +304,6 @@ def _quiet(
         for k in range(ENDS - 2, ENDS):
             if room[WAS + GUARDS + k] < -slack[allowed + k]:
                 return False
-    if BENDS == 1 and motion != 0:
-        room[NOW + STATES + 1] = _rubs(params, motion, gap_m, force_n, effort_n, dt)
     _moved(params.maps, mode * (HALVINGS + 1) * MAPPED * COLUMNS, room)
     for k in range(ENDS):
         if room[THEN + STATES + GUARDS + k] < -slack[allowed + k]:
@@ -378,28 +311,6 @@ def _quiet(
     if look == 0:
         return not (room[WAS + RISING] > 0.0 > room[THEN + STATES + RISING])
     return not _swings(params, mode, top, dt)
-
-
-def _rubs(params: Linear, motion: int, gap_m: float, force_n: float, effort_n: float, dt: float) -> float:
-    """Return the friction to move on with: with it what is no straight line in the speed or the gap.
-
-    As that will be in the middle of the tick. Given is the force on a pad at its beginning.
-    """
-    drive, lever, room = params.plant.drive, params.lever, params.room
-    speed: float = room[NOW + 1]
-    way = 1.0 if motion == 1 else -1.0
-    # The exponential of the speed that is known already, and a series from there: nothing then waits for it.
-    more, _, _ = rubbing(drive, speed)
-    net = effort_n - force_n - way * (drive.coulomb_n + drive.load_share * force_n)
-    net -= drive.damping_n_s_m * speed
-    middle = max(way * speed + way * net * (0.5 * dt / lever.mass_kg), 0.0)
-    rubs = drive.coulomb_n + sliding_on(drive, more, way * speed, middle)
-    off = gap_m - 0.5 * dt * speed - lever.gap_m
-    lighter = off * (lever.first_m + off * lever.second_m2)
-    steeper = lever.first_m + 2.0 * off * lever.second_m2
-    net = lighter * (net - way * (rubs - drive.coulomb_n))
-    net -= 0.5 * lever.mass_kg * steeper * middle * middle
-    return rubs - way * net
 
 
 def _swings(params: Linear, mode: int, top: float, dt: float) -> bool:
@@ -428,31 +339,24 @@ def _swings(params: Linear, mode: int, top: float, dt: float) -> bool:
 
 def _searched(
     params: Linear,
-    first: int,
     pressed: int,
     motion: int,
     touching: int,
     standing: bool,
-    shifted: bool,
     touched: int,
     top: float,
-    gap_m: float,
-    force_n: float,
-    effort_n: float,
     dt: float,
 ) -> tuple[int, int, float, int]:
     """Take a tick in which modes may end, in pieces; return pressed, touched and the peak then, and how many ended."""
-    drive, look, room = params.plant.drive, params.look, params.room
+    look, room = params.look, params.room
     maps, watched, begin, slack = params.maps, params.watched, params.begin, params.slack
-    if MOTIONS == 3:
-        room[NOW + STATES + 1] = drive.breakaway_n if standing else drive.coulomb_n
     mode = allowed = 0
     left, least, events, until = WHOLE, 0, 0, 0
     begins = True
     while left > 0:
         while begins:
             begins = False
-            mode = first + ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
+            mode = ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
             allowed = (mode * ENDS) & MOST_NUMBERS
             _seen(watched, mode * WATCHED * COLUMNS, room)
             if events == 0:
@@ -460,14 +364,6 @@ def _searched(
                     if room[WAS + GUARDS + k] < -slack[allowed + k]:
                         touching ^= 1 << k
                         begins = True
-            if BENDS == 1 and shifted and not begins:
-                # On another piece the covers and the object balance a little elsewhere.
-                at = 2 * mode * COLUMNS
-                cover = _row(begin, at + COLUMNS, room)
-                room[NOW + 2] = _row(begin, at, room)
-                if CREEPS == 1:
-                    room[NOW + 3] = cover
-                shifted, begins = False, True
             if MOTIONS == 3 and standing and not begins:
                 # What stands is stuck, unless what holds it less what closes it, or less what opens it, says otherwise.
                 standing = False
@@ -475,8 +371,6 @@ def _searched(
                     motion, begins = 1, True
                 elif room[WAS + GUARDS + ENDS - 1] < -slack[allowed + ENDS - 1]:
                     motion, begins = 2, True
-        if BENDS == 1 and motion != 0 and left == WHOLE:
-            room[NOW + STATES + 1] = _rubs(params, motion, gap_m, force_n, effort_n, dt)
         while (WHOLE >> least) > left:
             least += 1
         _moved(maps, (mode * (HALVINGS + 1) + least) * MAPPED * COLUMNS, room)
@@ -518,11 +412,10 @@ def _searched(
                     else:
                         # What slid stands, for now; what was stuck does, too.
                         room[NOW + 1] = 0.0
-                        room[NOW + STATES + 1] = drive.breakaway_n
                         standing, motion = True, 0
             if parted:
                 pressed = 1 - pressed
-                at = 2 * (first + ((pressed * MOTIONS + motion) << CONTACTS) + touching) * COLUMNS
+                at = 2 * (((pressed * MOTIONS + motion) << CONTACTS) + touching) * COLUMNS
                 cover = _row(begin, at + COLUMNS, room)
                 room[NOW + 2] = _row(begin, at, room)
                 if CREEPS == 1:
@@ -542,14 +435,9 @@ def _searched(
 
 def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> PlantState:
     """Return the plant after `dt`, the tick that the maps are for, in which this effort was asked for."""
-    drive = params.plant.drive
     done, after = _taken(params, state, effort_n, dt)
     if not done:
-        if state.touched == 1 and drive.link.finger_m != 0.0:
-            state = _in_place(drive.link, state)
         return plant_move(params.plant, state, effort_n, dt)  # type: ignore[no-any-return]
-    if after.touched == 0 and drive.link.finger_m != 0.0:
-        return _in_place(drive.link, after)
     return after
 
 
@@ -581,9 +469,8 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
         (opened and (LAGS == 1 or speed != 0.0 or squeezed.force_n > 0.0))
         or offset != 0.0
         or felt_left != felt_right
-        # What the plant has yet to bring up to date is the plant's, and so is a linkage before the contact.
+        # What the plant has yet to bring up to date is the plant's.
         or alone > 0.0
-        or (touched == 0 and drive.link.finger_m != 0.0)
     ):
         return False, state
 
@@ -608,47 +495,24 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
         room[NOW + 2] = d
     own = at
     at = put_states(thing.terms, squeezed.states, room, NOW + own)
-    acts = 0.0 if opened else effort_n
-    room[NOW + STATES] = acts
+    room[NOW + STATES] = 0.0 if opened else effort_n
     if LAGS == 1:
-        room[at] = acts = given
-    motion = first = 0
+        room[at] = given
+    motion = 0
     standing = room[NOW + 1] == 0.0
     if MOTIONS == 3:
-        room[NOW + STATES + 1] = drive.breakaway_n if standing else drive.coulomb_n
+        room[NOW + STATES + 1] = drive.coulomb_n
         if not standing:
             motion = 1 if room[NOW + 1] > 0.0 else 2
-    slope, shifted = squeezed.slope_n_m, False
-    if BENDS == 1:
-        # The piece of the curve that the middle of the tick will see.
-        room[NOW + COLUMNS - 1] = 1.0
-        ahead = max(d + 0.5 * dt * squeezed.rate_m_s, 0.0)
-        piece = _piece(params, ahead)
-        first = piece * MODES
-        shifted = pressed == 1 and params.slopes[piece] != slope
-        slope = params.slopes[piece]
     # A guess: see `_quiet` and `_searched`.
     touching = (1 << CONTACTS) - 1 if squeezed.force_n > 0.0 else 0
     top, events = peak, 0
-    mode = first + ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
-    force = squeezed.force_n
-    if not shifted and _quiet(params, mode, motion, standing, top, gap, force, acts, dt):
+    mode = ((pressed * PARTS * MOTIONS + motion) << CONTACTS) + touching
+    if _quiet(params, mode, standing, top, dt):
         top = max(top, room[THEN + STATES + FORCE])
     else:
         pressed, touched, top, events = _searched(
-            params,
-            first,
-            pressed,
-            motion,
-            touching,
-            standing,
-            shifted,
-            touched,
-            top,
-            gap,
-            force,
-            acts,
-            dt,
+            params, pressed, motion, touching, standing, touched, top, dt
         )
 
     came = room[THEN] - closure
@@ -676,8 +540,7 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
     if LAGS == 1:
         given = room[THEN + STATES - 1]
     after_states, _ = take_states(thing.terms, squeezed.states, room, THEN + own)
-    mean_m_s = (d - squeezed.compression_m) / dt if BENDS == 1 else squeezed.rate_m_s
-    felt = Squeezed(d, force, slope, after_states, cover, arm, mean_m_s, math.inf)
+    felt = Squeezed(d, force, squeezed.slope_n_m, after_states, cover, arm, squeezed.rate_m_s, math.inf)
     if thing.held == 1:
         # Centred: the other half does the same.
         other = felt

@@ -2,8 +2,7 @@
 
 The state holds, in this order: closure D (object's width less the gap) and closing speed V; where the object can part
 from the fingers its compression d; where the covers creep or damp their compression x and the creeping arm's force a;
-the terms' states; the effort e, where the drive lags. Beside it stand the tick's effort u, the friction c, and a one
-where a curve of the object's stands in straight pieces.
+the terms' states; the effort e, where the drive lags. Beside it stand the tick's effort u and the friction c.
 With N the force on a pad and F the friction,
 
     m V' = e - N - b V - F,    F = +-(c + l N) while it slides, V' = V = 0 while it is stuck,
@@ -46,13 +45,6 @@ FORCE, RISING, GUARDS = range(3)
 STUCK, CLOSING, OPENING = range(3)
 
 
-class Straight(NamedTuple):
-    """A piece of a curve: force `offset_n` + `slope_n_m` d."""
-
-    slope_n_m: float
-    offset_n: float
-
-
 class Scene(NamedTuple):
     """What the maps follow from. Friction's constant part does not count: it stands beside the state."""
 
@@ -64,8 +56,6 @@ class Scene(NamedTuple):
     skins_n_m: float
     skin: Skin
     forms: tuple[LinearForm | OwnContact, ...]
-    bend: tuple[Straight, ...] = ()
-    """What of the forms is a curve, in straight pieces; none: nothing is."""
 
 
 class Shape(NamedTuple):
@@ -83,8 +73,6 @@ class Shape(NamedTuple):
     """Contacts of the terms' own."""
     ends: int
     """What may end a mode: one a term's own contact, one where the object parts, two of the motion where it rubs."""
-    bends: int
-    """1: a curve stands in straight pieces, whose modes follow each other; a one beside the state carries offsets."""
 
 
 class Modes(NamedTuple):
@@ -112,12 +100,11 @@ def modes_of(scene: Scene, dt: float) -> Modes | None:
     """Return the modes of a scene with ticks of `dt`; None where one of them has no motion of its own."""
     layout = _Layout(scene)
     found = []
-    for piece in scene.bend or (Straight(0.0, 0.0),):
-        for mode in layout.modes():
-            one = _Mode.of(layout, mode, piece)
-            if one is None:
-                return None
-            found.append(one)
+    for mode in layout.modes():
+        one = _Mode.of(layout, mode)
+        if one is None:
+            return None
+        found.append(one)
     rates = np.array([one.rates for one in found])
     n = layout.states
     swings = np.linalg.eigvals(rates[:, :n, :n])
@@ -138,7 +125,6 @@ def modes_of(scene: Scene, dt: float) -> Modes | None:
         layout.motions,
         layout.contacts,
         len(found[0].guards),
-        int(layout.bends),
     )
     begin = np.array([one.begin for one in found])
     slack = np.array([one.slack for one in found])
@@ -189,8 +175,7 @@ class _Layout:
             self.places.append(slice(at, at + count))
             at += count
         self.states = at + int(self.lags)
-        self.bends = len(scene.bend) > 0
-        self.columns = self.states + 1 + int(self.rubs) + int(self.bends)
+        self.columns = self.states + 1 + int(self.rubs)
 
     def row(self, *places: int) -> Any:
         """Return a row that picks these."""
@@ -219,10 +204,6 @@ class _Layout:
     def friction(self) -> Any:
         return self.row(self.states + 1) if self.rubs else self.row()
 
-    @property
-    def one(self) -> Any:
-        return self.row(self.columns - 1) if self.bends else self.row()
-
     def modes(self) -> Iterator[tuple[bool, int, int]]:
         """Yield pressed or not, motion, and which contacts of the terms' own touch, a bit each."""
         pressed = (False, True) if self.parts else (True,)
@@ -233,7 +214,7 @@ class _Layout:
 def _only_pushes(form: LinearForm | OwnContact) -> bool:
     """Return whether the force is that of a contact spring, so that it never pulls."""
     if not isinstance(form, OwnContact):
-        return form.curve is None and form.spring_n_m == form.damper_n_s_m == 0.0 and not any(form.force)
+        return form.spring_n_m == form.damper_n_s_m == 0.0 and not any(form.force)
     by, parted = form.touching, form.parted
     spring = tuple(by.spring_n_m * place for place in form.reach)
     alone = parted.spring_n_m == parted.damper_n_s_m == 0.0 and not any(parted.force)
@@ -248,9 +229,8 @@ class _Mode(NamedTuple):
     slack: list[float]
 
     @classmethod
-    def of(cls, layout: _Layout, mode: tuple[bool, int, int], piece: Straight) -> _Mode | None:
-        """Return how this mode moves on this piece of the curve, by the balances above; None where they leave that
-        undecided."""
+    def of(cls, layout: _Layout, mode: tuple[bool, int, int]) -> _Mode | None:
+        """Return how this mode moves, by the balances above; None where they leave that undecided."""
         pressed, motion, touching = mode
         scene, row = layout.scene, layout.row
         rigid = scene.skins_n_m == math.inf
@@ -260,8 +240,8 @@ class _Mode(NamedTuple):
         d = closure if pressed and rigid else layout.compression
         arm = layout.arm
         # The terms together: force spring d + damper d' + own, own changing by `drift` and `grows` d' by itself.
-        spring, damper, grows = piece.slope_n_m, 0.0, 0.0
-        own, drift = piece.offset_n * layout.one, row()
+        spring, damper, grows = 0.0, 0.0, 0.0
+        own, drift = row(), row()
         places: list[tuple[slice, LinearForm]] = []
         guards: list[Any] = []
         slack: list[float] = []

@@ -20,7 +20,6 @@ from attrs import asdict, evolve, frozen
 
 from graspsense.plugin_api import bind
 from graspsense_sim_gripper.kernel import sum_of
-from graspsense_sim_gripper.linear_scene import forms_of, is_bent
 from graspsense_sim_gripper.plant import EXPLICIT, MEAN_FORCE, STIFF, Squeezed, Steps, Thing, squeeze
 from graspsense_sim_gripper.terms.registry import find_term, laws_of
 from graspsense_sim_gripper.terms.remainder import Kept, Remainder
@@ -40,25 +39,20 @@ class Rung(NamedTuple):
     """Steps are as for the accuracy over this."""
     least_steps: int = 1
     """Into how many steps a tick is cut at the least."""
-    maps: bool = False
-    """Whether exact maps may take the ticks of what is left, where they can."""
 
 
-BOLDEST: Final = Rung("boldest", 10.0, maps=True)
-BOLDER: Final = Rung("bolder", 3.0, maps=True)
-BOLD: Final = Rung("bold", 0.3, maps=True)
-IN_STEPS: Final = Rung("bold, in steps", 0.3)
+BOLDEST: Final = Rung("boldest", 10.0)
+BOLDER: Final = Rung("bolder", 3.0)
+BOLD: Final = Rung("bold", 0.3)
 CAREFUL: Final = Rung("careful", 0.05)
 WHOLE: Final = Rung("every term", 0.0)
 FINE: Final = Rung("every term, finer steps", 0.0, 10.0, 4)
 FINEST: Final = Rung("every term, finest steps", 0.0, 100.0, 32)
-LADDER: Final = (BOLDEST, BOLDER, BOLD, IN_STEPS, CAREFUL, WHOLE, FINE, FINEST)
+LADDER: Final = (BOLDEST, BOLDER, BOLD, CAREFUL, WHOLE, FINE, FINEST)
 FULL_LADDER: Final = (WHOLE, FINE, FINEST)
 """Where every term is wanted."""
 GROWS: Final = 0.1
 """Accuracy from which on steps grow twofold after a touch."""
-BESIDE_MAPS: Final = 2.0
-"""By how much steps grow where exact maps take nearly all ticks; what that does in the others the trial grasp shows."""
 KEPT: Final = "kept"
 DROPPED: Final = "dropped"
 BEYOND: Final = 1.5
@@ -69,10 +63,6 @@ HOLD_S: Final = 1.0
 SQUEEZE_S: Final = 3.0
 """No squeeze takes longer: the controllers give up then."""
 PIECES: Final = 24
-PIECES_SCALE: Final = 3.2
-"""Over the root of the accuracy: at least so many straight pieces."""
-MOST_PIECES: Final = 32
-"""More straight pieces of a curve take longer to make maps of than any grasp."""
 TOO_MUCH: Final = 0.5
 """A change of the force beyond which no accuracy takes it."""
 EARLY: Final = 3
@@ -122,9 +112,6 @@ class Choice:
     swings: bool
     """Whether a term has a state that swings, or one of which it does not say how fast it is."""
     rung: str
-    pieces: int = 0
-    """Exact maps take the ticks from the contact on, the force over compression in so many straight pieces; 0: they do
-    only where all is linear as it is."""
     check: Check | None = None
     """What a trial grasp said of it; None where there was none."""
 
@@ -144,12 +131,10 @@ class Choice:
 
     def covers(self, peak_n: float) -> bool:
         """Return whether a grasp with this peak is one that the choice was made for."""
-        return peak_n <= self.most_n or (self.error == 0.0 and self.pieces == 0)
+        return peak_n <= self.most_n or self.error == 0.0
 
     def by_maps(self) -> Choice:
         """Return the same choice where exact maps take the ticks of a scene that is linear as it is."""
-        if self.pieces > 0:
-            return self
         what = "all of it is linear between its modes"
         scheme = Decision(term="steps", decision="exact maps", what=what, number=0.0, error=0.0)
         return evolve(self, scheme=scheme)
@@ -239,14 +224,11 @@ def choose(
     mass_kg: float,
     damping_n_s_m: float,
     rubs: bool,
-    maps: bool = False,
-    straight: bool = False,
     rung: Rung = CAREFUL,
 ) -> Choice:
     """Return the model for a grasp that touches at this speed and squeezes with this force.
 
-    `rubs`: whether the drive has friction; `maps`: whether exact maps can take this grasp and are worth making;
-    `straight`: whether the drive is linear as it is.
+    `rubs`: whether the drive has friction.
     """
     seen = _survey(full, tuple(kinds), force_n, max(speed_m_s, LEAST_SPEED_M_S), mass_kg)
     paths, point = seen.paths, seen.point
@@ -256,8 +238,6 @@ def choose(
     # Verlet lets the energy of a swing rise and fall by a share of it, which only shows where nothing else takes it.
     swing = contact.number / dt_s * (6.0 * tolerance(accuracy)) ** (2.0 / 3.0) / 4.0
     scheme = STIFF if rate * dt_s > 1.0 else MEAN_FORCE if rate < swing and not rubs else EXPLICIT
-    # Without friction, pieces of a curve would show as energy that comes and goes.
-    pieces = _pieces(thing, kinds, accuracy, straight) if maps and rung.maps and rubs else 0
     return Choice(
         accuracy=accuracy,
         made=made,
@@ -266,16 +246,14 @@ def choose(
             tolerance(accuracy / rung.finer),
             scheme,
             dt_s / rung.least_steps if rung.least_steps > 1 else math.inf,
-            growth=BESIDE_MAPS if pieces > 0 else growth(accuracy / rung.finer),
+            growth=growth(accuracy / rung.finer),
         ),
         decisions=tuple(decisions),
         scheme=Decision(
             term="steps",
-            decision="exact maps" if pieces > 0 else SCHEMES[scheme],
-            what="straight pieces of the object's force over compression"
-            if pieces > 0
-            else "rate of the dampers, times tick",
-            number=float(pieces) if pieces > 0 else rate * dt_s,
+            decision=SCHEMES[scheme],
+            what="rate of the dampers, times tick",
+            number=rate * dt_s,
             error=accuracy * max(1.0 - rung.model_share, 0.0),
         ),
         contact=contact,
@@ -285,21 +263,7 @@ def choose(
             for kind, one, left in zip(kinds, full.terms[1:], thing.terms[1:], strict=True)
         ),
         rung=rung.name,
-        pieces=pieces,
     )
-
-
-def _pieces(thing: Thing, kinds: Sequence[str], accuracy: float, straight: bool) -> int:
-    """Return into how many straight pieces the curve of what is left is cut for exact maps; 0: none is needed, or they
-    cannot take it."""
-    forms = forms_of(thing, kinds)
-    if forms is None:
-        return 0
-    if not is_bent(forms):
-        return 0 if straight else 1
-    # Between knots at even roots a force that goes with d^1.5 is off by 0.4 of it over the square of their number.
-    pieces = 1 << math.ceil(math.log2(PIECES_SCALE / math.sqrt(accuracy)))
-    return pieces if pieces <= MOST_PIECES else 0
 
 
 def _swings(kind: str, params: Any, point: WorkingPoint) -> bool:

@@ -289,8 +289,6 @@ def choice_of(
             mass_kg=_rotor(config) / (rate * rate),
             damping_n_s_m=config.damping_n_s_m,
             rubs=config.coulomb_n > 0.0,
-            maps=_worth_maps(config, instance),
-            straight=config.transmission == "straight" and config.breakaway_n <= config.coulomb_n,
             rung=rung,
         )
         steps = choice.steps
@@ -308,13 +306,6 @@ def choice_of(
             )
         _CHOICES[key] = (spec, evolve(choice, steps=steps))
     return _CHOICES[key][1]
-
-
-def _worth_maps(config: SimConfig, instance: Instance) -> bool:
-    """Return whether exact maps can take this grasp and are worth making, which takes longer than a grasp."""
-    forced = config.scheme != "auto" or config.step_s is not None
-    # Where every grasp is of another instance its maps would be made for it alone.
-    return not (config.spread or forced or (instance.spec.held and instance.offset_m != 0.0))
 
 
 def _rotor(config: SimConfig) -> float:

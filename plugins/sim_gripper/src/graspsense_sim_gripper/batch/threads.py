@@ -183,11 +183,7 @@ class _Batch:
         composition = composition_of(self.job.config, setting)
         # What maps may take is checked by steps, which would be compiled for that alone.
         config = self.job.config
-        if (
-            config.transmission == "straight"
-            or not config.spread
-            or not self._worth(self.of_kinds[compiled_kinds(setting.kinds)])
-        ):
+        if config.transmission == "straight" or not self._worth(self.of_kinds[compiled_kinds(setting.kinds)]):
             return None
         try:
             loop = kernel.compiled(loop_of(composition, step))

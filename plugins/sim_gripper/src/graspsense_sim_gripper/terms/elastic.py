@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import NamedTuple
 
 from graspsense_sim_gripper.terms.term import Limit, LinearForm, NoState, Term, WorkingPoint
@@ -32,11 +31,9 @@ def limits(params: Elastic, at: WorkingPoint) -> tuple[Limit, ...]:
     return (Limit("spring", spring_n_m=params.k1_n_m),)
 
 
-def linear(params: Elastic) -> LinearForm:
-    """Return the spring that it is, and how it stiffens."""
-    if params.k3_n_m3 == 0.0:
-        return LinearForm(params.k1_n_m)
-    return LinearForm(params.k1_n_m, curve=partial(stiffened, params))
+def linear(params: Elastic) -> LinearForm | None:
+    """Return the spring k1; None if the shell stiffens (k3 > 0)."""
+    return LinearForm(params.k1_n_m) if params.k3_n_m3 == 0.0 else None
 
 
 TERM = Term(

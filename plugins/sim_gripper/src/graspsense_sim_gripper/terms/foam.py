@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import NamedTuple
 
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
@@ -66,12 +65,11 @@ def limits(params: Foam, at: WorkingPoint) -> tuple[Limit, ...]:
     return (Limit("without arms", bare, spring, damper),)
 
 
-def linear(params: Foam) -> LinearForm:
-    """Return its arms, beside the spring that it is with an exponent of 1 or the power law."""
-    straight = params.exponent == 1.0
-    form = LinearForm(
-        params.force_n / params.at_m if straight else 0.0, curve=None if straight else partial(power, params)
-    )
+def linear(params: Foam) -> LinearForm | None:
+    """Return a spring with the two Maxwell branches if the exponent is 1, otherwise None."""
+    if params.exponent != 1.0:
+        return None
+    form = LinearForm(params.force_n / params.at_m)
     if params.arm1_n_m == 0.0 and params.arm2_n_m == 0.0:
         return form
     # An arm that is none needs not be followed as fast as it is.

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.term import LinearForm, Rate, Term, WorkingPoint
+from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 
 
 class Rigid(NamedTuple):
@@ -48,11 +47,6 @@ def rates(params: Rigid, at: WorkingPoint) -> tuple[Rate, ...]:
     return ()
 
 
-def linear(params: Rigid) -> LinearForm | None:
-    """Return the contact where it cannot break: nothing of it is straight."""
-    return LinearForm(curve=partial(hertz, params)) if params.crush_force_n == math.inf else None
-
-
 TERM = Term(
     name="rigid",
     summary="rigid body through its Hertz contact, K d^1.5; breaks above its crush force",
@@ -60,7 +54,6 @@ TERM = Term(
     law=rigid,
     at_rest=RigidState(0),
     rates=rates,
-    linear=linear,
     positive=("hertz_n_m15",),
     stiffnesses=("hertz_n_m15", "crush_force_n"),
 )

@@ -62,8 +62,6 @@ class LinearForm(NamedTuple):
     """c"""
     force: tuple[float, ...] = ()
     """f"""
-    curve: Callable[[float], float] | None = None
-    """What is not linear of it: a force (N) that follows from d alone, rises with it and is 0 at 0."""
 
 
 class OwnContact(NamedTuple):
@@ -123,8 +121,7 @@ class Term:
     limits: Callable[[Any, WorkingPoint], tuple[Limit, ...]] = no_limits
     """What may stand for it, cheapest first; whether it may is found by the force it then gives."""
     linear: Callable[[Any], LinearForm | OwnContact | None] = not_linear
-    """Its linear form with these parameters, or None. Where all terms have one, exact maps may take the scene's ticks:
-    exactly where no form has a curve, else with as many straight pieces for it as the accuracy asks for."""
+    """Its linear form with these parameters, or None. The scene can be discretised exactly where every term has one."""
     positive: tuple[str, ...] = ()
     stiffnesses: tuple[str, ...] = ()
     """Parameters that a thicker wall makes larger: they vary between instances."""
