@@ -1,8 +1,8 @@
-"""Writes `docs/roles/*.md` from the code: what each role must do, what an entry declares, what is checked.
+"""Writes `docs/roles/*.md` from the code: the methods of each role, the fields of its entry, and its checks.
 
     python docs/role_pages.py
 
-A test compares the pages with what this gives.
+A test compares the pages with the output of this script.
 """
 
 from __future__ import annotations
@@ -68,41 +68,41 @@ def page(role: str) -> str:
         base: Any = BASES[role]
         table = TABLE_OF_ROLE[role]  # type: ignore[index]
         lines += [
-            f"Role `{role}`, chosen in the table `[{table}]` of a pipeline file. `graspsense plugins "
-            f"new NAME --role {role}` "
-            "makes a package to start from, which is the example below; `graspsense plugins check "
-            "NAME` tells whether it "
-            f"conforms. How a package is made by hand: [the tutorial](../tutorial.md). "
-            "What the values hold: [what flows](signals.md). The hook: "
-            f"[{HOOKS[role]}](../hooks.md#{_anchor(role)}).",
+            f"This page describes the role `{role}`. A component of this role is selected in the table `[{table}]` "
+            "of a pipeline file.",
             "",
-            "## What it must do",
+            f"- `graspsense plugins new NAME --role {role}` creates a package to start from: the example below.",
+            "- `graspsense plugins check NAME` checks whether a component conforms to the role.",
+            "- [The tutorial](../tutorial.md) creates a package by hand.",
+            "- [What flows](signals.md) describes the values that pass between components.",
+            f"- The hook [{HOOKS[role]}](../hooks.md#{_anchor(role)}) declares components of this role.",
+            "",
+            "## Methods",
             "",
             f"`graspsense.plugin_api.{base.__name__}`: {_text(base)}",
             "",
             *_methods(base),
             *(_many() if role == "sensor-backend" else ()),
-            "## What its entry declares",
+            "## Fields of the entry",
             "",
             *_entry(getattr(entries, f"{base.__name__}Entry")),
-            "## A whole one",
+            "## Complete example",
             "",
             *_example(role),
         ]
     else:
         lines += [
-            "What `graspsense plugins check DISTRIBUTION` looks at before the components it brings. "
-            "An editable installation is "
-            "built as a wheel, to see that nothing stays behind.",
+            "`graspsense plugins check DISTRIBUTION` checks the distribution itself before its components. It builds "
+            "an editable installation as a wheel, to verify that the wheel is complete.",
             "",
         ]
     lines += [
-        "## What is checked",
+        "## Conformance checks",
         "",
-        f"{len(CHECKS[role])} checks; {FLOOR[role]} of them must run. One that does not apply is "
-        "skipped, with its reason.",
+        f"There are {len(CHECKS[role])} checks, and at least {FLOOR[role]} of them must run. A check that does not "
+        "apply is skipped, with a reason.",
         "",
-        "| check | demands |",
+        "| check | requirement |",
         "|---|---|",
         *(f"| `{one.id}` | {_cell(one.title)} |" for one in CHECKS[role]),
         "",
@@ -123,10 +123,10 @@ def signals_page() -> str:
 
 def hooks_page() -> str:
     """Return the page of every hook and of what it gives."""
-    lines = [HEAD + "# Hooks and what they give", ""]
+    lines = [HEAD + "# Hook reference", ""]
     lines += [
-        "Every hook with its signature, as the code has it, and the fields of what it gives. "
-        "[Hooks](../hooks.md) has the rules, and an example of each.",
+        "This page lists every hook with its signature and the fields of the entries that it returns. "
+        "[Hooks](../hooks.md) has the rules, and an example of each hook.",
         "",
     ]
     specs = {name: spec for name, spec in vars(hookspecs).items() if name.startswith("graspsense_")}
@@ -169,13 +169,13 @@ def _methods(base: Any) -> list[str]:
             .replace("self, ", "")
             .replace("(self)", "()")
         )
-        must = "" if getattr(method, "__isabstractmethod__", False) else " (may be left out)"
+        must = "" if getattr(method, "__isabstractmethod__", False) else " (optional)"
         lines += [f"### {name}{must}", "", f"    {name}{signature}", "", _text(function), ""]
     return lines
 
 
 def _many() -> list[str]:
-    """Return what a backend offers that can do many grasps at once, with the text below each of its options."""
+    """Return the section on batch backends, with the docstring of each option."""
     body = ast.parse(inspect.getsource(roles.BatchOptions)).body[0].body  # type: ignore[attr-defined]
     options = [
         f"- `{one.target.id}: {ast.unparse(one.annotation)}`: {' '.join(text.value.value.split())}"
@@ -185,8 +185,8 @@ def _many() -> list[str]:
     return [
         "## Many grasps at once",
         "",
-        f"`graspsense.plugin_api.BatchBackend`: {_text(roles.BatchBackend)} Experiments and simulated trials then "
-        "ask it for them; it need not be one.",
+        f"`graspsense.plugin_api.BatchBackend`: {_text(roles.BatchBackend)} Experiments and simulated trials use this "
+        "class. A sensor backend does not have to be a batch backend.",
         "",
         *_methods(roles.BatchBackend),
         f"`BatchOptions`: {_text(roles.BatchOptions)}",
@@ -207,7 +207,7 @@ def _entry(cls: Any) -> list[str]:
     lines = ["| field | type | default |", "|---|---|---|"]
     attrs.resolve_types(cls)
     for one in attrs.fields(cls):
-        default = "must be given" if one.default is attrs.NOTHING else f"`{one.default!r}`"
+        default = "required" if one.default is attrs.NOTHING else f"`{one.default!r}`"
         kind = strict._kind_words(one.type).replace("graspsense.core.entries.", "").replace("|", "or")
         lines.append(f"| `{one.name}` | {_cell(kind)} | {default} |")
     return [*lines, "", _text(cls), ""]

@@ -29,20 +29,20 @@ class _Bench(NamedTuple):
 
 
 def _options(command: Callable[..., Any]) -> Callable[..., Any]:
-    command = click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")(command)
+    command = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")(command)
     command = click.option(
         "--replace",
         is_flag=True,
-        help="Replace what is stored, whatever it says, instead of comparing with it.",
+        help="Replace the stored calibration without comparing with it.",
     )(command)
     return pipeline_options(command)
 
 
 @click.group()
 def calibrate() -> None:
-    """Calibrate a gripper; what is found is kept under its serial number.
+    """Calibrate a gripper and store the result under its serial number.
 
-    The gripper must be empty. Files are kept below the folder gripper.calibration, or the user's own.
+    The gripper must be empty. Files are stored in gripper.calibration, or in the data folder of the user.
     """
 
 
@@ -52,7 +52,7 @@ def calibrate() -> None:
 )
 @_options
 def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
-    """Store the zero of the pads: the mean of cell images with the fingers open and nothing touching."""
+    """Store the zero of the pads: the mean of cell images with open fingers that touch nothing."""
     from graspsense.core import calibration
     from graspsense.core.calibrating import unloaded_images
     from graspsense.core.calibration_files import stored_zero
@@ -72,10 +72,10 @@ def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
 @click.argument("readings", type=click.Path(exists=True, dir_okay=False))
 @_options
 def load_cell(readings: str, replace: bool, as_json: bool, **asked: Any) -> None:
-    """Store a table from the pads' force to a load cell's, made of READINGS.
+    """Store a table from the pad force to the force of a load cell, computed from READINGS.
 
     READINGS is a CSV file with the columns side (left or right), pad_counts (sum of the 15 pad cells over their tare)
-    and load_n (what the load cell said).
+    and load_n (force of the load cell).
     """
     with _bench(asked, replace) as bench:
         data = _tables(readings, _counts_per_n(bench))
@@ -83,9 +83,11 @@ def load_cell(readings: str, replace: bool, as_json: bool, **asked: Any) -> None
 
 
 @calibrate.command()
-@click.option("--gaps", type=click.IntRange(2, 90), default=5, show_default=True, help="At how many gaps.")
+@click.option(
+    "--gaps", type=click.IntRange(2, 90), default=5, show_default=True, help="Number of gaps to measure at."
+)
 @click.option("--narrowest", "narrowest_m", type=click.FloatRange(0.002, 0.08), default=0.01, show_default=True,
-              help="The narrowest gap, in m.")  # fmt: skip
+              help="Smallest gap, in m.")  # fmt: skip
 @_options
 def friction(gaps: int, narrowest_m: float, replace: bool, as_json: bool, **asked: Any) -> None:
     """Store the effort at which the fingers begin to move, closing and opening, over the stroke."""

@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     "--labels",
     required=True,
     metavar="NAMES",
-    help="What there is, with commas: can:full_open,can:empty_open; #2 names the second can.",
+    help="Comma-separated labels: can:full_open,can:empty_open; #2 is the second can.",
 )
 @click.option("--each", type=int, default=10, show_default=True, help="Trials of each label.")
-@click.option("--save", metavar="DIR", default="trials", show_default=True, help="The store to keep them in.")
-@click.option("--operator", metavar="NAME", help="Who does it; kept with every trial.")
-@click.option("--changed", is_flag=True, help="Go on with another gripper or other settings than before.")
+@click.option("--save", metavar="DIR", default="trials", show_default=True, help="Store for the trials.")
+@click.option("--operator", metavar="NAME", help="Name of the operator, stored with every trial.")
+@click.option("--changed", is_flag=True, help="Continue with another gripper or other settings.")
 @pipeline_options
-@click.option("--json", "as_json", is_flag=True, help="At the end, print what was collected as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON at the end.")
 def collect(
     labels: str,
     each: int,
@@ -43,10 +43,11 @@ def collect(
     seed: int | None,
     as_json: bool,
 ) -> None:
-    """Prompt for the next object, grasp it, keep the trial; Enter grasps, u undoes, r takes again, q stops.
+    """Prompt for the next object, grasp it and store the trial (Enter: grasp, u: undo, r: repeat, q: stop).
 
-    Things come in rounds, so that no class is recorded in one go. It can be stopped or killed at any time and goes
-    on where it was. A simulated gripper finds what the label says. Answers can come from a file or a pipe.
+    Objects are grasped in rounds, so that no class is recorded as one batch. The command can be stopped or killed at
+    any time, and continues where it was. With a simulated gripper, the label selects the object. Answers can come from
+    a file or a pipe.
     """
     from graspsense.core.errors import ConfigError
     from graspsense.core.model import model_for

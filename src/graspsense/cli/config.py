@@ -22,11 +22,11 @@ def config() -> None:
 @config.command()
 @click.argument("name", metavar="[PIPELINE]", required=False)
 @pipeline_options
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def show(name: str | None, as_json: bool, **asked: Any) -> None:
-    """Print every setting with its origin: a default, a line of a file, -o, or a flag.
+    """Print every setting with its origin: a default, a line of a file, or a command-line option.
 
-    What is printed is a complete pipeline file.
+    The output is a complete pipeline file.
     """
     settings = _settings(name, asked)
     if as_json:
@@ -47,9 +47,9 @@ def show(name: str | None, as_json: bool, **asked: Any) -> None:
 @config.command()
 @click.argument("name", metavar="[PIPELINE]", required=False)
 @pipeline_options
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def validate(name: str | None, as_json: bool, **asked: Any) -> None:
-    """Check that the settings are valid and that the components fit together; nothing is opened."""
+    """Check that the settings are valid and the components fit together, without opening anything."""
     from graspsense.core.errors import ConfigError
     from graspsense.core.model import model_for
     from graspsense.core.plugins import installed

@@ -15,11 +15,11 @@ from graspsense.cli.output import echo_json, echo_table, talk
     type=click.FloatRange(min=0.0, min_open=True),
     default=2.0,
     show_default=True,
-    help="How long each plugin may look, in seconds.",
+    help="Time limit for each plugin, in seconds.",
 )
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def devices(timeout_s: float, as_json: bool) -> None:
-    """Look for grippers that are plugged in."""
+    """List connected grippers."""
     from graspsense.core.plugins import installed
 
     if timeout_s != timeout_s:

@@ -18,7 +18,7 @@ EXIT_PROBLEM: Final = 1
 MARKS: Final = {"ok": "ok", "note": "note", "problem": "PROBLEM"}
 
 
-@click.command(short_help="Say what is plugged in, and why it does not work.")
+@click.command(short_help="Diagnose plugins, permissions and devices.")
 @pipeline_options
 @click.option(
     "--timeout",
@@ -26,14 +26,14 @@ MARKS: Final = {"ok": "ok", "note": "note", "problem": "PROBLEM"}
     type=click.FloatRange(min=0.0, min_open=True),
     default=4.0,
     show_default=True,
-    help="How long each plugin may measure, in seconds.",
+    help="Measuring time for each plugin, in seconds.",
 )
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def doctor(timeout_s: float, as_json: bool, **asked: Any) -> None:
-    """Look at plugins, libraries, permissions and devices; measure rate, loss and delay. Nothing is moved.
+    """Check plugins, libraries, permissions and devices; measure rate, loss and latency. Nothing moves.
 
-    With --gripper and -o it looks for that gripper (-o gripper.vendor_id=..., -o gripper.serial=...), and its absence
-    is a problem. Exit code 0 means no problem, 1 that there is one.
+    With --gripper and -o, it looks for that gripper (-o gripper.vendor_id=..., -o gripper.serial=...), and reports a
+    problem if it is missing. Exit code 0: no problem; 1: a problem.
     """
     from graspsense.core.plugins import Diagnosis, installed
 

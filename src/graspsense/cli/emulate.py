@@ -30,14 +30,14 @@ EXIT_FAILED: Final = 4
 @click.option(
     "--wire",
     default="",
-    help="How it gets into the system, as in uhid or usb.  [default: the first that works]",
+    help="Type of the emulated device: uhid or usb.  [default: the first that works]",
 )
 @pipeline_options
 @click.option(
     "--json",
     "as_json",
     is_flag=True,
-    help="JSON on stdout: one object in a line, at the start and for each word.",
+    help="Print JSON, one object per line: at the start and for each command.",
 )
 def emulate(
     name: str,
@@ -49,10 +49,10 @@ def emulate(
     seed: int | None,
     as_json: bool,
 ) -> None:
-    """Stand in for the gripper NAME (as in pr2) until Ctrl-C: drivers find it as they would find a real one.
+    """Emulate the gripper NAME (for example pr2) as a device of the operating system, until Ctrl-C.
 
-    It takes words on its standard input, a line each, such as unplug and plug; `help` lists them. However it ends, the
-    device goes with it.
+    The command reads commands such as unplug and plug from its standard input, one per line; `help` lists them. The
+    device disappears with the process.
     """
     from graspsense.core.errors import ConfigError, suggestion
     from graspsense.core.plugins import installed

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 
 @click.command(
-    short_help="Measure an honest recognition rate.",
-    help=f"""Cross-validate a classifier on SOURCE; print its rate with the controls beside it.
+    short_help="Measure the recognition rate by cross-validation.",
+    help=f"""Cross-validate a classifier on SOURCE. Print its rate and the controls.
 
-    The headline holds whole instances out where instances are labelled, else it is the paper's: stratified ten
-    folds, predictions pooled. docs/evaluation.md defines every number.
+    The headline holds out whole instances if instances are labelled. Otherwise it uses the protocol of the paper:
+    ten stratified folds, with pooled predictions. docs/evaluation.md defines every number.
 
     {SOURCES}""",
 )
@@ -29,16 +29,16 @@ if TYPE_CHECKING:
     type=click.Choice(["both", "class", "state"]),
     default="both",
     show_default=True,
-    help="Labels as they are; what is before the colon; or what is behind it, in each class apart.",
+    help="What is recognised: whole labels, classes, or the states within each class.",
 )
 @click.option("--folds", type=int, default=10, show_default=True, help="Number of folds.")
-@click.option("--png", metavar="FILE", callback=file_to_write, help="Draw the confusion matrix, too.")
+@click.option("--png", metavar="FILE", callback=file_to_write, help="Draw the confusion matrix.")
 @click.option(
-    "--keep", metavar="FILE", callback=file_to_write, help="Keep the trials' features as a CSV, too."
+    "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
 )
 @classifier_option
 @source_options
-@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def evaluate(
     source: str,
     target: str,

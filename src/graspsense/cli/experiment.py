@@ -20,25 +20,25 @@ EXIT_INCOMPLETE = 1
 EXIT_INTERRUPTED = 130
 
 
-@click.command(short_help="Run an experiment from a file; resume it.")
+@click.command(short_help="Run or resume an experiment from a file.")
 @click.argument("experiment", required=False, metavar="NAME|FILE")
-@click.option("--out", metavar="DIR", help="Where everything goes.  [NAME]")
-@click.option("--resume", is_flag=True, help="Do only what has no result in --out yet.")
+@click.option("--out", metavar="DIR", help="Folder for the results.  [default: NAME]")
+@click.option("--resume", is_flag=True, help="Run only the tasks that have no result in --out yet.")
 @click.option(
     "--executor",
     metavar="HOW",
-    help="serial, processes, dask, or dask:ADDRESS of a scheduler.  [processes, or serial on one core]",
+    help="serial, processes, dask, or dask:ADDRESS.  [default: processes; serial on one core]",
 )
-@click.option("--workers", type=int, help="Processes, or workers of a local cluster.  [cores]")
+@click.option("--workers", type=int, help="Number of processes or local workers.  [default: number of cores]")
 @click.option(
     "-o",
     "options",
     metavar="KEY=VALUE",
     multiple=True,
-    help="A key of the file, as in -o seeds=3 or -o data.trials=2. May be given again.",
+    help="Set a key of the file: -o seeds=3, -o data.trials=2. Can be repeated.",
 )
-@click.option("--dry-run", is_flag=True, help="Say what would be done.")
-@click.option("--json", "as_json", is_flag=True, help="Print what came out as JSON.")
+@click.option("--dry-run", is_flag=True, help="Print what would be done, and do nothing.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def experiment(
     experiment: str | None,
     out: str | None,
@@ -49,10 +49,10 @@ def experiment(
     dry_run: bool,
     as_json: bool,
 ) -> None:
-    """Run NAME, or FILE.toml: every case with every seed; the page is report.html in --out.
+    """Run the experiment NAME or FILE.toml: every case with every seed. Write report.html to --out.
 
-    Each finished task is kept at once: after Ctrl-C, a crash or a lost machine, --resume does only the rest.
-    Without NAME it lists what there is. docs/experiments.md describes the file.
+    Each finished task is stored immediately. After Ctrl-C, a crash or a lost machine, --resume runs only the rest.
+    Without NAME, the available experiments are listed. docs/experiments.md describes the file.
     """
     from graspsense.experiments.experiment import read_experiment, shipped
 

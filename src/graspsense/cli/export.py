@@ -9,21 +9,21 @@ import click
 from graspsense.cli.output import echo_json, talk
 
 
-@click.command(short_help="Write trials or a recording for other programs.")
+@click.command(short_help="Export trials or a recording.")
 @click.argument("source", metavar="DIR|DIR#NUMBER|FILE.mcap")
 @click.option(
     "--to",
     "target",
     required=True,
     metavar="FILE",
-    help="The file to write; its ending says what: .csv .npz .arff .parquet .mcap .toml",
+    help="File to write. Its suffix is the format: .csv .npz .arff .parquet .mcap .toml",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def export(source: str, target: str, as_json: bool) -> None:
     """Write the trials of the store DIR as a table (.csv .npz .arff .parquet), or one recorded grasp, tick by tick.
 
-    One grasp is a trial of a store, DIR#NUMBER, or a FILE.mcap: .csv .npz .parquet, .mcap for a copy of the
-    recording, .toml for the settings that made it. No file is ever overwritten.
+    One grasp is a trial of a store, DIR#NUMBER, or a FILE.mcap. Its formats are .csv, .npz, .parquet,
+    .mcap (a copy of the recording) and .toml (its settings). Existing files are never overwritten.
     """
     from graspsense.core.errors import ConfigError
     from graspsense.recording import export_trace

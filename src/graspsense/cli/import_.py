@@ -7,30 +7,39 @@ import click
 from graspsense.cli.output import echo_json, talk
 
 
-@click.command("import", short_help="Take in what somebody else recorded.")
+@click.command("import", short_help="Import recordings of other programs.")
 @click.argument("sources", nargs=-1, required=True, metavar="FILE.csv|KIND:NAME...")
-@click.option("--save", metavar="DIR", required=True, help="The store to keep them in.")
-@click.option("--label", metavar="CLASS:STATE", help="What was squeezed, as in can:full_open#2.")
-@click.option("--time", metavar="COLUMN", help="CSV: the column of the time, in s.")
+@click.option("--save", metavar="DIR", required=True, help="Store for the trials.")
+@click.option("--label", metavar="CLASS:STATE", help="Label of the object: can:full_open#2.")
+@click.option("--time", metavar="COLUMN", help="CSV: column of the time, in s.")
+@click.option("--gap", metavar="COLUMN", help="CSV: column of the gap, in m. For mm: POS*0.001.")
 @click.option(
-    "--gap", metavar="COLUMN", help="CSV: that of the gap between the fingers, in m; POS*0.001 from mm."
+    "--force",
+    "forces",
+    metavar="COLUMN",
+    multiple=True,
+    help="CSV: column of the force, in N. Repeat it for two pads.",
+)
+@click.option("--effort", metavar="COLUMN", help="CSV: column of the effort, in N.")
+@click.option(
+    "--velocity",
+    metavar="COLUMN",
+    help="CSV: column of the velocity of the gap, in m/s; negative when closing.",
 )
 @click.option(
-    "--force", "forces", metavar="COLUMN", multiple=True, help="CSV: the force in N; twice for two pads."
-)
-@click.option("--effort", metavar="COLUMN", help="CSV: the effort in N.")
-@click.option("--velocity", metavar="COLUMN", help="CSV: the gap's rate in m/s, negative as it closes.")
-@click.option(
-    "--pipeline", metavar="NAME|FILE", default="default", help="What draws the features.  [default]"
+    "--pipeline",
+    metavar="NAME|FILE",
+    default="default",
+    help="Pipeline that computes the features.  [default: default]",
 )
 @click.option(
     "-o",
     "options",
     metavar="TABLE.KEY=VALUE",
     multiple=True,
-    help="A key of the pipeline, as in -o controller.probing_force_n=17. May be given again.",
+    help="Set a key of the pipeline: -o controller.probing_force_n=17. Can be repeated.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print what was kept as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def import_(
     sources: tuple[str, ...],
     save: str,
@@ -44,9 +53,9 @@ def import_(
     options: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Keep other people's squeezes as trials: each with its recording, its features and its label.
+    """Import recorded grasps as trials, each with its recording, features and label.
 
-    A FILE.csv needs --time, --gap and --force; KIND:NAME is what another reader reads, as rosbag:FILE.bag.
+    A FILE.csv needs --time, --gap and --force. KIND:NAME is a file of another reader, for example rosbag:FILE.bag.
     """
     from graspsense.core.config import Flag, resolve
     from graspsense.core.plugins import installed

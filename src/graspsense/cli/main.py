@@ -23,25 +23,28 @@ COMPLETION_VARIABLE: Final = "_GRASPSENSE_COMPLETE"
 TRACEBACK_VARIABLE: Final = "GRASPSENSE_TRACEBACK"
 
 COMMANDS: Final[dict[str, tuple[str, str]]] = {
-    "run": ("graspsense.cli.run:run", "Grasp once, live in the terminal."),
+    "run": ("graspsense.cli.run:run", "Perform one grasp."),
     "collect": ("graspsense.cli.collect:collect", "Collect labelled trials with an operator."),
-    "replay": ("graspsense.cli.replay:replay", "Put a recording through a pipeline."),
-    "recover": ("graspsense.cli.recover:recover", "Save what a killed program left."),
-    "verify": ("graspsense.cli.verify:verify", "Check every hash and file of a store."),
-    "export": ("graspsense.cli.export:export", "Write trials or a recording for other programs."),
-    "import": ("graspsense.cli.import_:import_", "Take in what somebody else recorded."),
-    "train": ("graspsense.cli.train:train", "Make a model from labelled trials."),
-    "predict": ("graspsense.cli.predict:predict", "Ask a model what trials are of."),
-    "evaluate": ("graspsense.cli.evaluate:evaluate", "Measure an honest recognition rate."),
-    "experiment": ("graspsense.cli.experiment:experiment", "Run an experiment from a file; resume it."),
-    "tradeoff": ("graspsense.cli.tradeoff:tradeoff", "Measure speed against accuracy."),
-    "report": ("graspsense.cli.report:report", "Write the page of a store or an experiment."),
-    "calibrate": ("graspsense.cli.calibrate:calibrate", "Keep a gripper's zero, load table and friction."),
+    "replay": ("graspsense.cli.replay:replay", "Process a recording with a pipeline."),
+    "recover": ("graspsense.cli.recover:recover", "Complete recordings of a killed program."),
+    "verify": ("graspsense.cli.verify:verify", "Check a store or a recording for damage."),
+    "export": ("graspsense.cli.export:export", "Export trials or a recording."),
+    "import": ("graspsense.cli.import_:import_", "Import recordings of other programs."),
+    "train": ("graspsense.cli.train:train", "Train a model on labelled trials."),
+    "predict": ("graspsense.cli.predict:predict", "Predict the labels of trials."),
+    "evaluate": ("graspsense.cli.evaluate:evaluate", "Measure the recognition rate by cross-validation."),
+    "experiment": ("graspsense.cli.experiment:experiment", "Run or resume an experiment from a file."),
+    "tradeoff": ("graspsense.cli.tradeoff:tradeoff", "Measure recognition or accuracy against cost."),
+    "report": ("graspsense.cli.report:report", "Write the report page of a store or an experiment."),
+    "calibrate": (
+        "graspsense.cli.calibrate:calibrate",
+        "Calibrate the zero, force and friction of a gripper.",
+    ),
     "config": ("graspsense.cli.config:config", "Show or check the settings of a pipeline."),
-    "plugins": ("graspsense.cli.plugins:plugins", "Show what is installed and whether it works."),
-    "devices": ("graspsense.cli.devices:devices", "Look for grippers that are plugged in."),
-    "doctor": ("graspsense.cli.doctor:doctor", "Say what is plugged in, and why it does not work."),
-    "emulate": ("graspsense.cli.emulate:emulate", "Stand in for a gripper as a device of this machine."),
+    "plugins": ("graspsense.cli.plugins:plugins", "List, check, disable and create plugins."),
+    "devices": ("graspsense.cli.devices:devices", "List connected grippers."),
+    "doctor": ("graspsense.cli.doctor:doctor", "Diagnose plugins, permissions and devices."),
+    "emulate": ("graspsense.cli.emulate:emulate", "Emulate a gripper as a device of this machine."),
     "completion": ("graspsense.cli.completion:completion", "Print the completion script for a shell."),
 }
 """Name to import string and summary of each command of our own."""
@@ -114,7 +117,7 @@ def _plugin_command(name: str) -> click.Command:
 @click.version_option(__version__, prog_name=PROGRAM)
 @click.pass_context
 def cli(ctx: click.Context) -> None:
-    """Feel what a thing is, whether it is open and whether it is full, while a gripper closes on it."""
+    """Recognise grasped objects and their state by touch."""
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())
 

@@ -20,23 +20,23 @@ _OPTIONS: Final = (
     click.option(
         "--pipeline",
         metavar="NAME|FILE",
-        help=f"A pipeline by name, or a .toml file.  [default: {DEFAULT_PIPELINE}]",
+        help=f"Name of a pipeline, or a .toml file.  [default: {DEFAULT_PIPELINE}]",
     ),
-    click.option("--gripper", metavar="NAME", help="Another gripper: sim, pr2, replay, ... (gripper.type)"),
+    click.option("--gripper", metavar="NAME", help="Gripper: sim, pr2, replay, ... (gripper.type)"),
     click.option(
         "--object",
         "object_name",
         metavar="NAME:STATE",
-        help="What a simulated gripper finds, as in odwalla:full_open. (gripper.object)",
+        help="Object of a simulated gripper: odwalla:full_open. (gripper.object)",
     ),
     click.option(
         "-o",
         "options",
         metavar="TABLE.KEY=VALUE",
         multiple=True,
-        help="Any other key, as in -o controller.probing_force_n=17. May be given again.",
+        help="Set any other key: -o controller.probing_force_n=17. Can be repeated.",
     ),
-    click.option("--seed", type=int, help="What everything drawn at random follows from. (run.seed)"),
+    click.option("--seed", type=int, help="Seed of all random numbers. (run.seed)"),
 )
 
 

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 @click.group()
 def plugins() -> None:
-    """Show what is installed and whether it works; check it, switch it off, begin a new one."""
+    """List, check, disable and create plugins."""
 
 
 @plugins.command("list")
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout: a list, one object a component.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON: a list with one object per component.")
 def list_plugins(as_json: bool) -> None:
-    """List every component and every other plugin, and say what is broken, too old, slow or there twice."""
+    """List all components and plugins, and report broken, outdated, slow and duplicate ones."""
     from graspsense.core.plugins import installed
 
     loaded = installed()
@@ -43,7 +43,7 @@ def list_plugins(as_json: bool) -> None:
 
 @plugins.command()
 @click.argument("name")
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def show(name: str, as_json: bool) -> None:
     """Show a distribution or a component (NAME or DISTRIBUTION/NAME): hooks, keys, and why it fails."""
     from graspsense.core.plugins import canonical, installed
@@ -71,15 +71,22 @@ def show(name: str, as_json: bool) -> None:
 
 @plugins.command()
 @click.argument("name")
-@click.option("-o", "keys", metavar="KEY=VALUE", multiple=True, help="A setting to check a component with.")
+@click.option("-o", "keys", metavar="KEY=VALUE", multiple=True, help="Setting for checking a component.")
 @click.option(
-    "--unplugged", metavar="KEY=VALUE", multiple=True, help="A setting with which a gripper vanishes in use."
+    "--unplugged",
+    metavar="KEY=VALUE",
+    multiple=True,
+    help="Setting with which the gripper disappears during use.",
 )
-@click.option("--absent", metavar="KEY=VALUE", multiple=True, help="A setting with which it is not there.")
 @click.option(
-    "--wheel/--no-wheel", default=True, help="Build a wheel of an editable installation and look inside."
+    "--absent", metavar="KEY=VALUE", multiple=True, help="Setting with which the gripper is not found."
 )
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout: counts and every result.")
+@click.option(
+    "--wheel/--no-wheel",
+    default=True,
+    help="Build a wheel of an editable installation and check its contents.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON: counts and every result.")
 @click.pass_context
 def check(
     ctx: click.Context,
@@ -129,11 +136,11 @@ def check(
 @plugins.command()
 @click.argument("name")
 @click.option(
-    "--role", required=True, metavar="ROLE", help="What it is to be; a wrong one lists all there are."
+    "--role", required=True, metavar="ROLE", help="Role of the plugin; an unknown role lists all of them."
 )
-@click.option("--folder", type=click.Path(path_type=Path), help="Where to make it.  [default: ./NAME]")
+@click.option("--folder", type=click.Path(path_type=Path), help="Folder of the package.  [default: ./NAME]")
 def new(name: str, role: str, folder: Path | None) -> None:
-    """Make the package of a new plugin: it installs, passes its own tests, and conforms."""
+    """Create the package of a new plugin, with tests."""
     from graspsense.scaffold.make import make
 
     for line in make(name, role, folder if folder is not None else Path(name)):
@@ -143,7 +150,7 @@ def new(name: str, role: str, folder: Path | None) -> None:
 @plugins.command()
 @click.argument("distribution")
 def disable(distribution: str) -> None:
-    """Switch a distribution's plugins off: they are not imported any more."""
+    """Switch the plugins of a distribution off: they are no longer imported."""
     from graspsense.core.disabling import disabled_in_config, write_disabled
     from graspsense.core.errors import UnknownName, suggestion
     from graspsense.core.firstparty import DISTRIBUTION
@@ -163,7 +170,7 @@ def disable(distribution: str) -> None:
 @plugins.command()
 @click.argument("distribution")
 def enable(distribution: str) -> None:
-    """Take back `disable`."""
+    """Switch the plugins of a distribution on again."""
     from graspsense.core.disabling import disabled_in_config, write_disabled
     from graspsense.core.errors import UnknownName
     from graspsense.core.plugins import canonical

@@ -19,12 +19,12 @@ MOST_WITH_REASONS: Final = 1000
 
 
 @click.command(
-    short_help="Ask a model what trials are of.",
-    help=f"""Ask MODEL what the trials of SOURCE are of: a label, how sure, and why.
+    short_help="Predict the labels of trials.",
+    help=f"""Predict the labels of the trials of SOURCE, with probabilities and reasons.
 
-    MODEL is a .json file that `graspsense train` wrote, or the name of one that a plugin offers (default). Where
-    the trials have labels, the rate is printed, too: an honest one if the model never saw these things. A CSV
-    needs no --label here.
+    MODEL is a .json file of `graspsense train`, or the name of a model of a plugin (such as default). If the trials
+    have labels, the rate is printed as well; it is meaningful only if the model was trained on other instances. A CSV file
+    does not need --label here.
 
     {SOURCES}""",
 )

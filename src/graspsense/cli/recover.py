@@ -11,14 +11,15 @@ from graspsense.cli.output import echo_json
 EXIT_DAMAGED = 5
 
 
-@click.command(short_help="Save what a killed program left.")
+@click.command(short_help="Complete recordings of a killed program.")
 @click.argument("source", metavar="DIR|FILE")
-@click.option("--out", metavar="FILE", help="With a FILE: where to write the recovered recording.")
-@click.option("--json", "as_json", is_flag=True, help="Print what became of each file as JSON.")
+@click.option("--out", metavar="FILE", help="With a FILE: file for the recovered recording.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result for each file as JSON.")
 def recover(source: str, out: str | None, as_json: bool) -> None:
-    """Give cut recordings an end and a row in the store DIR, or write what can be read of one FILE into a new one.
+    """Complete the interrupted recordings of the store DIR, or write the readable part of a FILE to a new file.
 
-    Nothing is deleted: a cut recording stays as .cut. Exit code 5 means that something could not be saved.
+    Nothing is deleted: the original of an interrupted recording stays as .cut. Exit code 5 means that some data could
+    not be recovered.
     """
     from graspsense.store.recover import recover_file, recover_store
     from graspsense.store.store import Store

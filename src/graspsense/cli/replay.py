@@ -13,27 +13,27 @@ if TYPE_CHECKING:
     from graspsense.core.config import Settings
 
 
-@click.command(short_help="Put a recording through a pipeline.")
+@click.command(short_help="Process a recording with a pipeline.")
 @click.argument("recording", metavar="FILE.mcap|DIR#NUMBER|KIND:NAME")
 @click.option(
-    "--pipeline", metavar="NAME|FILE", help="Another pipeline.  [for our own: the one it was recorded with]"
+    "--pipeline", metavar="NAME|FILE", help="Another pipeline.  [default: the one it was recorded with]"
 )
 @click.option(
     "-o",
     "options",
     metavar="TABLE.KEY=VALUE",
     multiple=True,
-    help="A key of the pipeline, as in -o features.pads=left. May be given again.",
+    help="Set a key of the pipeline: -o features.pads=left. Can be repeated.",
 )
 @click.option("--plot", metavar="FILE.png", help="Draw the grasp: forces, gap, phases, features, prediction.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
 def replay(
     recording: str, pipeline: str | None, options: tuple[str, ...], plot: str | None, as_json: bool
 ) -> None:
-    """Draw features from a recording, and predict, as if the gripper felt it now; nothing moves.
+    """Compute features and a prediction from a recording, as during the grasp; nothing moves.
 
-    FILE.mcap is a recording of ours, DIR#NUMBER a trial of a store, KIND:NAME what another reader reads, as in
-    icub:FOLDER/full_vitamin_water_1.txt.
+    FILE.mcap is a recording of graspsense, DIR#NUMBER a trial of a store, and KIND:NAME a file of another reader, for
+    example icub:FOLDER/full_vitamin_water_1.txt.
     """
     from graspsense.cli.run import draw_grasp, print_trial
     from graspsense.core.pipeline import grasp_with

@@ -9,11 +9,11 @@ import click
 from graspsense.cli.output import echo_json
 
 
-@click.command(short_help="Write the page of a store or an experiment.")
+@click.command(short_help="Write the report page of a store or an experiment.")
 @click.argument("folder", metavar="DIR")
-@click.option("--out", metavar="DIR", help="Where report.html goes.  [DIR itself]")
+@click.option("--out", metavar="DIR", help="Folder for report.html.  [default: DIR]")
 @click.option(
-    "--classifier", metavar="NAME", default="c45", show_default=True, help="Store: which one is judged."
+    "--classifier", metavar="NAME", default="c45", show_default=True, help="Store: classifier to evaluate."
 )
 @click.option(
     "--target",
@@ -23,9 +23,11 @@ from graspsense.cli.output import echo_json
     help="Store: what is recognised, as in `evaluate`.",
 )
 @click.option("--folds", type=int, default=10, show_default=True, help="Store: number of folds.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Store: of the folds.")
-@click.option("--grasp", type=int, metavar="NUMBER", help="Store: the trial shown over time.  [the newest]")
-@click.option("--json", "as_json", is_flag=True, help="Print where the page is as JSON.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Store: seed of the folds.")
+@click.option(
+    "--grasp", type=int, metavar="NUMBER", help="Store: trial to plot over time.  [default: the newest]"
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the path of the page as JSON.")
 def report(
     folder: str,
     out: str | None,
@@ -36,9 +38,9 @@ def report(
     grasp: int | None,
     as_json: bool,
 ) -> None:
-    """Write report.html for the store, or for the results of an experiment, in DIR.
+    """Write report.html for the store or the experiment in DIR.
 
-    The page is one file that loads nothing: it can be mailed, printed, and read without a network.
+    The page is one file without external resources.
     """
     from graspsense.cli.progress import Progress
     from graspsense.experiments.page import NAME, experiment_page

@@ -23,15 +23,17 @@ EXIT_ABORTED: Final = 4
 EXIT_NOT_KEPT: Final = 2
 
 
-@click.command(short_help="Grasp once, live in the terminal.")
+@click.command(short_help="Perform one grasp.")
 @pipeline_options
-@click.option("--save", metavar="DIR", help="Keep the trial in the store DIR, with its recording.")
-@click.option("--label", metavar="CLASS:STATE", help="With --save: what it was, as in can:full_open#2.")
+@click.option("--save", metavar="DIR", help="Store the trial and its recording in DIR.")
 @click.option(
-    "--explain-model", is_flag=True, help="Simulated: list the size of every term. (gripper.explain)"
+    "--label", metavar="CLASS:STATE", help="With --save: label of the object, as in can:full_open#2."
+)
+@click.option(
+    "--explain-model", is_flag=True, help="Simulated: list what every term contributed. (gripper.explain)"
 )
 @click.option("--plot", metavar="FILE.png", help="Draw the grasp: forces, gap, phases, features, prediction.")
-@click.option("--dry-run", is_flag=True, help="Say what would be done; open nothing.")
+@click.option("--dry-run", is_flag=True, help="Print what would be done, and open nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
 def run(
     pipeline: str | None,
@@ -46,10 +48,10 @@ def run(
     dry_run: bool,
     as_json: bool,
 ) -> None:
-    """Open, tare, close, squeeze, release; print the outcome, the features and what they say.
+    """Open, tare, close, squeeze and release; print the outcome, the features and the prediction.
 
-    Without any option a simulated gripper squeezes a full, closed bottle. Exit code 0 means the grasp ended by
-    itself, whatever its outcome; 2 a mistake in the settings, 3 no such device, 4 aborted or device lost.
+    Without options, a simulated gripper squeezes a full, closed bottle. Exit codes: 0 the grasp ended by itself,
+    whatever its outcome; 2 wrong settings; 3 device not found; 4 grasp aborted or device lost.
     """
     from graspsense.core.pipeline import grasp_with
     from graspsense.core.plugins import installed

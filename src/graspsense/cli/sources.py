@@ -20,46 +20,56 @@ DEFAULT_CLASSIFIER: Final = "c45"
 
 SOURCES: Final = """\b
     SOURCE is one of
-      FILE.csv     a table of features, one line a trial; --label names its column
-      NAME:FOLDER  a data set that a plugin reads, as icub:FOLDER
+      FILE.csv     a table of features, one line per trial; --label names its column
+      NAME:FOLDER  a data set that a plugin reads, such as icub:FOLDER
       simulated    grasps of the simulated gripper
     """
 
 _OPTIONS: Final = (
-    click.option("--label", metavar="COLUMN", help="CSV: the column that says what was grasped."),
-    click.option("--instance", metavar="COLUMN", help="CSV: the column that names the very thing."),
-    click.option("--order", metavar="COLUMN", help="CSV: a column that rises in the order of recording."),
+    click.option("--label", metavar="COLUMN", help="CSV: column of the label."),
+    click.option("--instance", metavar="COLUMN", help="CSV: column of the instance."),
+    click.option("--order", metavar="COLUMN", help="CSV: column that increases in the order of recording."),
     click.option(
-        "--features", metavar="COLUMNS", help="CSV: the columns to learn from, with commas.  [all numbers]"
+        "--features",
+        metavar="COLUMNS",
+        help="CSV: comma-separated feature columns.  [default: all numeric columns]",
     ),
     click.option(
-        "--before", metavar="COLUMNS", help="CSV: columns known before any contact; a control uses them."
-    ),
-    click.option("--unreliable", is_flag=True, help="Data set: take in what its author calls unreliable."),
-    click.option(
-        "--objects", metavar="NAMES", help="simulated: objects or kinds, with commas.  [the paper's]"
+        "--before",
+        metavar="COLUMNS",
+        help="CSV: comma-separated columns known before contact, for a control.",
     ),
     click.option(
-        "--instances", type=int, default=12, show_default=True, help="simulated: things of each object."
+        "--unreliable", is_flag=True, help="Data set: include trials that its author calls unreliable."
     ),
-    click.option("--trials", type=int, default=5, show_default=True, help="simulated: grasps of each thing."),
     click.option(
-        "--pipeline", metavar="NAME|FILE", default="default", help="simulated: the pipeline.  [default]"
+        "--objects",
+        metavar="NAMES",
+        help="simulated: comma-separated objects or kinds.  [default: those of the paper]",
+    ),
+    click.option(
+        "--instances", type=int, default=12, show_default=True, help="simulated: instances of each object."
+    ),
+    click.option(
+        "--trials", type=int, default=5, show_default=True, help="simulated: grasps of each instance."
+    ),
+    click.option(
+        "--pipeline", metavar="NAME|FILE", default="default", help="simulated: pipeline.  [default: default]"
     ),
     click.option("--gripper", metavar="NAME", help="simulated: another simulated gripper. (gripper.type)"),
     click.option(
-        "--only", metavar="CLASS", help="Use the trials of one class, what is before the colon of labels."
+        "--only",
+        metavar="CLASS",
+        help="Use only the trials of this class (the part of a label before the colon).",
     ),
     click.option(
         "-o",
         "options",
         metavar="TABLE.KEY=VALUE",
         multiple=True,
-        help="A key of a component, as in -o controller.probing_force_n=17. May be given again.",
+        help="Set a key of a component: -o controller.probing_force_n=17. Can be repeated.",
     ),
-    click.option(
-        "--seed", type=int, default=0, show_default=True, help="What is drawn at random follows from it."
-    ),
+    click.option("--seed", type=int, default=0, show_default=True, help="Seed of all random numbers."),
 )
 
 _ONLY_FOR: Final = {
@@ -81,7 +91,7 @@ def classifier_option(command: CommandT) -> CommandT:
     return click.option(
         "--classifier",
         metavar="NAME",
-        help=f"c45, svm, mlp, forest, knn, tree, or a plugin's.  [{DEFAULT_CLASSIFIER}] (classifier.type)",
+        help=f"c45, svm, mlp, forest, knn, tree, or one of a plugin. [{DEFAULT_CLASSIFIER}] (classifier.type)",
     )(command)
 
 

@@ -17,33 +17,33 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
-@click.group(short_help="Measure speed against accuracy.")
+@click.group(short_help="Measure recognition or accuracy against cost.")
 def tradeoff() -> None:
-    """Measure what accuracy costs, and draw it."""
+    """Measure recognition, or the accuracy of the simulator, against its cost."""
 
 
 for _one in commands():
     tradeoff.add_command(_one)
 
 
-@tradeoff.command(short_help="The simulator's accuracy against its time.")
+@tradeoff.command(short_help="Accuracy of the simulator against its run time.")
 @pipeline_options
 @click.option(
     "--scene",
     "scenes",
     metavar="NAME:STATE",
     multiple=True,
-    help="What is grasped; may be given again.  [six of the catalogue]",
+    help="Object to grasp. Can be repeated.  [default: six of the catalogue]",
 )
 @click.option(
     "--seeds", type=click.IntRange(min=1), default=2, show_default=True, help="Grasps of each scene."
 )
+@click.option("--peers", metavar="FILE", help="Output of `benchmarks/simulation.py --json`, for comparison.")
+@click.option("--png", metavar="FILE", callback=file_to_write, help="Draw the result.")
 @click.option(
-    "--peers", metavar="FILE", help="What `benchmarks/simulation.py --json` printed, to stand beside."
+    "--markdown", metavar="FILE", callback=file_to_write, help="Write the tables as a Markdown page."
 )
-@click.option("--png", metavar="FILE", callback=file_to_write, help="Draw it.")
-@click.option("--markdown", metavar="FILE", callback=file_to_write, help="Write the tables as a page.")
-@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def simulation(
     scenes: tuple[str, ...],
     seeds: int,
@@ -57,10 +57,10 @@ def simulation(
     options: tuple[str, ...],
     seed: int | None,
 ) -> None:
-    """Run the same grasps in every scheme and fidelity of the simulator.
+    """Run the same grasps with every scheme and fidelity of the simulator.
 
-    The error of each feature, of the peak force and of the force trace is against a reference in which everything
-    is modelled and steps are halved until nothing changes; the time is that of the very same grasps.
+    Errors of features, peak force and force trace are relative to a reference that keeps every term and halves its
+    steps until nothing changes. Times are measured on the same grasps.
     """
     from graspsense.cli.progress import Progress
     from graspsense.experiments.simulation import SCENES, trade_simulation

@@ -10,16 +10,16 @@ import click
 from graspsense.cli.experiment import experiment
 
 EXPERIMENTS: Final[Mapping[str, tuple[str, str]]] = {
-    "recognition": ("trade_recognition", "Recognition against everything below, on one page."),
-    "time": ("trade_time", "Recognition against the seconds of a grasp that are used."),
-    "force": ("trade_force", "Recognition against the probing force, and what it damages."),
+    "recognition": ("trade_recognition", "Recognition against all of the following, on one page."),
+    "time": ("trade_time", "Recognition against the used seconds of a grasp."),
+    "force": ("trade_force", "Recognition against the probing force, and the damage it does."),
     "speed": ("trade_speed", "Recognition against the approach speed."),
     "squeezes": ("trade_squeezes", "Recognition against the number of squeezes."),
     "sensing": ("trade_sensing", "Recognition against frame rate, noise and number of cells."),
-    "physics": ("trade_physics", "Recognition against errors of the physics learned on."),
-    "accuracy": ("trade_accuracy", "Recognition against the accuracy asked of the simulator."),
-    "next": ("trade_next", "Choosing the next squeeze, beside one fixed squeeze."),
-    "classifiers": ("trade_classifiers", "Classifiers on the same folds, and what each feature is worth."),
+    "physics": ("trade_physics", "Recognition against errors of the physics in the training data."),
+    "accuracy": ("trade_accuracy", "Recognition against the accuracy of the simulator."),
+    "next": ("trade_next", "Choice of the next squeeze, compared with a fixed squeeze."),
+    "classifiers": ("trade_classifiers", "Classifiers on the same folds, and the value of each feature."),
 }
 """Name to the experiment and what it measures."""
 

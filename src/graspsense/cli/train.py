@@ -19,31 +19,31 @@ from graspsense.cli.sources import (
 
 
 @click.command(
-    short_help="Make a model from labelled trials.",
+    short_help="Train a model on labelled trials.",
     help=f"""Train a classifier on all trials of SOURCE and write the model.
 
-    The model is a JSON file that runs no code: use it with -o classifier.model=FILE. How good it is says
-    `graspsense evaluate` with the same arguments: a rate on the trials that it was trained on would say nothing.
+    The model is a JSON file without code. Use it with -o classifier.model=FILE. To measure its recognition rate, run
+    `graspsense evaluate` with the same arguments.
 
     {SOURCES}""",
 )
 @click.argument("source")
 @click.option(
-    "--out", metavar="FILE", callback=file_to_write, required=True, help="Where the model goes, a .json file."
+    "--out", metavar="FILE", callback=file_to_write, required=True, help="File of the model (.json)."
 )
 @click.option(
-    "--keep", metavar="FILE", callback=file_to_write, help="Keep the trials' features as a CSV, too."
+    "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
 )
 @click.option(
     "--target",
     type=click.Choice(["both", "class", "state"]),
     default="both",
     show_default=True,
-    help="What it learns to name; state needs --only CLASS.",
+    help="What the model predicts; state needs --only CLASS.",
 )
 @classifier_option
 @source_options
-@click.option("--json", "as_json", is_flag=True, help="Print what was made as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def train(
     source: str,
     out: str,

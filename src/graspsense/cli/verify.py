@@ -11,9 +11,9 @@ from graspsense.cli.output import echo_json
 EXIT_DAMAGED = 5
 
 
-@click.command(short_help="Check every hash and file of a store.")
+@click.command(short_help="Check a store or a recording for damage.")
 @click.argument("source", metavar="DIR|FILE")
-@click.option("--json", "as_json", is_flag=True, help="Print what was found as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def verify(source: str, as_json: bool) -> None:
     """Check the store DIR with all its recordings, or one recording FILE. Exit code 5 means damage."""
     from graspsense.cli.progress import Progress
