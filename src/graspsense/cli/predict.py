@@ -23,8 +23,8 @@ MOST_WITH_REASONS: Final = 1000
     help=f"""Predict the labels of the trials of SOURCE, with probabilities and reasons.
 
     MODEL is a .json file of `graspsense train`, or the name of a model of a plugin (such as default). If the trials
-    have labels, the rate is printed as well; it is meaningful only if the model was trained on other instances. A CSV file
-    does not need --label here.
+    have labels, the rate is printed as well; it is meaningful only if the model was trained on other instances. A CSV
+    file does not need --label here.
 
     {SOURCES}""",
 )
