@@ -461,3 +461,46 @@ def test_a_reader_that_goes_away_is_no_error():
 
     assert child.wait(timeout=300) == 141
     assert err == ""
+
+
+def test_an_interrupt_before_the_commands_are_imported_is_quiet():
+    code = """
+import sys
+class Interrupting:
+    def find_spec(self, name, path, target=None):
+        if name == "graspsense.cli.main":
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, Interrupting())
+from graspsense.cli.entry import main
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell that closes streams")
+@pytest.mark.parametrize(
+    ("command", "code", "says"),
+    [
+        ("run -o classifier.type=none >&-", 2, "standard output is closed"),
+        ("run -o classifier.type=none --json >&-", 2, "standard output is closed"),
+        (
+            "collect --labels can:full_open --each 1 --save trials -o classifier.type=none <&-",
+            0,
+            "next: can:full_open",
+        ),
+    ],
+)
+def test_a_closed_stream_is_said(tmp_path, command, code, says):
+    done = subprocess.run(
+        ["sh", "-c", f"{sys.executable} -m graspsense {command}"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+    assert done.returncode == code
+    assert says in done.stderr
+    assert "internal error" not in done.stderr

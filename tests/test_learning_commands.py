@@ -236,3 +236,18 @@ def test_simulated_trials_never_open_a_real_gripper(run, tmp_path, opened, comma
     assert code == 2
     assert "graspsense-pr2-gripper/pr2 declares no objects that it can simulate, so it was not opened" in err
     assert opened == []
+
+
+def test_a_feature_set_that_raises_on_simulated_grasps_is_named(run, monkeypatch):
+    from graspsense.plugins.features.chitta import ChittaFeatures
+
+    monkeypatch.setattr(ChittaFeatures, "extract", lambda self, trace: 1 / 0)
+    objects = "can:full_open,can:empty_open"
+    code, _, err = run("evaluate", "simulated", "--objects", objects, "--instances", "1", "--trials", "2")
+
+    assert code == 70
+    assert (
+        "feature set graspsense/chitta failed on a simulated grasp: ZeroDivisionError: division by zero"
+        in err
+    )
+    assert "internal error" not in err

@@ -1,5 +1,5 @@
 """`python -m graspsense` is `graspsense`."""
 
-from graspsense.cli.main import main
+from graspsense.cli.entry import main
 
 main()

@@ -112,8 +112,10 @@ def collect(
 
 
 def _ask(question: str) -> str | None:
-    """Ask on the terminal, or take the next line of what stands in for it; None at its end."""
+    """Ask on the terminal, or take the next line of what stands in for it; None at its end or where it is closed."""
     click.echo(question, err=True, nl=False)
+    if sys.stdin is None:
+        return None
     line = sys.stdin.readline()
     if not sys.stdin.isatty():
         click.echo(line.rstrip("\n"), err=True)

@@ -138,8 +138,12 @@ def _exit_code(arguments: list[str]) -> int:
             if os.environ.get("NO_COLOR"):
                 ctx.color = False
             cli.invoke(ctx)
-        if sys.stdout is not None:  # it is where the shell has closed it
-            sys.stdout.flush()
+        if sys.stdout is None:
+            click.echo(
+                f"{PROGRAM}: standard output is closed, so nothing that was to be printed came out", err=True
+            )
+            return EXIT_USAGE
+        sys.stdout.flush()
         return 0
     except click.exceptions.Exit as ended:
         return ended.exit_code

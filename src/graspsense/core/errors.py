@@ -34,6 +34,10 @@ class PluginUnavailable(ConfigError):
     """A component whose code cannot be imported here."""
 
 
+class ComponentFailed(GraspsenseError):
+    """A component of a plugin raised an exception that its contract does not allow."""
+
+
 class NoDevice(GraspsenseError):
     """The gripper asked for is not there."""
 

@@ -150,7 +150,7 @@ def run_grasp(
         reason=reason,
         device=info,
         report=report,
-        counts={"ticks": len(frames), "late": grasp.late, "guarded": grasp.state.guard.acted},
+        counts={"ticks": len(frames), "late": grasp.late, "guarded": grasp.guarded},
         events=tuple(grasp.events),
         seconds_simulated=grasp.seconds() if info.clock == "virtual" else None,
         seconds_wall=time.perf_counter() - began,
@@ -193,7 +193,7 @@ class _Grasp:
         self.state: TickState = first_state(controller.init())
         self.recorder = TraceRecorder({**SI_UNITS, **info.units})
         self.events: list[GraspEvent] = []
-        self.late = 0
+        self.late = self.guarded = 0
         self.first_t_s: float | None = None
         self.last: Frame | None = None
 
@@ -248,11 +248,10 @@ class _Grasp:
                     "power, then `graspsense devices`"
                 )
             frame, pads = reading
-            if frame.dt_s > late_s:
-                self.late += 1
             self.last = frame
             if self.first_t_s is None:
                 self.first_t_s = frame.t_s
+            acted = state.guard.acted
             command, state = advance(params, state, frame, pads)
             self.state = state
             stepped = phase != TARING
@@ -269,6 +268,9 @@ class _Grasp:
                 watcher = state.guard
             # The frame that ended the taring still has the old zero.
             recorded = phase >= APPROACH and stepped
+            if recorded:
+                self.late += frame.dt_s > late_s
+                self.guarded += state.guard.acted - acted
             try:
                 apply(command)
             finally:

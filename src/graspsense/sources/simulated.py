@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from attrs import Attribute, evolve, field, frozen
 
-from graspsense.core.errors import ConfigError
+from graspsense.core.errors import ComponentFailed, ConfigError, named
 from graspsense.core.features import Features, table_of
 from graspsense.core.labelled import Labelled, class_of
 from graspsense.core.roles import BatchBackend, DeviceInfo, FeatureSet
@@ -207,11 +207,18 @@ def _full_names(objects: Sequence[str], kinds: Sequence[ObjectKind]) -> list[str
 class _Extraction:
     """Extracts all features from a trace. It is a class because a batch may send it to another process."""
 
+    name: str
     feature_set: FeatureSet[Any]
 
     def __call__(self, trace: Trace) -> tuple[Features, Features]:
         """Return the features, and those from before contact."""
-        return self.feature_set.extract(trace), before_contact(trace)
+        try:
+            features = self.feature_set.extract(trace)
+        except Exception as error:
+            raise ComponentFailed(
+                f"feature set {self.name} failed on a simulated grasp: {named(error)}"
+            ) from error
+        return features, before_contact(trace)
 
 
 def _grasps(
@@ -219,7 +226,7 @@ def _grasps(
 ) -> Iterator[tuple[Features, Features, Trace | None]]:
     """Yield the features of each trial, those from before contact, and its trace if `traces` asks for it."""
     backend, controller = settings.gripper.create(), settings.controller.create()
-    extract = _Extraction(settings.features.create())
+    extract = _Extraction(settings.features.component.qualified, settings.features.create())
     total = len(plan.scenes)
     if isinstance(backend, BatchBackend):
         # A trace has half a megabyte, so traces come in batches.
