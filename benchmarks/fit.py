@@ -256,7 +256,7 @@ def grasped(kind: str, figures: Sequence[float], seeds: range) -> Trials:
             n for other, (n, _) in TRIALS.items() if list(TRIALS).index(other) < list(TRIALS).index(kind)
         )
         features = create("feature-set", "chitta")
-        labels, drawn = _run(named, TRIALS[kind], 20.0, features.extract, seeds, first)
+        labels, extracted = _run(named, TRIALS[kind], 20.0, features.extract, seeds, first)
         tree: dict[str, float] = {}
         if kind == "odwalla":
             one_pad = create("feature-set", "chitta", force="left")
@@ -270,18 +270,18 @@ def grasped(kind: str, figures: Sequence[float], seeds: range) -> Trials:
             true, felt = _run(named, TREE_TRIALS, 23.0, squeeze, seeds, 0)
             states = [label.partition(":")[2] for label in true] * len(seeds)
             tree = by_the_splits(states, [one for of in felt for one in of])
-    return Trials(labels, drawn, tree)
+    return Trials(labels, extracted, tree)
 
 
 def _run(
     named: Mapping[str, str],
     trials: tuple[int, int],
     force_n: float,
-    draw: Callable[[Trace], Any],
+    extract: Callable[[Trace], Any],
     seeds: range,
     first: int,
 ) -> tuple[list[str], list[list[Any]]]:
-    """Return the label of each trial, and what was drawn from it at each seed."""
+    """Return the label of each trial, and what was extracted from it at each seed."""
     dealt = Group(named=named, total=trials[0], instances=trials[1]).planned(kinds=())
     scenes, numbers = [], []
     for seed in seeds:
@@ -289,10 +289,10 @@ def _run(
         numbers += [TRIALS_PER_SEED * seed + first + k for k in range(len(dealt))]
     controller = create("controller", "hybrid", probing_force_n=force_n)
     config = SimConfig(fidelity="full")
-    done = run_many(config, controller, scenes, numbers, draw=draw, traces=False, compiled=True)
-    drawn = [one.drawn for one in done]
+    done = run_many(config, controller, scenes, numbers, extract=extract, traces=False, compiled=True)
+    extracted = [one.extracted for one in done]
     n = len(dealt)
-    return [one.label for one in dealt], [drawn[n * i : n * (i + 1)] for i in range(len(seeds))]
+    return [one.label for one in dealt], [extracted[n * i : n * (i + 1)] for i in range(len(seeds))]
 
 
 def judged(features: Sequence[Features], labels: Sequence[str], seed: int) -> float:

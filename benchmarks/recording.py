@@ -109,10 +109,10 @@ def main() -> None:
     ticks = round(given.seconds * RATE_HZ)
     took: dict[bool, list[list[float]]] = {False: [], True: []}
     written: list[RecordingInfo] = []
-    draw = random.Random(1)
+    rng = random.Random(1)
     with tempfile.TemporaryDirectory() as folder:
         for k in range(given.rounds):
-            for recorded in draw.sample([False, True], 2):
+            for recorded in rng.sample([False, True], 2):
                 run, done = one_run(ticks, Path(folder) / f"{k}.mcap" if recorded else None)
                 took[recorded].append(run)
                 written += [done] if done else []

@@ -226,7 +226,7 @@ class Bench:
         compiling, began = self.compile_s, time.thread_time()
         setting = setting_of(config, scene.spec, 0, chooser=chooser)
         self.choice_s = time.thread_time() - began - (self.compile_s - compiling)
-        job = Job(config=config, controller=controller, run=run, draw=None, traces=True)
+        job = Job(config=config, controller=controller, run=run, extract=None, traces=True)
         whole = in_full(setting)
         loop = self.loop_of(config, whole, type(controller).step)
         return grasp_once(job, whole, loop, self.storage, on_arrays=True), setting, job
@@ -263,7 +263,7 @@ class Bench:
             loop = kernel.compiled(loop_of(composition, step))
             controller = create("controller", "hybrid")
             short = RunConfig(grasp_timeout_s=0.01)
-            job = Job(config=config, controller=controller, run=short, draw=None, traces=True)
+            job = Job(config=config, controller=controller, run=short, extract=None, traces=True)
             with first_call(slp_vectorize=by_maps is not None):
                 grasp_once(job, setting, loop, self.storage, on_arrays=True)
             # As grasps of a batch are run: without a look at the types, in storage that was there before.

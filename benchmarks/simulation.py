@@ -282,7 +282,7 @@ def many(n: int) -> dict[str, Any]:
         def run(count: int, config: SimConfig = config) -> tuple[float, float]:
             scenes = [names[k % len(names)] for k in range(count)]
             began, spent = time.perf_counter(), time.process_time()
-            run_many(config, law, scenes, range(count), draw=features.extract, traces=False, compiled=True)
+            run_many(config, law, scenes, range(count), extract=features.extract, traces=False, compiled=True)
             return time.perf_counter() - began, time.process_time() - spent
 
         run(len(names))

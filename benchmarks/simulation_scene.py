@@ -237,7 +237,9 @@ class Ours:
         self.setting = set_scene(config, config.object, 0)
         self.law = law or Law(None)
         # The trace is kept: what is measured includes recording it and making its columns.
-        self.job = Job(config=config, controller=self.law, run=RunConfig(hold_s=0.0), draw=None, traces=True)
+        self.job = Job(
+            config=config, controller=self.law, run=RunConfig(hold_s=0.0), extract=None, traces=True
+        )
         composition = composition_of(config, self.setting)
         self.loop = kernel.compiled(loop_of(composition, type(self.law).step))
         self.storage = Storage()

@@ -46,12 +46,12 @@ REPEATS = 5
 
 def fill(store: Store, trials: int) -> None:
     """Write so many trials, each in its own transaction."""
-    draw = random.Random(1)
+    rng = random.Random(1)
     # The store's own transaction is one a trial; to fill it in reasonable time the disk need not follow each.
     store._connection.execute("PRAGMA synchronous = OFF")
     for k in range(trials):
         label = LABELS[k % len(LABELS)]
-        values = tuple(draw.gauss(LABELS.index(label), 0.3) for _ in FEATURES)
+        values = tuple(rng.gauss(LABELS.index(label), 0.3) for _ in FEATURES)
         record = TrialRecord(
             made_at=f"2026-{1 + k % 12:02d}-{1 + k % 28:02d}T10:00:00.000+00:00",
             origin="collect",

@@ -292,12 +292,12 @@ def _(command, after, frame):
     return command._replace(effort_limit_n=nan), after
 
 
-_draw = random.Random(3)
+_rng = random.Random(3)
 
 
 @ruling("same-tick-same-answer", "nothing but its arguments")
 def _(command, after, frame):
-    return command._replace(value=command.value + _draw.random()), after
+    return command._replace(value=command.value + _rng.random()), after
 
 
 class Hidden(NamedTuple):
@@ -550,7 +550,7 @@ class Once(Hand):
 
 @giving("same-seed-same-frames", "draw everything from the seed")
 def _(reading):
-    return Reading(reading.frame._replace(edge_left_n=_draw.random()), reading.pads)
+    return Reading(reading.frame._replace(edge_left_n=_rng.random()), reading.pads)
 
 
 @giving("does-a-whole-grasp", "ended as aborted")
@@ -638,7 +638,7 @@ class Mixed(Nearest):
 class Dicing(Nearest):
     def fit(self, table, labels, seed):
         super().fit(table, labels, seed)
-        self._model["mean"][0] += 1e-6 * _draw.random()
+        self._model["mean"][0] += 1e-6 * _rng.random()
 
 
 @mutant("classifier", "survives-json", "keep every number in full")

@@ -11,7 +11,7 @@ from attrs import evolve
 from graspsense.core.config import SelectedComponent
 from graspsense.core.errors import ConfigError
 from graspsense.core.features import FeatureTable
-from graspsense.core.labelled import Control, Labelled
+from graspsense.core.labelled import ControlFeatures, Labelled
 from graspsense.core.plugins import installed
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import thinned
@@ -127,7 +127,7 @@ def test_what_is_known_before_the_contact_is_a_warning_only_where_it_tells(leak)
     labels, width, force = four_states()
     rng = np.random.default_rng(2)
     posture = (width if leak else rng.normal(size=120)) + 0.0
-    control = Control(table=table(posture, names=("posture",)), what="posture before the grasp")
+    control = ControlFeatures(table=table(posture, names=("posture",)), what="posture before the grasp")
     found = judged(labelled(labels, width, force, before_contact=control))
 
     assert any("before any contact" in warning for warning in found.warnings) is leak

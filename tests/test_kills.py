@@ -99,7 +99,7 @@ def test_a_recorder_killed_with_its_writer_loses_at_most_100_ms_of_the_running_t
 
     Every third is killed at a moment instead of at a tick: between two trials too, or while one is being kept.
     """
-    draw = random.Random(9)
+    rng = random.Random(9)
     missing = []
     for k in range(KILLS):
         folder, progress = tmp_path / f"{k}", tmp_path / f"{k}.progress"
@@ -111,11 +111,11 @@ def test_a_recorder_killed_with_its_writer_loses_at_most_100_ms_of_the_running_t
             f"{TICKS / 1000}",
         ]
         with subprocess.Popen(program, stdout=subprocess.PIPE, text=True) as process:
-            writer = until_tick(progress, draw.randrange(2 * TICKS), process)
+            writer = until_tick(progress, rng.randrange(2 * TICKS), process)
             if k % 3 == 2:
-                time.sleep(draw.uniform(0.0, 0.6))
+                time.sleep(rng.uniform(0.0, 0.6))
                 _, _, writer = PROGRESS.unpack(progress.read_bytes())
-            kill(*draw.sample([process.pid, writer], 2))
+            kill(*rng.sample([process.pid, writer], 2))
             printed = process.stdout.read()
         trial, last, writer_now = PROGRESS.unpack(progress.read_bytes())
         announced = {f"can#{line.split()[1]}" for line in printed.splitlines()}
@@ -140,7 +140,7 @@ def is_kept(line):
 
 def test_a_killed_collect_loses_no_trial_and_goes_on(tmp_path):
     """One store all along: killed again and again, some time after its first, second or third trial or before any."""
-    draw = random.Random(10)
+    rng = random.Random(10)
     folder, each = tmp_path / "trials", 20 * KILLS
     command = [sys.executable, "-m", "graspsense", "collect", "--save", str(folder), "--each", str(each)]
     command += ["--labels", "can:full_open,block", "-o", "classifier.type=none"]
@@ -151,11 +151,11 @@ def test_a_killed_collect_loses_no_trial_and_goes_on(tmp_path):
         ) as process:
             process.stdin.write("\n" * 2 * each)
             process.stdin.flush()
-            said, wanted = [], draw.randrange(4)
+            said, wanted = [], rng.randrange(4)
             while sum(map(is_kept, said)) < wanted or not any("next:" in one for one in said):
                 said.append(process.stderr.readline())
                 assert said[-1], "collect ended by itself"
-            time.sleep(draw.uniform(0.0, 0.3))
+            time.sleep(rng.uniform(0.0, 0.3))
             kill(process.pid)
             said += process.stderr.readlines()
         announced += sum(map(is_kept, said))

@@ -21,9 +21,9 @@ def table(rows):
 
 @pytest.fixture(scope="module")
 def rows():
-    draw = np.random.default_rng(4)
-    values = draw.normal(size=(240, 3)) + np.repeat(np.arange(3.0), 80)[:, None] * 1.5
-    values[draw.random(values.shape) < 0.1] = np.nan
+    rng = np.random.default_rng(4)
+    values = rng.normal(size=(240, 3)) + np.repeat(np.arange(3.0), 80)[:, None] * 1.5
+    values[rng.random(values.shape) < 0.1] = np.nan
     return values
 
 

@@ -30,17 +30,17 @@ MUTATIONS = int(os.environ.get("GRASPSENSE_MUTATIONS", "0"))
 NUMBER = MUTATIONS or 150
 
 
-def mutated(data, draw):
+def mutated(data, rng):
     """Return the bytes cut short, with some changed, a piece missing, twice there, or zeroed."""
     data = bytearray(data)
-    at = draw.randrange(len(data))
-    length = min(draw.choice([1, 4, 64, 4096]), len(data) - at)
-    match draw.randrange(6):
+    at = rng.randrange(len(data))
+    length = min(rng.choice([1, 4, 64, 4096]), len(data) - at)
+    match rng.randrange(6):
         case 0:
             del data[at:]
         case 1:
-            for _ in range(draw.choice([1, 1, 4, 40])):
-                data[draw.randrange(len(data))] = draw.randrange(256)
+            for _ in range(rng.choice([1, 1, 4, 40])):
+                data[rng.randrange(len(data))] = rng.randrange(256)
         case 2:
             del data[at : at + length]
         case 3:
@@ -48,7 +48,7 @@ def mutated(data, draw):
         case 4:
             data[at : at + length] = bytes(length)
         case _:
-            data[at] ^= 1 << draw.randrange(8)
+            data[at] ^= 1 << rng.randrange(8)
     return bytes(data)
 
 
@@ -64,10 +64,10 @@ def test_recordings(tmp_path):
     good = path.read_bytes()
     whole = read_recorded(path)
     written = {whole.ticks.tobytes()[k : k + 120] for k in range(0, 200 * 120, 120)}
-    draw = random.Random(1)
+    rng = random.Random(1)
     told = 0
     for _ in range(NUMBER):
-        bad = mutated(good, draw)
+        bad = mutated(good, rng)
         path.write_bytes(bad)
         try:
             found = read_recorded(path)
@@ -98,12 +98,12 @@ def test_stores(tmp_path):
         good_rows = store.query("SELECT * FROM trial")
         good_details = store.query("SELECT * FROM detail")
     good = (folder / "store.sqlite").read_bytes()
-    draw = random.Random(2)
+    rng = random.Random(2)
     told = silent = 0
     for _ in range(NUMBER):
         for one in folder.glob("store.sqlite*"):
             one.unlink()
-        (folder / "store.sqlite").write_bytes(mutated(good, draw))
+        (folder / "store.sqlite").write_bytes(mutated(good, rng))
         before = digests(folder)
         try:
             problems = verify_store(folder).problems
@@ -145,10 +145,10 @@ def test_models(tmp_path):
         model = train(plugins.find("classifier", name), create("classifier", name).config, labelled, name="m")
         good = json.dumps(model.as_json()).encode()
         content = json.loads(good)
-        draw = random.Random(3)
+        rng = random.Random(3)
         told = 0
         for _ in range(NUMBER):
-            bad = mutated(good, draw)
+            bad = mutated(good, rng)
             path.write_bytes(bad)
             try:
                 load_model(str(path), plugins)
@@ -163,10 +163,10 @@ def test_models(tmp_path):
 def test_settings(tmp_path):
     path = tmp_path / "p.toml"
     good = SETTINGS.encode()
-    draw = random.Random(4)
+    rng = random.Random(4)
     told = 0
     for _ in range(NUMBER):
-        bad = mutated(good, draw)
+        bad = mutated(good, rng)
         path.write_bytes(bad)
         try:
             resolve(str(path))

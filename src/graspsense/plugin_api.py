@@ -127,7 +127,7 @@ _TABLE: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
         "tree": ("TreeNode",),
     },
     "Data sets": {
-        "labelled": ("Control", "Labelled"),
+        "labelled": ("ControlFeatures", "Labelled"),
     },
     "Observers": {
         "trial": ("GraspEvent", "RunInfo", "Trial"),

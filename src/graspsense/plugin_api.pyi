@@ -121,7 +121,7 @@ from graspsense.core.roles import ClassifierConfig as ClassifierConfig
 from graspsense.core.tree import TreeNode as TreeNode
 
 # Data sets
-from graspsense.core.labelled import Control as Control
+from graspsense.core.labelled import ControlFeatures as ControlFeatures
 from graspsense.core.labelled import Labelled as Labelled
 
 # Observers

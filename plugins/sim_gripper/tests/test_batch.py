@@ -43,12 +43,12 @@ def test_the_number_of_workers_decides_nothing_to_the_bit():
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
     scenes, seeds = mixed(3 * SLICE + 1)
     one, two, five = (
-        run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True, workers=w, draw=FEATURES.extract)
+        run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True, workers=w, extract=FEATURES.extract)
         for w in (1, 2, 5)
     )
     for a, b, c in zip(one, two, five, strict=True):
         assert bits(a.trace) == bits(b.trace) == bits(c.trace)
-        assert a.drawn == b.drawn == c.drawn or any(np.isnan(a.drawn.values))
+        assert a.extracted == b.extracted == c.extracted or any(np.isnan(a.extracted.values))
         assert a.body == b.body == c.body
     # What stands in the common composition for terms that an object lacks changes no bit, and is not handed back.
     odd = ["odwalla:full_open", "egg", "none"]
@@ -65,13 +65,13 @@ def test_what_is_drawn_may_keep_a_column_of_the_trace():
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
     scenes, seeds = mixed(SLICE)
     kept = run_many(
-        SimConfig(), HYBRID, scenes, seeds, compiled=True, draw=lambda trace: trace.gap_m, traces=False
+        SimConfig(), HYBRID, scenes, seeds, compiled=True, extract=lambda trace: trace.gap_m, traces=False
     )
     whole = run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True)
 
     for one, other in zip(kept, whole, strict=True):
         assert one.kept is None
-        assert one.drawn.tobytes() == other.trace.gap_m.tobytes()
+        assert one.extracted.tobytes() == other.trace.gap_m.tobytes()
 
 
 @pytest.mark.slow
@@ -87,13 +87,13 @@ def test_plain_grasps_in_processes_are_those_of_this_one_to_the_bit():
         compiled=False,
         workers=2,
         # A closure, which no other process could be handed.
-        draw=lambda trace: (len(told) >= 0, FEATURES.extract(trace)),
+        extract=lambda trace: (len(told) >= 0, FEATURES.extract(trace)),
         progress=lambda done, total: told.append((done, total)),
     )
-    here = run_many(SimConfig(), HYBRID, scenes[:3], seeds[:3], compiled=False, draw=FEATURES.extract)
+    here = run_many(SimConfig(), HYBRID, scenes[:3], seeds[:3], compiled=False, extract=FEATURES.extract)
     for a, b in zip(apart[:3], here, strict=True):
         assert bits(a.trace) == bits(b.trace)
-        assert a.drawn == (True, b.drawn)
+        assert a.extracted == (True, b.extracted)
     assert told[0] == (0, n)
     assert told[-1] == (n, n)
 
@@ -143,7 +143,7 @@ def test_a_law_no_other_process_can_find_runs_here_and_the_warning_says_so(monke
 def job(controller=HYBRID, **more):
     return Job(
         controller=controller,
-        **{"config": SimConfig(), "run": RunConfig(), "draw": None, "traces": True, **more},
+        **{"config": SimConfig(), "run": RunConfig(), "extract": None, "traces": True, **more},
     )
 
 
@@ -170,14 +170,14 @@ def test_no_trace_is_handed_over_where_nobody_wants_one():
     with PlainProcess(job(run=run, traces=False)) as process:
         (one,) = process.run(["none"], [0])
     assert one.kept is None
-    assert one.drawn is None
+    assert one.extracted is None
     told = []
     # A closure, which no other process could be handed: it is called here.
     with PlainProcess(
-        job(run=run, traces=False, draw=lambda trace: told.append(len(trace)) or "felt")
+        job(run=run, traces=False, extract=lambda trace: told.append(len(trace)) or "felt")
     ) as process:
         (one,) = process.run(["none"], [0])
-    assert (one.kept, one.drawn) == (None, "felt")
+    assert (one.kept, one.extracted) == (None, "felt")
     assert told == [len(plainly(job(run=run), "none", 0).trace)]
 
 
@@ -264,11 +264,11 @@ def test_traces_are_kept_only_where_they_are_asked_for():
     backend = SimBackend(SimConfig(sensor="ideal"))
     run = RunConfig(grasp_timeout_s=0.5, opening_timeout_s=0.1)
     tracemalloc.start()
-    done = backend.run_many(HYBRID, ["none"] * 40, range(40), run=run, draw=len)
+    done = backend.run_many(HYBRID, ["none"] * 40, range(40), run=run, extract=len)
     kept, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert {one.trace for one in done} == {None}
-    assert all(one.drawn > 400 for one in done)
+    assert all(one.extracted > 400 for one in done)
     # Forty traces of half a second would be 2 MB.
     assert kept < 1e6
 
@@ -331,7 +331,7 @@ def test_a_dropped_term_is_not_compiled_and_changes_no_bit(tmp_path, spread):
     path = tmp_path / "thinned.toml"
     path.write_text(THINNED)
     config = SimConfig(object=str(path), spread=spread, sensor="ideal")
-    job = Job(config=config, controller=HYBRID, run=RunConfig(), draw=None, traces=True)
+    job = Job(config=config, controller=HYBRID, run=RunConfig(), extract=None, traces=True)
     setting = set_scene(config, str(path), 1, chooser_of(job))
     assert setting.kinds == ("elastic", "loss", "slosh")
     assert "slosh" not in composition_of(config, setting).kinds

@@ -50,7 +50,9 @@ def test_the_number_changes_nothing_else_of_a_trial():
 def test_a_numbered_instance_has_the_model_of_all_of_its_kind():
     config = SimConfig(object="toy#2", spread=False, sensor="ideal")
     controller = create("controller", "hybrid")
-    chooser = chooser_of(Job(config=config, controller=controller, run=RunConfig(), draw=None, traces=True))
+    chooser = chooser_of(
+        Job(config=config, controller=controller, run=RunConfig(), extract=None, traces=True)
+    )
     numbered, again = (set_scene(config, "toy#2", seed, chooser).choice for seed in (0, 1))
     spread = set_scene(evolve(config, spread=True), "toy", 0, chooser).choice
     assert numbered is again

@@ -20,7 +20,7 @@ TARGETS: Final[tuple[Target, ...]] = ("both", "class", "state")
 
 
 @frozen(kw_only=True, eq=False)
-class Control:
+class ControlFeatures:
     """Other features of the same trials, to be judged beside the main ones; `what` says in words which they are."""
 
     table: FeatureTable
@@ -45,11 +45,11 @@ class Labelled:
     no_instances: str = ""
     order: tuple[int, ...] | None = None
     no_order: str = ""
-    before_contact: Control | None = None
+    before_contact: ControlFeatures | None = None
     no_before_contact: str = ""
-    width: Control | None = None
+    width: ControlFeatures | None = None
     no_width: str = ""
-    variants: Mapping[str, Control] = field(factory=dict)
+    variants: Mapping[str, ControlFeatures] = field(factory=dict)
     notes: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(factory=dict)
 
@@ -80,7 +80,7 @@ class Labelled:
             before_contact=_control_rows(self.before_contact, which),
             width=_control_rows(self.width, which),
             variants={
-                name: Control(table=one.table.rows(which), what=one.what)
+                name: ControlFeatures(table=one.table.rows(which), what=one.what)
                 for name, one in self.variants.items()
             },
         )
@@ -122,5 +122,5 @@ def _picked(column: Sequence[Any], numbers: Sequence[int]) -> tuple[Any, ...]:
     return tuple(column[i] for i in numbers)
 
 
-def _control_rows(control: Control | None, which: NDArray[np.int64]) -> Control | None:
-    return None if control is None else Control(table=control.table.rows(which), what=control.what)
+def _control_rows(control: ControlFeatures | None, which: NDArray[np.int64]) -> ControlFeatures | None:
+    return None if control is None else ControlFeatures(table=control.table.rows(which), what=control.what)

@@ -160,13 +160,13 @@ class SensorBackend(ABC, Generic[ConfigT]):
 class Grasped:
     """One grasp of many.
 
-    `drawn` is what was drawn from its trace (features), `trace` the trace itself where traces were asked for;
-    `report` as of `SensorBackend.report`.
+    `extracted` is what `BatchOptions.extract` returned for its trace. `trace` is None unless traces were asked for.
+    `report` is as of `SensorBackend.report`.
     """
 
     outcome: Outcome
     reason: str = ""
-    drawn: Any = None
+    extracted: Any = None
     trace: Trace | None = None
     report: Mapping[str, float | int | str | bool] = field(factory=dict)
 
@@ -188,18 +188,18 @@ class SimulationVariant:
 
 
 class BatchOptions(TypedDict, total=False):
-    """How many grasps are run; each may be left out."""
+    """How many grasps are run at once; every option may be left out."""
 
     run: RunConfig | None
-    """The `[run]` table; its seed counts for nothing."""
-    draw: Callable[[Trace], Any] | None
-    """Called with each trace, as `feature_set.extract` is; what it returns is `Grasped.drawn`."""
+    """The `[run]` table; its seed is not used."""
+    extract: Callable[[Trace], Any] | None
+    """Called with each trace, like `feature_set.extract`; its result becomes `Grasped.extracted`."""
     traces: bool
-    """Whether traces are kept: half a megabyte each, they are not by default."""
+    """Whether traces are kept, half a megabyte each; False by default."""
     workers: int | None
-    """How many grasps run beside each other, by default one a core; it decides nothing about what comes out."""
+    """How many grasps run in parallel, by default one for each core; the results do not depend on it."""
     progress: Callable[[int, int], None] | None
-    """Told several times a second how many are done, of how many."""
+    """Called several times a second with the number of finished grasps and of all."""
 
 
 class BatchBackend(SensorBackend[ConfigT]):

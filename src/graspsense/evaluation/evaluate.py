@@ -13,7 +13,7 @@ import numpy as np
 from attrs import field, frozen
 
 from graspsense.core.errors import ConfigError
-from graspsense.core.labelled import Control, Labelled, Target, class_of
+from graspsense.core.labelled import ControlFeatures, Labelled, Target, class_of
 from graspsense.evaluation.confusion import Confusion, confusion
 from graspsense.evaluation.crossval import FitRefused, Groups, Learner, Pooled, cross_validate
 from graspsense.evaluation.folds import commonest, in_order, instance_held_out, stratified
@@ -186,7 +186,7 @@ class _Judge:
 
         majority_right, majority = self._majority(head, protocol)
 
-        def beside(name: str, control: Control | None, reason: str = "", default: str = "") -> Judged:
+        def beside(name: str, control: ControlFeatures | None, reason: str = "", default: str = "") -> Judged:
             """Judge other features by the same folds."""
             if control is None:
                 return Judged(default, reason=reason or "these trials have no such features")

@@ -54,7 +54,7 @@ def grasp(params: Mapping[str, Any], seed: int) -> dict[str, Any]:
         )
     feature_set = settings.features.create()
 
-    def draw(trace: Trace) -> tuple[dict[str, Any], dict[str, Any]]:
+    def extract(trace: Trace) -> tuple[dict[str, Any], dict[str, Any]]:
         course = grasp_as_json(trace) if params["first"] else {}
         return {**felt(trace), **feature_set.extract(trace).as_dict()}, course
 
@@ -63,14 +63,16 @@ def grasp(params: Mapping[str, Any], seed: int) -> dict[str, Any]:
     kept: list[dict[str, Any]] = []
     count: Counter[str] = Counter()
     done = backend.run_many(
-        controller, plan.scenes, plan.seeds, run=evolve(settings.run, seed=seed), draw=draw, workers=1
+        controller, plan.scenes, plan.seeds, run=evolve(settings.run, seed=seed), extract=extract, workers=1
     )
     for label, one in zip(plan.labels, done, strict=True):
-        drawn, course = one.drawn
+        extracted, course = one.extracted
         count[label] += 1
-        rows.append({"label": label, "outcome": one.outcome.name.lower(), **one.report, **drawn})
+        rows.append({"label": label, "outcome": one.outcome.name.lower(), **one.report, **extracted})
         if params["first"] and count[label] <= judge.grasps:
-            kept.append({"label": label, "trial": len(rows) - 1, "contact_s": drawn["contact_s"], **course})
+            kept.append(
+                {"label": label, "trial": len(rows) - 1, "contact_s": extracted["contact_s"], **course}
+            )
     return {"source": "simulated grasps", "simulated": True, "rows": rows, "grasps": kept}
 
 

@@ -105,7 +105,7 @@ class _Felt:
 
 
 @frozen
-class _Drawing:
+class _Extraction:
     feature_set: Any
 
     def __call__(self, trace: Trace) -> _Felt:
@@ -124,7 +124,7 @@ def _measured(
     ideal = {"sensor": "ideal"} if "sensor" in fields_dict(type(settings.gripper.config)) else {}
     config = evolve(settings.gripper.config, **{**ideal, **variant.settings})
     backend = settings.gripper.component.create(config)
-    controller, draw = settings.controller.create(), _Drawing(settings.features.create())
+    controller, extract = settings.controller.create(), _Extraction(settings.features.create())
 
     def run(which: slice) -> tuple[Sequence[Grasped], float]:
         began = time.process_time()
@@ -133,7 +133,7 @@ def _measured(
             scenes[which],
             seeds[which],
             run=settings.run,
-            draw=draw,
+            extract=extract,
             workers=1,
             progress=None if tick is None else lambda *_: tick(),
         )
@@ -148,7 +148,7 @@ def _measured(
         while total < LEAST_S:
             done, spent = run(slice(None))
             least, total = min(least, spent), total + spent
-    return [one.drawn for one in done], least / len(scenes), max(first - least, 0.0)
+    return [one.extracted for one in done], least / len(scenes), max(first - least, 0.0)
 
 
 def _point(

@@ -83,7 +83,7 @@ def graspsense_classifiers() -> Iterable[ClassifierEntry]:
         ("mlp", "Mlp", "neural network with one hidden layer (scikit-learn)"),
         ("forest", "Forest", "random forest (scikit-learn)"),
         ("knn", "Knn", "nearest neighbours (scikit-learn)"),
-        ("tree", "Tree", "binary decision tree, CART (scikit-learn)"),
+        ("tree", "Cart", "binary decision tree, CART (scikit-learn)"),
     ):
         yield ClassifierEntry(
             name=name,

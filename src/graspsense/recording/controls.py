@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, TypedDict
 
 from graspsense.core.entries import FeatureSetEntry
-from graspsense.core.labelled import Control
+from graspsense.core.labelled import ControlFeatures
 from graspsense.core.plugins import installed
 from graspsense.recording.before_contact import SPAN_S
 
@@ -22,9 +22,9 @@ BEFORE_CONTACT: Final = f"the first {SPAN_S:g} s of the approach: gap, velocity,
 class Controls(TypedDict):
     """The fields of `Labelled` that hold the control tables, or the reasons why there are none."""
 
-    before_contact: Control | None
+    before_contact: ControlFeatures | None
     no_before_contact: str
-    width: Control | None
+    width: ControlFeatures | None
     no_width: str
 
 
@@ -46,9 +46,11 @@ def controls(
     width = None
     if name is not None:
         what = f"{name} alone" + (f": {width_meaning}" if width_meaning else "")
-        width = Control(table=table.columns([name]), what=what)
+        width = ControlFeatures(table=table.columns([name]), what=what)
     return Controls(
-        before_contact=None if before_contact is None else Control(table=before_contact, what=before_what),
+        before_contact=None
+        if before_contact is None
+        else ControlFeatures(table=before_contact, what=before_what),
         no_before_contact=no_before if before_contact is None else "",
         width=width,
         no_width="" if width is not None else "none of the features is declared to be the width",

@@ -19,7 +19,7 @@ from graspsense.core.plugins import installed
 
 
 @frozen
-class Kind:
+class ScaffoldKind:
     """What is made for one role: the module that holds the part, and what to try first."""
 
     role: Role | None
@@ -31,8 +31,8 @@ class Kind:
     first: str
 
 
-KINDS: Final[Mapping[str, Kind]] = {
-    "sensor-backend": Kind(
+KINDS: Final[Mapping[str, ScaffoldKind]] = {
+    "sensor-backend": ScaffoldKind(
         "sensor-backend",
         "backend",
         "a gripper, here a fake one behind the place where its driver goes",
@@ -40,7 +40,7 @@ KINDS: Final[Mapping[str, Kind]] = {
         (),
         "graspsense run --gripper $part",
     ),
-    "controller": Kind(
+    "controller": ScaffoldKind(
         "controller",
         "law",
         "a control law that closes until the fingers rest",
@@ -48,7 +48,7 @@ KINDS: Final[Mapping[str, Kind]] = {
         (),
         "graspsense run -o controller.type=$part",
     ),
-    "feature-set": Kind(
+    "feature-set": ScaffoldKind(
         "feature-set",
         "features",
         "features of a grasp",
@@ -56,7 +56,7 @@ KINDS: Final[Mapping[str, Kind]] = {
         ("numpy>=1.26",),
         "graspsense run -o features.type=$part -o classifier.type=none",
     ),
-    "classifier": Kind(
+    "classifier": ScaffoldKind(
         "classifier",
         "classifier",
         "a classifier",
@@ -64,7 +64,7 @@ KINDS: Final[Mapping[str, Kind]] = {
         ("numpy>=1.26",),
         "graspsense evaluate simulated --classifier $part",
     ),
-    "sim-term": Kind(
+    "sim-term": ScaffoldKind(
         None,
         "term",
         "a term of the simulator: a part of an object's force",
@@ -72,7 +72,7 @@ KINDS: Final[Mapping[str, Kind]] = {
         ("graspsense-sim-gripper>=0.1,<0.2",),
         "graspsense run --object scene.toml -o classifier.type=none",
     ),
-    "observer": Kind(
+    "observer": ScaffoldKind(
         None, "observer", "an observer that logs how each grasp ended", "", (), "graspsense run"
     ),
 }
@@ -132,7 +132,7 @@ def make(name: str, role: str, folder: Path) -> list[str]:
     ]
 
 
-def _files(kind: Kind, role: str, words: Mapping[str, str]) -> dict[str, str]:
+def _files(kind: ScaffoldKind, role: str, words: Mapping[str, str]) -> dict[str, str]:
     """Return the path of each file to be made and the template it is made from."""
     package = f"src/{words['package']}"
     found = {name: f"{name.rpartition('/')[2].lstrip('.')}.txt" for name in COMMON}
@@ -147,7 +147,7 @@ def _files(kind: Kind, role: str, words: Mapping[str, str]) -> dict[str, str]:
     return found
 
 
-def _check_free(kind: Kind, part: str, name: str) -> None:
+def _check_free(kind: ScaffoldKind, part: str, name: str) -> None:
     if kind.role is None:
         return
     taken = [one for one in installed().components(kind.role) if one.name == part]

@@ -18,7 +18,7 @@ import numpy as np
 
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import FeatureTable, table_of
-from graspsense.core.labelled import Control, Labelled
+from graspsense.core.labelled import ControlFeatures, Labelled
 from graspsense.core.roles import FeatureSet
 from graspsense.core.signals import APPROACH
 from graspsense.core.trace import SI_UNITS, Trace, trace_of
@@ -73,7 +73,7 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
         what = (
             "the same features with gap and force of the first frame added back (p_first, p_steady, f_steady)"
         )
-        variants["absolute"] = Control(table=_absolute(table, grasps), what=what)
+        variants["absolute"] = ControlFeatures(table=_absolute(table, grasps), what=what)
     return Labelled(
         source=f"icub:{folder}",
         table=table,

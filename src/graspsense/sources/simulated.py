@@ -238,11 +238,11 @@ def _grasps(
                 plan.scenes[part],
                 plan.seeds[part],
                 run=settings.run,
-                draw=extract,
+                extract=extract,
                 traces=traces,
                 progress=None if progress is None else partial(_report_batch, progress, start, total),
             ):
-                yield *grasped.drawn, grasped.trace
+                yield *grasped.extracted, grasped.trace
         return
     for k, (scene, seed) in enumerate(zip(plan.scenes, plan.seeds, strict=True)):
         run = evolve(settings.run, seed=seed)

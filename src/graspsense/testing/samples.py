@@ -123,14 +123,14 @@ def _holed(trace: Trace) -> Trace:
 
 def three_kinds(trials: int = 45, missing: bool = False) -> tuple[FeatureTable, list[str]]:
     """Return a table of trials of three labels that can be told apart, and their labels."""
-    draw = np.random.default_rng(5)
+    rng = np.random.default_rng(5)
     labels = [("bottle:full_open", "bottle:empty_open", "can:full")[i % 3] for i in range(trials)]
-    values = draw.normal(size=(trials, 4)) * [1e-3, 1e-3, 0.5, 0.02]
+    values = rng.normal(size=(trials, 4)) * [1e-3, 1e-3, 0.5, 0.02]
     values += np.array([[0.06, 0.055, 4.0, 0.2], [0.06, 0.050, 9.0, 0.4], [0.05, 0.049, 15.0, 0.1]])[
         np.arange(trials) % 3
     ]
     if missing:
-        values[draw.random(values.shape) < 0.15] = nan
+        values[rng.random(values.shape) < 0.15] = nan
     names = ("p_first", "p_steady", "f_steady", "delta_t")
     return FeatureTable(names=names, units=("m", "m", "N", "s"), values=values), labels
 

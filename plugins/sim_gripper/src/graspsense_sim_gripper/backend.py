@@ -196,7 +196,7 @@ class SimBackend(BatchBackend[SimConfig]):
             Grasped(
                 outcome=one.outcome,
                 reason=one.reason,
-                drawn=one.drawn,
+                extracted=one.extracted,
                 trace=one.kept,
                 report=_known(one.body, kinds_in(scene)),
             )

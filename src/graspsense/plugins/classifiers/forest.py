@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from attrs import field, frozen
 from attrs.validators import ge, instance_of
 
-from graspsense.plugins.classifiers.scikit import Fitted, KeptConfig, ScikitClassifier, most_likely
+from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier, most_likely
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,7 +35,7 @@ class Forest(ScikitClassifier[ForestConfig]):
             n_estimators=self.config.trees, min_samples_leaf=self.config.min_leaf, random_state=seed
         )
 
-    def reasons(self, fitted: Fitted, row: NDArray[np.float64], label: str) -> Sequence[str]:
+    def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
         """Return how the trees voted."""
         what = f"mean of {self.config.trees} trees"
         return (most_likely(self.shares(fitted, row)[0].tolist(), self.classes(), what),)

@@ -9,7 +9,7 @@ from attrs import field, frozen
 from attrs.validators import ge, instance_of
 
 from graspsense.plugin_api import ClassifierConfig
-from graspsense.plugins.classifiers.scikit import Fitted, ScikitClassifier
+from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,7 +33,7 @@ class Knn(ScikitClassifier[KnnConfig]):
 
         return KNeighborsClassifier(n_neighbors=min(self.config.neighbours, trials))
 
-    def reasons(self, fitted: Fitted, row: NDArray[np.float64], label: str) -> Sequence[str]:
+    def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
         """Return the votes and how near the nearest was."""
         distances, rows = fitted.estimator.kneighbors(row)
         votes = [fitted.labels[i] for i in rows[0].tolist()]

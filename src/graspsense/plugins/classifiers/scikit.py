@@ -34,7 +34,7 @@ class KeptConfig(ClassifierConfig):
 
 
 @frozen(kw_only=True, eq=False)
-class Fitted:
+class FittedEstimator:
     """A fitted estimator, what it was fitted on, and how a trial is made ready for it."""
 
     estimator: Any
@@ -56,7 +56,7 @@ class Fitted:
 class ScikitClassifier(Classifier[ScikitConfigT]):
     """A classifier of scikit-learn; its subclasses say which."""
 
-    _fitted: Fitted | None = None
+    _fitted: FittedEstimator | None = None
     _made_with = ""
 
     @abstractmethod
@@ -64,10 +64,10 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         """Return scikit-learn's estimator, unfitted, for this number of training trials."""
 
     @abstractmethod
-    def reasons(self, fitted: Fitted, row: NDArray[np.float64], label: str) -> Sequence[str]:
+    def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
         """Return why this label, for one trial made ready, of shape (1, features)."""
 
-    def shares(self, fitted: Fitted, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def shares(self, fitted: FittedEstimator, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the probabilities of trials made ready, columns in the order of the estimator's classes."""
         import numpy as np
 
@@ -90,7 +90,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         scale = filled.std(axis=0)
         # What hardly differs from rounding is constant, and would be blown up to noise.
         constant = scale <= 1e-12 * np.maximum(np.abs(filled).max(axis=0), np.finfo(np.float64).tiny)
-        fitted = Fitted(
+        fitted = FittedEstimator(
             estimator=self.estimator(seed, len(labels)),
             table=table,
             labels=tuple(labels),
@@ -178,7 +178,9 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             raise ValueError("its training trials do not fit its labels and features")
         self.fit(FeatureTable(names=names, units=units, values=values), labels, int(model["seed"]))
 
-    def _from_skops(self, model: Mapping[str, Any], names: tuple[str, ...], units: tuple[str, ...]) -> Fitted:
+    def _from_skops(
+        self, model: Mapping[str, Any], names: tuple[str, ...], units: tuple[str, ...]
+    ) -> FittedEstimator:
         import numpy as np
 
         from graspsense.plugins.classifiers.skops_text import from_text
@@ -188,7 +190,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             if one.shape != (len(names),) or not np.isfinite(one).all():
                 raise ValueError("how its trials are made ready does not fit its features")
         kind = type(self.estimator(int(model["seed"]), 2))
-        return Fitted(
+        return FittedEstimator(
             estimator=from_text(model["skops"], kind, len(names)),
             table=FeatureTable(names=names, units=units, values=np.empty((0, len(names)))),
             labels=(),
@@ -198,7 +200,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             scale=scale,
         )
 
-    def _model(self) -> Fitted:
+    def _model(self) -> FittedEstimator:
         if self._fitted is None:
             raise ValueError("the classifier is neither fitted nor loaded yet")
         return self._fitted

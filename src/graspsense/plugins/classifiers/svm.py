@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from attrs import field, frozen
 from attrs.validators import gt
 
-from graspsense.plugins.classifiers.scikit import Fitted, KeptConfig, ScikitClassifier, most_likely
+from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier, most_likely
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,7 +32,7 @@ class Svm(ScikitClassifier[SvmConfig]):
 
         return SVC(C=self.config.c, decision_function_shape="ovr", random_state=seed)
 
-    def shares(self, fitted: Fitted, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def shares(self, fitted: FittedEstimator, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the softmax of the decision values."""
         import numpy as np
 
@@ -42,7 +42,7 @@ class Svm(ScikitClassifier[SvmConfig]):
         powers = np.exp(values - values.max(axis=1, keepdims=True))
         return np.asarray(powers / powers.sum(axis=1, keepdims=True))
 
-    def reasons(self, fitted: Fitted, row: NDArray[np.float64], label: str) -> Sequence[str]:
+    def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
         """Return the nearest labels."""
         shares = self.shares(fitted, row)[0].tolist()
         return (most_likely(shares, self.classes(), "softmax of the decision values (not calibrated)"),)

@@ -9,7 +9,7 @@ from attrs import field, frozen
 from attrs.validators import ge, in_, instance_of
 
 from graspsense.plugin_api import in_words
-from graspsense.plugins.classifiers.scikit import Fitted, KeptConfig, ScikitClassifier
+from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @frozen(kw_only=True)
-class TreeConfig(KeptConfig):
+class CartConfig(KeptConfig):
     """Settings of the tree."""
 
     criterion: Literal["entropy", "gini"] = field(default="entropy", validator=in_(("entropy", "gini")))
@@ -25,7 +25,7 @@ class TreeConfig(KeptConfig):
     """Least number of training trials at a leaf."""
 
 
-class Tree(ScikitClassifier[TreeConfig]):
+class Cart(ScikitClassifier[CartConfig]):
     """A binary tree without pruning."""
 
     def estimator(self, seed: int, trials: int) -> Any:
@@ -36,7 +36,7 @@ class Tree(ScikitClassifier[TreeConfig]):
             criterion=self.config.criterion, min_samples_leaf=self.config.min_leaf, random_state=seed
         )
 
-    def reasons(self, fitted: Fitted, row: NDArray[np.float64], label: str) -> Sequence[str]:
+    def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
         """Return the path through the tree, its thresholds in the features' own units."""
         inner = fitted.estimator.tree_
         nodes = fitted.estimator.decision_path(row).indices.tolist()

@@ -15,7 +15,7 @@ from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, 
 from graspsense.plugins.controllers.supervision import (
     NOT_NEGATIVE,
     POSITIVE,
-    Progress,
+    GraspProgress,
     Supervision,
     SupervisionConfig,
     not_begun,
@@ -92,7 +92,7 @@ class ForceState(NamedTuple):
 
     phase: int
     outcome: int
-    progress: Progress
+    progress: GraspProgress
     effort_n: float
 
 

@@ -21,7 +21,7 @@ from graspsense.plugins.controllers.force import (
 )
 from graspsense.plugins.controllers.supervision import (
     NOT_NEGATIVE,
-    Progress,
+    GraspProgress,
     Supervision,
     SupervisionConfig,
     not_begun,
@@ -60,7 +60,7 @@ class HybridState(NamedTuple):
 
     phase: int
     outcome: int
-    progress: Progress
+    progress: GraspProgress
     integral_n: float
     force_effort_n: float
     approach_effort_n: float

@@ -93,7 +93,7 @@ class Supervision(NamedTuple):
     force_tolerance_n: float
 
 
-class Progress(NamedTuple):
+class GraspProgress(NamedTuple):
     """How far the grasp has come. The start is unknown until the first tick (`begun` 0)."""
 
     phase: int
@@ -135,12 +135,12 @@ def supervision(
     )
 
 
-def not_begun() -> Progress:
+def not_begun() -> GraspProgress:
     """Return the progress before the first tick."""
-    return Progress(APPROACH, RUNNING, 0, 0.0, 0.0, Stillness(0.0, 0.0), 0.0, 0.0, 0.0)
+    return GraspProgress(APPROACH, RUNNING, 0, 0.0, 0.0, Stillness(0.0, 0.0), 0.0, 0.0, 0.0)
 
 
-def supervise(params: Supervision, now: Progress, frame: Frame) -> Progress:
+def supervise(params: Supervision, now: GraspProgress, frame: Frame) -> GraspProgress:
     """Return the progress after this frame; the same object where nothing has changed."""
     if now.outcome != RUNNING:
         return now
@@ -149,7 +149,7 @@ def supervise(params: Supervision, now: Progress, frame: Frame) -> Progress:
     return _squeezing(params, now, frame)
 
 
-def _approaching(params: Supervision, now: Progress, frame: Frame) -> Progress:
+def _approaching(params: Supervision, now: GraspProgress, frame: Frame) -> GraspProgress:
     t, _, gap, _, _, left, right, edge_left, edge_right, _ = frame
     contact, edge = params.contact_force_n, params.edge_force_n
     begun, start_gap, deadline = now.begun, now.start_gap_m, now.deadline_s
@@ -166,7 +166,7 @@ def _approaching(params: Supervision, now: Progress, frame: Frame) -> Progress:
         if start_gap - gap >= params.too_wide_m or begun == 0:
             force = 0.5 * (left + right)
             deadline = t + params.steady_timeout_s
-            return Progress(SQUEEZE, RUNNING, 1, start_gap, deadline, Stillness(t, gap), force, gap, t)
+            return GraspProgress(SQUEEZE, RUNNING, 1, start_gap, deadline, Stillness(t, gap), force, gap, t)
         outcome = TOO_WIDE
     elif gap <= params.closed_gap_m:
         outcome = NOTHING_THERE
@@ -174,10 +174,10 @@ def _approaching(params: Supervision, now: Progress, frame: Frame) -> Progress:
         outcome = ONE_FINGER if left >= contact or right >= contact else NOTHING_THERE
     if outcome == RUNNING and begun == 1:
         return now
-    return Progress(APPROACH, outcome, 1, start_gap, deadline, Stillness(t, gap), 0.0, gap, t)
+    return GraspProgress(APPROACH, outcome, 1, start_gap, deadline, Stillness(t, gap), 0.0, gap, t)
 
 
-def _squeezing(params: Supervision, now: Progress, frame: Frame) -> Progress:
+def _squeezing(params: Supervision, now: GraspProgress, frame: Frame) -> GraspProgress:
     t, gap, left, right = frame.t_s, frame.gap_m, frame.force_left_n, frame.force_right_n
     force = 0.5 * (left + right)
     still = watch(now.still, t, gap, params.rest_speed_m_s, params.rest_window_s)
@@ -201,4 +201,6 @@ def _squeezing(params: Supervision, now: Progress, frame: Frame) -> Progress:
         phase, outcome = HOLD, STEADY
     elif t > now.deadline_s:
         outcome = NEVER_STEADY
-    return Progress(phase, outcome, 1, now.start_gap_m, now.deadline_s, still, peak_force, peak_gap, felt_t)
+    return GraspProgress(
+        phase, outcome, 1, now.start_gap_m, now.deadline_s, still, peak_force, peak_gap, felt_t
+    )

@@ -16,7 +16,7 @@ from graspsense.plugin_api import EFFORT, VELOCITY, Command, Controller, Frame, 
 from graspsense.plugins.controllers.supervision import (
     NOT_NEGATIVE,
     POSITIVE,
-    Progress,
+    GraspProgress,
     Supervision,
     SupervisionConfig,
     not_begun,
@@ -99,7 +99,7 @@ class VelocityState(NamedTuple):
 
     phase: int
     outcome: int
-    progress: Progress
+    progress: GraspProgress
     integral_n: float
 
 

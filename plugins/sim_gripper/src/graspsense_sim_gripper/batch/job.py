@@ -54,13 +54,13 @@ IMAGES: Final = 128
 class Done:
     """One grasp of many: how it ended, and the plant at the end (the true peak force is in it).
 
-    `drawn` is what `Job.draw` made of its trace; the trace itself is there where it was asked for.
+    `extracted` is what `Job.extract` returned for its trace; the trace itself is there where it was asked for.
     """
 
     outcome: Outcome
     reason: str
     body: PlantState
-    drawn: Any
+    extracted: Any
     kept: Trace | None
 
     @property
@@ -78,7 +78,7 @@ class Job:
     config: SimConfig
     controller: Controller[Any]
     run: RunConfig
-    draw: Callable[[Trace], Any] | None
+    extract: Callable[[Trace], Any] | None
     traces: bool
     params: TickParams = field(init=False)
     """The numbers of every grasp, and the state that each begins with."""
@@ -165,7 +165,7 @@ def grasp_once(
     outcome, reason = ended_by_itself(end.controller)
     if not has_ended(end.controller):
         outcome, reason = Outcome.ABORTED, overdue(job.run)
-    if not job.traces and job.draw is None:
+    if not job.traces and job.extract is None:
         return done_of(job, outcome, reason, body, None)
     n, k = end.loop.recorded, end.sensor.images
     columns, phases = buffers.columns, buffers.phases
@@ -217,9 +217,11 @@ def _run(
 
 
 def done_of(job: Job, outcome: Outcome, reason: str, body: PlantState, trace: Trace | None) -> Done:
-    """Return what is kept of a grasp. A trace is needed where one is to be kept or drawn from."""
-    drawn = None if job.draw is None or trace is None else job.draw(trace)
-    return Done(outcome=outcome, reason=reason, body=body, drawn=drawn, kept=trace if job.traces else None)
+    """Return what is kept of a grasp. A trace is needed if it is to be kept or extracted from."""
+    extracted = None if job.extract is None or trace is None else job.extract(trace)
+    return Done(
+        outcome=outcome, reason=reason, body=body, extracted=extracted, kept=trace if job.traces else None
+    )
 
 
 def grasp_compiled(job: Job, setting: Setting, loop: Callable[..., Any], storage: Storage) -> Done:

@@ -92,7 +92,7 @@ def grasps(
         config=config,
         controller=controller,
         run=options.get("run") or RunConfig(),
-        draw=options.get("draw"),
+        extract=options.get("extract"),
         traces=options.get("traces", False),
     )
     workers = options.get("workers") or os.cpu_count() or 1

@@ -3,7 +3,7 @@
 The process is a fresh interpreter with `main` as its program, so that nothing of the caller's script runs a
 second time. It is handed names and numbers: a line of JSON with the settings and the controller's registered name,
 then a line with scenes and seeds at a time. It answers each with a line, and the traces behind it in numpy's own
-format. What is drawn from a trace is drawn by the caller.
+format. The caller extracts features from the traces.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class PlainProcess:
                     "config": asdict(job.config),
                     "controller": _named(job.controller),
                     "run": asdict(job.run),
-                    "traces": job.traces or job.draw is not None,
+                    "traces": job.traces or job.extract is not None,
                 }
             )
         except Exception as error:
@@ -87,7 +87,7 @@ class PlainProcess:
         job, found, chooser = self._job, [], chooser_of(self._job)
         for scene, seed, (outcome, reason, body) in zip(scenes, seeds, answer["done"], strict=True):
             begun = set_scene(job.config, scene, seed, chooser).body
-            trace = _read_trace(traces) if job.traces or job.draw is not None else None
+            trace = _read_trace(traces) if job.traces or job.extract is not None else None
             found.append(done_of(job, Outcome(outcome), reason, _like(begun, body), trace))
         return found
 
@@ -134,7 +134,7 @@ def _job(greeting: dict[str, Any]) -> Job:
         config=SimConfig(**greeting["config"]),
         controller=create("controller", name, **values),
         run=RunConfig(**greeting["run"]),
-        draw=None,
+        extract=None,
         traces=greeting["traces"],
     )
 
