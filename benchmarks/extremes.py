@@ -35,12 +35,12 @@ from selection import controller_is_stable
 
 from graspsense.plugin_api import ConfigError, NotCompilable, bind, create
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.kernel import compiled, plant_of
 from graspsense_sim_gripper.linear import move_of
 from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.objects.library import find
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.plant import PlantState
 from graspsense_sim_gripper.setting import Setting, setting_of
 from graspsense_sim_gripper.terms.registry import laws_of
 
@@ -64,8 +64,8 @@ move: Any = None
 def _pressing(params: Any, state: Any, carrying_n: float, effort_n: float, dt: float, forces: Any) -> Any:
     """Fill `forces` with the mean force on the pads after each tick; return the plant at the end."""
     for i in range(len(forces)):
-        state = move(params, state, effort_n if state.touched == 1 else carrying_n, dt)
-        forces[i] = 0.5 * (state.left_n + state.right_n)
+        state = move(params, state, effort_n if state.contact.touched == 1 else carrying_n, dt)
+        forces[i] = 0.5 * (state.contact.left_n + state.contact.right_n)
     return state
 
 
@@ -120,7 +120,8 @@ def press(
     plant = ready(config, spec)
     drive, state, dt = plant.setting.plant.drive, plant.setting.body, plant.setting.dt_s
     # It comes with its speed, so that the tick of a slow controller does not blur it.
-    state = state._replace(speed_rev_s=-speed_m_s / state.rate_m_rev)
+    motion = state.motion
+    state = state._replace(motion=motion._replace(speed_rev_s=-speed_m_s / motion.jacobian_m_rev))
     carrying = drive.coulomb_n + drive.damping_n_s_m * speed_m_s
     forces = np.zeros(max(round(seconds / dt), 1))
     loop = (
@@ -147,7 +148,7 @@ def against_reference(config: SimConfig, spec: ObjectSpec, **how: Any) -> Row:
         "rms_error": rms_of(forces, expected),
         "peak_n": state.peak_n,
         "finite": bool(np.isfinite(forces).all() and math.isfinite(state.peak_n)),
-        "flagged": flagged or state.unresolved > 0,
+        "flagged": flagged or state.step.unresolved > 0,
     }
 
 
@@ -336,12 +337,13 @@ def energy(quick: bool) -> Iterator[Row]:
                 )
                 plant = ready(config, spec)
                 state = plant.setting.body
-                state = state._replace(speed_rev_s=-0.05 / state.rate_m_rev)
+                motion = state.motion
+                state = state._replace(motion=motion._replace(speed_rev_s=-0.05 / motion.jacobian_m_rev))
                 most, first = -math.inf, 0.5 * mass * 0.05**2
                 last = first
                 for _ in range(400):
                     state = plant.move(plant.params, state, 0.0, plant.setting.dt_s)
-                    speed, d = state.speed_rev_s * state.rate_m_rev, state.squeezed.compression_m
+                    speed, d = speed_of(state), state.contact.left.compression_m
                     now = 0.5 * (mass * speed * speed + k1 * d * d + 0.5 * k3 * d**4)
                     most, last = max(most, (now - last) / first), now
                 yield {
@@ -360,25 +362,25 @@ def stuck(quick: bool) -> Iterator[Row]:
         for effort in (0.0, 5.0, 6.99, 8.01, 30.0, 100.0):
             config = evolve(BASE, transmission="pr2" if geared else "straight", breakaway_n=friction)
             plant = ready(config, bottle if geared else object_of(SHELL))
-            begin = state = plant.setting.body._replace(revolutions=plant.setting.body.revolutions - 1.0)
+            begin = state = a_turn_closer(plant.setting.body)
             for _ in range(1000):
                 state = plant.move(plant.params, state, effort, plant.setting.dt_s)
-            moved = state.revolutions != begin.revolutions
+            moved = state.motion.revolutions != begin.motion.revolutions
             yield {
                 "case": "effort, below breakaway and above",
                 "value": ["pr2" if geared else "straight", effort],
                 "by": plant.by,
-                "finite": math.isfinite(state.gap_m),
+                "finite": math.isfinite(state.motion.gap_m),
                 "holds": moved == (effort > friction),
             }
     steps = ready(evolve(BASE, transmission="pr2"), bottle)
-    begin = steps.setting.body._replace(revolutions=steps.setting.body.revolutions - 1.0)
+    begin = a_turn_closer(steps.setting.body)
     state = steps.move(steps.params, begin, 7.9, 1e6)
     yield {
         "case": "hold of 1e6 s",
         "value": ["pr2", "open"],
-        "finite": math.isfinite(state.gap_m),
-        "holds": state.revolutions == begin.revolutions,
+        "finite": math.isfinite(state.motion.gap_m),
+        "holds": state.motion.revolutions == begin.motion.revolutions,
     }
     _, held, pr2 = press(evolve(BASE, transmission="pr2"), bottle, seconds=2.0)
     yield _hold("pr2", pr2, held, 1e3)
@@ -390,6 +392,17 @@ def stuck(quick: bool) -> Iterator[Row]:
     yield _hold("straight", steps, held, 1e3)
 
 
+def speed_of(state: PlantState) -> float:
+    """Return the rate of the gap (m/s)."""
+    return state.motion.speed_rev_s * state.motion.jacobian_m_rev
+
+
+def a_turn_closer(state: PlantState) -> PlantState:
+    """Return the state with the motor one turn further closed, and the gap as it was."""
+    motion = state.motion
+    return state._replace(motion=motion._replace(revolutions=motion.revolutions - 1.0))
+
+
 def _hold(what: str, plant: Ready, state: PlantState, dt: float, count: int = 1000) -> Row:
     after = state
     for _ in range(count):
@@ -398,9 +411,9 @@ def _hold(what: str, plant: Ready, state: PlantState, dt: float, count: int = 10
         "case": "hold of 1e6 s",
         "value": [what, count * dt],
         "by": plant.by,
-        "moved_m": after.gap_m - state.gap_m,
+        "moved_m": after.motion.gap_m - state.motion.gap_m,
         "finite": math.isfinite(after.left_n),
-        "holds": state.speed_rev_s == 0.0 and after.revolutions == state.revolutions,
+        "holds": state.motion.speed_rev_s == 0.0 and after.motion.revolutions == state.motion.revolutions,
     }
 
 
@@ -464,11 +477,11 @@ def _looped(rate_hz: float) -> Row:
     state, same, dt = plant.setting.body, exact.setting.body, plant.setting.dt_s
     speeds, expected = [], []
     for _ in range(round(2.0 / dt)):
-        effort = min(max(gain * (0.02 + state.speed_rev_s * state.rate_m_rev), -100.0), 100.0)
+        effort = min(max(gain * (0.02 + speed_of(state)), -100.0), 100.0)
         state = plant.move(plant.params, state, effort, dt)
         same = exact.move(exact.params, same, effort, dt)
-        speeds.append(state.speed_rev_s * state.rate_m_rev)
-        expected.append(same.speed_rev_s * same.rate_m_rev)
+        speeds.append(speed_of(state))
+        expected.append(speed_of(same))
     error = max(abs(a - b) for a, b in zip(speeds, expected, strict=True)) / 0.02
     late = speeds[-max(len(speeds) // 5, 5) :]
     unstable = not controller_is_stable(plant.setting)

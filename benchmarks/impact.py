@@ -70,7 +70,7 @@ def eggs() -> dict[str, float]:
         controller = create("controller", name, probing_force_n=20.0)
         done = run_many(SimConfig(), controller, ["egg"] * EGGS, range(EGGS))
         peaks = np.array([one.body.peak_n for one in done])
-        broken = sum(one.body.squeezed.states[1].broken for one in done)
+        broken = sum(one.body.contact.left.states[1].broken for one in done)
         result[f"egg_{name}_broken"] = broken
         result[f"egg_{name}_peak_most_n"] = float(peaks.max())
         if name == "hybrid":

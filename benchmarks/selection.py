@@ -35,9 +35,9 @@ from graspsense_sim_gripper.batch.job import Composition, Done, Job, Storage, gr
 from graspsense_sim_gripper.checking import Control, checked_choice
 from graspsense_sim_gripper.compiled.padding import as_compiled
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.plant import PlantState
 from graspsense_sim_gripper.reduction.error import Course, deviation
 from graspsense_sim_gripper.setting import Setting, setting_of
 from graspsense_sim_gripper.terms.registry import find_term, in_order
@@ -148,7 +148,7 @@ def controller_is_stable(setting: Setting) -> bool:
     assert setting.choice is not None
     loop = create("controller", "hybrid").config
     dt, damping = setting.dt_s, setting.plant.drive.damping_n_s_m
-    mass = setting.plant.drive.inertia / setting.body.rate_m_rev**2
+    mass = setting.plant.drive.inertia / setting.body.motion.jacobian_m_rev**2
     gain, integral = loop.velocity_gain_n_s_m, loop.integral_gain_n_m * setting.dt_s
     for stiffness in (0.0, mass * (setting.choice.contact.number / dt) ** 2):
         rates = np.array([[0.0, 1.0, 0.0], [-stiffness / mass, -damping / mass, 1.0 / mass], [0.0, 0.0, 0.0]])
@@ -167,18 +167,19 @@ def controller_is_stable(setting: Setting) -> bool:
 def in_full(setting: Setting) -> Setting:
     """Return the setting as a composition of all kinds, of which it keeps its own."""
     places = {kind: i + 1 for i, kind in enumerate(setting.kinds)}
-    terms, states = [setting.plant.thing.terms[0]], [setting.body.squeezed.states[0]]
+    terms, states = [setting.plant.thing.terms[0]], [setting.body.contact.left.states[0]]
     for kind in KINDS:
         if kind in places:
             terms.append(setting.plant.thing.terms[places[kind]])
-            states.append(setting.body.squeezed.states[places[kind]])
+            states.append(setting.body.contact.left.states[places[kind]])
         else:
             term = find_term(kind)[1]
             terms.append(Kept(0, term.params(*DUMMIES[kind])))
             states.append(term.at_rest)
     thing = setting.plant.thing._replace(terms=tuple(terms))
-    object_ = setting.body.squeezed._replace(states=tuple(states))
-    body: PlantState = setting.body._replace(squeezed=object_, right=object_)
+    object_ = setting.body.contact.left._replace(states=tuple(states))
+    contact = setting.body.contact._replace(left=object_, right=object_)
+    body: PlantState = setting.body._replace(contact=contact)
     return evolve(setting, kinds=KINDS, plant=setting.plant._replace(thing=thing), body=body)
 
 
@@ -293,7 +294,7 @@ def measure(bench: Bench, numbers: range, costs: int = 0) -> dict[str, Any]:
                 one["refused"] = str(error)
                 continue
             one["error"], one["whose"] = error_of(done, reference)
-            one["steps"], one["choice_s"] = done.body.steps, bench.choice_s
+            one["steps"], one["choice_s"] = done.body.step.n_steps, bench.choice_s
             if accuracy == COSTS_AT:
                 grasps[name] = chosen, job
             choice = chosen.choice

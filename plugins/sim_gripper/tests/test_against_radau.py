@@ -124,7 +124,10 @@ def test_the_reference_is_what_radau_finds(terms, cover):
     link = setting.plant.drive.link
     # It begins where the fingers touch, at their speed.
     state = setting.body._replace(
-        revolutions=0.05 / link.pitch_m, gap_m=0.05, speed_rev_s=-SPEED / link.pitch_m, touched=1
+        motion=setting.body.motion._replace(
+            revolutions=0.05 / link.pitch_m, gap_m=0.05, speed_rev_s=-SPEED / link.pitch_m
+        ),
+        contact=setting.body.contact._replace(touched=1),
     )
     side, force_of = rates(terms, cover)
     start = [0.0, SPEED, 0.0, 0.0, 0.0, 0.0, 0.0]
@@ -138,8 +141,8 @@ def test_the_reference_is_what_radau_finds(terms, cover):
     forces = []
     for _ in exact.t:
         state = move(setting.plant, state, EFFORT, 1e-3)
-        forces.append(state.left_n)
+        forces.append(state.contact.left_n)
     expected = np.array([force_of(s) for s in exact.y.T])
     assert len(expected) > 5
     np.testing.assert_allclose(forces, expected, rtol=1e-4, atol=1e-4 * expected.max())
-    assert exact.y[0][-1] == pytest.approx(0.05 - state.gap_m, rel=5e-5)
+    assert exact.y[0][-1] == pytest.approx(0.05 - state.motion.gap_m, rel=5e-5)

@@ -56,8 +56,8 @@ def test_the_number_of_workers_decides_nothing_to_the_bit():
     common = run_many(SimConfig(), HYBRID, odd, range(3), compiled=True)
     for a, b in zip(alone, common, strict=True):
         np.testing.assert_allclose(b.trace.force_left_n, a.trace.force_left_n, rtol=1e-9, atol=1e-12)
-        assert [type(state) for state in b.body.squeezed.states] == [
-            type(state) for state in a.body.squeezed.states
+        assert [type(state) for state in b.body.contact.left.states] == [
+            type(state) for state in a.body.contact.left.states
         ]
 
 
@@ -159,8 +159,8 @@ def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit(
         here = plainly(odd, name, seed)
         assert (one.outcome, one.reason) == (here.outcome, here.reason)
         assert repr(one.body) == repr(here.body)
-        assert [type(part) for part in one.body.squeezed.states] == [
-            type(part) for part in here.body.squeezed.states
+        assert [type(part) for part in one.body.contact.left.states] == [
+            type(part) for part in here.body.contact.left.states
         ]
         assert bits(one.trace) == bits(here.trace)
 

@@ -43,7 +43,7 @@ def test_the_number_changes_nothing_else_of_a_trial():
 
     assert with_number.sensor == without.sensor
     assert with_number.plant.drive == without.plant.drive
-    assert with_number.body.offset_m == without.body.offset_m
+    assert with_number.body.contact.offset_m == without.body.contact.offset_m
     assert with_number.plant.thing.width_m != without.plant.thing.width_m
 
 

@@ -68,12 +68,14 @@ def ready(config, spec, *, maps=True, on_arrays=False):
 def along(config, spec, efforts, *, maps=True, speed_m_s=0.0):
     """Return closure, force and closing speed at each tick under these efforts, and the last state."""
     move, params, setting = ready(config, spec, maps=maps)
-    state = setting.body._replace(speed_rev_s=-speed_m_s / setting.body.rate_m_rev)
+    motion = setting.body.motion
+    motion = motion._replace(speed_rev_s=-speed_m_s / motion.jacobian_m_rev)
+    state = setting.body._replace(motion=motion)
     found = []
     for effort in efforts:
         state = move(params, state, effort, setting.dt_s)
-        speed = -state.speed_rev_s * state.rate_m_rev
-        found.append((setting.plant.thing.width_m - state.gap_m, state.left_n, speed))
+        speed = -state.motion.speed_rev_s * state.motion.jacobian_m_rev
+        found.append((setting.plant.thing.width_m - state.motion.gap_m, state.contact.left_n, speed))
     return *np.array(found).T, state
 
 
@@ -196,8 +198,8 @@ def test_maps_agree_with_the_steps_at_a_tight_tolerance(name):
     np.testing.assert_allclose(closure, closure1, atol=5e-7)
     np.testing.assert_allclose(force, force1, atol=1e-3 * max(force.max(), 1.0))
     assert state.peak_n == pytest.approx(state1.peak_n, rel=2e-4)
-    assert state.touched == state1.touched
-    assert state.unresolved == 0
+    assert state.contact.touched == state1.contact.touched
+    assert state.step.unresolved == 0
 
 
 def test_what_was_let_go_comes_back_while_the_fingers_stand_wide_open():
@@ -207,12 +209,14 @@ def test_what_was_let_go_comes_back_while_the_fingers_stand_wide_open():
     found = [along(config, spec, efforts, maps=maps, speed_m_s=0.02)[-1] for maps in (True, False)]
     state, by_steps = found
     open_rev = ready(config, spec)[2].plant.drive.open_rev
-    assert (state.revolutions, state.speed_rev_s, state.touched) == (open_rev, 0.0, 1)
-    assert by_steps.revolutions == open_rev
+    assert (state.motion.revolutions, state.motion.speed_rev_s, state.contact.touched) == (open_rev, 0.0, 1)
+    assert by_steps.motion.revolutions == open_rev
     # It still is on its way, after a second.
-    assert abs(state.squeezed.compression_m) > 1e-6
-    for one in ("compression_m", "cover_m"):
-        assert getattr(state.squeezed, one) == pytest.approx(getattr(by_steps.squeezed, one), rel=5e-3)
+    assert abs(state.contact.left.compression_m) > 1e-6
+    for one in ("compression_m", "pad_m"):
+        assert getattr(state.contact.left, one) == pytest.approx(
+            getattr(by_steps.contact.left, one), rel=5e-3
+        )
     # And where it is closed again it meets the object where that then is.
     again = [
         along(config, spec, [*efforts, *[30.0] * 900], maps=maps, speed_m_s=0.02)[1] for maps in (True, False)
@@ -335,10 +339,12 @@ def test_it_slides_as_far_as_its_speed_and_friction_say_and_stands():
 def test_below_breakaway_it_never_moves():
     spec = thing(ELASTIC, MAXWELL)
     move, params, setting = ready(RUBS, spec)
-    state = setting.body._replace(speed_rev_s=-0.02 / setting.body.rate_m_rev)
+    motion = setting.body.motion
+    motion = motion._replace(speed_rev_s=-0.02 / motion.jacobian_m_rev)
+    state = setting.body._replace(motion=motion)
     for _ in range(500):
         state = move(params, state, 25.0, 1e-3)
-    assert state.speed_rev_s == 0.0
+    assert state.motion.speed_rev_s == 0.0
     before = state
     setting = evolve(setting, dt_s=1e3)
     params, shape = linear_of(RUBS, setting)
@@ -346,9 +352,12 @@ def test_below_breakaway_it_never_moves():
     for _ in range(1000):
         state = move(params, state, 25.0, 1e3)
     # The arm gives way, and the fingers hold.
-    assert (state.gap_m, state.revolutions, state.speed_rev_s) == (before.gap_m, before.revolutions, 0.0)
+    assert (state.motion.gap_m, state.motion.revolutions) == (before.motion.gap_m, before.motion.revolutions)
+    assert state.motion.speed_rev_s == 0.0
     covers = 0.5 * RUBS.skin_n_m
-    assert state.left_n == pytest.approx((0.05 - state.gap_m) / (1.0 / covers + 1.0 / 1e4), rel=1e-9)
+    assert state.contact.left_n == pytest.approx(
+        (0.05 - state.motion.gap_m) / (1.0 / covers + 1.0 / 1e4), rel=1e-9
+    )
 
 
 def test_what_relaxes_is_followed_up_to_the_edge_of_friction():
@@ -359,7 +368,7 @@ def test_what_relaxes_is_followed_up_to_the_edge_of_friction():
     assert force[-1] == pytest.approx(60.0 - 7.0, rel=1e-6)
     assert closure[-1] == pytest.approx(53.0 / (0.5 * RUBS.skin_n_m) + 53.0 / 1e4, rel=1e-6)
     assert (speed == 0.0).any()
-    assert state.unresolved == 0
+    assert state.step.unresolved == 0
 
 
 # ------------------------------------------------------------------------------------- energy, stiffness
@@ -377,14 +386,18 @@ def test_what_relaxes_is_followed_up_to_the_edge_of_friction():
 def test_with_the_drive_off_stored_energy_never_rises(change, terms):
     config = evolve(RUBS, **{**FREE, **change})
     move, params, setting = ready(config, thing(*terms))
-    state = setting.body._replace(speed_rev_s=-0.05 / setting.body.rate_m_rev)
+    motion = setting.body.motion
+    motion = motion._replace(speed_rev_s=-0.05 / motion.jacobian_m_rev)
+    state = setting.body._replace(motion=motion)
     k, arm = terms[0][1]["k1_n_m"], dict(terms).get("maxwell", {}).get("k_n_m", 1.0)
 
     def energy():
-        v, d = state.speed_rev_s * state.rate_m_rev, state.squeezed.compression_m
-        q = state.squeezed.states[2][0] if "maxwell" in dict(terms) else 0.0
+        v, d = state.motion.speed_rev_s * state.motion.jacobian_m_rev, state.contact.left.compression_m
+        q = state.contact.left.states[2][0] if "maxwell" in dict(terms) else 0.0
         cover = (
-            0.05 - state.gap_m - d if setting.plant.thing.skins_n_m < math.inf and state.left_n > 0 else 0.0
+            0.05 - state.motion.gap_m - d
+            if setting.plant.thing.skins_n_m < math.inf and state.contact.left_n > 0
+            else 0.0
         )
         stored = k * d * d + q * q / arm + (0.5 * config.skin_n_m * cover * cover if cover else 0.0)
         return 0.5 * (100.0 * v * v + stored)
@@ -414,12 +427,14 @@ def test_a_stiff_contact_costs_no_more_than_a_soft_one():
             evolve(RUBS, **RIGID), thing(("elastic", {"k1_n_m": stiffness}), LOSS, MAXWELL)
         )
         params = params._replace(maps=Counting(params.maps))
-        state = setting.body._replace(speed_rev_s=-0.02 / setting.body.rate_m_rev)
+        motion = setting.body.motion
+        motion = motion._replace(speed_rev_s=-0.02 / motion.jacobian_m_rev)
+        state = setting.body._replace(motion=motion)
         Counting.looked = 0
         for effort in squeeze_and_let_go(3000):
             state = move(params, state, effort, 1e-3)
         costs[stiffness] = Counting.looked
-        assert math.isfinite(state.left_n)
+        assert math.isfinite(state.contact.left_n)
     # Steps would be a thousand times shorter; what there is of it are more rebounds, each of which is located.
     assert costs[1e6] <= 1.5 * costs[1e4], costs
     assert costs[1e9] <= 2.5 * costs[1e4], costs
@@ -434,7 +449,7 @@ def test_however_stiff_it_comes_to_rest_at_the_same_force(contact_n_m):
     closure, force, _, state = along(PEERS, surface_of(contact_n_m), [2.0] * 3000)
     assert np.all(np.isfinite(force))
     assert force[-1] == pytest.approx(2.0, rel=1e-3)
-    assert state.left_n == state.right_n
+    assert state.contact.left_n == state.contact.right_n
     # At rest the surface's spring has the force, and the contact has it again.
     assert closure[-1] == pytest.approx(2.0 / 2e3 + 2.0 / contact_n_m, rel=1e-3)
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from graspsense.plugin_api import bind, gap_and_rate, revolutions_at, straight_linkage
 from graspsense_sim_gripper.drive_models import LINKAGES
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState
 from graspsense_sim_gripper.kernel import plant_of, sum_of
 from graspsense_sim_gripper.plant import (
     EXPLICIT,
@@ -17,9 +18,7 @@ from graspsense_sim_gripper.plant import (
     STIFF,
     Drive,
     PlantParams,
-    PlantState,
     Skin,
-    Squeezed,
     Steps,
     Thing,
     friction,
@@ -33,7 +32,7 @@ from graspsense_sim_gripper.terms.gas import Gas
 from graspsense_sim_gripper.terms.liquid import Liquid, liquid
 from graspsense_sim_gripper.terms.loss import Loss, loss
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
-from graspsense_sim_gripper.terms.oscillator import Motion
+from graspsense_sim_gripper.terms.oscillator import OscillatorState
 from graspsense_sim_gripper.terms.registry import TERMS
 from graspsense_sim_gripper.terms.rigid import Rigid, RigidState, rigid
 from graspsense_sim_gripper.terms.slosh import Slosh
@@ -67,8 +66,9 @@ def thing(*terms, width=0.05, table=0.0, skins=inf):
 def at(gap, states=(), offset=0.0, speed_m_s=0.0, link=LINK):
     revolutions = revolutions_at(link, gap)
     gap, rate = gap_and_rate(link, revolutions)
-    fresh = Squeezed(0.0, 0.0, 0.0, states, 0.0, 0.0)
-    return PlantState(revolutions, speed_m_s / rate, gap, rate, 0.0, 0.0, offset, 0, fresh, 0.0, 0.0, fresh)
+    fresh = ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0)
+    motion = Motion(revolutions, speed_m_s / rate, gap, rate)
+    return PlantState(motion, Contact(0.0, 0.0, offset, 0, fresh, fresh))
 
 
 SPRING = (Elastic(2000.0, 0.0),)
@@ -86,24 +86,23 @@ def test_below_breakaway_nothing_moves_at_all(effort):
     params = PlantParams(drive(), thing(*SPRING), FINE)
     before = at(0.06, (NoState(),))
     after = run(params, before, effort, 100.0)
-    assert after.revolutions == before.revolutions
-    assert after.speed_rev_s == 0.0
+    assert after.motion.revolutions == before.motion.revolutions
+    assert after.motion.speed_rev_s == 0.0
 
 
 def test_above_breakaway_it_moves():
     params = PlantParams(drive(), thing(*SPRING), FINE)
-    assert run(params, at(0.06, (NoState(),)), 8.01, 1.0).gap_m < 0.06 - 1e-5
+    assert run(params, at(0.06, (NoState(),)), 8.01, 1.0).motion.gap_m < 0.06 - 1e-5
 
 
 def test_a_loaded_gripper_is_stuck_by_as_much_as_its_load_adds():
     # At 10 N on the pads breakaway is 8 + 0.5 * 10 = 13 N to either side of the balance.
     params = PlantParams(drive(), thing(*SPRING), FINE)
-    loaded = at(0.045, (NoState(),))._replace(
-        left_n=10.0, right_n=10.0, touched=1, squeezed=Squeezed(0.005, 10.0, 2000.0, (NoState(),), 0.0, 0.0)
-    )
+    pressed = ContactState(0.005, 10.0, 2000.0, (NoState(),))
+    loaded = at(0.045, (NoState(),))._replace(contact=Contact(10.0, 10.0, 0.0, 1, pressed, pressed))
     for effort, moves in ((22.9, False), (23.1, True), (-2.9, False), (-3.1, True)):
         after = run(params, loaded, effort, 0.2)
-        assert (after.revolutions != loaded.revolutions) == moves, effort
+        assert (after.motion.revolutions != loaded.motion.revolutions) == moves, effort
 
 
 def test_a_free_drive_falls_as_newton_says():
@@ -111,10 +110,12 @@ def test_a_free_drive_falls_as_newton_says():
     params = PlantParams(drive(0.0, 0.0, 0.0, 0.0), thing(), FINE)
     start = at(0.08, ())
     after = run(params, start, 10.0, 0.1, laws=())
-    mass = drive().inertia / start.rate_m_rev**2
+    mass = drive().inertia / start.motion.jacobian_m_rev**2
     assert mass == pytest.approx(118.0, rel=0.01)
     # Over the 0.4 mm it travels the transmission's ratio, and with it the mass, changes by 0.1 %.
-    assert after.speed_rev_s * after.rate_m_rev == pytest.approx(-10.0 * 0.1 / mass, rel=3e-3)
+    assert after.motion.speed_rev_s * after.motion.jacobian_m_rev == pytest.approx(
+        -10.0 * 0.1 / mass, rel=3e-3
+    )
 
 
 @given(st.floats(-0.02, 0.02).filter(lambda v: abs(abs(v) - 0.009) > 1e-5))
@@ -134,7 +135,7 @@ def test_friction_that_changes_from_its_greatest_within_a_tick_is_seen():
     params = PlantParams(drive()._replace(stribeck_m_s=5e-4), thing(), Steps(2e-4))
     start = at(0.06, (), speed_m_s=-1e-7)
     ends = [run(params, start, 60.0, TICK, laws=(), dt=dt) for dt in (TICK, 1e-6)]
-    one, fine = (end.speed_rev_s * end.rate_m_rev for end in ends)
+    one, fine = (end.motion.speed_rev_s * end.motion.jacobian_m_rev for end in ends)
     assert abs(fine) > 4e-4
     assert abs(one - fine) < 1e-6
 
@@ -148,10 +149,10 @@ def test_halving_the_tick_quarters_the_error_of_a_way_in_the_free(effort):
         state = at(0.05, (), speed_m_s=-3e-3)
         for _ in range(round(0.016 / dt)):
             state = move(params, state, effort, dt)
-        gap, rate = gap_and_rate(LINK, state.revolutions)
-        assert state.gap_m == pytest.approx(gap, abs=1e-12)
-        assert state.rate_m_rev == pytest.approx(rate, rel=1e-9)
-        return np.array([state.revolutions, state.speed_rev_s])
+        gap, rate = gap_and_rate(LINK, state.motion.revolutions)
+        assert state.motion.gap_m == pytest.approx(gap, abs=1e-12)
+        assert state.motion.jacobian_m_rev == pytest.approx(rate, rel=1e-9)
+        return np.array([state.motion.revolutions, state.motion.speed_rev_s])
 
     exact = end(1e-6)
     coarse, fine = (np.abs(end(dt) - exact) for dt in (2e-3, 1e-3))
@@ -172,8 +173,8 @@ def test_the_reflected_mass_of_each_linkage(name, closed_kg, open_kg):
 
 def energy(params, state):
     stiffness = params.thing.terms[0].k1_n_m
-    kinetic = 0.5 * params.drive.inertia * state.speed_rev_s**2
-    return kinetic + 0.5 * stiffness * max(params.thing.width_m - state.gap_m, 0.0) ** 2
+    kinetic = 0.5 * params.drive.inertia * state.motion.speed_rev_s**2
+    return kinetic + 0.5 * stiffness * max(params.thing.width_m - state.motion.gap_m, 0.0) ** 2
 
 
 @settings(max_examples=40, deadline=None)
@@ -211,8 +212,8 @@ def test_without_friction_a_squeeze_and_the_letting_go_create_no_energy(stiffnes
     first = before = 50.0 * speed * speed
     for _ in range(400):
         state = move(params, state, 0.0, TICK)
-        now = 50.0 * (state.speed_rev_s * state.rate_m_rev) ** 2
-        now += 0.5 * stiffness * state.squeezed.compression_m**2
+        now = 50.0 * (state.motion.speed_rev_s * state.motion.jacobian_m_rev) ** 2
+        now += 0.5 * stiffness * state.contact.left.compression_m**2
         assert now <= before + 1e-9 * first
         before = now
 
@@ -234,14 +235,14 @@ def test_what_swings_keeps_its_energy_by_the_mean_force_even_where_it_stiffens(
     if link is not LINK:
         params = params._replace(drive=params.drive._replace(inertia=100.0 * link.pitch_m**2))
     state, move = at(0.0503, (NoState(),), speed_m_s=-speed, link=link), plant_of([elastic])
-    first = before = 0.5 * params.drive.inertia * state.speed_rev_s**2
+    first = before = 0.5 * params.drive.inertia * state.motion.speed_rev_s**2
     for _ in range(400):
         state = move(params, state, 0.0, TICK)
-        if state.speed_rev_s == 0.0 and state.touched == 0:
+        if state.motion.speed_rev_s == 0.0 and state.contact.touched == 0:
             # At the end of its travel.
             break
-        d = state.squeezed.compression_m
-        now = 0.5 * params.drive.inertia * state.speed_rev_s**2 + 0.5 * k1 * d * d + 0.25 * k3 * d**4
+        d = state.contact.left.compression_m
+        now = 0.5 * params.drive.inertia * state.motion.speed_rev_s**2 + 0.5 * k1 * d * d + 0.25 * k3 * d**4
         # What is left are the searches' rounding, many times over where it stiffens this much.
         assert abs(now - before) <= 5e-9 * first
         before = now
@@ -252,7 +253,7 @@ def test_what_is_let_go_at_first_comes_back_from_the_tick_on_in_which_it_was(dam
     law, params = sum_of([elastic, loss]), (Elastic(2e4, 1e9), Loss(damping))
     states = (NoState(), NoState())
     pressed, _ = law(params, states, 1e-3, 1e-3, 1e-3, 0.0)
-    before = Squeezed(1e-3, pressed, 0.0, states, 0.0, 0.0)
+    before = ContactState(1e-3, pressed, 0.0, states, 0.0, 0.0)
     after = bind(squeeze, advance=law)(Thing(0.05, 0.0, inf, params), before, -1e-4, -1.0, 1e-3)
     assert after.force_n == 0.0
     assert after.compression_m < 1e-3
@@ -282,7 +283,7 @@ def test_the_slam_of_a_constant_effort_is_as_large_as_estimated(stiffness, speed
     state = run(params, at(0.06, (NoState(),)), 23.0, 0.62)
     move, impact = plant_of([elastic]), 0.0
     for _ in range(600):
-        impact = max(impact, -state.speed_rev_s * state.rate_m_rev)
+        impact = max(impact, -state.motion.speed_rev_s * state.motion.jacobian_m_rev)
         state = move(params, state, 23.0, TICK)
     assert impact == pytest.approx(speed, rel=0.03)
     # The softest contact travels 10 mm, over which the mass falls by 4 %; the estimate holds it fixed.
@@ -308,9 +309,9 @@ def test_halving_the_step_quarters_the_error_of_the_peak(scheme):
 def test_covers_in_series_share_the_compression():
     params = PlantParams(drive(), thing(*SPRING, skins=2000.0), FINE)
     state = run(params, at(0.0501, (NoState(),)), 30.0, 2.0)
-    squeezed = state.squeezed
+    squeezed = state.contact.left
     assert squeezed.force_n == pytest.approx(2000.0 * squeezed.compression_m, rel=1e-6)
-    assert squeezed.compression_m == pytest.approx(0.5 * (0.05 - state.gap_m), rel=1e-6)
+    assert squeezed.compression_m == pytest.approx(0.5 * (0.05 - state.motion.gap_m), rel=1e-6)
 
 
 def test_nothing_pulls_when_the_fingers_open_faster_than_the_object_recovers():
@@ -319,19 +320,21 @@ def test_nothing_pulls_when_the_fingers_open_faster_than_the_object_recovers():
     move = plant_of([elastic, maxwell])
     for _ in range(500):
         state = move(params, state, -60.0, TICK)
-        assert state.left_n >= 0.0
-        assert state.right_n >= 0.0
-    assert state.gap_m > 0.05
-    assert state.left_n == 0.0
+        assert state.contact.left_n >= 0.0
+        assert state.contact.right_n >= 0.0
+    assert state.motion.gap_m > 0.05
+    assert state.contact.left_n == 0.0
 
 
 def test_the_finger_that_touches_first_pushes_with_the_tables_friction_until_both_touch():
     params = PlantParams(drive(), thing(*SPRING, table=1.5), FINE)
     state, move = at(0.06, (NoState(),), offset=0.003), plant_of([elastic])
     pushed = []
-    while state.squeezed.force_n < 3.0:
+    while state.contact.left.force_n < 3.0:
         state = move(params, state, 12.0, TICK)
-        pushed.append((state.gap_m, state.left_n, state.right_n, state.offset_m))
+        pushed.append(
+            (state.motion.gap_m, state.contact.left_n, state.contact.right_n, state.contact.offset_m)
+        )
     for gap, left, right, offset in pushed:
         if gap > 0.056:
             assert (left, right) == (0.0, 0.0)
@@ -340,15 +343,15 @@ def test_the_finger_that_touches_first_pushes_with_the_tables_friction_until_bot
             assert offset == pytest.approx(0.5 * (gap - 0.05))
         elif gap < 0.049:
             assert left == right > 1.5
-    assert state.offset_m == 0.0
+    assert state.contact.offset_m == 0.0
 
 
 def test_the_stops_hold_at_both_ends():
     params = PlantParams(drive(), thing(width=-1.0), FINE)
     closed = run(params, at(0.01, ()), 100.0, 2.0, laws=())
-    assert (closed.gap_m, closed.speed_rev_s) == (pytest.approx(0.0, abs=1e-9), 0.0)
+    assert (closed.motion.gap_m, closed.motion.speed_rev_s) == (pytest.approx(0.0, abs=1e-9), 0.0)
     opened = run(params, at(0.08, ()), -100.0, 2.0, laws=())
-    assert (opened.gap_m, opened.speed_rev_s) == (pytest.approx(0.086, abs=1e-9), 0.0)
+    assert (opened.motion.gap_m, opened.motion.speed_rev_s) == (pytest.approx(0.086, abs=1e-9), 0.0)
 
 
 @pytest.mark.parametrize("link", [LINK, STRAIGHT])
@@ -358,8 +361,8 @@ def test_what_is_pressed_at_the_closed_end_is_pressed_as_far_as_the_travel_goes(
         drive(link=link), thing(Elastic(1e4, 0.0), width=0.002), Steps(1e-3, scheme, growth=4.0)
     )
     state = run(params, at(0.01, (NoState(),), speed_m_s=-0.15, link=link), 60.0, 0.3)
-    assert (state.gap_m, state.speed_rev_s) == (pytest.approx(0.0, abs=1e-9), 0.0)
-    assert state.left_n == pytest.approx(20.0, rel=1e-6)
+    assert (state.motion.gap_m, state.motion.speed_rev_s) == (pytest.approx(0.0, abs=1e-9), 0.0)
+    assert state.contact.left_n == pytest.approx(20.0, rel=1e-6)
     # Not for a moment was it pressed through the other finger.
     assert state.peak_n == pytest.approx(20.0, rel=1e-6)
 
@@ -372,15 +375,15 @@ def test_no_moving_mass_is_too_light_for_the_stops(mass_share):
         state = at(0.04, ())
         for _ in range(200):
             state = move(params, state, effort, TICK)
-            assert -1e-9 <= state.gap_m <= 0.086 + 1e-9
+            assert -1e-9 <= state.motion.gap_m <= 0.086 + 1e-9
 
 
 def test_a_stuck_gripper_does_not_creep_over_a_long_hold():
     params = PlantParams(drive(), thing(Elastic(2000.0, 0.0), Maxwell(250.0, 0.4)), FINE)
     state = run(params, at(0.0501, (NoState(), MaxwellState(0.0))), 23.0, 3.0, (elastic, maxwell))
     after = run(params, state, 23.0, 1e6, (elastic, maxwell), dt=1e3)
-    assert after.revolutions == state.revolutions
-    assert after.squeezed.force_n == pytest.approx(2000.0 * state.squeezed.compression_m, rel=1e-9)
+    assert after.motion.revolutions == state.motion.revolutions
+    assert after.contact.left.force_n == pytest.approx(2000.0 * state.contact.left.compression_m, rel=1e-9)
 
 
 def test_a_damper_in_the_contents_lengthens_the_squeeze():
@@ -389,7 +392,7 @@ def test_a_damper_in_the_contents_lengthens_the_squeeze():
         state, move = at(0.0501, states), plant_of(laws)
         for k in range(5000):
             state = move(params, state, 23.0, TICK)
-            if state.touched and abs(state.speed_rev_s * state.rate_m_rev) < 1e-4:
+            if state.contact.touched and abs(state.motion.speed_rev_s * state.motion.jacobian_m_rev) < 1e-4:
                 return k * TICK
         raise AssertionError("never slower than 0.1 mm/s")
 
@@ -404,10 +407,10 @@ def test_steps_that_grow_slowly_see_what_rings_after_a_touch(tolerance):
     free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=0.0, link=STRAIGHT)
     free = free._replace(inertia=100.0 * STRAIGHT.pitch_m**2)
     body = Thing(0.05, 0.0, 1e4, (Surface(0.5, 1e3, 1.0, 2e4),), Skin(50.0, 0.0, 1.0))
-    start = at(0.0501, (Motion(0.0, 0.0),), speed_m_s=-0.1, link=STRAIGHT)
+    start = at(0.0501, (OscillatorState(0.0, 0.0),), speed_m_s=-0.1, link=STRAIGHT)
 
     def force(steps):
-        return plant_of([surface])(PlantParams(free, body, steps), start, 0.0, 5e-3).left_n
+        return plant_of([surface])(PlantParams(free, body, steps), start, 0.0, 5e-3).contact.left_n
 
     exact = force(Steps(inf, EXPLICIT, 1e-6))
     errors = [abs(force(Steps(tolerance, growth=growth)) - exact) / exact for growth in (2.0, 1.1, 1.03)]
@@ -425,7 +428,7 @@ def test_a_tick_that_is_to_settle_is_halved_even_where_no_error_asks_for_it():
         after = plant_of([elastic])(
             PlantParams(free, thing(*SPRING), Steps(1e9, EXPLICIT, inf, settle)), start, 0.0, TICK
         )
-        speeds.append(after.speed_rev_s * after.rate_m_rev)
+        speeds.append(after.motion.speed_rev_s * after.motion.jacobian_m_rev)
     exact = -0.05 * math.exp(-3e4 / 100.0 * TICK)
     assert abs(speeds[1] - exact) < 0.01 * abs(speeds[0] - exact)
 
@@ -433,15 +436,16 @@ def test_a_tick_that_is_to_settle_is_halved_even_where_no_error_asks_for_it():
 def test_what_stands_is_looked_at_in_steps_no_longer_than_the_longest():
     # A light liquid behind soft covers swings some five times in the tick through which the fingers stand.
     body = Thing(0.05, 0.0, 1.5e4, (Elastic(2000.0, 0.0), Liquid(1e-3, 1e-3, 0.02, 1e-11)))
-    laws, states = [elastic, liquid], (NoState(), Motion(0.0, 0.0))
+    laws, states = [elastic, liquid], (NoState(), OscillatorState(0.0, 0.0))
     start = run(PlantParams(drive(), body, FINE), at(0.0499, states, speed_m_s=-0.05), 15.0, 0.5, laws)
-    assert start.speed_rev_s == 0.0
-    start = start._replace(squeezed=start.squeezed._replace(states=(NoState(), Motion(0.0, 0.05))))
+    assert start.motion.speed_rev_s == 0.0
+    left = start.contact.left._replace(states=(NoState(), OscillatorState(0.0, 0.05)))
+    start = start._replace(contact=start.contact._replace(left=left))
     held = PlantParams(drive(breakaway=1e4), body, FINE)
     short = run(held, start, 15.0, TICK, laws, dt=TICK / 16)
     cut = run(held._replace(steps=FINE._replace(longest_s=TICK / 16)), start, 15.0, TICK, laws)
-    assert cut.left_n == pytest.approx(short.left_n, rel=1e-12)
-    assert cut.left_n != pytest.approx(run(held, start, 15.0, TICK, laws).left_n, rel=1e-3)
+    assert cut.contact.left_n == pytest.approx(short.contact.left_n, rel=1e-12)
+    assert cut.contact.left_n != pytest.approx(run(held, start, 15.0, TICK, laws).contact.left_n, rel=1e-3)
 
 
 def test_a_pushed_object_is_pressed_only_from_when_the_second_finger_meets_it():
@@ -452,8 +456,8 @@ def test_a_pushed_object_is_pressed_only_from_when_the_second_finger_meets_it():
     for begun in range(8):
         start = at(0.0505 + 5e-6 * begun, (NoState(),), offset=2.4e-4, speed_m_s=-0.1)
         one, other = (run(params, start, 0.0, 0.006) for params in (coarse, fine))
-        assert other.left_n > 0.0
-        assert one.left_n == pytest.approx(other.left_n, abs=2e-3)
+        assert other.contact.left_n > 0.0
+        assert one.contact.left_n == pytest.approx(other.contact.left_n, abs=2e-3)
 
 
 def test_what_a_touch_begins_with_is_not_rounding_however_fine_the_steps():
@@ -462,8 +466,8 @@ def test_what_a_touch_begins_with_is_not_rounding_however_fine_the_steps():
     body = Thing(0.05, 0.0, 8e3, (Elastic(200.0, 0.0), Loss(3e5)), held=1)
     start = at(0.0521, (NoState(), NoState()), offset=1e-3, speed_m_s=-0.1)
     after = run(PlantParams(free, body, Steps(1e-10)), start, 0.0, 0.0425, [elastic, loss])
-    assert after.left_n > 0.0
-    assert after.peak_n == pytest.approx(max(after.left_n, after.right_n), rel=1e-5)
+    assert after.contact.left_n > 0.0
+    assert after.peak_n == pytest.approx(max(after.contact.left_n, after.contact.right_n), rel=1e-5)
 
 
 @settings(max_examples=60, deadline=None)
@@ -480,7 +484,7 @@ def test_covers_and_object_carry_one_force_however_stiff_they_are(stiffness, ski
     )
     search = bind(squeeze, advance=sum_of([law]))
     body = Thing(0.05, 0.0, skins, (params,))
-    now = Squeezed(0.0, 0.0, 0.0, (state,), 0.0, 0.0)
+    now = ContactState(0.0, 0.0, 0.0, (state,), 0.0, 0.0)
     for closure in (1e-6, 1e-4, 5e-3, 1e-2, 5e-3, 1e-4, -1e-3, -0.02, 1e-5, 3e-3):
         now = search(body, now, closure, 0.0, 1e-3)
         felt, _ = law(params, state, 0.0, now.compression_m, 1e-3, now.compression_m / 1e-3)
@@ -507,7 +511,7 @@ def test_a_stuck_gripper_does_not_creep_whatever_it_holds(name, params):
     term = TERMS[name]
     params = PlantParams(drive(), thing(Elastic(2000.0, 0.0), params, skins=1.5e4), FINE)
     state = run(params, at(0.0501, (NoState(), term.at_rest)), 23.0, 3.0, (elastic, term.law))
-    assert state.speed_rev_s == 0.0
+    assert state.motion.speed_rev_s == 0.0
     after = run(params, state, 23.0, 1e6, (elastic, term.law), dt=1e3)
-    assert after.revolutions == state.revolutions
-    assert math.isfinite(after.squeezed.force_n)
+    assert after.motion.revolutions == state.motion.revolutions
+    assert math.isfinite(after.contact.left.force_n)

@@ -22,8 +22,8 @@ def test_the_open_loop_profile_gives_the_exact_trace(ticks):
     gaps, forces = [], []
     for tick in range(ticks):
         state = move(setting.plant, state, profile(tick * TICK), TICK)
-        gaps.append(state.gap_m)
-        forces.append(state.left_n)
+        gaps.append(state.motion.gap_m)
+        forces.append(state.contact.left_n)
     # Its columns are of the beginning of each tick, the plant's of the end.
     run = exact(lambda tick, x, v, f: profile(tick * TICK), ticks + 1)
     gap, force = OPEN_M - run.x[1:], run.force[1:]
@@ -31,4 +31,4 @@ def test_the_open_loop_profile_gives_the_exact_trace(ticks):
     assert peak > 1.0
     assert np.max(np.abs(np.array(gaps) - gap)) < 1e-5
     assert np.sqrt(np.mean((np.array(forces) - force) ** 2)) < 1e-2 * peak
-    assert state.left_n == pytest.approx(state.right_n)
+    assert state.contact.left_n == pytest.approx(state.contact.right_n)

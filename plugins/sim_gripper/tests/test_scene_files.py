@@ -120,12 +120,13 @@ def test_an_object_held_fast_is_pressed_by_the_finger_that_meets_it_first(scene)
     _, fast = pressed(config, 10.0, 6.0, scene=scene(text.format("held = true\n")))
     end = fast[-1]
     # Each half is twice as stiff as the whole; effort is the mean of the two pads.
-    assert end.right_n - end.left_n == pytest.approx(2000.0 * 4 * 0.002 / (1 + 2000.0 / 1.5e4), rel=1e-3)
-    assert 0.5 * (end.left_n + end.right_n) == pytest.approx(10.0, rel=1e-2)
-    assert end.offset_m == pytest.approx(0.002)
+    difference_n = end.contact.right_n - end.contact.left_n
+    assert difference_n == pytest.approx(2000.0 * 4 * 0.002 / (1 + 2000.0 / 1.5e4), rel=1e-3)
+    assert 0.5 * (end.contact.left_n + end.contact.right_n) == pytest.approx(10.0, rel=1e-2)
+    assert end.contact.offset_m == pytest.approx(0.002)
     _, free = pressed(config, 10.0, 6.0, scene=scene(text.format("")))
-    assert free[-1].left_n == free[-1].right_n == pytest.approx(10.0, rel=1e-2)
-    assert free[-1].offset_m == 0.0
+    assert free[-1].contact.left_n == free[-1].contact.right_n == pytest.approx(10.0, rel=1e-2)
+    assert free[-1].contact.offset_m == 0.0
 
 
 def test_a_drive_that_lags_gives_its_effort_as_a_first_order_rise(scene):
@@ -136,7 +137,7 @@ def test_a_drive_that_lags_gives_its_effort_as_a_first_order_rise(scene):
     _, at_once = pressed(quick, 2.0, 0.2, scene=scene(BOTTLE))
     _, later = pressed(lagging, 2.0, 0.2, scene=scene(BOTTLE))
     # Impulse of 1 - exp(-t / tau) over 0.2 s: 0.2 - 0.05 (1 - exp(-4)).
-    ratio = later[-1].speed_rev_s / at_once[-1].speed_rev_s
+    ratio = later[-1].motion.speed_rev_s / at_once[-1].motion.speed_rev_s
     assert ratio == pytest.approx((0.2 - 0.05 * 0.9817) / 0.2, rel=2e-3)
     assert later[-1].effort_n == pytest.approx(2.0 * 0.9817, rel=1e-3)
 
@@ -150,11 +151,11 @@ def test_covers_that_creep_give_way_and_covers_that_damp_lower_no_force_at_rest(
     )  # fmt: skip
     _, stiff = pressed(plain, 20.0, 20.0, scene=hard)
     _, soft = pressed(creeping, 20.0, 20.0, scene=hard)
-    assert soft[-1].squeezed.force_n == pytest.approx(20.0, rel=1e-2)
+    assert soft[-1].contact.left.force_n == pytest.approx(20.0, rel=1e-2)
     # The arm has let go: the gap is where the spring alone leaves it, and got there later.
-    assert soft[-1].gap_m == pytest.approx(stiff[-1].gap_m, abs=2e-5)
-    first = next(k for k, b in enumerate(soft) if b.touched)
-    assert soft[first + 300].gap_m > stiff[first + 300].gap_m + 1e-4
+    assert soft[-1].motion.gap_m == pytest.approx(stiff[-1].motion.gap_m, abs=2e-5)
+    first = next(k for k, b in enumerate(soft) if b.contact.touched)
+    assert soft[first + 300].motion.gap_m > stiff[first + 300].motion.gap_m + 1e-4
 
 
 def test_a_bottle_with_a_deep_snap_stays_dented(scene):
@@ -173,12 +174,12 @@ def test_a_bottle_with_a_deep_snap_stays_dented(scene):
     move, body = plant_of(laws_of(setting.kinds)), setting.body
     for _ in range(3000):
         body = move(setting.plant, body, 25.0, 1e-3)
-    assert body.squeezed.force_n > 8.0
+    assert body.contact.left.force_n > 8.0
     for _ in range(3000):
         body = move(setting.plant, body, -30.0, 1e-3)
-    assert body.squeezed.force_n == 0.0
+    assert body.contact.left.force_n == 0.0
     # On the second branch, where it crosses zero: 6 - 8 + 3000 (d - 0.007) = 0.
-    assert body.squeezed.compression_m == pytest.approx(0.007 + 2.0 / 3000.0, rel=1e-3)
+    assert body.contact.left.compression_m == pytest.approx(0.007 + 2.0 / 3000.0, rel=1e-3)
 
 
 def test_the_explanation_adds_up_to_the_force_that_was_felt():
@@ -253,7 +254,7 @@ PROGRAM = """
 
     law, (scene, *compiled) = create("controller", "hybrid"), sys.argv[1:]
     done = [run_many(SimConfig(spread=False), law, [scene], [0], compiled=one == "yes")[0] for one in compiled]
-    print(done[0].outcome.name, done[0].body.squeezed.force_n, done[0].body.peak_n)
+    print(done[0].outcome.name, done[0].body.contact.left.force_n, done[0].body.peak_n)
     print(all(np.array_equal(done[0].trace.gap_m, one.trace.gap_m) for one in done))
 """
 

@@ -13,7 +13,7 @@ from graspsense_sim_gripper.terms.gas import Gas, GasState, gas
 from graspsense_sim_gripper.terms.liquid import GRAVITY_M_S2, Liquid, liquid
 from graspsense_sim_gripper.terms.loss import Loss, loss
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
-from graspsense_sim_gripper.terms.oscillator import Motion, moved
+from graspsense_sim_gripper.terms.oscillator import OscillatorState, moved
 from graspsense_sim_gripper.terms.registry import TERMS
 from graspsense_sim_gripper.terms.rigid import Rigid, RigidState, rigid
 from graspsense_sim_gripper.terms.slosh import Slosh, slosh
@@ -265,7 +265,7 @@ def test_a_worn_shell_is_softer_and_dented_by_as_much_as_its_law_says():
 
 def test_a_column_of_liquid_weighs_at_rest_what_it_should():
     bottle = Liquid(1.2e-3, 5e-4, 0.08, 1e-10)
-    forces, _, _ = along(liquid, bottle, Motion(0.0, 0.0), [*ramp(0.01, 100), *[0.01] * 400], 1.0)
+    forces, _, _ = along(liquid, bottle, OscillatorState(0.0, 0.0), [*ramp(0.01, 100), *[0.01] * 400], 1.0)
     # rho g A^2 / A_n: 28 N/m here, far below the wall's 14 kN/m.
     expected = 1000.0 * GRAVITY_M_S2 * 1.2e-3**2 / 5e-4 * 0.01
     assert sum(forces[-300:]) / 300 == pytest.approx(expected, rel=0.05)
@@ -274,7 +274,7 @@ def test_a_column_of_liquid_weighs_at_rest_what_it_should():
 def test_liquid_with_a_stiff_wall_resists_as_its_mass_times_the_acceleration():
     bottle = Liquid(1.2e-3, 5e-4, 0.08, 1e-13, viscosity_pa_s=1.0)
     path = [0.5 * 2.0 * (1e-4 * k) ** 2 for k in range(1001)]
-    force = along(liquid, bottle, Motion(0.0, 0.0), path, 1e-4)[0][-1]
+    force = along(liquid, bottle, OscillatorState(0.0, 0.0), path, 1e-4)[0][-1]
     ratio = 1.2e-3**2 / 5e-4
     mass, damping = 1000.0 * 0.08 * ratio, 8.0 * math.pi * 1.0 * 0.08 * ratio / 5e-4
     weight = 1000.0 * GRAVITY_M_S2 * ratio * 0.01
@@ -288,8 +288,8 @@ def test_liquid_with_a_stiff_wall_resists_as_its_mass_times_the_acceleration():
 )
 def test_an_oscillators_motion_is_exact_whatever_the_step(w, ratio, steps):
     square, a = w * w, ratio * w
-    whole = moved(Motion(1e-3, 0.2), a, square, 3.0, 40.0, 0.01)
-    pieces = Motion(1e-3, 0.2)
+    whole = moved(OscillatorState(1e-3, 0.2), a, square, 3.0, 40.0, 0.01)
+    pieces = OscillatorState(1e-3, 0.2)
     for k in range(steps):
         pieces = moved(pieces, a, square, 3.0 + 40.0 * 0.01 * k / steps, 40.0, 0.01 / steps)
     scale = 1e-3 + 3.4 / square + 0.01 * 0.2
@@ -299,18 +299,18 @@ def test_an_oscillators_motion_is_exact_whatever_the_step(w, ratio, steps):
 def test_slosh_swings_at_its_frequency_after_a_step():
     mode = Slosh(0.2, 4.0, 0.01)
     path = [min(0.05 * 1e-3 * k, 0.005) for k in range(1000)]
-    forces, _, _ = along(slosh, mode, Motion(0.0, 0.0), path, 1e-3)
+    forces, _, _ = along(slosh, mode, OscillatorState(0.0, 0.0), path, 1e-3)
     crossings = [k for k, (x, y) in enumerate(pairwise(forces)) if k > 120 and x < 0.0 <= y]
     assert (crossings[-1] - crossings[0]) / (len(crossings) - 1) == pytest.approx(250.0, rel=0.01)
 
 
 def test_a_surface_rings_on_its_springs_and_a_light_one_is_those_springs_in_series():
     light = Surface(1e-7, 2000.0, 0.05, 20000.0)
-    force, state = surface(light, Motion(0.0, 0.0), 0.0, 0.01, 0.5, 0.01 / 0.5)
+    force, state = surface(light, OscillatorState(0.0, 0.0), 0.0, 0.01, 0.5, 0.01 / 0.5)
     assert force == pytest.approx(0.01 * 2000.0 * 20000.0 / 22000.0, rel=1e-4)
     # Struck and left: the contact parts, and the mass swings by itself with sqrt(k / m).
     swinging = Surface(0.02, 2000.0, 0.0, 20000.0)
-    _, state = surface(swinging, Motion(0.0, 0.0), 0.0, 0.002, 1e-3, 0.002 / 1e-3)
+    _, state = surface(swinging, OscillatorState(0.0, 0.0), 0.0, 0.002, 1e-3, 0.002 / 1e-3)
     force, state = surface(swinging, state, 0.002, -0.05, 1e-4, (-0.05 - 0.002) / 1e-4)
     assert force == 0.0
     period = 2.0 * math.pi * math.sqrt(0.02 / 2000.0)
@@ -323,8 +323,10 @@ def test_a_surface_bounces_alike_however_long_the_pieces_are(steps):
     # 10 g on 10 kN/m behind a contact of 1 MN/m: it bounces several times within a millisecond.
     hit = Surface(0.01, 1e4, 0.2, 1e6)
     path = [2e-4 + 5e-5 * k / steps for k in range(3 * steps + 1)]
-    force, _, state = along(surface, hit, Motion(0.0, 0.0), path, 1e-3 / steps)
-    exact = along(surface, hit, Motion(0.0, 0.0), [2e-4 + 5e-5 * k / 2000 for k in range(6001)], 5e-7)
+    force, _, state = along(surface, hit, OscillatorState(0.0, 0.0), path, 1e-3 / steps)
+    exact = along(
+        surface, hit, OscillatorState(0.0, 0.0), [2e-4 + 5e-5 * k / 2000 for k in range(6001)], 5e-7
+    )
     assert force[-1] == pytest.approx(exact[0][-1], rel=2e-3)
     assert state.y_m == pytest.approx(exact[2].y_m, rel=2e-3)
 

@@ -29,12 +29,13 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.checking import Control, checked_choice, standard
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
 from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.linear import Linear, move_of
 from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
-from graspsense_sim_gripper.plant import PlantParams, PlantState, Squeezed
+from graspsense_sim_gripper.plant import PlantParams
 from graspsense_sim_gripper.sensing import (
     PAD_COUNTS_PER_N,
     Encoder,
@@ -56,7 +57,9 @@ _sense = bind(
 )
 _reading = maker(Reading)
 _COMPILED: Mapping[str, bool | None] = {"worth": None, "always": True, "never": False}
-_PLANT_TUPLES = {"PlantState": maker(PlantState), "Squeezed": maker(Squeezed)}
+_PLANT_TUPLES = {
+    kind.__name__: maker(kind) for kind in (PlantState, Motion, Contact, ContactState, StepState)
+}
 
 
 class SimBackend(BatchBackend[SimConfig]):
@@ -115,9 +118,9 @@ class SimBackend(BatchBackend[SimConfig]):
         else:
             self._body = self._move(self._plant, self._body, effort, dt)
             self._ticks += 1
-            if self._explains and self._body.touched == 1:
+            if self._explains and self._body.contact.touched == 1:
                 # Of an object that is held fast the half that is pressed harder.
-                half = max(self._body.squeezed, self._body.right, key=lambda one: one.force_n)
+                half = max(self._body.contact.left, self._body.contact.right, key=lambda one: one.force_n)
                 self._pressed.append((half.compression_m, half.force_n))
         buffers = self._buffers
         if self._sensor.images >= len(buffers.images):
@@ -159,7 +162,7 @@ class SimBackend(BatchBackend[SimConfig]):
             report["selection"] = {
                 "fidelity": self.config.fidelity,
                 **choice.plain(),
-                "steps": self._body.steps,
+                "steps": self._body.step.n_steps,
                 "within": choice.covers(self._body.peak_n),
             }
         if self.config.explain:
@@ -207,13 +210,15 @@ class SimBackend(BatchBackend[SimConfig]):
 def _known(body: PlantState, kinds: Sequence[str]) -> dict[str, Any]:
     """Return what only the model knows at the end of a grasp."""
     states = (
-        (kind, half.states[i]) for half in (body.squeezed, body.right) for i, kind in enumerate(kinds, 1)
+        (kind, half.states[i])
+        for half in (body.contact.left, body.contact.right)
+        for i, kind in enumerate(kinds, 1)
     )
     beyond = {f"{kind}: {why}": None for kind, state in states if (why := find_term(kind)[1].beyond(state))}
     return {
         "simulated": True,
         "true_peak_force_n": body.peak_n,
-        "resolved": body.unresolved == 0,
-        "broken": any(getattr(state, "broken", 0) == 1 for state in body.squeezed.states),
+        "resolved": body.step.unresolved == 0,
+        "broken": any(getattr(state, "broken", 0) == 1 for state in body.contact.left.states),
         "beyond": "; ".join(beyond),
     }

@@ -38,6 +38,7 @@ from graspsense.plugin_api import (
     tick_params,
 )
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.state import Motion
 from graspsense_sim_gripper.kernel import grasp_of
 from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.loop import COLUMNS, NOT_STARTED, Buffers, GraspParams, Progress, has_ended
@@ -373,28 +374,28 @@ class _Trial:
         """Return the grasp as it stands shortly before the first touch."""
         # Not cut into short steps, as nothing happens.
         steps = setting.plant.steps._replace(scheme=EXPLICIT, longest_s=math.inf)
-        reach = setting.plant.thing.width_m + 2.0 * abs(setting.body.offset_m)
+        reach = setting.plant.thing.width_m + 2.0 * abs(setting.body.contact.offset_m)
         link = setting.plant.drive.link
         law = self.control.controller
         for far in (True, False):
             body = setting.body
             if not far:
-                near = revolutions_at(link, min(body.gap_m, reach + NEAR_M))
+                near = revolutions_at(link, min(body.motion.gap_m, reach + NEAR_M))
                 gap, rate = gap_and_rate(link, near)
-                body = body._replace(revolutions=near, gap_m=gap, rate_m_rev=rate)
+                body = body._replace(motion=Motion(near, body.motion.speed_rev_s, gap, rate))
             drive = self._driven(setting, far)
             state = first_state(law.init())
             now = _Stand(Progress(NOT_STARTED, body, setting.sensed, state), (), far)
             while not has_ended(now.progress.controller):
-                ticks, plant = now.progress.loop.ticks, now.progress.plant
+                ticks, motion = now.progress.loop.ticks, now.progress.plant.motion
                 if ticks >= self._ticks(setting):
                     break
-                closing = max(-plant.speed_rev_s * plant.rate_m_rev, SPEED_M_S)
-                ahead = 0.5 * (plant.gap_m - reach) / (closing * setting.dt_s)
+                closing = max(-motion.speed_rev_s * motion.jacobian_m_rev, SPEED_M_S)
+                ahead = 0.5 * (motion.gap_m - reach) / (closing * setting.dt_s)
                 if ahead < 2.0:
                     return now
                 after = drive(steps, now, ticks + min(int(ahead), LEAP))
-                if after.progress.plant.touched == 1:
+                if after.progress.plant.contact.touched == 1:
                     return now
                 now = after
             if has_ended(now.progress.controller):
@@ -424,10 +425,11 @@ class _Trial:
 
         def drive(steps: Steps, at: _Stand, until: int) -> _Stand:
             progress, rows, _ = at
-            if progress.plant.touched == 0:
+            if progress.plant.contact.touched == 0:
                 # What nothing has pressed yet, as this composition has it.
-                body = progress.plant._replace(squeezed=made.body.squeezed, right=made.body.right)
-                progress = progress._replace(plant=body)
+                contact, fresh = progress.plant.contact, made.body.contact
+                contact = contact._replace(left=fresh.left, right=fresh.right)
+                progress = progress._replace(plant=progress.plant._replace(contact=contact))
             plant: Any = made.plant._replace(steps=steps) if by_maps is None else by_maps[0]
             grasp_params = GraspParams(plant, made.sensor, params, setting.dt_s, until)
             while not has_ended(progress.controller) and progress.loop.ticks < until:

@@ -11,9 +11,10 @@ from typing import Any, Final
 
 from graspsense.plugin_api import CompileOptions, Inlining, bind, compile_function, tick
 from graspsense_sim_gripper import linear, plant
+from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.linear_modes import Shape
 from graspsense_sim_gripper.loop import grasp
-from graspsense_sim_gripper.plant import PlantParams, PlantState
+from graspsense_sim_gripper.plant import PlantParams
 from graspsense_sim_gripper.terms.term import Law
 
 
@@ -78,7 +79,7 @@ def plant_of(
     felt = bind(plant._felt, squeeze=squeeze)
     stuck = bind(plant._stuck, _felt=felt, **tuples)
     step = bind(plant._step, _felt=felt, _stuck=stuck, _implicit=bind(plant._implicit, _felt=felt), **tuples)
-    glide = bind(plant._glide, **{name: made for name, made in tuples.items() if name == "PlantState"})
+    glide = bind(plant._glide, **tuples)
     stepped = bind(plant._stepped, _step=step)
     driven = plant._settled if settles else plant._driven
     return bind(plant.move, _driven=bind(driven, _stepped=stepped, _glide=glide))

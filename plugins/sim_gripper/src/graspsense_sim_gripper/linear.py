@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import bind
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
 from graspsense_sim_gripper.linear_modes import (
     APART_M,
     FORCE,
@@ -29,8 +30,6 @@ from graspsense_sim_gripper.linear_modes import (
 from graspsense_sim_gripper.plant import (
     IN_SHAPE_M,
     PlantParams,
-    PlantState,
-    Squeezed,
 )
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import NO_STATE
@@ -444,24 +443,8 @@ def move(params: Linear, state: PlantState, effort_n: float, dt: float) -> Plant
 def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tuple[bool, PlantState]:
     """Return whether the maps can take this tick, and the plant after it."""
     plant, room = params.plant, params.room
-    (
-        revolutions,
-        speed,
-        gap,
-        rate,
-        felt_left,
-        felt_right,
-        offset,
-        touched,
-        squeezed,
-        peak,
-        given,
-        other,
-        step,
-        n,
-        lost,
-        alone,
-    ) = state
+    (revolutions, speed, gap, rate), contact, (step, n, lost), given, peak = state
+    felt_left, felt_right, offset, touched, squeezed, other, alone = contact
     drive, thing = plant.drive, plant.thing
     # Opened as far as it goes it stands, whatever opens it further, and what it let go comes back to its shape.
     opened = revolutions >= drive.open_rev and effort_n <= 0.0
@@ -483,8 +466,8 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
     if PARTS == 1:
         d = squeezed.compression_m
         if CREEPS == 1:
-            cover = squeezed.cover_m
-            room[NOW + 3], room[NOW + 4] = cover, squeezed.arm_n
+            cover = squeezed.pad_m
+            room[NOW + 3], room[NOW + 4] = cover, squeezed.branch_n
             at = 5
         else:
             at = 3
@@ -524,7 +507,7 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
         return False, state
     # A mode that begins at the very end of the tick has yet to act.
     force = max(room[THEN + STATES + FORCE], 0.0) if pressed == 1 else 0.0
-    cover, arm = squeezed.cover_m, squeezed.arm_n
+    cover, arm = squeezed.pad_m, squeezed.branch_n
     if CREEPS == 1:
         cover, arm = room[THEN + 3], room[THEN + 4]
     if PARTS == 1:
@@ -540,25 +523,14 @@ def _taken(params: Linear, state: PlantState, effort_n: float, dt: float) -> tup
     if LAGS == 1:
         given = room[THEN + STATES - 1]
     after_states, _ = take_states(thing.terms, squeezed.states, room, THEN + own)
-    felt = Squeezed(d, force, squeezed.slope_n_m, after_states, cover, arm, squeezed.rate_m_s, math.inf)
+    felt = ContactState(d, force, squeezed.slope_n_m, after_states, cover, arm, squeezed.rate_m_s, math.inf)
     if thing.held == 1:
         # Centred: the other half does the same.
         other = felt
     return True, PlantState(
-        revolutions1,
-        -room[THEN + 1] * turns,
-        gap1,
-        rate,
-        force,
-        force,
-        offset,
-        touched,
-        felt,
-        top,
+        Motion(revolutions1, -room[THEN + 1] * turns, gap1, rate),
+        Contact(force, force, offset, touched, felt, other, 0.0),
+        StepState(step, n + 1, lost + (1 if events >= MOST_EVENTS else 0)),
         given,
-        other,
-        step,
-        n + 1,
-        lost + (1 if events >= MOST_EVENTS else 0),
-        0.0,
+        top,
     )

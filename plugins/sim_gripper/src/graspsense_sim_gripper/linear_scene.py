@@ -35,14 +35,14 @@ def linear_of(config: SimConfig, setting: Setting, *, on_arrays: bool = False) -
         forced
         or drive.link.finger_m != 0.0
         or drive.breakaway_n != drive.coulomb_n
-        or (thing.held == 1 and setting.body.offset_m != 0.0)
+        or (thing.held == 1 and setting.body.contact.offset_m != 0.0)
     ):
         return None
     forms = forms_of(thing, setting.kinds)
     if forms is None:
         return None
     scene = Scene(
-        drive.inertia / setting.body.rate_m_rev**2,
+        drive.inertia / setting.body.motion.jacobian_m_rev**2,
         drive.damping_n_s_m,
         drive.breakaway_n > 0.0,
         drive.load_share,

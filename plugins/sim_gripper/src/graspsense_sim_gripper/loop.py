@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import TARING, Command, Frame, Pads, TickParams, TickState
-from graspsense_sim_gripper.plant import PlantState
+from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.sensing import PadBuffers, SensorParams, SensorState, apply_tare, sense
 
 COLUMNS: Final = (

@@ -28,6 +28,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import ScrewLinkage, gap_and_rate
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
 from graspsense_sim_gripper.terms.relaxation import late_share, mean_share
 
 MOST_STEPS: Final = 20_000
@@ -146,50 +147,6 @@ class PlantParams(NamedTuple):
     steps: Steps
 
 
-class Squeezed(NamedTuple):
-    """The object's compression, the force that goes with it, its last slope, and its terms' states."""
-
-    compression_m: float
-    force_n: float
-    slope_n_m: float
-    states: Any
-    cover_m: float = 0.0
-    """Compression of the two covers, kept where they creep or damp."""
-    arm_n: float = 0.0
-    rate_m_s: float = 0.0
-    """Mean rate of the compression in the last piece of path, and how long that took (inf: there was none)."""
-    span_s: float = math.inf
-
-
-class PlantState(NamedTuple):
-    """Motor angle and speed (revolutions), the gap with its rate, forces on the pads, the object's state."""
-
-    revolutions: float
-    speed_rev_s: float
-    gap_m: float
-    rate_m_rev: float
-    left_n: float
-    right_n: float
-    offset_m: float
-    """Where the object stands off the gripper's centre line; positive is nearer the right finger."""
-    touched: int
-    squeezed: Squeezed
-    """The object; where it is held fast, its half at the left finger, as if the other did the same."""
-    peak_n: float
-    effort_n: float
-    """What the drive gives at the moment, where it lags."""
-    right: Squeezed
-    """The half at the right finger of an object that is held fast."""
-    step_s: float = math.inf
-    """How long the next step may be, by the error of the last."""
-    steps: int = 0
-    """How many steps were taken, a tick that is taken as a whole being one; one that stands for all of it none."""
-    unresolved: int = 0
-    """How many steps were taken although their error was too large."""
-    alone_s: float = 0.0
-    """For how long an object that was let go has come back to its shape since that was last looked at."""
-
-
 def _unbound(params: Any, states: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
     raise TypeError("the plant has no terms: bind(squeeze, advance=sum_of(terms))")
 
@@ -212,7 +169,7 @@ def root_guess(x: float, miss: float, last: float, slope: float, least: float, m
     return x - further if miss > 0.0 else x + further
 
 
-def squeeze(thing: Thing, now: Squeezed, closure_m: float, speed_m_s: float, h: float) -> Squeezed:
+def squeeze(thing: Thing, now: ContactState, closure_m: float, speed_m_s: float, h: float) -> ContactState:
     """Return the object after the fingers have come to `closure_m` (its width less the gap) within `h`.
 
     They then close at `speed_m_s`. The covers' compression and the object's add up to the closure and carry one
@@ -233,7 +190,7 @@ def squeeze(thing: Thing, now: Squeezed, closure_m: float, speed_m_s: float, h: 
         force, states = advance(terms, states0, d0, closure_m, h, speed_m_s)
         # A finger that is still behind where the object stood presses it only if that has not come back so far.
         if force >= 0.0 and (force <= 0.0 or force0 > 0.0 or closure_m >= d0):
-            return Squeezed(closure_m, force, slope, states, cover0, arm0, rate0, math.inf)
+            return ContactState(closure_m, force, slope, states, cover0, arm0, rate0, math.inf)
         if h <= 0.0:
             return now
         attempt = 1
@@ -273,7 +230,7 @@ def squeeze(thing: Thing, now: Squeezed, closure_m: float, speed_m_s: float, h: 
         force, states = advance(terms, states0, d0, d1, h, speed_m_s if rigid else (d1 - base) / over)
         if rigid:
             if force >= 0.0:
-                return Squeezed(d1, force, slope, states, cover0, arm0, rate0, math.inf)
+                return ContactState(d1, force, slope, states, cover0, arm0, rate0, math.inf)
             rigid, attempt = False, 1
             total = _let_go(slope, force, force0, d0, closure_m)
             d1 = d0 - force0 / total
@@ -315,13 +272,13 @@ def squeeze(thing: Thing, now: Squeezed, closure_m: float, speed_m_s: float, h: 
     rate = (d1 - d0) / h
     if not touching:
         arm = arm0 * kept + (even + late) * (free_cover - cover0)
-        return Squeezed(d1, 0.0, slope, states, free_cover, arm, rate, math.inf)
+        return ContactState(d1, 0.0, slope, states, free_cover, arm, rate, math.inf)
     span = h if force0 > 0.0 else math.inf
     if not creeps:
-        return Squeezed(d1, force, slope, states, cover0, arm0, rate, span)
+        return ContactState(d1, force, slope, states, cover0, arm0, rate, span)
     cover = closure_m - d1
     arm = arm0 * kept + even * (cover - cover0) + late * h * (speed_m_s - (d1 - base) / over)
-    return Squeezed(d1, force, slope, states, cover, arm, rate, span)
+    return ContactState(d1, force, slope, states, cover, arm, rate, span)
 
 
 def _let_go(slope: float, force: float, force0: float, d0: float, closure_m: float) -> float:
@@ -394,56 +351,18 @@ def move(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> 
             decay = math.exp(-h / lag)
             short = state.effort_n - effort_n
             given = effort_n + short * mean_share(h / lag, decay)
-            state = _with_effort(state, effort_n + short * decay)
+            motion, contact, step, _, peak = state
+            state = PlantState(motion, contact, step, effort_n + short * decay, peak)
         state = _driven(params, state, given, h)
     return state
-
-
-def _with_effort(state: PlantState, effort_n: float) -> PlantState:
-    (
-        revolutions,
-        speed,
-        gap,
-        rate,
-        left,
-        right,
-        offset,
-        touched,
-        squeezed,
-        peak,
-        _,
-        other,
-        step,
-        n,
-        lost,
-        since,
-    ) = state
-    return PlantState(
-        revolutions,
-        speed,
-        gap,
-        rate,
-        left,
-        right,
-        offset,
-        touched,
-        squeezed,
-        peak,
-        effort_n,
-        other,
-        step,
-        n,
-        lost,
-        since,
-    )
 
 
 def _driven(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
     """Return the plant after `dt` under a constant effort, taken once."""
     drive, thing, steps = params
-    if state.touched == 0 and state.speed_rev_s == 0.0 and _blocked(drive, state, effort_n):
+    if state.contact.touched == 0 and state.motion.speed_rev_s == 0.0 and _blocked(drive, state, effort_n):
         return state
-    if state.speed_rev_s != 0.0 and steps.longest_s >= dt <= state.step_s:
+    if state.motion.speed_rev_s != 0.0 and steps.longest_s >= dt <= state.step.next_s:
         alike, after = _glide(drive, thing, steps, state, effort_n, dt)
         if alike:
             return after
@@ -457,7 +376,7 @@ def _stepped(
     """Return the plant after `dt` under a constant effort, and in how many steps."""
     left, count = dt, 0
     while True:
-        h = min(state.step_s, steps.longest_s)
+        h = min(state.step.next_s, steps.longest_s)
         must = count >= MOST_STEPS
         if must or left <= h * (1.0 + 1e-9):
             h = left
@@ -476,9 +395,9 @@ def _settled(params: PlantParams, state: PlantState, effort_n: float, dt: float)
     The state that the tick began with is then needed to its end, which costs compiled code a twentieth.
     """
     drive, thing, steps = params
-    if state.touched == 0 and state.speed_rev_s == 0.0 and _blocked(drive, state, effort_n):
+    if state.contact.touched == 0 and state.motion.speed_rev_s == 0.0 and _blocked(drive, state, effort_n):
         return state
-    if state.speed_rev_s != 0.0 and steps.longest_s >= dt <= state.step_s and steps.settle <= 0.0:
+    if state.motion.speed_rev_s != 0.0 and steps.longest_s >= dt <= state.step.next_s and steps.settle <= 0.0:
         alike, after = _glide(drive, thing, steps, state, effort_n, dt)
         if alike:
             return after
@@ -491,16 +410,18 @@ def _settled(params: PlantParams, state: PlantState, effort_n: float, dt: float)
             or halved == MOST_HALVINGS
             # Halved once more they would be too many, and too short to be of use.
             or 4 * count > MOST_STEPS
-            or (state.touched == 0 and state.speed_rev_s == 0.0)
+            or (state.contact.touched == 0 and state.motion.speed_rev_s == 0.0)
         ):
             return state
         # Where the first steps were cut at half the tick already, those of the next attempt are the same.
         if count > counted > 0:
-            speed0, speed1 = before.speed_rev_s * before.rate_m_rev, state.speed_rev_s * state.rate_m_rev
-            force0, force1 = before.left_n + before.right_n, state.left_n + state.right_n
+            speed0 = before.motion.speed_rev_s * before.motion.jacobian_m_rev
+            speed1 = state.motion.speed_rev_s * state.motion.jacobian_m_rev
+            contact0, contact1 = before.contact, state.contact
+            force0, force1 = contact0.left_n + contact0.right_n, contact1.left_n + contact1.right_n
             # What is let go has no force that tells of it until it strikes the fingers again.
-            shape0, shape1 = before.squeezed.compression_m, state.squeezed.compression_m
-            other0, other1 = before.right.compression_m, state.right.compression_m
+            shape0, shape1 = contact0.left.compression_m, contact1.left.compression_m
+            other0, other1 = contact0.right.compression_m, contact1.right.compression_m
             if (
                 abs(speed1 - speed0) <= steps.settle * max(abs(speed1), SPEED_SCALE_M_S)
                 and abs(force1 - force0) <= steps.settle * max(force1, FORCE_SCALE_N)
@@ -529,24 +450,8 @@ def _glide(
     are taken, of friction and damper over the speed and of the linkage's ratio over the way, so that a tick waits for
     friction and linkage once, and for neither behind the other.
     """
-    (
-        revolutions,
-        speed,
-        gap,
-        rate,
-        left,
-        right,
-        offset,
-        touched,
-        squeezed,
-        peak,
-        given,
-        other,
-        step,
-        n,
-        lost,
-        alone,
-    ) = state
+    (revolutions, speed, gap, rate), contact, (step, n, lost), given, peak = state
+    left, right, offset, touched, squeezed, other, alone = contact
     direction = 1.0 if speed > 0.0 else -1.0
     load = 0.5 * (left + right)
     reach = thing.width_m + 2.0 * abs(offset)
@@ -600,22 +505,11 @@ def _glide(
         pushed = 0.5 * (gap1 - reach)
         offset = pushed if offset >= 0.0 else -pushed
     return True, PlantState(
-        revolutions1,
-        speed1,
-        gap1,
-        rate1,
-        left,
-        right,
-        offset,
-        touched,
-        squeezed,
-        peak,
+        Motion(revolutions1, speed1, gap1, rate1),
+        Contact(left, right, offset, touched, squeezed, other, alone),
+        StepState(step, n + 1, lost),
         given,
-        other,
-        step,
-        n + 1,
-        lost,
-        alone,
+        peak,
     )
 
 
@@ -634,24 +528,8 @@ def _step(
     What stands still does so for the longest step, as a rule all that is left of the tick. `must`: whatever its error.
     A step whose error is too large takes no time, and leaves the state as it was with a shorter step to try.
     """
-    (
-        revolutions,
-        speed,
-        gap,
-        rate,
-        left,
-        right,
-        offset,
-        touched,
-        squeezed,
-        peak,
-        given,
-        other,
-        step,
-        n,
-        lost,
-        alone,
-    ) = state
+    (revolutions, speed, gap, rate), contact, (step, n, lost), given, peak = state
+    left, right, offset, touched, squeezed, other, alone = contact
     load = 0.5 * (left + right)
     net = load - effort_n
     used = h
@@ -696,7 +574,7 @@ def _step(
             short = abs(speed) / (abs(speed) + abs(speed1))
         elif load > 0.0 and load1 == 0.0 and gap1 > gap:
             # Let go on the way: beyond where the object then ends nothing drives the fingers.
-            beyond = gap1 - (thing.width_m - squeezed1.compression_m - squeezed1.cover_m)
+            beyond = gap1 - (thing.width_m - squeezed1.compression_m - squeezed1.pad_m)
             if beyond > TOUCHING_M:
                 short = max(1.0 - beyond / (gap1 - gap), 0.01)
         if short > 0.0 and h > SHORTEST_S and not must:
@@ -780,30 +658,13 @@ def _step(
         elif step < math.inf:
             step = growth * max(step, used) if step < LONG_S else math.inf
     if again > 0.0:
-        return PlantState(
-            revolutions,
-            speed,
-            gap,
-            rate,
-            left,
-            right,
-            offset,
-            touched,
-            squeezed,
-            peak,
-            given,
-            other,
-            again,
-            n,
-            lost,
-            alone,
-        ), 0.0
+        return PlantState(state.motion, contact, StepState(again, n, lost), given, peak), 0.0
     if gap > meeting >= gap1 and steps.tolerance < math.inf:
         # A damper of cover or object begins to relax here, which only short steps see.
         step = min(step, max(TOUCH_S * steps.tolerance, LEAST_TOUCH_S))
     if touched == 1 or gap1 <= reach:
         # Let go and in shape again: as before the first contact.
-        shape = abs(squeezed1.compression_m) + abs(squeezed1.cover_m) + abs(other1.compression_m)
+        shape = abs(squeezed1.compression_m) + abs(squeezed1.pad_m) + abs(other1.compression_m)
         touched = 0 if gap1 > reach and left1 + right1 == 0.0 and shape <= IN_SHAPE_M else 1
         peak = max(peak, squeezed1.force_n, other1.force_n)
     if revolutions1 >= drive.open_rev and speed1 >= 0.0:
@@ -813,33 +674,22 @@ def _step(
         revolutions1, speed1 = drive.closed_rev, 0.0
         gap1, rate1 = gap_and_rate(drive.link, revolutions1)
     return PlantState(
-        revolutions1,
-        speed1,
-        gap1,
-        rate1,
-        left1,
-        right1,
-        offset1,
-        touched,
-        squeezed1,
-        peak,
+        Motion(revolutions1, speed1, gap1, rate1),
+        Contact(left1, right1, offset1, touched, squeezed1, other1, alone if done else 0.0),
+        StepState(step, n + 1, lost),
         given,
-        other1,
-        step,
-        n + 1,
-        lost,
-        alone if done else 0.0,
+        peak,
     ), used
 
 
 def _blocked(drive: Drive, state: PlantState, effort_n: float) -> bool:
     """Return whether fingers that stand do not begin to move: for friction, or at an end of their travel."""
-    load = 0.5 * (state.left_n + state.right_n)
+    load = 0.5 * (state.contact.left_n + state.contact.right_n)
     net = load - effort_n
     return (
         abs(net) <= drive.breakaway_n + drive.load_share * load
-        or (net > 0.0 and state.revolutions >= drive.open_rev)
-        or (net < 0.0 and state.revolutions <= drive.closed_rev)
+        or (net > 0.0 and state.motion.revolutions >= drive.open_rev)
+        or (net < 0.0 and state.motion.revolutions <= drive.closed_rev)
     )
 
 
@@ -847,24 +697,8 @@ def _stuck(
     drive: Drive, thing: Thing, state: PlantState, effort_n: float, h: float
 ) -> tuple[PlantState, float]:
     """Return the plant after the fingers have stood still for `h`, or until they begin to slip."""
-    (
-        revolutions,
-        _,
-        gap,
-        rate,
-        left,
-        right,
-        offset,
-        touched,
-        squeezed,
-        peak,
-        given,
-        other,
-        step,
-        n,
-        lost,
-        alone,
-    ) = state
+    (revolutions, _, gap, rate), contact, step, given, peak = state
+    left, right, offset, touched, squeezed, other, alone = contact
     load = 0.5 * (left + right)
     spare = drive.breakaway_n + drive.load_share * load - abs(load - effort_n)
     used = h
@@ -879,22 +713,11 @@ def _stuck(
         used = max(used * (spare + 5e-7) / (spare - spare1), min(used, SHORTEST_S))
     peak = max(peak, squeezed1.force_n, other1.force_n)
     return PlantState(
-        revolutions,
-        0.0,
-        gap,
-        rate,
-        left1,
-        right1,
-        offset1,
-        touched,
-        squeezed1,
-        peak,
-        given,
-        other1,
+        Motion(revolutions, 0.0, gap, rate),
+        Contact(left1, right1, offset1, touched, squeezed1, other1, 0.0),
         step,
-        n,
-        lost,
-        0.0,
+        given,
+        peak,
     ), used
 
 
@@ -907,12 +730,13 @@ def _implicit(
     direction: float,
     h: float,
     by_mean: bool,
-) -> tuple[float, float, float, float, float, float, float, float, float, Squeezed, Squeezed]:
+) -> tuple[float, float, float, float, float, float, float, float, float, ContactState, ContactState]:
     """Take one step of TR-BDF2, or `by_mean` of the force along the step.
 
     Return angle, speed, gap and its rate, the errors of the speed (m/s) and of the force (N), and what `_felt` does.
     """
-    revolutions, speed, _, rate, left, right, offset, touched, squeezed, _, _, other, _, _, _, alone = state
+    revolutions, speed, _, rate = state.motion
+    left, right, offset, touched, squeezed, other, alone = state.contact
     part, over = GAMMA * h, WEIGHT * h
     scale = max(abs(speed), 1e-3 * SPEED_SCALE_M_S / abs(rate))
     # The trapezoid, then the backward difference over the same weight of the rate.
@@ -989,7 +813,7 @@ def _implicit(
         error = ESTIMATE * h * (early * kick - mid * middle_kick + late * kick1) / slope
         moved = ESTIMATE * h * (early * speed - mid * middle_speed + late * x) / slope
     way = abs(revolutions1 - revolutions)
-    before = 0.5 * (state.left_n + state.right_n)
+    before = 0.5 * (state.contact.left_n + state.contact.right_n)
     grip = abs(load1 - before) * abs(moved) / way if way > 0.0 else 0.0
     return (
         revolutions1,
@@ -1011,13 +835,13 @@ def _felt(
     left_n: float,
     right_n: float,
     offset_m: float,
-    squeezed: Squeezed,
-    other: Squeezed,
+    squeezed: ContactState,
+    other: ContactState,
     gap_m: float,
     speed_m_s: float,
     h: float,
     still: bool,
-) -> tuple[float, float, float, Squeezed, Squeezed]:
+) -> tuple[float, float, float, ContactState, ContactState]:
     """Return the forces on the pads at this gap, reached in `h` and closing at this speed, and the object then.
 
     Given are the forces, the offset and the object before; `still`: the fingers did not move.

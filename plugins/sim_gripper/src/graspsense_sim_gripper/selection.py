@@ -19,8 +19,9 @@ from typing import Any, Final, NamedTuple
 from attrs import asdict, evolve, frozen
 
 from graspsense.plugin_api import bind
+from graspsense_sim_gripper.dynamics.state import ContactState
 from graspsense_sim_gripper.kernel import sum_of
-from graspsense_sim_gripper.plant import EXPLICIT, MEAN_FORCE, STIFF, Squeezed, Steps, Thing, squeeze
+from graspsense_sim_gripper.plant import EXPLICIT, MEAN_FORCE, STIFF, Steps, Thing, squeeze
 from graspsense_sim_gripper.terms.registry import find_term, laws_of
 from graspsense_sim_gripper.terms.remainder import Kept, Remainder
 from graspsense_sim_gripper.terms.term import NO_STATE, WorkingPoint, no_rates
@@ -157,10 +158,10 @@ def whole(terms: Sequence[Any]) -> tuple[Kept, ...]:
     return (Kept(0, Remainder(0.0, 0.0)), *(Kept(1, one) for one in terms))
 
 
-def untouched(kinds: Sequence[str]) -> Squeezed:
+def untouched(kinds: Sequence[str]) -> ContactState:
     """Return an object of these terms that nothing has pressed yet."""
     states = (NO_STATE, *(find_term(kind)[1].at_rest for kind in kinds))
-    return Squeezed(0.0, 0.0, 0.0, states, 0.0, 0.0, 0.0, math.inf)
+    return ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0, 0.0, math.inf)
 
 
 def tolerance(accuracy: float) -> float:

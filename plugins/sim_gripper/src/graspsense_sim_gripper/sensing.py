@@ -23,7 +23,7 @@ from graspsense.plugin_api import (
     pad_force,
 )
 from graspsense_sim_gripper.drive_models import ENCODER_TICKS
-from graspsense_sim_gripper.plant import PlantState
+from graspsense_sim_gripper.dynamics.state import PlantState
 
 VELOCITY_FILTER_S: Final = 0.003
 """Time constant of the velocity filter. From 10 ms on the velocity loop runs into a limit cycle."""
@@ -137,7 +137,7 @@ class SensorState(NamedTuple):
 
 def initial_sensor(params: SensorParams, plant: PlantState) -> SensorState:
     """Return the sensor's state before the first tick; the velocity filter starts at rest."""
-    ticks = float(math.floor(plant.revolutions * ENCODER_TICKS))
+    ticks = float(math.floor(plant.motion.revolutions * ENCODER_TICKS))
     gap, _ = gap_and_rate(params.link, ticks / ENCODER_TICKS)
     return SensorState(Encoder(ticks, gap, 0.0), 0, 0.0, PadForces(0.0, 0.0, 0.0, 0.0), Pending(0, 0.0, 0.0))
 
@@ -153,8 +153,8 @@ def sense(
 ) -> tuple[Frame, SensorState]:
     """Return the frame of this tick and the sensor's state; a new image is written to `pads.images`."""
     if params.ideal == 1:
-        velocity = plant.speed_rev_s * plant.rate_m_rev
-        gap, left_n, right_n = plant.gap_m, plant.left_n, plant.right_n
+        velocity = plant.motion.speed_rev_s * plant.motion.jacobian_m_rev
+        gap, left_n, right_n = plant.motion.gap_m, plant.contact.left_n, plant.contact.right_n
         force_error_n, travel_share, from_m = params.bias
         if force_error_n != 0.0:
             gap += travel_share * min(gap - from_m, 0.0)
@@ -166,7 +166,7 @@ def sense(
     count, image_t, forces, pending = state.images, state.image_t_s, state.forces, state.pending
     due_s = params.clock.phase_s + count * params.clock.period_s - CLOCK_TOLERANCE_S
     if pending.waiting == 0 and t_s >= due_s:
-        pending = Pending(1, plant.left_n, plant.right_n)
+        pending = Pending(1, plant.contact.left_n, plant.contact.right_n)
     if pending.waiting == 1 and t_s >= due_s + params.clock.delay_s:
         image, noise = pads.images[count], pads.noise[count]
         _write_image(params, params.left, pending.left_n, noise, 0, image[0])
@@ -191,13 +191,14 @@ def sense(
 
 def _read_encoder(last: Encoder, plant: PlantState, dt_s: float) -> Encoder:
     ticks, gap, velocity = last
-    now = float(math.floor(plant.revolutions * ENCODER_TICKS))
+    now = float(math.floor(plant.motion.revolutions * ENCODER_TICKS))
     moved = 0.0
     if now != ticks:
         ticks = now
         before = gap
         # Within an encoder tick the linkage is linear to a tenth of a picometre.
-        gap = plant.gap_m - plant.rate_m_rev * (plant.revolutions - ticks / ENCODER_TICKS)
+        motion = plant.motion
+        gap = motion.gap_m - motion.jacobian_m_rev * (motion.revolutions - ticks / ENCODER_TICKS)
         moved = gap - before
     velocity += dt_s / (VELOCITY_FILTER_S + dt_s) * (moved / dt_s - velocity)
     return Encoder(ticks, gap, velocity)

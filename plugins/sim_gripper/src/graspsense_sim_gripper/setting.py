@@ -23,6 +23,7 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
+from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
 from graspsense_sim_gripper.objects.instance import Instance, cell_weights, central_cells, sample
 from graspsense_sim_gripper.objects.library import find, split_number
 from graspsense_sim_gripper.objects.spec import ObjectSpec
@@ -31,7 +32,6 @@ from graspsense_sim_gripper.plant import (
     STIFF,
     Drive,
     PlantParams,
-    PlantState,
     Skin,
     Steps,
     Thing,
@@ -202,7 +202,8 @@ def _plant(
         thing, at_rest, offset = _thing(config, instance), untouched(instance.kinds), instance.offset_m
         if choice is not None:
             thing, steps = choice.apply(thing, instance.kinds), choice.steps
-    state = PlantState(drive.open_rev, 0.0, gap, rate, 0.0, 0.0, offset, 0, at_rest, 0.0, 0.0, at_rest)
+    motion = Motion(drive.open_rev, 0.0, gap, rate)
+    state = PlantState(motion, Contact(0.0, 0.0, offset, 0, at_rest, at_rest))
     return PlantParams(drive, thing, steps), state
 
 

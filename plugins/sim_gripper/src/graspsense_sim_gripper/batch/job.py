@@ -28,6 +28,7 @@ from graspsense.plugin_api import (
 from graspsense_sim_gripper.checking import Checking, Control, Loops
 from graspsense_sim_gripper.compiled.padding import as_compiled, as_own, layout_of
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.kernel import grasp_of
 from graspsense_sim_gripper.linear_modes import Shape
 from graspsense_sim_gripper.linear_scene import linear_of
@@ -39,7 +40,6 @@ from graspsense_sim_gripper.loop import (
     Progress,
     has_ended,
 )
-from graspsense_sim_gripper.plant import PlantState
 from graspsense_sim_gripper.sensing import PadBuffers
 from graspsense_sim_gripper.setting import CELL_OFFSET, Chooser, Setting, device_info, set_scene
 from graspsense_sim_gripper.terms.registry import laws_of

@@ -14,8 +14,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.objects.library import catalogue
-from graspsense_sim_gripper.plant import PlantState
 from graspsense_sim_gripper.sensing import PadCells
 from graspsense_sim_gripper.setting import Setting, setting_of
 from graspsense_sim_gripper.terms.registry import find_term, in_order
@@ -101,15 +101,17 @@ def as_compiled(setting: Setting) -> Setting:
     layout = layout_of(setting)
     if kinds != layout.kinds:
         thing, places = plant.thing, layout.places
-        own, state = thing.terms, body.squeezed.states
+        own, state = thing.terms, body.contact.left.states
         terms = tuple([own[i] if i >= 0 else filler.params for i, filler in places])
-        left = body.squeezed._replace(states=tuple([state[i] if i >= 0 else f.state for i, f in places]))
+        left = body.contact.left._replace(states=tuple([state[i] if i >= 0 else f.state for i, f in places]))
         right = left
-        if body.right is not body.squeezed:
-            state = body.right.states
-            right = body.right._replace(states=tuple([state[i] if i >= 0 else f.state for i, f in places]))
+        if body.contact.right is not body.contact.left:
+            state = body.contact.right.states
+            right = body.contact.right._replace(
+                states=tuple([state[i] if i >= 0 else f.state for i, f in places])
+            )
         kinds, plant = layout.kinds, plant._replace(thing=thing._replace(terms=terms))
-        body = body._replace(squeezed=left, right=right)
+        body = body._replace(contact=body.contact._replace(left=left, right=right))
     return Setting(
         kinds=kinds,
         terms=setting.terms,
@@ -131,9 +133,9 @@ def as_own(body: PlantState, setting: Setting) -> PlantState:
     own = layout.own
     left, right = (
         half._replace(states=tuple([half.states[i] if i >= 0 else rests for i, rests in own]))
-        for half in (body.squeezed, body.right)
+        for half in (body.contact.left, body.contact.right)
     )
-    return body._replace(squeezed=left, right=right)
+    return body._replace(contact=body.contact._replace(left=left, right=right))
 
 
 @cache

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.terms.oscillator import Motion, moved
+from graspsense_sim_gripper.terms.oscillator import OscillatorState, moved
 from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, WorkingPoint
 
 GRAVITY_M_S2: Final = 9.80665
@@ -45,7 +45,9 @@ def _seen(params: Liquid) -> _AtCompression:
     )
 
 
-def liquid(params: Liquid, state: Motion, d0: float, d1: float, h: float, v1: float) -> tuple[float, Motion]:
+def liquid(
+    params: Liquid, state: OscillatorState, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, OscillatorState]:
     """Return the force of the liquid's pressure on the wall; exact for a straight path."""
     mass, k, damping, wall = _seen(params)
     if h > 0.0:
@@ -87,7 +89,7 @@ TERM = Term(
     summary="liquid pressed up a neck: weight, viscosity and inertia behind the wall's bulge",
     params=Liquid,
     law=liquid,
-    at_rest=Motion(0.0, 0.0),
+    at_rest=OscillatorState(0.0, 0.0),
     rates=rates,
     limits=limits,
     linear=linear,

@@ -6,14 +6,16 @@ import math
 from typing import NamedTuple
 
 
-class Motion(NamedTuple):
+class OscillatorState(NamedTuple):
     """Where the mass stands (m) and how fast it moves (m/s)."""
 
     y_m: float
     v_m_s: float
 
 
-def moved(now: Motion, damping: float, square: float, u0: float, u1: float, h: float) -> Motion:
+def moved(
+    now: OscillatorState, damping: float, square: float, u0: float, u1: float, h: float
+) -> OscillatorState:
     """Return the motion after `h` seconds of y'' + 2 a y' + w2 y = u0 + u1 t.
 
     `damping` is a (1/s, not negative) and `square` w2 (1/s2, greater than 0). Exact at any `h`, whichever is
@@ -38,7 +40,7 @@ def moved(now: Motion, damping: float, square: float, u0: float, u1: float, h: f
     else:
         even = math.exp(-a * h)
         odd = even * h
-    return Motion(
+    return OscillatorState(
         offset + slope * h + y * even + (v + a * y) * odd,
         slope + v * even - (a * v + w2 * y) * odd,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.oscillator import Motion, moved
+from graspsense_sim_gripper.terms.oscillator import OscillatorState, moved
 from graspsense_sim_gripper.terms.term import LinearForm, Rate, Term, WorkingPoint
 
 
@@ -18,7 +18,9 @@ class Slosh(NamedTuple):
     damping_ratio: float = 0.0
 
 
-def slosh(params: Slosh, state: Motion, d0: float, d1: float, h: float, v1: float) -> tuple[float, Motion]:
+def slosh(
+    params: Slosh, state: OscillatorState, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, OscillatorState]:
     """Return the force with which the mass hangs back; its motion is exact for a straight path."""
     w = 2.0 * math.pi * params.frequency_hz
     a, square = params.damping_ratio * w, w * w
@@ -53,7 +55,7 @@ TERM = Term(
     summary="lightly damped mode of the contents that hangs on the wall",
     params=Slosh,
     law=slosh,
-    at_rest=Motion(0.0, 0.0),
+    at_rest=OscillatorState(0.0, 0.0),
     rates=rates,
     linear=linear,
     positive=("mass_kg", "frequency_hz"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.terms.oscillator import Motion, moved
+from graspsense_sim_gripper.terms.oscillator import OscillatorState, moved
 from graspsense_sim_gripper.terms.relaxation import late_share, mean_share
 from graspsense_sim_gripper.terms.term import Limit, LinearForm, OwnContact, Rate, Term, WorkingPoint
 
@@ -24,8 +24,8 @@ class Surface(NamedTuple):
 
 
 def surface(
-    params: Surface, state: Motion, d0: float, d1: float, h: float, v1: float
-) -> tuple[float, Motion]:
+    params: Surface, state: OscillatorState, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, OscillatorState]:
     """Return the contact's force: exact motion between contacts, each contact and parting located.
 
     It looks at the contact at least twelve times in a swing, as a light mass bounces many times in a tick, and at most
@@ -68,14 +68,14 @@ def surface(
 
 
 def _massless(
-    params: Surface, state: Motion, d0: float, d1: float, h: float, v1: float
-) -> tuple[float, Motion]:
+    params: Surface, state: OscillatorState, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, OscillatorState]:
     """Return the contact's force where the mass is none: what it stands on relaxes towards the balance."""
     _, k, damping, contact = params
     both = k + contact
     if damping <= 0.0:
         y = max(contact * d1 / both, 0.0)
-        return contact * max(d1 - y, 0.0), Motion(y, 0.0)
+        return contact * max(d1 - y, 0.0), OscillatorState(y, 0.0)
     x = h * both / damping
     decay = math.exp(-x)
     late = late_share(x, decay)
@@ -87,7 +87,7 @@ def _massless(
     y = share * d1 - behind
     if d1 - y < 0.0:
         y = state.y_m * math.exp(-h * k / damping)
-    return contact * max(d1 - y, 0.0), Motion(y, 0.0)
+    return contact * max(d1 - y, 0.0), OscillatorState(y, 0.0)
 
 
 def rates(params: Surface, at: WorkingPoint) -> tuple[Rate, ...]:
@@ -131,7 +131,7 @@ TERM = Term(
     summary="mass on a spring and a damper behind a contact that can only push",
     params=Surface,
     law=surface,
-    at_rest=Motion(0.0, 0.0),
+    at_rest=OscillatorState(0.0, 0.0),
     rates=rates,
     limits=limits,
     linear=linear,

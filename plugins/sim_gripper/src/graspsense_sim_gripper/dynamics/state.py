@@ -1,0 +1,79 @@
+"""The state of the simulated plant, which is everything that changes in the course of a grasp.
+
+It is nested, because compiled code has no `_replace`: a function that changes one part builds that part anew and passes
+the others on.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+
+class Motion(NamedTuple):
+    """Position and speed of the motor, and of the gap between the fingertips, which the linkage derives from it."""
+
+    revolutions: float
+    speed_rev_s: float
+    gap_m: float
+    jacobian_m_rev: float
+    """Derivative of the gap with respect to the motor's angle (m/rev)."""
+
+
+class ContactState(NamedTuple):
+    """The object between the pads, or one half of an object that is held fast: compression, force and memory."""
+
+    compression_m: float
+    force_n: float
+    slope_n_m: float
+    """Stiffness that the last solution met, with which the next one begins."""
+    states: Any
+    """The states of the object's terms, in the order of the terms."""
+    pad_m: float = 0.0
+    """Compression of the two pads in series. Kept up to date only where the pads creep or damp."""
+    branch_n: float = 0.0
+    """Force of the pads' Maxwell branch."""
+    rate_m_s: float = 0.0
+    """Mean rate of the compression over the last step."""
+    span_s: float = math.inf
+    """Duration of the last step; inf: the last step says nothing about the rate."""
+
+
+class Contact(NamedTuple):
+    """The forces on the two pads and the object between them."""
+
+    left_n: float
+    right_n: float
+    offset_m: float
+    """Position of the object relative to the gripper's centre line, positive towards the right finger."""
+    touched: int
+    """1 from the first contact on, until the object is released and has recovered its shape."""
+    left: ContactState
+    """The whole object; where it is held fast, the half at the left finger, as if the other half did the same."""
+    right: ContactState
+    """The half at the right finger of an object that is held fast; otherwise unused."""
+    pending_s: float = 0.0
+    """Time since the release for which the recovery of the object's shape has not been computed yet."""
+
+
+class StepState(NamedTuple):
+    """What the step control remembers between steps."""
+
+    next_s: float = math.inf
+    """Length of the next step that the error of the last one allows."""
+    n_steps: int = 0
+    """Steps so far."""
+    unresolved: int = 0
+    """Steps that were accepted although their error was too large."""
+
+
+class PlantState(NamedTuple):
+    """The state of the plant between two ticks."""
+
+    motion: Motion
+    contact: Contact
+    step: StepState = StepState()
+    effort_n: float = 0.0
+    """Force of the drive at the moment, where it lags behind the command."""
+    peak_n: float = 0.0
+    """Greatest force on a pad so far."""
