@@ -412,7 +412,7 @@ def _hold(what: str, plant: Ready, state: PlantState, dt: float, count: int = 10
         "value": [what, count * dt],
         "by": plant.by,
         "moved_m": after.motion.gap_m - state.motion.gap_m,
-        "finite": math.isfinite(after.left_n),
+        "finite": math.isfinite(after.contact.left_n),
         "holds": state.motion.speed_rev_s == 0.0 and after.motion.revolutions == state.motion.revolutions,
     }
 
