@@ -277,7 +277,7 @@ def test_a_plugin_for_another_api_is_refused_before_its_hooks_are_looked_at(site
         ),
         (
             "Channel('temperature', '')",
-            "ValueError: channel 'temperature' is none of gap, velocity, effort, force_left, force_right, "
+            "ValueError: channel 'temperature' is not one of gap, velocity, effort, force_left, force_right, "
             "edge_left, edge_right, pads: give it a unit",
         ),
         ("raise SystemExit(3)", "SystemExit: 3"),

@@ -177,7 +177,7 @@ def test_a_command_that_is_no_number_ends_the_grasp_safely():
     assert "NaN" in grasp.reason
     assert all(c.value == c.value for c in gripper.commands)
     assert let_go(gripper)
-    assert any("commanded no number" in event.what for event in grasp.events)
+    assert any("commanded NaN" in event.what for event in grasp.events)
 
 
 def test_a_refused_tare_aborts_before_anything_closes():

@@ -1,6 +1,6 @@
-"""Composing pure steps: a generic function names its parts as module globals, and `bind` fills them in.
+"""Composition of pure functions: a generic function names its parts as module globals, and `bind` supplies them.
 
-A bound function runs as it is in the interpreter, and can be compiled whole, so that no law is written twice.
+A bound function runs in the interpreter and can be compiled as a whole, so that each law is written once.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ TupleT = TypeVar("TupleT", bound=tuple[Any, ...])
 
 
 def bind(function: FunctionT, **parts: Any) -> FunctionT:
-    """Return a copy of `function` that sees `parts` in place of its module's globals of those names.
+    """Return a copy of `function` in which `parts` replace the globals of its module with those names.
 
-    Raises TypeError for anything but a plain function, and for a part that the function's module does not name.
+    Raises TypeError for anything but a plain function, and for a part whose name is not a global of the module.
     """
     if not isinstance(function, FunctionType):
-        raise TypeError(f"{function!r} is no plain function, so it cannot be bound")
+        raise TypeError(f"{function!r} is not a plain function, so it cannot be bound")
     unknown = parts.keys() - function.__globals__.keys()
     if unknown:
-        raise TypeError(f"{function.__module__}.{function.__name__} names no part {sorted(unknown)}")
+        raise TypeError(f"{function.__module__}.{function.__name__} has no part named {sorted(unknown)}")
     bound = FunctionType(
         function.__code__, {**function.__globals__, **parts}, function.__name__, function.__defaults__
     )
@@ -31,9 +31,10 @@ def bind(function: FunctionT, **parts: Any) -> FunctionT:
 
 
 def maker(named_tuple: type[TupleT]) -> Callable[..., TupleT]:
-    """Return a function that makes `named_tuple` of all its fields in order, at half the cost of calling the class.
+    """Return a function that builds `named_tuple` from all its fields in order, in half the time of calling the class.
 
-    To be bound in the class's place where steps run in the interpreter, many a tick. It counts no fields.
+    Bind it in place of the class where a function runs many times in the interpreter. It does not check the number of
+    fields.
     """
     new = tuple.__new__
     return lambda *fields: new(named_tuple, fields)

@@ -1,9 +1,9 @@
-"""The two instants a grasp turns on: first contact of both fingers, and coming to rest.
+"""The two instants that define a grasp: first contact of both fingers, and rest.
 
-Chitta, Piccoli and Sturm (ICRA 2010), equations 1 and 2, as they must be read: contact is the first time at
-which *both* pads are at or above tau_1 (the text; the printed formula has the inequality reversed), and rest is
-a speed that *stays* below tau_2 (the printed formula takes a single sample, which noise would end).
-Controllers and features share these, so that they never disagree on when a thing was touched or at rest.
+These are equations 1 and 2 of Chitta, Piccoli and Sturm (ICRA 2010) with two corrections. Contact is the first time at
+which *both* pads are at or above tau_1, as the text says; the printed formula has the inequality reversed. Rest is a
+speed that *stays* below tau_2 over a window; the printed formula takes a single sample, which noise would pass.
+Controllers and features share these functions, so that they agree on contact and rest.
 """
 
 from __future__ import annotations
@@ -16,35 +16,35 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 CONTACT_FORCE_N: Final = 0.625
-"""tau_1 on each pad: 1000 counts over the tared zero at 1600 counts/N, as in the authors' code."""
+"""tau_1 for each pad: 1000 counts above the tared zero at 1600 counts/N, as in the authors' code."""
 REST_SPEED_M_S: Final = 1e-4
 """tau_2: 0.1 mm/s, as in the authors' code."""
 REST_WINDOW_S: Final = 0.05
-"""How long the speed must stay below tau_2: one encoder tick in 1 ms alone is 0.33 mm/s on the PR2."""
+"""Time for which the speed must stay below tau_2: a single encoder tick in 1 ms is 0.33 mm/s on the PR2."""
 
 FEW: Final = 8
-"""Samples that are looked at one by one before the rest of them at once."""
+"""Number of samples that are examined one by one before all others at once."""
 
 
 class Stillness(NamedTuple):
-    """Since when, and where, the gap has stood still."""
+    """The time since which the gap has been at rest, and its value then."""
 
     since_t_s: float
     gap_m: float
 
 
 def both_touch(force_left_n: float, force_right_n: float, contact_force_n: float) -> bool:
-    """Return whether both pads are at or above the contact force (equation 1). NaN never touches."""
+    """Return whether both pads are at or above the contact force (equation 1). NaN counts as no contact."""
     return force_left_n >= contact_force_n and force_right_n >= contact_force_n
 
 
 def watch(
     still: Stillness, t_s: float, gap_m: float, rest_speed_m_s: float, rest_window_s: float
 ) -> Stillness:
-    """Return the stillness after one more sample: unchanged, or begun anew where the gap has moved on.
+    """Return the stillness after one more sample: unchanged, or starting at this sample if the gap has moved.
 
-    The gap may stray from where the stillness began by the rest speed times the window; on a clock slower than
-    the window, by the rest speed times the time elapsed. A gap that is NaN is never still.
+    The gap may differ from its value at the start of the stillness by the rest speed times the window, or, if samples
+    are further apart than the window, by the rest speed times the elapsed time. A gap of NaN is never at rest.
     """
     allowed_m = rest_speed_m_s * max(rest_window_s, t_s - still.since_t_s)
     if abs(gap_m - still.gap_m) <= allowed_m:
@@ -53,8 +53,8 @@ def watch(
 
 
 def at_rest(still: Stillness, t_s: float, rest_window_s: float) -> bool:
-    """Return whether the stillness has lasted the window (equation 2); rest then began at `still.since_t_s`."""
-    # Half a nanosecond of grace: sums of ticks of 1 ms fall short of 50 ms by rounding.
+    """Return whether the stillness has lasted for the window (equation 2); rest then began at `still.since_t_s`."""
+    # The tolerance of half a nanosecond covers the rounding of sums of 1 ms ticks.
     return t_s - still.since_t_s >= rest_window_s - 5e-10
 
 
@@ -65,16 +65,16 @@ def first_rest(
     rest_speed_m_s: float,
     rest_window_s: float,
 ) -> tuple[int, int] | None:
-    """Return the sample at which rest begins and the first that shows it, or None.
+    """Return the sample at which rest begins and the first sample that shows it, or None.
 
-    It is what `watch` and `at_rest` say sample by sample. `shows` tells which samples may show a rest.
+    The result is that of `watch` and `at_rest` applied to each sample in turn. Only samples in `shows` can show a rest.
     """
     import numpy as np
 
     n = len(times_s)
     if n == 0:
         return None
-    # Where the very next sample has moved on, and one alone is no rest, there is nothing to look at.
+    # A stillness that the next sample ends cannot be a rest, unless one sample suffices.
     lasting = np.ones(n, bool)
     if not at_rest(Stillness(times_s[0], gaps_m[0]), times_s[0], rest_window_s):
         allowed = rest_speed_m_s * np.maximum(rest_window_s, times_s[1:] - times_s[:-1])
@@ -90,7 +90,7 @@ def first_rest(
             following += 1
         since = begins[following]
         still = Stillness(times[since], gaps[since])
-        # While it moves most stillnesses are short, so the first samples are looked at one by one, as `watch` does.
+        # While the gap moves, most stillnesses are short: the first samples are examined one by one, as by `watch`.
         few = min(since + FEW, n)
         end, at_m, since_s = since, still.gap_m, still.since_t_s
         if times[few - 1] - since_s <= rest_window_s:
@@ -105,7 +105,7 @@ def first_rest(
             strayed = ~(np.abs(gaps_m[begin:] - still.gap_m) <= allowed)
             end = few + int(strayed.argmax()) if strayed.any() else n
         if end > since and at_rest(still, times[end - 1], rest_window_s):
-            # From just before the window is full, for what is left is a matter of rounding.
+            # From just before the end of the window on, because rounding decides the rest.
             full = bisect_left(times, still.since_t_s + rest_window_s - 1e-9, since, end)
             while not at_rest(still, times[full], rest_window_s):
                 full += 1

@@ -1,4 +1,4 @@
-"""A device in software that is one of this machine's, as its plugin makes it and `graspsense emulate` runs it."""
+"""A device that software emulates on this machine: a plugin makes it, and `graspsense emulate` runs it."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Mapping
 
 
 class EmulatedDevice(ABC):
-    """It is there from the first `plug` on, and gone with its process, however that ends.
+    """An emulated device, which exists from the first `plug` to the end of its process, however that ends.
 
-    `wire` is the way into the operating system that it took, `rate_hz` that of its reports.
+    `wire` is the interface of the operating system in use, `rate_hz` the rate of its reports.
     """
 
     wire: str
@@ -18,16 +18,16 @@ class EmulatedDevice(ABC):
     @property
     @abstractmethod
     def words(self) -> Mapping[str, str]:
-        """What it can be told, and what that does; `plug` and `unplug` at least."""
+        """The words that `tell` understands, with their effects; at least `plug` and `unplug`."""
 
     @abstractmethod
     def tell(self, word: str) -> None:
-        """Do one of `words`. Raises KeyError for any other, NoDevice where it cannot be plugged in."""
+        """Execute one of `words`. Raises KeyError for any other, NoDevice if it cannot be plugged in."""
 
     @abstractmethod
     def state(self) -> Mapping[str, float | int | str | bool]:
-        """Return how it is; under `failed` why it ended by itself, empty while it runs."""
+        """Return its state; `failed` is the reason if it ended by itself, empty while it runs."""
 
     @abstractmethod
     def close(self) -> None:
-        """Unplug it and give everything back."""
+        """Unplug it and release all resources."""

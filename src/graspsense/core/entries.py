@@ -1,7 +1,7 @@
-"""What a plugin declares about its components: light values and import strings, no driver imported.
+"""Entries: the declarations of components and resources that the hooks of a plugin return.
 
-An entry is what the hooks return. The names of classes are import strings (`"package.module:Class"`),
-resolved at first use, so that listing plugins imports nothing beyond the modules that hold the entries.
+Classes are named by import strings (`"package.module:Class"`), which are resolved at first use. Listing plugins
+therefore imports the entry modules only, and no driver.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ TABLE_OF_ROLE: Final[dict[Role, str]] = {
     "feature-set": "features",
     "classifier": "classifier",
 }
-"""The table of a pipeline file in which a component of each role is chosen."""
+"""The table of a pipeline file in which a component of each role is selected."""
 
 STATES: Final = ("ok", "note", "problem")
-"""How a finding can be."""
+"""The states of a finding."""
 
 KINDS: Final = tuple(kind.name.lower() for kind in CommandKind)
-"""Command kinds as entries name them: effort, velocity, position, force."""
+"""The kinds of command as entries name them: effort, velocity, position, force."""
 
 
 def _known_kinds(entry: object, attribute: Attribute[Any], kinds: tuple[str, ...]) -> None:
@@ -59,11 +59,11 @@ _ARE_KINDS: Final = [instance_of(tuple), _known_kinds]
 
 @frozen
 class Channel:
-    """A signal that a backend gives or a component needs.
+    """A signal that a backend provides or that a component requires.
 
-    `rate_hz` is what a backend gives, or the least that a component needs (0: any rate will do). A name of
-    `signals.CHANNELS` has the unit given there; any other name is a channel of the plugin's own, in a unit of
-    its own. Raises ValueError for a wrong or missing unit.
+    `rate_hz` is the rate that a backend provides, or the least rate that a component requires (0: any rate). A name in
+    `signals.CHANNELS` must have the unit given there; a plugin may define further channels with units of its own.
+    Raises ValueError for a wrong or missing unit.
     """
 
     name: str = field(validator=_IS_NAME)
@@ -77,7 +77,7 @@ class Channel:
                 f"channel {self.name!r} is in {unit}, not in {self.unit!r}: convert its numbers, and write {unit!r}"
             )
         if not self.unit:
-            raise ValueError(f"channel {self.name!r} is none of {', '.join(CHANNELS)}: give it a unit")
+            raise ValueError(f"channel {self.name!r} is not one of {', '.join(CHANNELS)}: give it a unit")
 
 
 _ARE_CHANNELS: Final = [deep_iterable(instance_of(Channel), instance_of(tuple)), _distinct_channels]
@@ -85,7 +85,7 @@ _ARE_CHANNELS: Final = [deep_iterable(instance_of(Channel), instance_of(tuple)),
 
 @frozen
 class SensorBackendEntry:
-    """A gripper with its sensors: what it gives, what it can be told, where its class lies."""
+    """A gripper with its sensors: its class, its channels, and the kinds of command that it accepts."""
 
     name: str = field(validator=_IS_NAME)
     target: str = field(validator=_IS_TARGET)
@@ -93,14 +93,14 @@ class SensorBackendEntry:
     summary: str = field(validator=instance_of(str))
     channels: tuple[Channel, ...] = field(validator=_ARE_CHANNELS)
     accepts: tuple[str, ...] = field(validator=_ARE_KINDS)
-    """Command kinds it takes: any of effort, velocity, position, force."""
+    """The kinds of command that it accepts: any of effort, velocity, position, force."""
     needs: str = ""
-    """What to install or do where the target cannot be imported."""
+    """What to install or do if the target cannot be imported."""
 
 
 @frozen
 class ControllerEntry:
-    """A control law: what it must see and what it will command."""
+    """A control law: its class, the channels that it requires, and the kinds of command that it sends."""
 
     name: str = field(validator=_IS_NAME)
     target: str = field(validator=_IS_TARGET)
@@ -164,7 +164,7 @@ class FeatureSetEntry:
 
 @frozen
 class ClassifierEntry:
-    """A classifier: learns from a table of features, names the object and its state."""
+    """A classifier: it learns from a table of features, and predicts the object and its state."""
 
     name: str = field(validator=_IS_NAME)
     target: str = field(validator=_IS_TARGET)
@@ -193,7 +193,7 @@ class ModelEntry:
 
 @frozen
 class DatasetEntry:
-    """A reader of somebody's recordings, called as `name:FOLDER`; `target` is what reads them."""
+    """A reader of recorded data, used as `name:FOLDER`; `target` is the function that reads them."""
 
     name: str = field(validator=_IS_NAME)
     target: str = field(validator=_IS_TARGET)
@@ -213,19 +213,19 @@ class CommandEntry:
 
 @frozen
 class EmulatorEntry:
-    """A device that software can stand in for, as one of this machine's: `graspsense emulate NAME`.
+    """A device that software emulates on this machine: `graspsense emulate NAME`.
 
-    `name` is the sensor backend that drives it. `target` is a function `emulate(config, wire, seed)` that returns an
-    `EmulatedDevice`; `config` is the backend's own, of the pipeline that was asked for.
+    `name` is the sensor backend that drives the device. `target` is a function `emulate(config, wire, seed)` that
+    returns an `EmulatedDevice`; `config` is that of the backend in the pipeline that the user names.
     """
 
     name: str = field(validator=_IS_NAME)
     target: str = field(validator=_IS_TARGET)
     summary: str = field(validator=instance_of(str))
     wires: tuple[str, ...] = field(validator=deep_iterable(and_(*_IS_NAME), instance_of(tuple)))
-    """The ways into the operating system that it knows, for `--wire`; the best first."""
+    """The interfaces of the operating system that it can use, for `--wire`; the best one first."""
     options: tuple[str, ...] = ()
-    """Settings that come before the user's own, as in `("gripper.transport=emulated",)`."""
+    """Settings that the user's options override, as in `("gripper.transport=emulated",)`."""
     needs: str = ""
 
 
@@ -247,7 +247,7 @@ class ConformanceCheckEntry:
 
 @frozen
 class FoundDevice:
-    """A device that a probe found: which backend drives it, how to name it, and whether it can be opened."""
+    """A device that a probe found: its backend, its serial number, and whether it can be opened."""
 
     backend: str
     serial: str
@@ -263,10 +263,10 @@ def _a_state(entry: object, attribute: Attribute[Any], state: str) -> None:
 
 @frozen
 class Finding:
-    """What a doctor found: what was looked at, how it is, and what to do.
+    """A result of `graspsense doctor`: the subject that was examined, its state, and what to do.
 
-    `state` is `ok`, `note` (nothing wrong, but worth to know) or `problem`. `numbers` are what was measured, each name
-    with its unit: `rate_hz`.
+    `state` is `ok`, `note` (not wrong, but worth knowing) or `problem`. `numbers` are measured values, whose names end
+    with their units: `rate_hz`.
     """
 
     subject: str = field(validator=instance_of(str))

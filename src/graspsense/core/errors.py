@@ -1,7 +1,7 @@
-"""Every error a user can meet: what was found, what is allowed, what to do.
+"""The errors that a user can meet. Their messages say what was found, what is allowed, and what to do.
 
-Each class carries the exit code the command line ends with. A grasp that goes wrong is no error: that is an
-`Outcome` (see `graspsense.core.signals`).
+Each class has the exit code of the command line. A grasp that fails is not an error but an `Outcome` (see
+`graspsense.core.signals`).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from difflib import get_close_matches
 
 
 class GraspsenseError(Exception):
-    """Base of all errors meant for the user; `exit_code` is what the command line returns."""
+    """Base class of all errors for the user; `exit_code` is that of the command line."""
 
     exit_code = 70
 
@@ -23,7 +23,7 @@ class ConfigError(GraspsenseError):
 
 
 class UnknownName(ConfigError):
-    """A name that nothing answers to, or that more than one distribution answers to."""
+    """A name that is unknown, or that several distributions provide."""
 
 
 class WiringError(ConfigError):
@@ -39,13 +39,13 @@ class ComponentFailed(GraspsenseError):
 
 
 class NoDevice(GraspsenseError):
-    """The gripper asked for is not there."""
+    """The gripper is not connected."""
 
     exit_code = 3
 
 
 class DeviceLost(GraspsenseError):
-    """The gripper was there and stopped answering."""
+    """The gripper was open and no longer responds."""
 
     exit_code = 4
 
@@ -57,17 +57,17 @@ class TareRefused(GraspsenseError):
 
 
 class DataDamaged(GraspsenseError):
-    """A file of ours or somebody else's that cannot be read as what it claims to be."""
+    """A file whose content is not what its format requires."""
 
     exit_code = 5
 
 
 class RecordingEnded(Exception):
-    """A replayed recording has no further frame. The runner turns it into an outcome; no user sees it."""
+    """A replayed recording has no further frame. The runner turns this into an outcome."""
 
 
 def named(error: BaseException) -> str:
-    """Return an exception of anybody's in words: `ZeroDivisionError: float division by zero`."""
+    """Return an exception in words: `ZeroDivisionError: float division by zero`."""
     return f"{type(error).__name__}: {error}"
 
 

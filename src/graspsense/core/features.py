@@ -1,4 +1,4 @@
-"""Features, tables of them, and predictions: what passes between a feature set and a classifier."""
+"""Features, tables of features, and predictions: the values that pass between a feature set and a classifier."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 @frozen(kw_only=True)
 class Features:
-    """Named numbers drawn from one trace.
+    """Named numbers extracted from one trace.
 
-    A feature that is not defined on this trace is NaN, and `reasons` says why. NaN means *missing*.
+    A feature that is not defined for this trace is NaN, and `reasons` gives the reason. NaN means *missing*.
     """
 
     names: tuple[str, ...]
@@ -106,11 +106,11 @@ def _texts(items: Iterable[str]) -> tuple[str, ...]:
 
 @frozen(kw_only=True)
 class Prediction:
-    """What a classifier says of one trial.
+    """The prediction of a classifier for one trial.
 
-    `label` is a class, or `unknown` where the trial lies far outside the training data. `probabilities` sum to 1;
-    they are empty where the model could not be asked. `because` is the reason in words and units, one step an
-    item. `model` says in one line what the model was trained on.
+    `label` is a class, or `unknown` for a trial far outside the training data. `probabilities` sum to 1; they are empty
+    if the model could not be applied. `because` is the reason in words and units, with one step in each item. `model`
+    describes in one line what the model was trained on.
     """
 
     label: str

@@ -1,7 +1,7 @@
-"""The guard between a controller and a gripper: limits, and a stop where a command is no number.
+"""The guard between a controller and a gripper: it limits commands, and stops the grasp if a command is not a number.
 
-It clamps to the gripper's limits of effort and speed and to the command's own, turns NaN into a stop, keeps the
-first closing of a real gripper slow and weak until a contact has once been seen, and counts each time it acted.
+It applies the limits of effort and speed of the gripper and of the command, turns NaN into a stop, and keeps the first
+closing of a real gripper slow and weak until a contact was detected. It counts the ticks in which it acts.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from graspsense.core.signals import EFFORT, FORCE, POSITION, VELOCITY, Command, 
 
 
 class GuardParams(NamedTuple):
-    """Limits in N and m/s; `first_*` hold until a pad has once felt `contact_force_n` (`inf`: no such limit)."""
+    """Limits in N and m/s; `first_*` apply until the force on a pad reaches `contact_force_n` (`inf`: no limit)."""
 
     effort_limit_n: float
     speed_limit_m_s: float
@@ -23,7 +23,7 @@ class GuardParams(NamedTuple):
 
 
 class GuardState(NamedTuple):
-    """Whether a contact was ever felt, on how many ticks the guard acted, and whether it stopped the grasp."""
+    """Whether a contact was detected, in how many ticks the guard acted, and whether it stopped the grasp."""
 
     contact_seen: int
     acted: int
@@ -33,13 +33,13 @@ class GuardState(NamedTuple):
 def guard(
     params: GuardParams, state: GuardState, frame: Frame, command: Command
 ) -> tuple[Command, GuardState]:
-    """Return the command as the gripper may have it, and the guard's state.
+    """Return the limited command, and the state of the guard.
 
-    An effort in the direction in which the gap already moves at the speed limit becomes 0: friction brakes.
+    An effort in the direction in which the gap already moves at the speed limit becomes 0, so that friction brakes.
     """
     kind, value, effort_limit, speed_limit = command
     contact_seen, acted, stopped = state
-    # A limit that is NaN fails this comparison, is kept, and stops the grasp below.
+    # A limit of NaN fails this comparison, remains NaN, and stops the grasp below.
     if params.effort_limit_n < effort_limit:
         effort_limit = params.effort_limit_n
     if params.speed_limit_m_s < speed_limit:
@@ -72,13 +72,13 @@ def guard(
     elif kind == POSITION and value < inf:
         value = max(value, 0.0)
     else:
-        # A kind nobody knows, or a place nobody can reach: as good as no number.
+        # An unknown kind, or a position out of reach, is treated like NaN.
         halt = Command(EFFORT, 0.0, params.effort_limit_n, params.speed_limit_m_s)
         return halt, GuardState(contact_seen, acted + 1, 1)
     if value != asked:
         acted += 1
     elif kind == EFFORT:
-        # Within its limits already, which say nothing more to whoever applies an effort.
+        # The value is within its limits, which have no further meaning for an effort.
         if contact_seen != state.contact_seen:
             state = GuardState(contact_seen, acted, 0)
         return command, state

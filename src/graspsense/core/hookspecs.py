@@ -1,8 +1,7 @@
-"""The hooks a plugin can implement. Component hooks return entries; observer hooks return nothing.
+"""The hooks that a plugin can implement. Component hooks return entries; observer hooks return nothing.
 
-A plugin implements any of these as module functions marked with `graspsense.plugin_api.hookimpl`, in the module
-that its entry point in the group `graspsense.plugins` names. No hook depends on the order of plugins, and none
-may change a run.
+A plugin implements hooks as module functions marked with `graspsense.plugin_api.hookimpl`, in the module that its entry
+point in the group `graspsense.plugins` names. No hook depends on the order of plugins, and none can change a run.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
 PROJECT = "graspsense"
 ENTRY_POINT_GROUP = "graspsense.plugins"
 API = (1, 0)
-"""Version of these hooks. A plugin's `GRASPSENSE_API` must have the same major and no larger minor number."""
+"""Version of these hooks. A plugin's `GRASPSENSE_API` must have the same major number and a minor number not larger."""
 
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
@@ -41,37 +40,37 @@ hookimpl = pluggy.HookimplMarker(PROJECT)
 
 @hookspec
 def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:  # type: ignore[empty-body]
-    """Return the grippers this plugin brings."""
+    """Return the grippers of this plugin."""
 
 
 @hookspec
 def graspsense_controllers() -> Iterable[ControllerEntry]:  # type: ignore[empty-body]
-    """Return the control laws this plugin brings."""
+    """Return the control laws of this plugin."""
 
 
 @hookspec
 def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:  # type: ignore[empty-body]
-    """Return the feature sets this plugin brings."""
+    """Return the feature sets of this plugin."""
 
 
 @hookspec
 def graspsense_classifiers() -> Iterable[ClassifierEntry]:  # type: ignore[empty-body]
-    """Return the classifiers this plugin brings."""
+    """Return the classifiers of this plugin."""
 
 
 @hookspec
 def graspsense_pipelines() -> Iterable[PipelineEntry]:  # type: ignore[empty-body]
-    """Return the pipeline files this plugin ships."""
+    """Return the pipeline files that this plugin ships."""
 
 
 @hookspec
 def graspsense_models() -> Iterable[ModelEntry]:  # type: ignore[empty-body]
-    """Return the trained models this plugin ships."""
+    """Return the trained models that this plugin ships."""
 
 
 @hookspec
 def graspsense_datasets() -> Iterable[DatasetEntry]:  # type: ignore[empty-body]
-    """Return the readers of recorded data this plugin brings."""
+    """Return the readers of recorded data of this plugin."""
 
 
 @hookspec
@@ -81,7 +80,7 @@ def graspsense_commands() -> Iterable[CommandEntry]:  # type: ignore[empty-body]
 
 @hookspec
 def graspsense_emulators() -> Iterable[EmulatorEntry]:  # type: ignore[empty-body]
-    """Return the devices that software can stand in for, as devices of the operating system."""
+    """Return the devices that this plugin can emulate as devices of the operating system."""
 
 
 @hookspec
@@ -91,12 +90,12 @@ def graspsense_conformance_checks() -> Iterable[ConformanceCheckEntry]:  # type:
 
 @hookspec
 def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:  # type: ignore[empty-body]
-    """Look for devices for at most `timeout_s` seconds. May import drivers: only `graspsense devices` calls it."""
+    """Search for devices for at most `timeout_s` seconds. May import drivers: only `graspsense devices` calls it."""
 
 
 @hookspec
 def graspsense_diagnose(config: object, timeout_s: float) -> Iterable[Finding]:  # type: ignore[empty-body]
-    """Look into what is plugged in and why it does not work. May import drivers: only `graspsense doctor` calls it."""
+    """Examine the connected devices and why they fail. May import drivers: only `graspsense doctor` calls it."""
 
 
 @hookspec
@@ -106,7 +105,7 @@ def graspsense_run_starting(run: RunInfo) -> None:
 
 @hookspec
 def graspsense_grasp_event(run: RunInfo, event: GraspEvent) -> None:
-    """Observe a change of phase, or that the guard acted."""
+    """Observe a change of phase, or an action of the guard."""
 
 
 @hookspec

@@ -1,4 +1,4 @@
-"""Trials with labels: what a classifier is trained and judged on."""
+"""Trials with labels: the data that a classifier is trained and evaluated on."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 Target = Literal["both", "class", "state"]
 TARGETS: Final[tuple[Target, ...]] = ("both", "class", "state")
-"""What a label stands for: `class:state` as it is, what is before the colon, or what is behind it."""
+"""The part of a label `class:state` to predict: all of it, the class, or the state."""
 
 
 @frozen(kw_only=True, eq=False)
 class ControlFeatures:
-    """Other features of the same trials, to be judged beside the main ones; `what` says in words which they are."""
+    """Other features of the same trials, evaluated as a baseline; `what` describes them in words."""
 
     table: FeatureTable
     what: str
@@ -31,11 +31,11 @@ class ControlFeatures:
 class Labelled:
     """Trials with their features and labels.
 
-    `labels` are `class:state`, or just a class. `instances` name the one object that was grasped in each trial
-    (`odwalla#3`), None where that was not recorded, with the reason in `no_instances`. `order` numbers the trials
-    in the order in which they were recorded. `before_contact` are features from before the contact only, None
-    with the reason in `no_before_contact`; `width` is the width alone. `variants` are further tables to judge.
-    `notes` say what a reader of a rate must know; `provenance` what made the trials.
+    `labels` are `class:state`, or a class alone. `instances` identify the individual object of each trial
+    (`odwalla#3`); None if that was not recorded, with the reason in `no_instances`. `order` numbers the trials in the
+    order of recording. `before_contact` are features from before contact only, None with the reason in
+    `no_before_contact`; `width` is the width alone. `variants` are further tables to evaluate. `notes` tell what a
+    reader of a rate must know, `provenance` how the trials were made.
     """
 
     source: str
@@ -57,7 +57,9 @@ class Labelled:
         for name in ("labels", "instances", "order"):
             column = getattr(self, name)
             if column is not None and len(column) != len(self.table):
-                raise ValueError(f"{len(self.table)} trials and {len(column)} {name}: give one a trial")
+                raise ValueError(
+                    f"{len(self.table)} trials and {len(column)} {name}: give one for each trial"
+                )
 
     def __len__(self) -> int:
         """Return the number of trials."""
@@ -65,7 +67,7 @@ class Labelled:
 
     @property
     def classes(self) -> tuple[str, ...]:
-        """Labels that occur, sorted."""
+        """The labels that occur, sorted."""
         return tuple(sorted(set(self.labels)))
 
     def rows(self, which: NDArray[np.int64]) -> Labelled:
@@ -86,7 +88,7 @@ class Labelled:
         )
 
     def of_class(self, name: str) -> Labelled:
-        """Return the trials of one class. Raises ConfigError where there is none."""
+        """Return the trials of one class. Raises ConfigError if there are none."""
         import numpy as np
 
         of = np.array([class_of(label) == name for label in self.labels])
@@ -99,7 +101,7 @@ class Labelled:
         return self.rows(np.flatnonzero(of))
 
     def aimed(self, target: str) -> Labelled:
-        """Return the trials with labels by one of `TARGETS`. Raises ConfigError where labels have no state."""
+        """Return the trials with one of `TARGETS` as labels. Raises ConfigError if the labels have no state."""
         if target == "both":
             return self
         if target == "class":
@@ -114,7 +116,7 @@ class Labelled:
 
 
 def class_of(label: str) -> str:
-    """Return what is before the colon of `class:state`."""
+    """Return the class of a label `class:state`."""
     return label.partition(":")[0]
 
 

@@ -1,7 +1,7 @@
-"""The four roles a component can play. Each is abstract; an implementation is final.
+"""The four roles that a component can have, as abstract base classes.
 
-A component is built from its config (an attrs class) and does nothing until it is used: no file, no device, no
-prompt in a constructor.
+A component is constructed from its config (an attrs class). Its constructor must not open files or devices, and must
+not prompt the user.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ConfigT = TypeVar("ConfigT")
 
 
 class Reading(NamedTuple):
-    """What one read of a gripper gives: the frame of this tick and the last cell image."""
+    """The result of one read of a gripper: the frame of this tick and the last cell image."""
 
     frame: Frame
     pads: Pads
@@ -39,8 +39,8 @@ class Reading(NamedTuple):
 class ObjectKind:
     """A kind of object that a simulated gripper can grasp.
 
-    Its full names are `name:state` for each of `states`, or `name` alone where it has no states. With `default` it
-    belongs to the set of objects that trials are simulated with where the user names none.
+    Its full names are `name:state` for each of `states`, or `name` alone if it has no states. With `default` it
+    belongs to the set of objects that trials are simulated with if the user names none.
     """
 
     name: str
@@ -58,13 +58,13 @@ class DeviceInfo:
     """A gripper as it was opened.
 
     `simulated` is True where forces and motion come from a model, False where a physical gripper measures them.
-    On a `virtual` clock, apply-then-read advances one tick and nothing waits; on a `device` clock a read waits
-    for the next frame. `opening` is the command that opens the fingers and `relaxed` the one that lets go; a
-    recording has no opening (None). `tare_images` is how many unloaded cell images the tare needs (0: none).
-    `calibration` names each stored calibration in use and the hash of its content; `numbers` are what the device's
-    raw numbers mean (counts per newton, transmission): a stored calibration holds for these alone.
-    `units` names units that are not SI, as of a recording: `{"t": "frame"}`. `notes` are
-    sentences that whoever reads the result has to know.
+    With a `virtual` clock, apply and read advance the time by one tick without waiting; with a `device` clock, a read
+    waits for the next frame. `opening` is the command that opens the fingers, None for a recording, and `relaxed` the
+    command that exerts no force. `tare_images` is the number of unloaded cell images that a tare needs, 0 if the
+    gripper is not tared. `calibration` maps each stored calibration in use to the hash of its content. `numbers` state
+    what the raw numbers of the device mean (counts per newton, transmission); a stored calibration is valid for these
+    only. `units` names the units that are not SI, as in a recording: `{"t": "frame"}`. `notes` are sentences that a
+    reader of the result must know.
     """
 
     name: str
@@ -87,7 +87,7 @@ class DeviceInfo:
 class SensorBackend(ABC, Generic[ConfigT]):
     """A gripper with its sensors, real, simulated, emulated or recorded.
 
-    The order of calls is expect (if at all), open, then read and apply in turn, then close. Config is kept as
+    The methods are called in the order `expect` (optional), `open`, `read` and `apply` in turn, `close`. The config is
     `self.config`.
     """
 
@@ -95,46 +95,45 @@ class SensorBackend(ABC, Generic[ConfigT]):
         self.config = config
 
     def objects(self) -> Sequence[ObjectKind]:
-        """Return the kinds of object that this backend can simulate; empty where it grasps what is really there."""
+        """Return the kinds of object that this backend can simulate; empty if it grasps real objects."""
         return ()
 
     def with_object(self, name: str) -> SensorBackend[ConfigT]:
         """Return a backend with the same config, but with this object between its fingers.
 
         `name` is a full name of `objects()`, or any other name that the backend knows. A name that it does not know
-        raises UnknownName, at the latest in `open`. Raises ConfigError where the backend cannot be given an object.
+        raises UnknownName, at the latest in `open`. Raises ConfigError if the backend cannot be given an object.
         """
         raise ConfigError(
-            f"{type(self).__name__} grasps what is really there, so it cannot be given the object {name!r}. "
+            f"{type(self).__name__} grasps real objects, so it cannot be given the object {name!r}. "
             "Choose a simulated gripper, as in --gripper sim"
         )
 
     def expect(self, controller: Controller[Any], run: RunConfig) -> None:
-        """Be told, before `open`, under which controller and settings it is to be opened next.
+        """Announce, before `open`, the controller and the settings of the next grasp.
 
-        Opens and does nothing. A simulator chooses its model by it; a gripper need not know.
+        A simulator selects its model by them; a real gripper ignores them. Nothing is opened.
         """
         del controller, run
 
     @abstractmethod
     def open(self, seed: int) -> DeviceInfo:
-        """Open the gripper and describe it; bounded in time, asks nothing.
+        """Open the gripper in a bounded time, without user interaction, and describe it.
 
-        `seed` decides whatever the backend draws at random; a real gripper ignores it.
-
-        Raises NoDevice where the gripper is not there, saying what was looked for and what to try.
+        `seed` determines everything that the backend draws at random; a real gripper ignores it. Raises NoDevice if the
+        gripper is not connected; the message says what was searched for and what to try.
         """
 
     @abstractmethod
     def read(self, timeout_s: float) -> Reading | None:
-        """Return the next frame with the last cell image, or None where none came within `timeout_s`.
+        """Return the next frame with the last cell image, or None if none came within `timeout_s`.
 
-        Raises DeviceLost where the gripper stopped answering, RecordingEnded after the last recorded frame.
+        Raises DeviceLost if the gripper no longer responds, RecordingEnded after the last recorded frame.
         """
 
     @abstractmethod
     def apply(self, command: Command) -> None:
-        """Ask the gripper for this until the next command. Raises DeviceLost."""
+        """Apply this command until the next one. Raises DeviceLost."""
 
     @abstractmethod
     def tare(self, images: Sequence[Pads]) -> None:
@@ -142,10 +141,10 @@ class SensorBackend(ABC, Generic[ConfigT]):
 
     @abstractmethod
     def close(self) -> None:
-        """Leave the gripper safe and let go of it. Bounded in time, can be called twice and in any state."""
+        """Make the gripper safe and release the device, in a bounded time. May be called in any state, and twice."""
 
     def report(self) -> Mapping[str, float | int | str | bool]:
-        """Return what the backend counted, or knows beyond its frames (a simulator knows the true force)."""
+        """Return counters, and values that the frames do not contain (a simulator knows the true force)."""
         return {}
 
     def dry_run_backend(self) -> SensorBackend[Any] | None:
@@ -173,11 +172,11 @@ class Grasped:
 
 @frozen(kw_only=True)
 class SimulationVariant:
-    """One way in which a simulated gripper can trade accuracy for time.
+    """Settings of a simulated gripper with a certain trade-off between accuracy and time.
 
-    `settings` are the keys of its own table that make it so. Those of one `method` and `fidelity` lie on one curve,
-    and `step` says which of them this is. A `role` of `reference` is what errors are measured against, `floor` what
-    a fidelity comes to in steps that no longer matter: the error of the model alone.
+    `settings` are keys of the gripper's own table. Variants of one `method` and `fidelity` form a curve, on which
+    `step` names the point. The `role` is `reference` for the variant that errors are measured against, and `floor`
+    for one whose steps are so short that only the error of the model remains.
     """
 
     method: str
@@ -203,10 +202,10 @@ class BatchOptions(TypedDict, total=False):
 
 
 class BatchBackend(SensorBackend[ConfigT]):
-    """A backend that can do many grasps at once."""
+    """A backend that can run many grasps at once."""
 
     def variants(self) -> Sequence[SimulationVariant]:
-        """Return the ways in which it trades accuracy for time; none where there is nothing to trade."""
+        """Return the variants that trade accuracy for time; empty if there are none."""
         return ()
 
     @abstractmethod
@@ -217,15 +216,15 @@ class BatchBackend(SensorBackend[ConfigT]):
         seeds: Sequence[int],
         **options: Unpack[BatchOptions],
     ) -> Sequence[Grasped]:
-        """Grasp each scene with its seed under this controller and return what came of each, in that order.
+        """Run a grasp of each scene with its seed under this controller, and return the results in the same order.
 
-        The same seed gives the same trace as `read` and `apply` under the runner, to rounding. Raises ValueError
-        where seeds and scenes differ in number, and before anything runs what the scenes' names raise.
+        A seed gives the same trace as `read` and `apply` under the runner, up to rounding. Raises ValueError if seeds
+        and scenes differ in number, and UnknownName or ConfigError for a scene before any grasp is run.
         """
 
 
 class ControllerState(Protocol):
-    """What every controller state carries besides its own numbers."""
+    """The fields that the state of every controller must have."""
 
     @property
     def phase(self) -> int:
@@ -233,18 +232,18 @@ class ControllerState(Protocol):
 
     @property
     def outcome(self) -> int:
-        """`RUNNING` until the law has ended the grasp, then an `Outcome` number."""
+        """`RUNNING` until the controller ends the grasp, then the number of an `Outcome`."""
 
 
 StepLaw = Callable[[Any, Any, Frame, Pads], tuple[Command, Any]]
 
 
 class Controller(ABC, Generic[ConfigT]):
-    """A control law: a pure step over named tuples of numbers.
+    """A control law: a pure step function of named tuples of numbers.
 
-    Write `step` as a plain module function and assign it: `step = staticmethod(step)`. It has no clock, no input,
-    no output and no objects, and keeps to the subset of Python that a just-in-time compiler takes, so that the
-    one law drives a gripper, runs in a debugger and is compiled together with a simulated plant.
+    Write `step` as a module function and assign it: `step = staticmethod(step)`. It must not use a clock, input, output
+    or objects, and must stay within the subset of Python that numba compiles. The same function then drives a gripper,
+    runs in a debugger, and is compiled together with a simulated plant.
     """
 
     def __init__(self, config: ConfigT) -> None:
@@ -257,7 +256,7 @@ class Controller(ABC, Generic[ConfigT]):
 
     @abstractmethod
     def params(self) -> Any:
-        """Return the law's numbers as a named tuple of floats and integers."""
+        """Return the parameters of `step`, a named tuple of floats and integers."""
 
     @abstractmethod
     def init(self) -> ControllerState:
@@ -265,29 +264,29 @@ class Controller(ABC, Generic[ConfigT]):
 
 
 class FeatureSet(ABC, Generic[ConfigT]):
-    """Draws features from a trace."""
+    """Extracts features from a trace."""
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config
 
     @abstractmethod
     def extract(self, trace: Trace) -> Features:
-        """Return the features of this trace, defined or NaN with a reason for every trace there can be."""
+        """Return the features of this trace. Any trace is allowed: an undefined feature is NaN with a reason."""
 
 
 @frozen(kw_only=True)
 class ClassifierConfig:
-    """What every classifier's config has; a classifier's own config class extends it."""
+    """The settings of every classifier; the config class of a classifier extends this one."""
 
     model: str | None = field(default=None, metadata=NAMES_INPUT)
-    """The trained model: the name of one that a plugin offers, or a .json file."""
+    """The trained model: the name of a model that a plugin ships, or a .json file."""
 
 
 class Classifier(ABC, Generic[ConfigT]):
-    """Learns labels from a table of features, and predicts with reasons.
+    """Learns labels from a table of features, and explains its predictions.
 
-    A NaN in a table is missing, and every classifier has an answer to it. Which trials are `unknown` is not its
-    business: one rule for all stands in `graspsense.core.novelty`.
+    NaN in a table is a missing value, which every classifier must handle. Classifiers do not answer `unknown`:
+    `graspsense.core.novelty` decides this by the same rule for all of them.
     """
 
     def __init__(self, config: ConfigT) -> None:
@@ -295,34 +294,34 @@ class Classifier(ABC, Generic[ConfigT]):
 
     @abstractmethod
     def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
-        """Learn from these trials. The same table, labels and seed give the same model.
+        """Fit the model to these trials. The same table, labels and seed give the same model.
 
-        Raises ValueError where nothing can be learned from them.
+        Raises ValueError if nothing can be learned from them.
         """
 
     @abstractmethod
     def classes(self) -> tuple[str, ...]:
-        """Return the labels it can give, in the order of the columns of `probabilities`."""
+        """Return the labels that it can predict, in the order of the columns of `probabilities`."""
 
     @abstractmethod
     def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
-        """Return shape (trials, classes); each row sums to 1."""
+        """Return the probability of each class for each trial, shape (trials, classes); each row sums to 1."""
 
     @abstractmethod
     def explain(self, features: Features) -> Prediction:
-        """Return the prediction for one trial with its reason in words and units."""
+        """Return the prediction for one trial, with the reason in words and units."""
 
     def tree(self) -> Sequence[TreeNode] | None:
-        """Return the fitted model as one decision tree, the root first; None where it is none."""
+        """Return the nodes of the fitted model, the root first, if it is a decision tree; else None."""
         return None
 
     @abstractmethod
     def to_json(self) -> dict[str, Any]:
-        """Return the fitted model as values that JSON holds exactly."""
+        """Return the fitted model as values that JSON represents exactly."""
 
     @abstractmethod
     def from_json(self, model: Mapping[str, Any]) -> None:
-        """Become the model that `to_json` gave; run and import nothing that the model names.
+        """Load a model that `to_json` returned. Nothing that the model names may be executed or imported.
 
-        Raises KeyError, TypeError, ValueError or DataDamaged where it is no such model.
+        Raises KeyError, TypeError, ValueError or DataDamaged if the values are not such a model.
         """

@@ -1,4 +1,4 @@
-"""The settings of a grasp that belong to no component."""
+"""The settings of a grasp that do not belong to a component."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from attrs.validators import ge, gt, instance_of, lt
 
 @frozen(kw_only=True)
 class RunConfig:
-    """The `[run]` table: what holds for a grasp whatever the components are."""
+    """The `[run]` table: settings that apply to a grasp with any components."""
 
     seed: int = field(default=0, validator=[instance_of(int), ge(0)])
-    """Decides everything drawn at random."""
+    """Determines everything that is drawn at random."""
     hold_s: float = field(default=0.25, validator=ge(0.0))
-    """How long a steady grasp is held before the fingers open."""
+    """Time for which a steady grasp is held before the fingers open."""
     opening_timeout_s: float = field(default=5.0, validator=[gt(0.0), lt(inf)])
-    """Opening, taring and releasing each take at most this long."""
+    """Longest duration of opening, of taring, and of releasing."""
     frame_timeout_s: float = field(default=0.1, validator=gt(0.0))
-    """No frame for this long on a device clock: the device is lost."""
+    """Time without a frame, with a device clock, after which the device counts as lost."""
     grasp_timeout_s: float = field(default=300.0, validator=[gt(0.0), lt(inf)])
-    """Longest approach, squeeze and hold together: the end of a controller that never gives up by itself."""
+    """Longest duration of approach, squeeze and hold together, after which the grasp is ended."""
     late_periods: float = field(default=5.0, validator=gt(0.0))
     """A frame older than this many periods counts as late."""
     first_effort_n: float = field(default=12.0, validator=gt(0.0))
-    """Most effort on a real gripper until a contact has once been seen; above its breakaway, below a squeeze."""
+    """Limit of the effort on a real gripper before the first contact; above its breakaway effort, below a squeeze."""
     first_speed_m_s: float = field(default=0.015, validator=gt(0.0))
-    """Most speed on a real gripper until a contact has once been seen."""
+    """Limit of the speed on a real gripper before the first contact."""

@@ -1,8 +1,9 @@
-"""The runner owns time: it opens the gripper, drives one grasp tick by tick, and leaves the gripper safe.
+"""The runner: it opens the gripper, runs one grasp tick by tick, and leaves the gripper safe.
 
-Open the fingers, tare, close under the controller, hold, open again; each tick it reads, steps, guards, applies
-and hands the tick to the sinks. On every way out (done, error, Ctrl-C) the fingers are told to open, then
-to relax; a lost gripper is told to relax. Then the gripper is closed.
+A grasp opens the fingers, tares, closes under the controller, holds, and opens again. In each tick the runner reads a
+frame, computes the command and limits it, applies it, and passes the tick to the sinks. On every way out (end of the
+grasp, error, Ctrl-C) the gripper is commanded to open and then to relax, a lost gripper only to relax. It is then
+closed.
 """
 
 from __future__ import annotations
@@ -40,15 +41,15 @@ from graspsense.core.trial import GraspEvent
 
 
 class Sink(Protocol):
-    """Something that is handed every tick: a terminal, a recorder. It must not block."""
+    """A receiver of every tick, such as a terminal or a recorder. It must not block."""
 
     def take(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
-        """Take one tick."""
+        """Receive one tick."""
 
 
 @frozen(kw_only=True, eq=False)
 class Grasp:
-    """What the runner brings back: the trace and how it ended."""
+    """The result of the runner: the trace and the outcome."""
 
     trace: Trace
     outcome: Outcome
@@ -62,7 +63,7 @@ class Grasp:
 
 
 def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -> TickParams:
-    """Return the numbers of one grasp of this gripper under this controller."""
+    """Return the parameters of one grasp of this gripper under this controller."""
     real = info.clock == "device"
     infinite = float("inf")
     return TickParams(
@@ -86,22 +87,22 @@ def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -
 
 
 def seconds_at_most(run: RunConfig) -> float:
-    """Return how long a grasp may take with opening, taring and release."""
+    """Return the longest time (s) of a grasp with opening, taring and release."""
     return run.grasp_timeout_s + 3.0 * run.opening_timeout_s
 
 
 def overdue(run: RunConfig) -> str:
-    """Return what is said of a grasp that took longer than that."""
+    """Return the reason given for a grasp that took longer."""
     return (
-        f"no end after {seconds_at_most(run):g} s of ticks: the controller neither ended the grasp nor gave it up "
+        f"no end after {seconds_at_most(run):g} s of ticks: the controller did not end the grasp "
         "(run.grasp_timeout_s)"
     )
 
 
 def ended_by_itself(state: TickState) -> tuple[Outcome, str]:
-    """Return how a grasp ended that its controller or the guard ended, and the reason where that is not plain."""
+    """Return the outcome of a grasp that its controller or the guard ended, and the reason if it needs one."""
     if state.guard.stopped:
-        return Outcome.ABORTED, "the controller commanded no number (NaN), so the guard stopped the grasp"
+        return Outcome.ABORTED, "the controller commanded NaN, so the guard stopped the grasp"
     return Outcome(state.law.outcome), ""
 
 
@@ -114,10 +115,10 @@ def run_grasp(
     on_event: Callable[[GraspEvent], None] | None = None,
     on_open: Callable[[DeviceInfo], None] | None = None,
 ) -> Grasp:
-    """Drive one grasp and return it, whatever its outcome.
+    """Run one grasp and return it, whatever its outcome.
 
-    `on_open` is told which gripper was opened, before it is commanded anything; what it raises ends the run.
-    Raises NoDevice where the gripper cannot be opened. All that goes wrong later is an outcome.
+    `on_open` is called with the description of the opened gripper before any command; an exception from it ends the
+    run. Raises NoDevice if the gripper cannot be opened. Every later failure is an outcome.
     """
     began = time.perf_counter()
     with Interrupts() as interrupts:
@@ -132,13 +133,13 @@ def run_grasp(
         except BaseException:
             backend.close()
             raise
-        # The trace must outlive a backend that fails at the very end.
+        # The trace must survive a backend that fails on closing.
         try:
             backend.close()
         except Exception as error:
             reason = f"the gripper could not be closed: {named(error)} ({reason or outcome.words})"
             outcome = Outcome.ABORTED
-        # After closing: what came of that is worth reporting too.
+        # After closing, so that the report covers it.
         try:
             report = dict(backend.report())
         except Exception as error:
@@ -159,7 +160,7 @@ def run_grasp(
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Keep the garbage collector from pausing a tick: thousands of kept frames make each pause milliseconds."""
+    """Suspend garbage collection, which would pause a tick for milliseconds once there are thousands of frames."""
     collects = gc.isenabled()
     gc.disable()
     try:
@@ -170,11 +171,11 @@ def _no_collection() -> Iterator[None]:
 
 
 class _Overdue(Exception):
-    """A grasp that took longer than any may."""
+    """A grasp that took longer than the limit."""
 
 
 class _Grasp:
-    """One grasp under way: what the loop below and the ways out of it share."""
+    """The state of a running grasp, which the loop and the ways out of it share."""
 
     def __init__(
         self,
@@ -198,7 +199,7 @@ class _Grasp:
         self.last: Frame | None = None
 
     def drive(self) -> tuple[Outcome, str]:
-        """Run the loop to its end and return how it ended; the gripper has then been told to let go."""
+        """Run the loop and return the outcome. The gripper was then commanded to open or relax."""
         lost = False
         try:
             self._loop()
@@ -213,10 +214,10 @@ class _Grasp:
         except KeyboardInterrupt:
             ending = Outcome.ABORTED, "interrupted"
         except Exception as error:
-            # A controller of anybody's may fail; the gripper must be let go and the trace kept.
+            # A controller can raise anything; the gripper must still be released and the trace kept.
             ending = Outcome.ABORTED, named(error)
         finally:
-            # Of a lost gripper it is not known whether it still hears, so it is told to relax all the same.
+            # A lost gripper may still receive commands, so it is commanded to relax.
             self._let_go(opens=not lost and not self.state.done)
         if ending is None:
             ending = ended_by_itself(self.state)
@@ -228,7 +229,7 @@ class _Grasp:
         return ending
 
     def seconds(self) -> float:
-        """Return the seconds of the gripper's own clock from the first frame to the last."""
+        """Return the time (s) from the first frame to the last, by the clock of the gripper."""
         return 0.0 if self.last is None or self.first_t_s is None else self.last.t_s - self.first_t_s
 
     def _loop(self) -> None:
@@ -266,7 +267,7 @@ class _Grasp:
             if state.guard is not watcher:
                 self._guard_event(frame, watcher, state.guard)
                 watcher = state.guard
-            # The frame that ended the taring still has the old zero.
+            # The frame that ended the taring still has forces relative to the old zero.
             recorded = phase >= APPROACH and stepped
             if recorded:
                 self.late += frame.dt_s > late_s
@@ -274,7 +275,7 @@ class _Grasp:
             try:
                 apply(command)
             finally:
-                # Also where the gripper is lost at this very moment: the frame was felt.
+                # Also if the gripper is lost at this moment: the frame was measured.
                 if recorded:
                     record(frame, pads, phase, command)
             if recorded:
@@ -282,16 +283,16 @@ class _Grasp:
                     try:
                         sink.take(frame, pads, phase, command)
                     except Exception as error:
-                        # Who watches may not decide how a grasp ends.
+                        # A failing sink must not change the outcome of a grasp.
                         self.sinks = sinks = [one for one in sinks if one is not sink]
                         self._event(frame.t_s, Phase(phase), f"{type(sink).__name__} failed: {named(error)}")
             if state.done or watcher.stopped:
                 return
 
     def _due(self) -> Iterator[int]:
-        """Yield once a tick for as long as a grasp may take; a recording ends by itself.
+        """Yield once for each tick that a grasp may take; a recording ends by itself.
 
-        Ticks are counted, not clocks read: a device whose clock stands still must not squeeze for ever.
+        This counts ticks and does not read the clock of the device: if that stands still, the squeeze must still end.
         """
         if self.info.opening is None:
             yield from count()
@@ -300,7 +301,7 @@ class _Grasp:
 
     def _guard_event(self, frame: Frame, before: GuardState, now: GuardState) -> None:
         if now.stopped and not before.stopped:
-            self._event(frame.t_s, Phase(self.state.phase), "guard: the controller commanded no number")
+            self._event(frame.t_s, Phase(self.state.phase), "guard: the controller commanded NaN")
         elif now.acted and not before.acted:
             self._event(frame.t_s, Phase(self.state.phase), "guard: a command was limited")
 
@@ -311,9 +312,9 @@ class _Grasp:
             self.on_event(event)
 
     def _let_go(self, opens: bool) -> None:
-        """Open the fingers for as long as that takes, then relax. Nothing that fails here may stop the rest.
+        """Open the fingers, then relax. A failure of one step must not prevent the next.
 
-        With `opens` false (they are open, or no frame would tell) only relax.
+        With `opens` false, because the fingers are open or frames no longer come, it only relaxes.
         """
         info, run = self.info, self.run
         try:
@@ -321,7 +322,7 @@ class _Grasp:
                 still, began_s = Stillness(self.last.t_s, self.last.gap_m), self.last.t_s
                 give_up = time.perf_counter() + run.opening_timeout_s
                 fresh = GuardState(1, 0, 0)
-                # A second Ctrl-C asks to hurry: then only relax.
+                # After a second Ctrl-C, only relax.
                 while time.perf_counter() < give_up and self.interrupts.count < 2:
                     command, fresh = guard(self.params.guard, fresh, self.last, info.opening)
                     self.backend.apply(command)

@@ -1,8 +1,8 @@
-"""What passes between a gripper and a controller: frames, cell images, commands, and how a grasp ended.
+"""The values that pass between a gripper and a controller: frames, cell images, commands, and the outcome of a grasp.
 
-Everything here is plain numbers in named tuples, so that the same law runs in the interpreter and compiled.
-SI units. The gap is the distance between the fingertip faces; closing makes it fall, so a closing velocity is
-negative. An effort is the force on each finger if nothing were lost on the way; positive squeezes.
+All are named tuples of numbers in SI units, so that the same control law runs in the interpreter and compiled. The gap
+is the distance between the fingertip faces; it decreases on closing, so a closing velocity is negative. An effort is
+the force on each finger without losses in the drive; a positive effort squeezes.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ CHANNELS: Final = {
     "edge_right": "N",
     "pads": "counts",
 }
-"""Channels a backend can declare, with the unit each must have."""
+"""The channels that a backend can declare, each with its unit."""
 
 
 class Frame(NamedTuple):
-    """One tick, numbers only.
+    """The measurements of one tick.
 
-    A channel that the backend does not have is NaN. Forces are tared. `edge_*` is the largest force on any
-    single edge cell (0-6) of that fingertip. `status` is a set of bits: 0 is well, the rest is the backend's.
+    A channel that the backend lacks is NaN. Forces are tared. `edge_*` is the largest force on a single edge cell (0-6)
+    of that fingertip. `status` is a bit set whose meaning the backend defines; 0 means no error.
     """
 
     t_s: float
@@ -49,9 +49,9 @@ class Frame(NamedTuple):
 
 
 class Pads(NamedTuple):
-    """The last cell image, on the pads' own slower clock: raw counts of 22 cells a fingertip.
+    """The last cell image: raw counts of the cells of both fingertips, which come at a lower rate than frames.
 
-    `counter` rises by one with each new image. A backend without pads gives counter 0 and NaN cells.
+    `counter` increases by one with each new image. A backend without pads gives a counter of 0 and NaN cells.
     """
 
     t_s: float
@@ -64,10 +64,10 @@ NO_PADS: Final = Pads(0.0, 0, (float("nan"),) * CELLS, (float("nan"),) * CELLS)
 
 
 class Command(NamedTuple):
-    """What the gripper is asked for: one of the four kinds, its value, and limits (none is `inf`).
+    """A command to the gripper: its kind, its value, and limits of effort (N) and speed (m/s), `inf` for no limit.
 
-    Values by kind: `EFFORT` in N, positive squeezes; `VELOCITY` of the gap in m/s, negative closes; `POSITION`
-    of the gap in m; `FORCE` on each pad in N.
+    The value is, for `EFFORT`, the effort in N (positive squeezes); for `VELOCITY`, the rate of the gap in m/s
+    (negative closes); for `POSITION`, the gap in m; for `FORCE`, the force on each pad in N.
     """
 
     kind: int
@@ -86,7 +86,7 @@ class CommandKind(enum.IntEnum):
 
 
 class Phase(enum.IntEnum):
-    """Where a grasp stands. A controller reports APPROACH, SQUEEZE and HOLD; the runner owns the rest."""
+    """The phase of a grasp. A controller reports APPROACH, SQUEEZE and HOLD; the runner sets the others."""
 
     OPENING = 0
     TARING = 1
@@ -97,7 +97,7 @@ class Phase(enum.IntEnum):
 
 
 class Outcome(enum.IntEnum):
-    """How a grasp ended. A value, never an exception."""
+    """How a grasp ended. This is a value; no exception is raised for it."""
 
     RUNNING = 0
     STEADY = 1
@@ -113,12 +113,12 @@ class Outcome(enum.IntEnum):
 
     @property
     def words(self) -> str:
-        """The outcome as a person says it: `never steady`."""
+        """The outcome in words: `never steady`."""
         return self.name.lower().replace("_", " ")
 
 
-# The same numbers as plain integers: laws compare these, because a named tuple that holds an enum member is
-# another type to a compiler than one that holds an integer.
+# The same numbers as plain integers, for control laws: to a compiler, a named tuple with an enum member and one with
+# an integer are of different types.
 EFFORT: Final = 0
 VELOCITY: Final = 1
 POSITION: Final = 2

@@ -1,7 +1,7 @@
 """One tick of a grasp as one pure function: open, tare, the controller's step, hold, release, and the guard.
 
-The runner calls it in the interpreter; a simulator that does many grasps at once binds the same function, with
-the same controller, into its compiled loop. `bind(tick, step=controller.step)` makes it whole.
+The runner calls it in the interpreter. A simulator that runs many grasps at once compiles the same function, with the
+same controller, into its loop. `bind(tick, step=controller.step)` supplies the controller.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ RELEASE = int(Phase.RELEASE)
 
 OPEN_SPEED_M_S = 1e-3
 OPEN_WINDOW_S = 0.1
-"""Opened or released is: slower than 1 mm/s over 0.1 s (the authors' stopped threshold and least time)."""
+"""The fingers count as opened or released when slower than 1 mm/s for 0.1 s, the values of the authors' code."""
 
 
 class Schedule(NamedTuple):
-    """What frames a grasp: how to open and let go, how many images to tare with, how long to hold.
+    """The phases around a grasp: the commands that open and relax, the images for the tare, the time to hold.
 
-    `opens` is 0 where there is nothing to open (a recording): then there is no opening, taring or release.
+    `opens` is 0 for a recording, which has no opening, taring or release.
     """
 
     opens: int
@@ -38,7 +38,7 @@ class Schedule(NamedTuple):
 
 
 class TickParams(NamedTuple):
-    """The numbers of one grasp: the schedule's, the guard's, and the controller's own (`law`)."""
+    """The parameters of one grasp: of the schedule, the guard, and the controller (`law`)."""
 
     schedule: Schedule
     guard: GuardParams
@@ -46,7 +46,7 @@ class TickParams(NamedTuple):
 
 
 class TickState(NamedTuple):
-    """Where the grasp stands. `done` is 1 after the release."""
+    """The state of a grasp. `done` is 1 after the release."""
 
     phase: int
     since_t_s: float
@@ -58,7 +58,7 @@ class TickState(NamedTuple):
 
 
 def first_state(law: Any) -> TickState:
-    """Return the state before the first tick, given the controller's."""
+    """Return the state before the first tick, given that of the controller."""
     return TickState(-1, 0.0, Stillness(0.0, 0.0), 0, law, GuardState(0, 0, 0), 0)
 
 
@@ -93,7 +93,7 @@ def tick(params: TickParams, state: TickState, frame: Frame, pads: Pads) -> tupl
         command = schedule.relaxed
         waited = frame.t_s - since
         if pads.counter >= first_image + schedule.tare_images or waited >= schedule.opening_timeout_s:
-            # The zero holds from the next frame on, so the approach begins with that.
+            # The zero applies from the next frame on, so the approach begins there.
             phase, since = APPROACH, frame.t_s
     else:
         command = schedule.opening

@@ -1,4 +1,4 @@
-"""The columns of a grasp: what was felt, tick by tick, and in which phase."""
+"""The trace of a grasp: measurements, phases and commands as arrays over its ticks."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ PAD_COLUMNS: Final = ("pad_t_s", "pad_left", "pad_right")
 
 @frozen(eq=False, kw_only=True)
 class Trace:
-    """A finished or running grasp as arrays: `n` ticks, and `m` cell images on their own clock.
+    """A finished or running grasp as arrays: `n` ticks, and `m` cell images with times of their own.
 
-    The tick columns have shape (n,); `phase` holds `Phase` numbers, `command` the value commanded after that
-    tick. `pad_t_s` has shape (m,), `pad_left` and `pad_right` (m, 22), in raw counts. A channel that the gripper
-    does not have is NaN throughout. `units` names the unit of each channel and of `t`; they are SI for a
-    gripper, but a recording may have been made in others (`{"t": "frame"}`).
+    The columns of ticks have shape (n,): `phase` holds the numbers of `Phase`, `command` the value commanded after
+    the tick. `pad_t_s` has shape (m,), `pad_left` and `pad_right` have shape (m, 22), in raw counts. A channel that
+    the gripper lacks is NaN throughout. `units` gives the unit of each channel and of `t`: SI for a gripper, possibly
+    others for a recording (`{"t": "frame"}`).
     """
 
     t_s: Floats
@@ -55,7 +55,7 @@ class Trace:
         return len(self.t_s)
 
     def until(self, t_s: float) -> Trace:
-        """Return the trace as it stood at time `t_s`: every tick and image not later than that."""
+        """Return the trace up to time `t_s`: every tick and image that is not later."""
         n = int(np.searchsorted(self.t_s, t_s, side="right"))
         m = int(np.searchsorted(self.pad_t_s, t_s, side="right"))
         cut: dict[str, Any] = {name: getattr(self, name)[:n] for name in TICK_COLUMNS}
@@ -65,7 +65,7 @@ class Trace:
 
 @define(eq=False)
 class TraceRecorder:
-    """Collects the ticks of a running grasp; `trace()` gives what was collected so far."""
+    """Collects the ticks of a running grasp; `trace()` returns those collected so far."""
 
     units: Mapping[str, str] = field(factory=lambda: dict(SI_UNITS))
     frames: list[Frame] = field(factory=list, init=False)
@@ -74,7 +74,7 @@ class TraceRecorder:
     images: list[Pads] = field(factory=list, init=False)
 
     def add(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
-        """Take one tick; a cell image is kept when its counter is new."""
+        """Add one tick, and its cell image if the counter of the image is new."""
         self.frames.append(frame)
         self.phases.append(phase)
         self.commands.append(command.value)
@@ -83,7 +83,7 @@ class TraceRecorder:
             images.append(pads)
 
     def trace(self) -> Trace:
-        """Return the columns of what was collected so far."""
+        """Return the trace of the ticks collected so far."""
         return trace_of(self.frames, self.phases, self.commands, self.images, self.units)
 
 
@@ -94,7 +94,7 @@ def trace_of(
     images: Sequence[Pads],
     units: Mapping[str, str] = SI_UNITS,
 ) -> Trace:
-    """Return the columns of these ticks and images. `frames`, `phases` and `commands` have one length."""
+    """Return the trace of these ticks and images. `frames`, `phases` and `commands` must have the same length."""
     width = len(_FRAME_COLUMNS)
     numbers = np.fromiter(chain.from_iterable(frames), dtype=np.float64, count=len(frames) * width)
     table = numbers.reshape(len(frames), width)

@@ -1,4 +1,4 @@
-"""What a grasp leaves behind: the trial, with everything that made it, and the events on the way."""
+"""The result of a grasp: the trial, with the settings that made it, and its events."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @frozen(kw_only=True)
 class RunInfo:
-    """What is about to run: qualified names and versions of the components, the resolved settings, the seed."""
+    """A grasp before it starts: names and versions of the components, the resolved settings, the seed."""
 
     components: Mapping[str, str]
     settings: Mapping[str, Any]
@@ -27,7 +27,7 @@ class RunInfo:
 
 @frozen
 class GraspEvent:
-    """Something that happened once: at `t_s`, in `phase`, in a sentence."""
+    """An event of a grasp: its time (s), the phase, and a sentence."""
 
     t_s: float
     phase: Phase
@@ -38,9 +38,9 @@ class GraspEvent:
 class Trial:
     """One grasp: trace, features, prediction, labels, and every setting, version and seed that made it.
 
-    `reason` says why where the outcome alone does not. `device` describes the gripper as it was opened;
-    `report` is what the gripper counted or, being simulated, knows to be true. `counts` are the runner's own:
-    ticks, late frames, how often the guard acted.
+    `reason` explains the outcome if this is needed. `device` describes the gripper as it was opened. `report` holds
+    the counters of the gripper, and the true values if it is simulated. `counts` are those of the runner: ticks, late
+    frames, actions of the guard.
     """
 
     run: RunInfo
@@ -58,7 +58,7 @@ class Trial:
 
 
 def trial_as_json(trial: Trial) -> dict[str, Any]:
-    """Return what `graspsense run --json` prints: everything but the trace, a missing feature as None."""
+    """Return the trial without its trace as `graspsense run --json` prints it; a missing feature is None."""
     features, prediction, device = trial.features, trial.prediction, trial.device
     return {
         "outcome": trial.outcome.words,
