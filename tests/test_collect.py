@@ -197,7 +197,9 @@ def test_the_first_trials_are_collected_for_a_model_that_does_not_exist_yet(
     graspsense, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "mine.toml").write_text('[classifier]\ntype = "knn"\nmodel = "mine.json"\n')
+    (tmp_path / "mine.toml").write_text(
+        'extends = "default"\n[classifier]\ntype = "knn"\nmodel = "mine.json"\n'
+    )
     kinds = "can:full_open,can:empty_open"
 
     valid = graspsense("config", "validate", "mine.toml")

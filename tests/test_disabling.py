@@ -31,7 +31,7 @@ def home(tmp_path, monkeypatch):
 
 def graspsense(site, *arguments, code=0):
     environ = {**os.environ, "PYTHONPATH": str(site.folder), "NO_COLOR": "1"}
-    environ["GRASPSENSE_PLUGINS"] = "lab-loud lab-peak lab-other lab-old lab-slow lab-broken"
+    environ["GRASPSENSE_PLUGINS"] = "lab-loud lab-peak lab-other lab-old lab-slow lab-broken lab-sleepy"
     program = "import sys; from graspsense.cli.main import main; main(sys.argv[1:])"
     done = subprocess.run(
         [sys.executable, "-c", program, *arguments], env=environ, capture_output=True, text=True, check=False
@@ -95,6 +95,7 @@ def test_the_list_says_what_is_to_be_done(home, site):
     site.install("lab-old", "GRASPSENSE_API = (0, 9)")
     site.install("lab-slow", "import numpy; GRASPSENSE_API = (1, 0)")
     site.install("lab-broken", "import no_such_driver")
+    site.install("lab-sleepy", "import time; time.sleep(0.7); GRASPSENSE_API = (1, 0)")
 
     said = graspsense(site, "plugins", "list").partition("To be done:")[2]
 
@@ -106,6 +107,12 @@ def test_the_list_says_what_is_to_be_done(home, site):
     assert "upgrade lab-old" in said
     assert "lab-slow: slow: importing lab_slow_plugin takes" in said
     assert "and imports numpy. Its author: name classes by import strings" in said
+    assert (
+        "lab-sleepy: slow: importing lab_sleepy_plugin waits for 0.7 s. Its author: wait for a device" in said
+    )
+    assert (
+        "GRASPSENSE_PLUGINS names lab-loud, and no plugin of that distribution is installed. Did you mean 'lab-old'?"
+    ) in said
     assert (
         "lab-broken: broken: ModuleNotFoundError: No module named 'no_such_driver'; `graspsense plugins show "
         "lab-broken` has the whole of it, `graspsense plugins disable lab-broken` leaves it out"

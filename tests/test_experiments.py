@@ -183,12 +183,12 @@ def test_a_full_disk_ends_a_run_with_an_account_and_what_is_done_stays(
 
 
 def test_a_task_that_fails_is_a_result_with_a_reason(run, file, tmp_path):
-    file.write_text(EXPERIMENT.replace("[2, 4]", "[2, 900]"))
+    file.write_text(EXPERIMENT.replace('"judge.folds" = [2, 4]', '"judge.targets" = [["both"], ["state"]]'))
     code, out, _ = run("experiment", file, "--out", tmp_path / "out", "--executor", "serial")
 
     assert code == 1
     assert "4 tasks: 2 done now, 2 failed" in out
-    assert "failed 2 times: 40 trials cannot be cut into 900 folds" in out
+    assert "failed 2 times: label 'a' in" in out
     assert "2 tasks failed and are not in these figures" in (tmp_path / "out" / "report.html").read_text()
 
 
@@ -360,6 +360,32 @@ def test_an_experiment_never_opens_a_real_gripper(tmp_path):
 
     with pytest.raises(ConfigError, match="declares no objects that it can simulate, so it was not opened"):
         read_experiment(str(path))
+
+
+def test_an_experiment_is_not_a_part_of_itself(tmp_path):
+    (tmp_path / "itself.toml").write_text('title = "x"\nparts = ["itself.toml"]\n')
+    (tmp_path / "a.toml").write_text('title = "x"\nparts = ["b.toml"]\n')
+    (tmp_path / "b.toml").write_text('title = "x"\nparts = ["a.toml"]\n')
+
+    with pytest.raises(ConfigError, match=r"cannot be a part of itself: itself\.toml > itself\.toml"):
+        read_experiment(str(tmp_path / "itself.toml"))
+    with pytest.raises(ConfigError, match=r"cannot be a part of itself: a\.toml > b\.toml > a\.toml"):
+        read_experiment(str(tmp_path / "a.toml"))
+
+
+def test_a_slip_in_the_number_of_seeds_is_refused_at_once(file):
+    with pytest.raises(ConfigError, match="1000000 seeds: at most 10000"):
+        read_experiment(str(file), ["seeds=1000000"])
+
+
+def test_more_folds_than_trials_are_refused_before_any_task(file, tmp_path):
+    few = tmp_path / "few.toml"
+    few.write_text('title = "x"\n[data]\nobjects = ["can:full_open", "can:empty_open"]\ntotal = 7\n')
+
+    with pytest.raises(ConfigError, match=r"few.toml.*: judge.folds: 10 folds of 7 trials"):
+        read_experiment(str(few))
+    with pytest.raises(ConfigError, match=r"sweep|judge.folds: 1000 folds of 40 trials"):
+        read_experiment(str(file), ['sweep={"judge.folds"=[1000]}'])
 
 
 def test_what_there_is(run):

@@ -105,3 +105,13 @@ def test_a_group_without_a_command_prints_its_help_once(graspsense):
     assert code == 2
     assert (out + err).count("Usage:") == 1
     assert "shows what there is" not in err
+
+
+def test_a_package_is_made_for_one_role(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["plugins", "new", "lab-hand", "--role", "controller", "--role", "feature-set"])
+
+    assert ended.value.code == 2
+    assert "--role is given 2 times (controller, feature-set)" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

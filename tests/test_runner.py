@@ -91,6 +91,29 @@ def test_a_device_lost_in_any_phase_is_an_outcome_with_the_trace_to_the_last_fra
     assert len(grasp.trace) == 0 or grasp.trace.t_s[-1] == pytest.approx((at - 1) * 0.001)
 
 
+def test_a_slow_gripper_has_three_of_its_own_periods_for_a_frame():
+    class Slow(Scripted):
+        """Reports five times a second, and keeps whoever asks for less than a period waiting in vain."""
+
+        def open(self, seed):
+            return evolve(super().open(seed), rate_hz=5.0)
+
+        def read(self, timeout_s):
+            self.asked_s = timeout_s
+            return super().read(timeout_s) if timeout_s >= 0.2 and self.silent_from is None else None
+
+    slow, silent = (
+        Slow(squeezing, bottle, clock="device"),
+        Slow(squeezing, bottle, clock="device", silent_from=0),
+    )
+
+    assert run_grasp(slow, HYBRID, RUN).outcome != Outcome.DEVICE_LOST
+    assert slow.asked_s == pytest.approx(0.6)
+    reason = run_grasp(silent, HYBRID, RUN).reason
+    assert "no frame from scripted for 600 ms, although it declares 5 Hz" in reason
+    assert "run.frame_timeout_s sets how long to wait" in reason
+
+
 @pytest.mark.parametrize("silent_from", [0, 700])
 def test_a_silent_device_is_lost_too(silent_from):
     gripper = Scripted(squeezing, bottle, clock="device", silent_from=silent_from)

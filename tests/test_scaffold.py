@@ -40,6 +40,13 @@ def test_a_package_is_whole(role, tmp_path):
         ),
         ("Lab_Thing", "feature-set", "small letters, digits and single hyphens"),
         ("graspsense-chitta", "feature-set", "name 'chitta' is taken by graspsense/chitta: choose another"),
+        (
+            "numpy",
+            "feature-set",
+            "name 'numpy' is taken: numpy has a package numpy, which this one would hide",
+        ),
+        ("json", "feature-set", "Python itself has a module json"),
+        ("class", "observer", "class is a keyword of Python"),
         ("hybrid", "controller", "name 'hybrid' is taken by graspsense/hybrid: choose another"),
     ],
 )

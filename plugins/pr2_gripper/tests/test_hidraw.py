@@ -6,6 +6,8 @@ docs/pr2.md.
 
 from __future__ import annotations
 
+import threading
+import time
 from typing import Any
 
 import pytest
@@ -68,6 +70,20 @@ def test_write_that_returns_minus_one_is_a_loss(opened: Pr2Backend, machine: Any
     machine.unplug("/dev/hidraw3")
     with pytest.raises(DeviceLost, match="-1 of 64 bytes"):
         opened.apply(RELAX)
+
+
+def test_a_stalled_write_is_a_loss_within_a_second(
+    opened: Pr2Backend, machine: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernel waits for 5 s where an endpoint is stalled, and nothing interrupts it."""
+    following(opened, machine)
+    stalled = threading.Event()
+    monkeypatch.setattr(type(machine.open_handles[0]), "write", lambda self, data: stalled.wait(60.0) and -1)
+    began = time.monotonic()
+    with pytest.raises(DeviceLost, match=r"not taken within 0\.25 s"):
+        opened.apply(RELAX)
+    assert time.monotonic() - began < 30.0  # not the minute that the write takes
+    stalled.set()
 
 
 def test_silence_is_no_frame_but_no_loss_yet(opened: Pr2Backend, machine: Any) -> None:

@@ -35,6 +35,7 @@ def list_plugins(as_json: bool) -> None:
     table = [[*(row[key] or "-" for key in columns), row["reason"] or row["summary"]] for row in rows]
     echo_table([*(key.upper() for key in columns), "WHAT"], [[_line(cell) for cell in row] for row in table])
     advice = list(dict.fromkeys(f"{row['distribution']}: {one}" for row in rows for one in row["advice"]))
+    advice += loaded.unknown_names
     if advice:
         click.echo("\nTo be done:")
         for one in advice:
@@ -136,14 +137,24 @@ def check(
 @plugins.command()
 @click.argument("name")
 @click.option(
-    "--role", required=True, metavar="ROLE", help="Role of the plugin; an unknown role lists all of them."
+    "--role",
+    "roles",
+    required=True,
+    multiple=True,
+    metavar="ROLE",
+    help="Role of the plugin; an unknown role lists all of them.",
 )
 @click.option("--folder", type=click.Path(path_type=Path), help="Folder of the package.  [default: ./NAME]")
-def new(name: str, role: str, folder: Path | None) -> None:
+def new(name: str, roles: tuple[str, ...], folder: Path | None) -> None:
     """Create the package of a new plugin, with tests."""
     from graspsense.scaffold.make import make
 
-    for line in make(name, role, folder if folder is not None else Path(name)):
+    if len(roles) > 1:
+        raise click.UsageError(
+            f"--role is given {len(roles)} times ({', '.join(roles)}): a package is made for one role. Make one, and "
+            "add the other parts to its plugin.py"
+        )
+    for line in make(name, roles[0], folder if folder is not None else Path(name)):
         click.echo(line)
 
 

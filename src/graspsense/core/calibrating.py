@@ -13,6 +13,7 @@ from graspsense.core.errors import DeviceLost, GraspsenseError
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
 from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import frame_timeout_s, no_frame
 from graspsense.core.signals import EFFORT, Command, Pads
 from graspsense.core.tick import OPEN_SPEED_M_S, OPEN_WINDOW_S
 
@@ -88,12 +89,9 @@ class Rig:
         return reading
 
     def _read(self) -> Reading:
-        reading = self._backend.read(self._run.frame_timeout_s)
+        reading = self._backend.read(frame_timeout_s(self._run, self._info))
         if reading is None:
-            raise DeviceLost(
-                f"no frame from {self._info.name} for {self._run.frame_timeout_s * 1e3:.0f} ms: check its cable and "
-                "power, then `graspsense devices`"
-            )
+            raise DeviceLost(no_frame(self._run, self._info))
         return reading
 
 

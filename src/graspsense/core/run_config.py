@@ -19,7 +19,7 @@ class RunConfig:
     opening_timeout_s: float = field(default=5.0, validator=[gt(0.0), lt(inf)])
     """Longest duration of opening, of taring, and of releasing."""
     frame_timeout_s: float = field(default=0.1, validator=gt(0.0))
-    """Time without a frame, with a device clock, after which the device counts as lost."""
+    """Time without a frame after which the device counts as lost; at least three periods of the gripper."""
     grasp_timeout_s: float = field(default=300.0, validator=[gt(0.0), lt(inf)])
     """Longest duration of approach, squeeze and hold together, after which the grasp is ended."""
     late_periods: float = field(default=5.0, validator=gt(0.0))

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from itertools import count
 from math import ceil
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from attrs import frozen
 
@@ -89,6 +89,24 @@ def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -
 def seconds_at_most(run: RunConfig) -> float:
     """Return the longest time (s) of a grasp with opening, taring and release."""
     return run.grasp_timeout_s + 3.0 * run.opening_timeout_s
+
+
+FRAME_PERIODS: Final = 3.0
+"""How many of its own periods a gripper may take for a frame, if that is longer than `run.frame_timeout_s`."""
+
+
+def frame_timeout_s(run: RunConfig, info: DeviceInfo) -> float:
+    """Return how long to wait for a frame: `run.frame_timeout_s`, or three periods of a gripper that is slower."""
+    return max(run.frame_timeout_s, FRAME_PERIODS / info.rate_hz)
+
+
+def no_frame(run: RunConfig, info: DeviceInfo) -> str:
+    """Return the message for a gripper that gave no frame for that long."""
+    return (
+        f"no frame from {info.name} for {frame_timeout_s(run, info) * 1e3:.0f} ms, although it declares "
+        f"{info.rate_hz:g} Hz: check its cable and power, then `graspsense devices`. run.frame_timeout_s sets how long "
+        "to wait"
+    )
 
 
 def overdue(run: RunConfig) -> str:
@@ -238,16 +256,14 @@ class _Grasp:
         params, record = self.params, self.recorder.add
         on_device_clock = self.info.clock == "device"
         late_s = run.late_periods / self.info.rate_hz if on_device_clock else float("inf")
+        timeout_s = frame_timeout_s(run, self.info)
         state, phase, watcher = self.state, self.state.phase, self.state.guard
         images: list[Pads] = []
         newest = 0
         for _ in self._due():
-            reading = read(run.frame_timeout_s)
+            reading = read(timeout_s)
             if reading is None:
-                raise DeviceLost(
-                    f"no frame from {self.info.name} for {run.frame_timeout_s * 1e3:.0f} ms: check its cable and "
-                    "power, then `graspsense devices`"
-                )
+                raise DeviceLost(no_frame(run, self.info))
             frame, pads = reading
             self.last = frame
             if self.first_t_s is None:
@@ -326,7 +342,7 @@ class _Grasp:
                 while time.perf_counter() < give_up and self.interrupts.count < 2:
                     command, fresh = guard(self.params.guard, fresh, self.last, info.opening)
                     self.backend.apply(command)
-                    reading = self.backend.read(run.frame_timeout_s)
+                    reading = self.backend.read(frame_timeout_s(run, info))
                     if reading is None:
                         break
                     self.last, _ = reading

@@ -19,17 +19,22 @@ from graspsense.core.plugins import installed
 from graspsense.core.strict import InvalidValue, ValidationFailed, plain, structured
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.task import Task
-from graspsense.sources.simulated import simulated_objects
-from graspsense.sources.trial_source import SIMULATED, Source
+from graspsense.sources.simulated import plan_trials, simulated_objects
+from graspsense.sources.trial_source import SIMULATED, Source, groups_of, labelled_trials
 
 PIPELINE_TABLES: Final = (*(one for one in TABLE_OF_ROLE.values() if one != "classifier"), "run")
 SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
 DEFAULT_CLASSIFIER: Final = "c45"
+MOST_SEEDS: Final = 10_000
+"""More seeds than that are a slip: intervals have long stopped to narrow."""
 
 
 def _seeds(experiment: object, attribute: object, value: int | tuple[int, ...]) -> None:
     if isinstance(value, int) and value < 1:
         raise ValueError(f"{value} seeds: give at least 1, or a list of seeds")
+    number = value if isinstance(value, int) else len(value)
+    if number > MOST_SEEDS:
+        raise ValueError(f"{number} seeds: at most {MOST_SEEDS}, each of which is a task of every case")
     if not isinstance(value, int) and (not value or len(set(value)) < len(value) or min(value) < 0):
         raise ValueError("seeds: give a number of them, or a list of different ones from 0 on")
 
@@ -160,12 +165,18 @@ def shipped() -> dict[str, Any]:
     }
 
 
-def read_experiment(asked: str, options: Sequence[str] = ()) -> Planned:
+def read_experiment(asked: str, options: Sequence[str] = (), within: Sequence[str] = ()) -> Planned:
     """Return a shipped experiment by name, or that of a `.toml` file, with options as after `-o` laid over it.
 
-    Raises ConfigError with every error that can be told, each with its file and line.
+    `within` names the experiments that this one is a part of. Raises ConfigError with every error that can be told,
+    each with its file and line.
     """
     layer, base, name = _found(asked)
+    identity = asked if base is None else str(Path(asked).expanduser().resolve())
+    if identity in within:
+        chain = " > ".join(Path(one).name for one in (*within, identity))
+        raise ConfigError(f"{layer.label}: an experiment cannot be a part of itself: {chain}")
+    within = (*within, identity)
     layers, complaints = option_layers(options)
     merged = Merged()
     merged.add((), _located(layer.values, base), layer)
@@ -182,15 +193,15 @@ def read_experiment(asked: str, options: Sequence[str] = ()) -> Planned:
     if experiment is None or complaints:
         raise ConfigError("\n".join(complaints))
     if experiment.parts:
-        return _of_parts(name, experiment, layer)
+        return _of_parts(name, experiment, layer, within)
     return _Plan(name, experiment, layer).planned()
 
 
-def _of_parts(name: str, experiment: Experiment, layer: Layer) -> Planned:
+def _of_parts(name: str, experiment: Experiment, layer: Layer, within: Sequence[str]) -> Planned:
     """Return the cases of all parts, each under its part's name."""
     kind_of(experiment.kind)
     seeds = _listed(experiment.seeds)
-    parts = [read_experiment(part, [f"seeds={list(seeds)}"]) for part in experiment.parts]
+    parts = [read_experiment(part, [f"seeds={list(seeds)}"], within) for part in experiment.parts]
     pipelines: dict[str, Settings] = {}
     cases: list[Case] = []
     for part in parts:
@@ -310,6 +321,8 @@ class _Plan:
         if any(source is not None and source.kind == SIMULATED for source in (data, test)):
             simulated_objects(settings)
         judge = self._keys(values.get("judge", {}), kind_of(one.kind).keys_class(), "judge")
+        if test is None and data is not None and judge is not None:
+            self._check_folds(settings, data, judge)
         return Case(
             name=name,
             at=at,
@@ -320,6 +333,20 @@ class _Plan:
             judge=judge,
             kind=one.kind,
         )
+
+    def _check_folds(self, settings: Settings, data: Source, judge: Any) -> None:
+        """Complain of more folds than trials, which every task of the case would end with."""
+        folds = getattr(judge, "folds", None)
+        if folds is None:
+            return
+        try:
+            trials = _number_of_trials(settings, data)
+        except GraspsenseError as error:
+            self.complaints.append(f"{self.layer.where(('data',))}: {error}")
+            return
+        if trials is not None and folds > trials:
+            text = f"{folds} folds of {trials} trials: give at most as many folds as there are trials"
+            self.complaints.append(self.layer.complain(InvalidValue(("judge", "folds"), text)))
 
     def _keys(self, values: Mapping[str, Any], cls: type, table: str) -> Any:
         try:
@@ -378,6 +405,15 @@ class _Plan:
                     self.complaints.append(self.layer.complain(InvalidValue(("classifiers", index), text)))
                 seen.add(name)
                 yield Learner(name=name, type=component.qualified, config=config)
+
+
+def _number_of_trials(settings: Settings, data: Source) -> int | None:
+    """Return how many trials a source has, None where that is known only when a data set is read."""
+    if data.kind == SIMULATED:
+        return len(plan_trials(settings, groups_of(data), 0).labels)
+    if data.kind == "CSV":
+        return len(labelled_trials(data, settings=lambda: settings, features=settings.features.create))
+    return None
 
 
 def in_a_name(key: str, value: Any) -> str:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import keyword
 import re
+import sys
 from collections.abc import Mapping
+from importlib.metadata import packages_distributions
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -15,7 +18,7 @@ from graspsense import __version__
 from graspsense.core.entries import Role
 from graspsense.core.errors import ConfigError, suggestion
 from graspsense.core.hookspecs import API
-from graspsense.core.plugins import installed
+from graspsense.core.plugins import canonical, installed, installed_sources
 
 
 @frozen
@@ -99,6 +102,7 @@ def make(name: str, role: str, folder: Path) -> list[str]:
             f"the name {name!r} will not do: small letters, digits and single hyphens, a letter first, as in lab-hand"
         )
     part = name.removeprefix("graspsense-")
+    _check_importable(name)
     _check_free(kind, part, name)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ConfigError(f"{folder} is there already: give another name, or --folder")
@@ -145,6 +149,24 @@ def _files(kind: ScaffoldKind, role: str, words: Mapping[str, str]) -> dict[str,
     if role == "sim-term":
         found["scene.toml"] = f"{role}/scene.toml.txt"
     return found
+
+
+def _check_importable(name: str) -> None:
+    """Refuse a name whose package another distribution or Python itself has. Raises ConfigError."""
+    package = name.replace("-", "_")
+    if keyword.iskeyword(package):
+        raise ConfigError(f"the name {name!r} will not do: {package} is a keyword of Python")
+    if package in sys.stdlib_module_names:
+        raise ConfigError(f"the name {name!r} is taken: Python itself has a module {package}")
+    plugins = {source.distribution for source in installed_sources()}
+    others = [
+        one for one in packages_distributions().get(package, ()) if canonical(one) not in {name} & plugins
+    ]
+    if others:
+        raise ConfigError(
+            f"the name {name!r} is taken: {others[0]} has a package {package}, which this one would hide. Choose "
+            f"another name, as lab-{name}"
+        )
 
 
 def _check_free(kind: ScaffoldKind, part: str, name: str) -> None:

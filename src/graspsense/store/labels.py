@@ -19,7 +19,8 @@ def labels_of(word: str) -> dict[str, str]:
     match = _WORD.fullmatch(word)
     if match is None:
         raise ConfigError(
-            f"{word!r} is not a label: write CLASS:STATE, as in can:full_open, or can:full_open#2 for the second can"
+            f"{word!r} is not a label: write CLASS:STATE, as in can:full_open, or can:full_open#2 for the second can. "
+            "Class, state and number are without spaces and without the characters : # ,"
         )
     label = match["kind"] + (match["state"] or "")
     if match["kind"] == UNKNOWN:

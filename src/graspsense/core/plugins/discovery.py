@@ -13,6 +13,7 @@ from attrs import define
 
 from graspsense import __version__
 from graspsense.core.disabling import config_file
+from graspsense.core.errors import suggestion
 from graspsense.core.firstparty import BUILTIN_MODULE, DISTRIBUTION
 from graspsense.core.hookspecs import ENTRY_POINT_GROUP
 from graspsense.core.plugins.parts import canonical
@@ -71,6 +72,15 @@ def reason_not_to_load(distribution: str, environ: Mapping[str, str], disabled: 
     if distribution in disabled:
         return f"in {config_file()} (graspsense plugins enable {distribution})"
     return ""
+
+
+def unknown_names(installed: set[str], environ: Mapping[str, str]) -> tuple[str, ...]:
+    """Return a sentence for each name in an environment variable that no installed distribution with plugins has."""
+    return tuple(
+        f"{variable} names {name}, and no plugin of that distribution is installed.{suggestion(name, installed)}"
+        for variable in (ALLOWED_VARIABLE, DISABLED_VARIABLE)
+        for name in sorted(_names(environ.get(variable, "")) - installed)
+    )
 
 
 def _sources_of(distribution: Distribution) -> list[PluginSource]:

@@ -11,7 +11,7 @@ import logging
 import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, cast
 
 import attrs
 import pluggy
@@ -35,6 +35,8 @@ HEAVY: Final = frozenset(
 """Packages that the module of a plugin must not import: listing plugins would import them for every user."""
 SLOW_IMPORT_S: Final = 0.1
 """Processor time (s) above which the import of a plugin's module counts as slow."""
+SLOW_WAIT_S: Final = 0.5
+"""Time (s) beyond its processor time above which an import counts as slow: it waits for something."""
 
 _SPECS: Final = tuple(name for name in vars(hookspecs) if name.startswith("graspsense_"))
 
@@ -161,11 +163,21 @@ class HookCalls:
         self._manager.add_hookcall_monitoring(before, after)
 
 
-def imported(source: PluginSource) -> tuple[object, float, frozenset[str]]:
-    """Import a plugin; return it, the processor time (s) that took, and the heavy packages that it imported."""
-    present, began = HEAVY.intersection(sys.modules), time.process_time()
+class ImportCost(NamedTuple):
+    """What the import of a plugin took: processor time (s), further time (s) that it waited, and heavy packages."""
+
+    processor_s: float
+    waited_s: float
+    heavy: frozenset[str]
+
+
+def imported(source: PluginSource) -> tuple[object, ImportCost]:
+    """Import a plugin; return it with what that took."""
+    present, began, began_wall = HEAVY.intersection(sys.modules), time.process_time(), time.perf_counter()
     plugin = source.load()
-    return plugin, time.process_time() - began, HEAVY.intersection(sys.modules) - present
+    processor_s = time.process_time() - began
+    waited_s = time.perf_counter() - began_wall - processor_s
+    return plugin, ImportCost(processor_s, waited_s, HEAVY.intersection(sys.modules) - present)
 
 
 def check_api(plugin: object, source: PluginSource) -> None:
@@ -187,14 +199,19 @@ def check_api(plugin: object, source: PluginSource) -> None:
         )
 
 
-def advice_on(source: PluginSource, took_s: float, heavy: frozenset[str]) -> tuple[str, ...]:
+def advice_on(source: PluginSource, cost: ImportCost) -> tuple[str, ...]:
     """Return what to improve about a plugin that works."""
     advice = []
-    if heavy or took_s > SLOW_IMPORT_S:
-        brings = f", and imports {', '.join(sorted(heavy))}" if heavy else ""
+    if cost.heavy or cost.processor_s > SLOW_IMPORT_S:
+        brings = f", and imports {', '.join(sorted(cost.heavy))}" if cost.heavy else ""
         advice.append(
-            f"slow: importing {source.module} takes {took_s * 1e3:.0f} ms of processor time{brings}. Its author: name "
-            "classes by import strings, and import heavy packages inside them"
+            f"slow: importing {source.module} takes {cost.processor_s * 1e3:.0f} ms of processor time{brings}. Its "
+            "author: name classes by import strings, and import heavy packages inside them"
+        )
+    if cost.waited_s > SLOW_WAIT_S:
+        advice.append(
+            f"slow: importing {source.module} waits for {cost.waited_s:.1f} s. Its author: wait for a device or a "
+            "network where it is opened, not where the plugin is imported"
         )
     if source.copies:
         advice.append(

@@ -37,6 +37,7 @@ from graspsense.core.plugins.discovery import (
     builtin_source,
     installed_sources,
     reason_not_to_load,
+    unknown_names,
 )
 from graspsense.core.plugins.isolation import (
     TRACE_VARIABLE,
@@ -97,6 +98,9 @@ class Plugins:
         self._loaded: list[tuple[PluginStatus, object]] = []
         self._components: list[Component] = []
         self._resources: list[Resource[Any]] = []
+        sources = list(sources)
+        self.unknown_names = unknown_names({source.distribution for source in sources}, environ)
+        """Distributions that an environment variable names and that are not installed, a sentence each."""
         switched_off = {canonical(name) for name in disabled}
         for source in sources:
             reason = reason_not_to_load(source.distribution, environ, switched_off)
@@ -200,7 +204,8 @@ class Plugins:
 
     def absences(self) -> str:
         """Return lines on the installed plugins that are not in use, for a user who misses a name."""
-        return "".join(status.absence for status in self._statuses)
+        lines = [status.absence for status in self._statuses]
+        return "".join([*lines, *(f"\n  {problem}" for problem in self.unknown_names)])
 
     def probe_devices(self, timeout_s: float) -> tuple[Probe, ...]:
         """Let every plugin search for its devices for at most `timeout_s` each; a failure is reported as its own."""
@@ -265,7 +270,7 @@ class Plugins:
         try:
             # The output of a plugin must not mix with JSON on the standard output.
             with contextlib.redirect_stdout(sys.stderr):
-                plugin, took_s, heavy = imported(source)
+                plugin, cost = imported(source)
                 check_api(plugin, source)
                 status, components, resources = self._registered(plugin, source)
         except (Exception, SystemExit) as error:
@@ -277,7 +282,7 @@ class Plugins:
             broken = _status(source, "broken", error_text(error))
             self._statuses.append(evolve(broken, traceback="".join(traceback.format_exception(error))))
             return
-        status = evolve(status, import_s=took_s, advice=advice_on(source, took_s, heavy))
+        status = evolve(status, import_s=cost.processor_s, advice=advice_on(source, cost))
         self._statuses.append(status)
         self._loaded.append((status, plugin))
         self._components += components

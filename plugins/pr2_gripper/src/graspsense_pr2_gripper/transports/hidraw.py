@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import math
+import threading
 from importlib import import_module
-from typing import Any, final
+from queue import Empty, SimpleQueue
+from typing import Any, Final, final
 
 from graspsense_pr2_gripper.discovery import LIBRARY, HidDevice
 from graspsense_pr2_gripper.protocol import REPORT_SIZE
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
 
+WRITE_TIMEOUT_S: Final = 0.25
+"""How long a write may take. Where an endpoint is stalled the kernel itself waits for 5 s, uninterruptibly."""
+
 
 @final
 class HidrawTransport(Transport):
-    """A device opened by its path. Raises OSError where it cannot be opened."""
+    """A device opened by its path. Raises OSError where it cannot be opened.
+
+    Writes are made by a thread of their own, so that a stalled endpoint is reported within `WRITE_TIMEOUT_S`.
+    """
 
     def __init__(self, device: HidDevice) -> None:
         self._path = device.path
         self._device: Any = import_module(LIBRARY).device()
         self._device.open_path(device.path.encode())
+        self._reports: SimpleQueue[bytes | None] = SimpleQueue()
+        self._written: SimpleQueue[int | Exception] = SimpleQueue()
+        self._writer = threading.Thread(target=self._write_all, name="PR2 writer", daemon=True)
+        self._writer.start()
 
     def read(self, timeout_s: float) -> bytes:
         """Return the next report, as hidapi's list of integers made bytes."""
@@ -31,10 +43,13 @@ class HidrawTransport(Transport):
 
     def write(self, report: bytes) -> None:
         """Send a report; hidapi tells of a device that is gone by -1 alone."""
+        self._reports.put(report)
         try:
-            written = self._device.write(report)
-        except (OSError, ValueError) as error:
-            raise TransportGone(f"writing to {self._path}: {error}") from error
+            written = self._written.get(timeout=WRITE_TIMEOUT_S)
+        except Empty:
+            raise TransportGone(f"writing to {self._path}: not taken within {WRITE_TIMEOUT_S:g} s") from None
+        if isinstance(written, Exception):
+            raise TransportGone(f"writing to {self._path}: {written}") from written
         if written != len(report):
             raise TransportGone(f"writing to {self._path}: {written} of {len(report)} bytes were taken")
 
@@ -46,5 +61,14 @@ class HidrawTransport(Transport):
             raise TransportGone(f"feature report {report_id} of {self._path}: {error}") from error
 
     def close(self) -> None:
-        """Close the node."""
+        """Close the node, never under a write: a stalled one is waited for."""
+        self._reports.put(None)
+        self._writer.join()
         self._device.close()
+
+    def _write_all(self) -> None:
+        while (report := self._reports.get()) is not None:
+            try:
+                self._written.put(self._device.write(report))
+            except (OSError, ValueError) as error:
+                self._written.put(error)
