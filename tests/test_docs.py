@@ -1,12 +1,17 @@
-"""The pages on the roles are those that the code gives, and the tutorial's plugin is as short as it is said to be."""
+"""The generated pages and the drawing are current, and the commands and examples of the other pages are valid."""
 
 from __future__ import annotations
 
 import importlib.util
 import re
+import shlex
 from pathlib import Path
 
+import click
 import pytest
+
+from graspsense.cli.main import cli
+from graspsense.experiments.experiment import read_experiment
 
 ROOT = Path(__file__).parents[1]
 
@@ -69,6 +74,39 @@ def test_a_gripper_takes_fewer_than_a_hundred_lines():
     lines = [line for line in code("roles/sensor-backend.md", 2) if not line.strip().startswith('"""')]
     assert len(lines) < 100
     assert any("def read" in line for line in lines)
+
+
+def printed_commands():
+    """Every command in a page: between backticks, in an indented line, or in a block of code."""
+    pages = (path for pattern in ("README.md", "docs/*.md", "*/*/README.md") for path in ROOT.glob(pattern))
+    for page in pages:
+        text = re.sub(r"\\\n\s+", " ", page.read_text(encoding="utf-8"))
+        blocks = "".join(re.findall(r"```sh\n(.*?)```", text, re.DOTALL))
+        lines = re.findall(r"(?:`|^    )(?:sudo )?(graspsense [^`\n]+)", text, re.MULTILINE)
+        lines += re.findall(r"^(graspsense [^\n]+)", blocks, re.MULTILINE)
+        for line in sorted({line for line in lines if line.split()[1].islower()}):
+            yield pytest.param(line, id=f"{page.relative_to(ROOT)}: {line}")
+
+
+@pytest.mark.parametrize("line", [*printed_commands()])
+def test_a_printed_command_and_its_options_exist(line):
+    words = shlex.split(line, comments=True)[1:]
+    command, context = cli, click.Context(cli)
+    while isinstance(command, click.Group) and words and not words[0].startswith("-") and "|" not in words[0]:
+        command = command.get_command(context, words.pop(0))
+        assert command is not None, line
+    known = {
+        option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)
+    }
+    named = {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)}
+    assert named <= known | {"--help"}, line
+
+
+def test_the_example_of_an_experiment_is_one(tmp_path):
+    page = (ROOT / "docs" / "experiments.md").read_text()
+    (text,) = re.findall(r"<!-- experiment: example -->\n```toml\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "mine.toml").write_text(text)
+    assert len(read_experiment(str(tmp_path / "mine.toml"), []).cases) == 3
 
 
 def test_the_navigation_has_every_page_and_no_other():
