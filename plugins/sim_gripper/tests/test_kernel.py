@@ -131,5 +131,5 @@ def test_a_sum_of_many_terms_is_the_sum_of_each():
 def test_bind_refuses_what_it_cannot_bind():
     with pytest.raises(TypeError, match="has no part named"):
         bind(plain_only, nobody=1)
-    with pytest.raises(TypeError, match="no plain function"):
+    with pytest.raises(TypeError, match="not a plain function"):
         bind(len)
