@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import pkgutil
 import re
 import shlex
 from pathlib import Path
@@ -100,6 +101,34 @@ def test_a_printed_command_and_its_options_exist(line):
     }
     named = {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)}
     assert named <= known | {"--help"}, line
+
+
+def in_backticks(pattern):
+    """Every text between backticks of this form, with the page that has it."""
+    pages = (
+        path
+        for glob in ("README.md", "CONTRIBUTING.md", "docs/*.md", "specs/*.md")
+        for path in ROOT.glob(glob)
+    )
+    found = {(page.name, name) for page in pages for name in re.findall(rf"`({pattern})`", page.read_text())}
+    assert found
+    return sorted(found)
+
+
+METADATA = ("graspsense.device", "graspsense.trial")
+"""Names of metadata records in a recording."""
+
+
+@pytest.mark.parametrize(("page", "name"), in_backticks(r"graspsense(?:_\w+)?(?:\.\w+)+"))
+def test_a_module_or_name_that_a_page_mentions_exists(page, name):
+    assert name in METADATA or pkgutil.resolve_name(name) is not None
+
+
+@pytest.mark.parametrize(("page", "name"), in_backticks(r"[\w./]+/[\w.]+\.(?:py|toml|md|json)"))
+def test_a_file_that_a_page_mentions_exists(page, name):
+    folders = (ROOT, ROOT / "src" / "graspsense", *ROOT.glob("plugins/*"))
+    made_by_users = ("results/", "lab_", "OUT/", "~", "/")
+    assert name.startswith(made_by_users) or any((folder / name).exists() for folder in folders)
 
 
 def test_the_example_of_an_experiment_is_one(tmp_path):
