@@ -235,7 +235,7 @@ def test_extends_in_a_circle_is_an_error(plugins, write):
     write('extends = "b.toml"', "a.toml")
     write('\nextends = "a.toml"', "b.toml")
 
-    assert complaint("a.toml") == "b.toml:2: extends goes round in a circle: a.toml -> b.toml -> a.toml"
+    assert complaint("a.toml") == "b.toml:2: extends forms a circle: a.toml -> b.toml -> a.toml"
 
 
 def test_a_file_that_extends_nothing_known_is_named_with_its_line(plugins, write):
@@ -313,7 +313,7 @@ class TestClassifier:
 
     def test_a_key_for_none_is_an_error(self, plugins, write):
         assert complaint(write(BASE), options=["classifier.type=none", "classifier.force_n=3"]) == (
-            '-o classifier.force_n=3: classifier.type is "none", so nothing takes this key'
+            '-o classifier.force_n=3: classifier.type is "none", so this key has no meaning'
         )
 
     def test_a_table_without_a_type_is_an_error(self, plugins, write):
@@ -533,7 +533,7 @@ def test_a_recipe_makes_the_same_component_again():
         class Own(type(made)):
             """Of a script."""
 
-        with pytest.raises(UnknownName, match="Own is no controller that a plugin declares"):
+        with pytest.raises(UnknownName, match="Own is not a controller that a plugin declares"):
             recipe_of("controller", Own(made.config))
         made.config = evolve(made.config, probing_force_n=Decimal(17))
         with pytest.raises(ConfigError, match="probing_force_n"):

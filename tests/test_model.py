@@ -86,7 +86,7 @@ def test_a_thing_unlike_anything_is_unknown_and_says_why():
 
     assert said.label == UNKNOWN
     assert said.because[0].startswith("p_first = 30 mm is unlike everything trained on: the nearest, bottle:")
-    assert said.because[1].startswith("taken for a known thing, it would be bottle:")
+    assert said.because[1].startswith("of the known labels, the nearest is bottle:")
 
 
 def test_nothing_felt_is_unknown_with_the_reason():
@@ -126,7 +126,7 @@ def test_simulated_training_is_said_and_louder_on_a_real_gripper():
     simulated = model(simulated=True)
 
     assert simulated.predict(CAN).warnings == (
-        "trained on simulated grasps: right for the simulator, untested on real things",
+        "trained on simulated grasps: valid for the simulator, untested on real objects",
     )
     assert simulated.predict(CAN, None, device("virtual")).warnings == simulated.predict(CAN).warnings
     (warning,) = simulated.predict(CAN, None, device("device")).warnings
@@ -165,13 +165,13 @@ class TestDamage:
     def test_a_changed_number(self, file):
         file.write_text(file.read_text().replace("0.25", "0.26", 1))
 
-        with pytest.raises(DataDamaged, match="not what its sha256 says"):
+        with pytest.raises(DataDamaged, match="its sha256 does not match"):
             load_model(str(file), installed())
 
     def test_half_a_file(self, file):
         file.write_bytes(file.read_bytes()[:400])
 
-        with pytest.raises(DataDamaged, match="is no JSON"):
+        with pytest.raises(DataDamaged, match="is not JSON"):
             load_model(str(file), installed())
 
     @pytest.mark.parametrize("content", [b"", b"[]", b"{}", b"\x80\x04\x95pickle", b'{"format": "other"}'])

@@ -212,7 +212,7 @@ def test_what_is_not_all_in_names_and_values_is_not_handed_over():
     altered.params = lambda: numbers._replace(ramp_s=numbers.ramp_s + 1.0)
     with pytest.raises(NotHandedOver, match="hybrid made of its settings has other numbers"):
         PlainProcess(job(altered))
-    with pytest.raises(NotHandedOver, match="Endless is no controller that a plugin declares"):
+    with pytest.raises(NotHandedOver, match="Endless is not a controller that a plugin declares"):
         PlainProcess(job(Endless(HYBRID.config)))
 
 

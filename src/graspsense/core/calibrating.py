@@ -1,6 +1,6 @@
-"""Driving a gripper to calibrate it: cell images with nothing touching, and the effort that breaks friction.
+"""Moving a gripper to calibrate it: images of unloaded cells, and the effort at which the fingers begin to move.
 
-Every command passes the guard, with the limits of a first use throughout: nothing is to be touched.
+Every command passes the guard with the limits of a first use, because nothing is to be touched.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from graspsense.core.signals import EFFORT, Command, Pads
 from graspsense.core.tick import OPEN_SPEED_M_S, OPEN_WINDOW_S
 
 RAMP_N_S: Final = 2.0
-"""How fast the effort rises: the authors' stiction test took 1 N/s."""
+"""Rate at which the effort rises; the authors' stiction test used 1 N/s."""
 MOVED_M: Final = 5e-6
-"""The fingers have broken away when the gap has changed by this: some fifteen encoder ticks of a PR2."""
+"""Change of the gap at which the fingers count as moving; about fifteen encoder ticks of a PR2."""
 BETWEEN_M_S: Final = 0.01
 """Speed from one gap to the next."""
 
 
 class CalibrationFailed(GraspsenseError):
-    """The gripper did not do what a calibration needs."""
+    """The gripper did not do what the calibration requires."""
 
     exit_code = 4
 
@@ -40,7 +40,7 @@ class Breakaway(NamedTuple):
 
 
 class Rig:
-    """A gripper that was opened, and what it is commanded at each tick."""
+    """An opened gripper with the guard that limits its commands."""
 
     def __init__(self, backend: SensorBackend[Any], info: DeviceInfo, run: RunConfig) -> None:
         self._backend, self._info, self._run = backend, info, run
@@ -54,7 +54,7 @@ class Rig:
         self._last: Reading | None = None
 
     def tick(self, command: Command) -> Reading:
-        """Apply a command, guarded, and return the next reading. Raises DeviceLost, CalibrationFailed."""
+        """Apply a limited command, and return the next reading. Raises DeviceLost, CalibrationFailed."""
         last = self._last if self._last is not None else self._read()
         guarded, _ = guard(self._guard, GuardState(0, 0, 0), last.frame, command)
         self._backend.apply(guarded)
@@ -62,17 +62,17 @@ class Rig:
         return self._last
 
     def open(self) -> Reading:
-        """Open the fingers until they rest."""
+        """Open the fingers until they are at rest."""
         if self._info.opening is None:
             raise CalibrationFailed(f"{self._info.name} cannot be opened, so it cannot be calibrated")
         return self._until_rest(self._info.opening)
 
     def let_go(self) -> Reading:
-        """Let go until the fingers rest."""
+        """Relax until the fingers are at rest."""
         return self._until_rest(self._info.relaxed)
 
     def relax(self) -> Reading:
-        """Let go for one tick."""
+        """Relax for one tick."""
         return self.tick(self._info.relaxed)
 
     def _until_rest(self, command: Command) -> Reading:
@@ -96,9 +96,9 @@ class Rig:
 
 
 def unloaded_images(rig: Rig, count: int, timeout_s: float) -> list[Pads]:
-    """Open the fingers, let go, and return the next `count` cell images.
+    """Open the fingers, relax, and return the next `count` cell images.
 
-    Raises CalibrationFailed where they do not come within `timeout_s` of the gripper's own time.
+    Raises CalibrationFailed if they do not come within `timeout_s` by the clock of the gripper.
     """
     rig.open()
     reading = rig.let_go()
@@ -118,10 +118,10 @@ def unloaded_images(rig: Rig, count: int, timeout_s: float) -> list[Pads]:
 
 
 def breakaways(rig: Rig, gaps_m: Sequence[float], most_n: float) -> list[Breakaway]:
-    """Return the effort at which the fingers begin to move, closing and opening, at each gap from wide to narrow.
+    """Return the efforts at which the fingers begin to close and to open, at each gap from wide to narrow.
 
-    The effort rises by `RAMP_N_S` until the gap has changed by `MOVED_M`. Raises CalibrationFailed where that takes
-    more than `most_n` or a pad is touched.
+    The effort rises at `RAMP_N_S` until the gap has changed by `MOVED_M`. Raises CalibrationFailed if this takes more
+    than `most_n`, or if a pad is touched.
     """
     rig.open()
     found = []

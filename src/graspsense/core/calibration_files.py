@@ -1,8 +1,8 @@
-"""Calibrations kept as files: one folder a device serial, one file a kind, each with its version and its hash.
+"""Calibration files: a folder for each serial number, and in it a file for each kind, with its version and hash.
 
     FOLDER/SERIAL/tare.json, load-cell.json, friction.json
 
-A file says which device it was made on; one that is used with another is an error, never a guess.
+A file names the device that it was made on; its use with another device is an error.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ FORMAT: Final = "graspsense-calibration"
 VERSION: Final = 1
 KINDS: Final = ("tare", "load-cell", "friction")
 UNCALIBRATED: Final = "none"
-"""The folder name that stands for: use no calibration."""
+"""The value of the setting for the use without calibration."""
 
 
 @frozen(kw_only=True)
 class Calibration:
     """One calibration of one device.
 
-    `device` is what the numbers depend on besides the serial: transmission, counts per newton. `made` is when, in
-    ISO 8601 with the zone. `sha256` is of the content, empty until it was written.
+    `device` holds what the numbers depend on besides the serial number: transmission, counts per newton. `made` is the
+    time in ISO 8601 with the zone. `sha256` is the hash of the content, empty before it is written.
     """
 
     kind: str
@@ -48,13 +48,13 @@ class Calibration:
 
 
 def calibration_path(folder: str | Path, serial: str, kind: str) -> Path:
-    """Return the file of this kind for this serial, in this folder or (an empty one) in the user's.
+    """Return the path of a calibration of this kind and serial number; an empty folder means that of the user.
 
-    Raises ConfigError for a serial that names no folder, and where the user has none.
+    Raises ConfigError for a serial number that cannot name a folder, and for a user without a home folder.
     """
     if not re.fullmatch(r"[\w.+-]+", serial) or serial.startswith("."):
         raise ConfigError(
-            f"calibrations are kept by serial number, and {serial!r} is none: letters, digits and . + - _ are allowed"
+            f"calibrations are kept by serial number, and {serial!r} is not one: it has letters, digits and . + - _"
         )
     kept = _folder(folder)
     if kept is None:
@@ -70,7 +70,7 @@ def _folder(given: str | Path) -> Path | None:
 
 
 def write_calibration(path: Path, calibration: Calibration) -> Calibration:
-    """Write the file, whole or not at all, and return the calibration with its hash. Raises OSError."""
+    """Write the file atomically, and return the calibration with its hash. Raises OSError."""
     content = {
         "format": FORMAT,
         "version": VERSION,
@@ -94,8 +94,8 @@ def write_calibration(path: Path, calibration: Calibration) -> Calibration:
 def read_calibration(path: Path) -> Calibration:
     """Return the calibration in this file.
 
-    Raises DataDamaged where it is no calibration of ours, was changed since it was written, or holds numbers that
-    mean nothing; FileNotFoundError where there is none.
+    Raises DataDamaged if it is not a calibration of graspsense, was changed since it was written, or has invalid
+    numbers; FileNotFoundError if it is missing.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -104,7 +104,7 @@ def read_calibration(path: Path) -> Calibration:
     except (OSError, ValueError) as error:
         raise DataDamaged(f"{path} cannot be read as a calibration: {error}") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise DataDamaged(f"{path} is no calibration of graspsense: its format is not {FORMAT!r}")
+        raise DataDamaged(f"{path} is not a calibration of graspsense: its format is not {FORMAT!r}")
     if content.get("version") != VERSION:
         raise DataDamaged(
             f"{path} has version {content.get('version')!r}, and this graspsense reads version {VERSION}"
@@ -132,10 +132,10 @@ def read_calibration(path: Path) -> Calibration:
 
 
 def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) -> dict[str, Calibration]:
-    """Return the calibrations of this device, by kind; none where `folder` is `none` or there is no folder to have any.
+    """Return the calibrations of this device by kind; empty if `folder` is `none` or the folder does not exist.
 
-    Raises ConfigError, with the two choices there are, where a file was made on another device or on this one as it
-    no longer is; DataDamaged.
+    Raises ConfigError if a file was made on another device, or on this one with other numbers, and names the two
+    choices; raises DataDamaged.
     """
     if folder == UNCALIBRATED or _folder(folder) is None:
         return {}
@@ -166,7 +166,7 @@ def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) 
 
 
 def stored_zero(calibration: Calibration) -> tuple[Cells, Cells]:
-    """Return the zero of both fingertips that a tare holds."""
+    """Return the zeros of both fingertips from a stored tare."""
     left, right = _numbers(calibration.data["left"]), _numbers(calibration.data["right"])
     if len(left) != CELLS or len(right) != CELLS:
         raise ValueError(f"a tare has {CELLS} cells a fingertip, not {len(left)} and {len(right)}")
@@ -174,7 +174,7 @@ def stored_zero(calibration: Calibration) -> tuple[Cells, Cells]:
 
 
 def stored_tables(calibration: Calibration) -> tuple[LoadTable, LoadTable]:
-    """Return the load tables of the left and of the right pad."""
+    """Return the stored load tables of the left and of the right pad."""
     tables = []
     for side in ("left", "right"):
         pads, loads = _numbers(calibration.data[side]["pad_n"]), _numbers(calibration.data[side]["load_n"])
@@ -187,7 +187,7 @@ def stored_tables(calibration: Calibration) -> tuple[LoadTable, LoadTable]:
 
 
 def stored_friction(calibration: Calibration) -> tuple[Cells, Cells, Cells]:
-    """Return gaps (m) and the breakaway (N) at each, closing and opening."""
+    """Return the gaps (m) of a stored friction table, and the breakaway efforts (N), closing and opening."""
     columns = [_numbers(calibration.data[name]) for name in ("gap_m", "closing_n", "opening_n")]
     if len({len(column) for column in columns}) != 1:
         raise ValueError("the friction table's columns differ in length")

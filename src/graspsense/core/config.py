@@ -1,8 +1,8 @@
-"""Settings: which components make up a pipeline, and the value and the origin of every one of their keys.
+"""Settings: the components of a pipeline, and the value and the origin of each of their keys.
 
-Layers, each over the one before: defaults of the config classes, the pipeline file with what it extends, an
-experiment, options (`-o a.b=VALUE`), named flags. First each table's `type` is settled, then only the chosen
-component's config class is imported and the rest of the table made into it.
+Settings come in layers, each of which overrides those before: defaults of the config classes, the pipeline file with
+the files that it extends, an experiment, options (`-o a.b=VALUE`), named flags. The `type` of each table is resolved
+first. Then only the config class of the selected component is imported, and the rest of the table becomes its instance.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ __all__ = [
 ]
 
 NONE: Final = "none"
-"""The `type` of a classifier table that asks for no classifier."""
+"""The `type` of a classifier table for a pipeline without a classifier."""
 
 _ROLE_OF_TABLE: Final[dict[str, Role]] = {table: role for role, table in TABLE_OF_ROLE.items()}
 _TABLES: Final = (*_ROLE_OF_TABLE, "run")
@@ -57,7 +57,7 @@ _TABLES: Final = (*_ROLE_OF_TABLE, "run")
 
 @frozen(eq=False)
 class SelectedComponent:
-    """A component that was chosen, with its config."""
+    """A component that a pipeline selects, with its config."""
 
     component: Component
     config: Any
@@ -71,9 +71,9 @@ class SelectedComponent:
 class Settings:
     """A resolved pipeline.
 
-    `values` holds every key of every table as plain values, defaults included, `type` with its qualified
-    name; None stands for a key that is not set. `origins` says for each key where its value comes from:
-    `default`, `lab.toml:7`, `-o` or a flag's name. `pipeline` is the pipeline as it was asked for.
+    `values` holds every key of every table as plain values, including defaults, with the qualified name as `type`; a
+    key that is not set is None. `origins` gives the origin of each value: `default`, `lab.toml:7`, `-o` or the name
+    of a flag. `pipeline` is the name or path that the user gave.
     """
 
     pipeline: str
@@ -87,14 +87,14 @@ class Settings:
 
     @property
     def chosen(self) -> tuple[SelectedComponent, ...]:
-        """Gripper, controller, features, and the classifier where there is one."""
+        """Gripper, controller, features, and the classifier if there is one."""
         return tuple(
             one for one in (self.gripper, self.controller, self.features, self.classifier) if one is not None
         )
 
     @property
     def components(self) -> dict[str, str]:
-        """Table to `distribution/name version` of each component."""
+        """The `distribution/name version` of each component, by table."""
         return {
             one.component.table: f"{one.component.qualified} {one.component.version}" for one in self.chosen
         }
@@ -108,11 +108,10 @@ def resolve(
     options: Sequence[str] = (),
     flags: Sequence[Flag] = (),
 ) -> Settings:
-    """Return the settings that these layers give.
+    """Return the settings of a pipeline with options and flags.
 
-    `pipeline` is the name of a pipeline or the path of a `.toml` file; `options` are as typed after `-o`;
-    `plugins` are the process's own where none are given. Raises ConfigError with every error at once, each
-    with its file and line.
+    `pipeline` is the name of a pipeline or the path of a `.toml` file; `options` are as typed after `-o`; `plugins`
+    are by default those of the process. Raises ConfigError that lists all errors, each with its file and line.
     """
     plugins = installed() if plugins is None else plugins
     layers = pipeline_layers(pipeline, plugins)
@@ -125,9 +124,9 @@ def resolve(
 
 
 def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | None = None) -> Settings:
-    """Return the settings of these tables alone, as `Settings.values` or a resolved file has them.
+    """Return the settings of complete tables, such as `Settings.values` or the content of a resolved file.
 
-    `called` names them in errors. Raises ConfigError.
+    `called` is their name in errors. Raises ConfigError.
     """
     given = {
         table: {key: one for key, one in keys.items() if one is not None} for table, keys in values.items()
@@ -136,7 +135,7 @@ def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | Non
 
 
 def _laid(pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins: Plugins) -> Settings:
-    """Return the settings that these layers give, one over the other. Raises ConfigError."""
+    """Return the settings of these layers, of which each overrides those before. Raises ConfigError."""
     layers = [_tables_only(layer, complaints) for layer in layers]
 
     from graspsense.core.run_config import RunConfig
@@ -204,9 +203,9 @@ def _choose_sent_kind(merged: Merged, controller: Component, gripper: Component)
 
 
 def build(component: Component, values: Mapping[str, Any]) -> Any:
-    """Return the config instance of a component from plain values.
+    """Return the config of a component from plain values.
 
-    Raises ConfigError with every error at once, PluginUnavailable.
+    Raises ConfigError that lists all errors, and PluginUnavailable.
     """
     try:
         return structured(values, component.config_class(), component.qualified)
@@ -216,7 +215,7 @@ def build(component: Component, values: Mapping[str, Any]) -> Any:
 
 
 def create(role: Role, name: str, /, **config: Any) -> Any:
-    """Return a component by role and name, its config made from these values as strictly as from a file.
+    """Return a component by role and name. Its config is checked as strictly as one from a file.
 
     Raises UnknownName, PluginUnavailable, ConfigError.
     """
@@ -224,20 +223,19 @@ def create(role: Role, name: str, /, **config: Any) -> Any:
 
 
 def select_component(role: Role, name: str, **config: Any) -> SelectedComponent:
-    """Return a component by role and name with its config, not built yet. Raises as `create` does."""
+    """Return a component by role and name with its config, without constructing it. Raises like `create`."""
     component = installed().find(role, name)
     return SelectedComponent(component, build(component, config))
 
 
 def recipe_of(role: Role, part: Any) -> tuple[str, dict[str, Any]]:
-    """Return the name and the plain values of which `create` makes another such component.
+    """Return the name and the plain values from which `create` makes an equal component.
 
-    Raises UnknownName where its class is no component that a plugin declares, ConfigError where its config says
-    more than values can.
+    Raises UnknownName if no plugin declares its class, ConfigError if plain values cannot represent its config.
     """
     cls = type(part)
     for component in installed().components(role):
-        # One that lies in another package is not imported only to be told apart.
+        # A component of another package is not imported for the comparison.
         if component.entry.target.split(":")[0].split(".")[0] != cls.__module__.split(".")[0]:
             continue
         try:
@@ -249,13 +247,13 @@ def recipe_of(role: Role, part: Any) -> tuple[str, dict[str, Any]]:
             if plain(build(component, values)) != plain(part.config):
                 raise ConfigError(f"{component.qualified}: its settings are not all plain values")
             return component.qualified, values
-    raise UnknownName(f"{cls.__module__}.{cls.__qualname__} is no {role} that a plugin declares")
+    raise UnknownName(f"{cls.__module__}.{cls.__qualname__} is not a {role} that a plugin declares")
 
 
 def to_toml(settings: Settings, origins: bool = False) -> str:
-    """Return a complete pipeline file: it extends nothing, and resolves to the same values by itself.
+    """Return a complete pipeline file, which extends nothing and resolves to the same values.
 
-    With `origins` a comment behind each key says where its value comes from.
+    With `origins`, a comment after each key gives the origin of its value.
     """
     lines = [f"# Resolved by graspsense {__version__} from the pipeline {json.dumps(settings.pipeline)}."]
     versions = {one.component.table: one.component.version for one in settings.chosen}
@@ -300,7 +298,7 @@ def toml_value(value: Any) -> str:
         return "{ " + ", ".join(inner) + " }" if value else "{}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(toml_value(one) for one in value) + "]"
-    raise TypeError(f"{value!r} is no TOML value")
+    raise TypeError(f"{value!r} is not a TOML value")
 
 
 def _toml_text(text: str) -> str:
@@ -308,7 +306,7 @@ def _toml_text(text: str) -> str:
 
 
 def _tables_only(layer: Layer, complaints: list[str]) -> Layer:
-    """Return the layer without what is no table of a pipeline, having complained of that."""
+    """Return the layer without keys that are not tables of a pipeline; add a complaint for each of them."""
     values = {}
     for key, value in layer.values.items():
         if key not in _TABLES:
@@ -329,7 +327,7 @@ def _tables_only(layer: Layer, complaints: list[str]) -> Layer:
 def _component(
     layers: Sequence[Layer], table: str, plugins: Plugins, complaints: list[str]
 ) -> tuple[Component, type] | None:
-    """Return the component that a table asks for and its config class; None, with any complaint, for none."""
+    """Return the component that a table selects, and its config class; None, perhaps with complaints, for none."""
     role = _ROLE_OF_TABLE[table]
     path = (table, "type")
     setter = next((layer for layer in reversed(layers) if "type" in layer.values.get(table, {})), None)
@@ -349,7 +347,7 @@ def _component(
         for layer in users:
             for key in layer.values[table]:
                 if key != "type" and (layer.final or layer is setter):
-                    text = f'classifier.type is "{NONE}", so nothing takes this key'
+                    text = f'classifier.type is "{NONE}", so this key has no meaning'
                     complaints.append(layer.complain(InvalidValue((table, key), text)))
         return None
     try:
@@ -361,7 +359,7 @@ def _component(
 
 
 def _merged(layers: Sequence[Layer], table: str, component: Component | None) -> Merged:
-    """Lay the layers of one table over each other, without the file keys meant for another component."""
+    """Merge the layers of one table, without keys of files that are for another component."""
     merged = Merged()
     named: str | None = None
     for layer in layers:

@@ -1,4 +1,4 @@
-"""Which plugins the user has switched off for good: a list in a file of their own, read before anything is imported."""
+"""The list of plugins that the user has disabled permanently, read before any plugin is imported."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from graspsense.core.user_folders import NOWHERE, config_folder
 
 
 def config_file() -> Path | None:
-    """Return the file that holds the list, whether or not it exists; None for a user without a home."""
+    """Return the file of the list, whether or not it exists; None for a user without a home folder."""
     folder = config_folder()
     return None if folder is None else folder / "plugins.toml"
 
@@ -20,7 +20,7 @@ def config_file() -> Path | None:
 def disabled_in_config() -> tuple[str, ...]:
     """Return the distributions listed under `disabled`, as they are written there.
 
-    Raises ConfigError where the file is not `disabled = ["NAME", ...]`.
+    Raises ConfigError if the file is not `disabled = ["NAME", ...]`.
     """
     path = config_file()
     if path is None:
@@ -43,7 +43,7 @@ def disabled_in_config() -> tuple[str, ...]:
 
 
 def write_disabled(names: Iterable[str]) -> Path:
-    """Write the list, and return its file; an empty list removes it. Raises ConfigError for a user without a home."""
+    """Write the list and return its file; an empty list removes it. Raises ConfigError without a home folder."""
     path, wanted = config_file(), sorted(set(names))
     if path is None:
         raise ConfigError(NOWHERE.format("XDG_CONFIG_HOME"))

@@ -1,4 +1,4 @@
-"""The one place in core that knows what this project ships, as plain strings: nothing is imported here."""
+"""The distributions and models that this project ships, as plain strings; the only place in core that names them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from graspsense.core.entries import Role
 
 DISTRIBUTION: Final = "graspsense"
 BUILTIN_MODULE: Final = "graspsense.plugins.builtin"
-"""The plugin module of the parts that come with this distribution."""
+"""The plugin module of the components of this distribution."""
 
 
 @frozen
@@ -23,7 +23,7 @@ class Shipped:
 
     @property
     def hint(self) -> str:
-        """How to install it, from a clone and from an index."""
+        """The commands that install it, from a clone and from an index."""
         return (
             f"in a clone: pip install -e . -e ./plugins/{self.folder}"
             f'     published: pip install "graspsense[{self.extra}]"'
@@ -39,7 +39,7 @@ SHIPPED: Final[dict[tuple[Role, str], Shipped]] = {
     ("sensor-backend", "sim"): _SIM,
     ("classifier", "c45"): _C45,
 }
-"""Components that this project ships in distributions of their own: the hint where one is not installed."""
+"""Components in other distributions of this project, for the hint if one is not installed."""
 
 MODELS: Final[dict[str, Shipped]] = {"default": _SIM}
-"""Models that this project ships, and with which distribution."""
+"""Models that this project ships, with their distributions."""

@@ -1,4 +1,4 @@
-"""Signals that end a grasp: they stop it once, and never stop what lets go of the gripper."""
+"""Signals that end a grasp. The first one ends it; none interrupts the release of the gripper."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from contextlib import suppress
 from types import FrameType, TracebackType
 from typing import Any, Final
 
-# Ctrl-C, a polite kill, and a terminal or an ssh session that went away.
+# Ctrl-C, kill, and the end of a terminal or ssh session.
 ENDING: Final = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
 
 
 class Interrupts:
-    """While entered, the first ending signal raises KeyboardInterrupt; later ones are only counted in `count`.
+    """Within this context, the first signal raises KeyboardInterrupt; later ones are only counted in `count`.
 
-    So the way out of a grasp is never itself interrupted, however often somebody presses Ctrl-C; it may look at
-    `count` and hurry. Only the main thread can take signals; elsewhere this does nothing. A signal that the
-    process ignores stays ignored.
+    The way out of a grasp is therefore never interrupted, however often the user presses Ctrl-C; it may read `count`
+    and hurry. Only the main thread receives signals; in other threads this has no effect. A signal that the process
+    ignores stays ignored.
     """
 
     def __init__(self) -> None:
@@ -46,7 +46,7 @@ class Interrupts:
         self.count += 1
         previous = self._previous[number]
         if callable(previous) and previous is not signal.default_int_handler:
-            # Whoever listened before is told too; what it raises is raised here, once.
+            # The previous handler is called too; its KeyboardInterrupt is raised below, once.
             with suppress(KeyboardInterrupt):
                 previous(number, frame)
         if self.count == 1:

@@ -1,4 +1,4 @@
-"""The layers that settings are made of: files that extend one another, options and flags."""
+"""The layers of settings: files that extend one another, options and flags."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from graspsense.core.toml_lines import KeyPath, key_lines
 
 @frozen(eq=False, kw_only=True)
 class Layer:
-    """Values from one place.
+    """Values from one origin.
 
-    `label` names the place, `typed` is what a user typed for it where it is no file. A layer that is `final`
-    holds for whichever component is chosen at last; of another, the keys of a table are dropped where a later
-    layer changes that table's `type`.
+    `label` names the origin; `typed` is what the user typed, for an origin that is not a file. A `final` layer applies
+    to the component that is selected in the end. Of any other layer, the keys of a table are dropped if a later layer
+    changes the `type` of the table.
     """
 
     label: str
@@ -36,7 +36,7 @@ class Layer:
 
     @classmethod
     def of(cls, values: Mapping[str, Any], label: str) -> Layer:
-        """Return a layer of values that stand in no file."""
+        """Return a layer of values that are not from a file."""
         return cls(label=label, values=values)
 
     def where(self, path: KeyPath) -> str:
@@ -47,7 +47,7 @@ class Layer:
         return self.label
 
     def complain(self, problem: InvalidValue) -> str:
-        """Return a problem in one line: where, which key, what."""
+        """Return a problem in one line: origin, key, text."""
         if self.typed:
             return f"{self.typed}: {problem.text}"
         return f"{self.where(problem.path)}: {dotted(problem.path)}: {problem.text}"
@@ -69,13 +69,13 @@ class Flag:
 
 @define
 class Merged:
-    """One table's values, and the layer that set each key last."""
+    """The merged values of one table, and the layer that set each key last."""
 
     values: dict[str, Any] = field(factory=dict)
     owner: dict[KeyPath, Layer] = field(factory=dict)
 
     def add(self, path: KeyPath, values: Mapping[str, Any], layer: Layer) -> None:
-        """Lay these values over the others; `path` is where the table stands. Lists replace, tables merge."""
+        """Merge the values of a later layer; `path` is that of the table. Tables are merged, lists replaced."""
         self._add(self.values, path, values, layer)
 
     def _add(self, into: dict[str, Any], path: KeyPath, values: Mapping[str, Any], layer: Layer) -> None:
@@ -94,7 +94,7 @@ class Merged:
                     del self.owner[below]
 
     def owner_of(self, path: KeyPath) -> Layer | None:
-        """Return the layer that set this key, or the table that holds it; None for a default."""
+        """Return the layer that set this key, or the table that contains it; None for a default."""
         for end in range(len(path), 0, -1):
             if path[:end] in self.owner:
                 return self.owner[path[:end]]
@@ -102,12 +102,12 @@ class Merged:
 
 
 def read_layer(path: str | os.PathLike[str]) -> Layer:
-    """Read a TOML file. Raises ConfigError where there is none, or where it is no readable TOML."""
+    """Read a TOML file. Raises ConfigError if it is missing or is not TOML."""
     return read_toml(Path(path), os.fspath(path), "configuration file")
 
 
 def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
-    """Return the layers of a pipeline, the one that extends nothing first.
+    """Return the layers of a pipeline; the first one extends nothing.
 
     `pipeline` is a path that ends in `.toml`, or a name that a plugin provides. Raises ConfigError.
     """
@@ -119,7 +119,7 @@ def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
         identity = source.resolve() if isinstance(source, Path) else str(source)
         if identity in (one for one, _ in seen):
             names = " -> ".join([*(name for _, name in seen), label])
-            raise ConfigError(f"{asker}extends goes round in a circle: {names}")
+            raise ConfigError(f"{asker}extends forms a circle: {names}")
         seen.append((identity, label))
         layer = read_toml(source, label, "pipeline file")
         values = dict(layer.values)
@@ -137,7 +137,7 @@ def pipeline_layers(pipeline: str, plugins: Plugins) -> list[Layer]:
 
 
 def _located(asked: str, base: Path, asker: str, plugins: Plugins) -> tuple[Traversable, str, Path]:
-    """Return the file of a pipeline, how to call it, and the folder from which its own `extends` counts."""
+    """Return the file of a pipeline, its name in errors, and the folder that its `extends` is relative to."""
     if asked.endswith(".toml"):
         path = base / asked
         return path, str(path), path.parent
@@ -159,7 +159,7 @@ def _located(asked: str, base: Path, asker: str, plugins: Plugins) -> tuple[Trav
 
 
 def read_toml(source: Traversable, label: str, what: str) -> Layer:
-    """Read a TOML file that errors call `what` and `label`. Raises ConfigError."""
+    """Read a TOML file, which errors call `what` and `label`. Raises ConfigError."""
     try:
         data = source.read_bytes()
     except FileNotFoundError:
@@ -188,21 +188,21 @@ def read_toml(source: Traversable, label: str, what: str) -> Layer:
 
 
 def _nearby(missing: Traversable) -> str:
-    """Return where a file was looked for and which file there has nearly its name."""
+    """Return the folder in which a file was sought, and the file there with the most similar name."""
     if not isinstance(missing, Path):
         return ""
     folder = missing.absolute().parent
     if not folder.is_dir():
         return f": there is no folder {str(folder)!r}"
-    # The ending, which all have in common, must not make them alike.
+    # Without the ending, which would make all names similar.
     near = get_close_matches(missing.stem, [one.stem for one in folder.glob("*.toml")], n=1)
     return f" in {folder}" + (f". Did you mean {near[0] + '.toml'!r}?" if near else "")
 
 
 def option_layers(options: Sequence[str]) -> tuple[list[Layer], list[str]]:
-    """Return a layer for each `a.b=VALUE`, and what is wrong with those that are none.
+    """Return a layer for each option `a.b=VALUE`, and a complaint for each malformed one.
 
-    VALUE is a TOML value; anything that is none is a string.
+    VALUE is a TOML value; any other text is a string.
     """
     layers, complaints = [], []
     for option in options:
@@ -231,10 +231,10 @@ def _key_parts(key: str) -> list[str]:
 
 
 def _toml_value(text: str) -> Any:
-    """Return the TOML value that this text is, or the text itself where it is none or more than one."""
+    """Return the TOML value of this text, or the text itself unless it is exactly one value."""
     try:
         value = tomllib.loads(f"value = {text}")["value"]
-        # Within brackets a comment swallows the end and a second key is no TOML.
+        # Within brackets, a comment hides the end, and a second key is not TOML.
         return value if len(tomllib.loads(f"value = [{text}]")["value"]) == 1 else text
     except (ValueError, RecursionError):
         return text
@@ -247,7 +247,7 @@ def _nested(parts: Sequence[str], value: Any) -> dict[str, Any]:
 
 
 def dotted(path: Iterable[str | int]) -> str:
-    """Return a key as it is written: `gripper.terms[2].stiffness`."""
+    """Return a key in dotted form: `gripper.terms[2].stiffness`."""
     text = ""
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part

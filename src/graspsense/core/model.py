@@ -1,7 +1,7 @@
-"""A trained model: a fitted classifier with what it was trained on, as one JSON file that runs no code.
+"""A trained model: a fitted classifier and a description of its training data, in one JSON file without code.
 
-The file names its classifier, which is looked up among the installed plugins like any other; nothing in it is
-imported, evaluated or unpickled. Its `sha256` is that of the rest, so that a damaged file is found out.
+The file names its classifier, which must be an installed component. Nothing in the file is imported, evaluated or
+unpickled. Its `sha256` is the hash of the other content, which detects a damaged file.
 """
 
 from __future__ import annotations
@@ -47,10 +47,10 @@ _UNITS: Final = (("_m_s", "mm/s", 1e3), ("_n", "N", 1.0), ("_hz", "Hz", 1.0), ("
 
 @frozen(kw_only=True, eq=False)
 class Model:
-    """A fitted classifier, the features it takes, what it has seen, and where it comes from.
+    """A fitted classifier with its features, the range of its training data, and their provenance.
 
-    `component` is the classifier's qualified name and `settings` the config it was fitted with. `target` is what
-    its labels mean. `provenance` is empty where nothing is known of the trials.
+    `component` is the qualified name of the classifier, `settings` the config that it was fitted with, `target` the
+    part of a label that it predicts. `provenance` is empty if nothing is known about the trials.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Model:
 
     @property
     def in_a_line(self) -> str:
-        """What was trained on what."""
+        """The classifier and its training data, in one line."""
         kind = "simulated grasps" if self.simulated else f"trials of {self.provenance.get('source', '?')}"
         settings = self.provenance.get("settings", {}).get("controller", {})
         at = [
@@ -86,10 +86,10 @@ class Model:
     def predict(
         self, features: Features, settings: Settings | None = None, device: DeviceInfo | None = None
     ) -> Prediction:
-        """Return what the model says of one trial, and what speaks against believing it.
+        """Return the prediction for one trial, with warnings about its validity.
 
-        `settings` and `device` are those of the grasp, where there was one. A trial that lacks a feature of the
-        model, or has it in another unit, cannot be judged: it is unknown, with that as the reason.
+        `settings` and `device` are those of the grasp, if there was one. A trial that lacks a feature of the model, or
+        has it in another unit, is unknown, with that as the reason.
         """
         warnings = tuple(self._warnings(settings, device))
         probabilities: Mapping[str, float] = {}
@@ -107,7 +107,7 @@ class Model:
             probabilities = prediction.probabilities
             because = (strange,)
             if not all(math.isnan(value) for value in chosen.values):
-                because = (strange, f"taken for a known thing, it would be {prediction.label}")
+                because = (strange, f"of the known labels, the nearest is {prediction.label}")
         return Prediction(
             label=UNKNOWN,
             probabilities=probabilities,
@@ -117,10 +117,10 @@ class Model:
         )
 
     def answers(self, table: FeatureTable) -> tuple[list[str], NDArray[np.float64]]:
-        """Return for each trial of a table the label that `predict` gives, and the probabilities, all at once.
+        """Return the label of `predict` for each trial of a table, and the probabilities.
 
-        The probabilities have shape (trials, classes), in the order of the classifier's classes; they are those of
-        a trial that is unknown, too. Raises ConfigError where the table is none for this model.
+        The probabilities have shape (trials, classes), in the order of the classes of the classifier; unknown trials
+        have probabilities too. Raises ConfigError if the table does not have the features of the model.
         """
         misfit = self.misfit(table)
         if misfit:
@@ -129,13 +129,13 @@ class Model:
         shares = self.classifier.probabilities(chosen)
         unlike = self.novelty.unlike_rows(chosen).tolist()
         classes = self.classifier.classes()
-        # Shares that are equal but for rounding are equal: the first of them is the answer.
+        # Probabilities that differ by rounding count as equal: the first of them is the answer.
         best = np.argmax(shares >= shares.max(axis=1, keepdims=True) - _EQUAL, axis=1).tolist()
         labels = [UNKNOWN if strange else classes[k] for strange, k in zip(unlike, best, strict=True)]
         return labels, shares
 
     def misfit(self, given: Features | FeatureTable) -> str:
-        """Return why the model cannot be asked about these features, or an empty string where it can."""
+        """Return why the model cannot be applied to these features; empty if it can."""
         lacking = [name for name in self.names if name not in given.names]
         if lacking:
             return (
@@ -157,7 +157,7 @@ class Model:
                     "trained on grasps of its own"
                 )
             else:
-                yield "trained on simulated grasps: right for the simulator, untested on real things"
+                yield "trained on simulated grasps: valid for the simulator, untested on real objects"
         if settings is None:
             return
         trained = dict(self.provenance.get("settings", {}))
@@ -177,7 +177,7 @@ class Model:
                     )
 
     def as_json(self) -> dict[str, Any]:
-        """Return the content of the model's file."""
+        """Return the content of the file of the model."""
         content = {
             "format": FORMAT,
             "version": VERSION,
@@ -209,9 +209,9 @@ def train(
     target: str = "both",
     provenance: Mapping[str, Any] | None = None,
 ) -> Model:
-    """Return the model that a classifier of this config makes of these trials.
+    """Return the model of a classifier with this config, fitted to these trials.
 
-    Raises ConfigError where nothing can be learned from them.
+    Raises ConfigError if nothing can be learned from them.
     """
     from graspsense.core.strict import plain
 
@@ -248,8 +248,8 @@ def train(
 
 
 def write_model(path: Path, model: Model) -> None:
-    """Write a model's file, whole or not at all. Raises OSError."""
-    # A line a key: readable, and much shorter than a line a number.
+    """Write the file of a model atomically. Raises OSError."""
+    # One line for each key: readable, and much shorter than one for each number.
     lines = (f"{json.dumps(key)}: {_json(value)}" for key, value in model.as_json().items())
     part = path.with_name(path.name + ".part")
     part.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
@@ -257,10 +257,10 @@ def write_model(path: Path, model: Model) -> None:
 
 
 def load_model(name: str, plugins: Plugins, component: Component | None = None) -> Model:
-    """Return a model: one that a plugin offers, by name, or a `.json` file.
+    """Return a model from a `.json` file, or by the name of a model that a plugin ships.
 
-    `component` is the classifier that is to use it, where that is chosen. Raises ConfigError where there is none
-    or another classifier made it, DataDamaged where the file is not what it claims to be.
+    `component` is the classifier that the pipeline selects, if any. Raises ConfigError if the file is missing or
+    another classifier made it, DataDamaged if its content is not a model.
     """
     text = _text(name, plugins)
     content = _content(name, text)
@@ -296,9 +296,9 @@ def load_model(name: str, plugins: Plugins, component: Component | None = None) 
 
 
 def model_for(settings: Settings, plugins: Plugins) -> Model | None:
-    """Return the model that a pipeline's classifier uses, None where the pipeline has no classifier.
+    """Return the model of the classifier of a pipeline; None if the pipeline has no classifier.
 
-    Raises ConfigError where it names none, and what `load_model` raises.
+    Raises ConfigError if it does not name a model, and what `load_model` raises.
     """
     chosen = settings.classifier
     if chosen is None:
@@ -354,20 +354,20 @@ def _content(name: str, text: bytes) -> dict[str, Any]:
     try:
         content = json.loads(text)
     except (UnicodeDecodeError, ValueError) as error:
-        raise DataDamaged(f"model {name!r} is no JSON: {error}") from error
+        raise DataDamaged(f"model {name!r} is not JSON: {error}") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise DataDamaged(f'{name!r} is no model of graspsense: it lacks "format": "{FORMAT}"')
+        raise DataDamaged(f'{name!r} is not a model of graspsense: it lacks "format": "{FORMAT}"')
     if content.get("version") != VERSION:
         raise DataDamaged(
             f"model {name!r} has version {content.get('version')!r}; this graspsense ({__version__}) reads {VERSION}"
         )
     rest = {key: value for key, value in content.items() if key != "sha256"}
     if content.get("sha256") != _digest(rest):
-        raise DataDamaged(f"model {name!r} was changed or damaged: it is not what its sha256 says")
+        raise DataDamaged(f"model {name!r} was changed or damaged: its sha256 does not match")
     expected = {"classifier": str, "settings": dict, "features": list, "provenance": dict, "unknown": dict}
     for key, kind in expected.items():
         if not isinstance(content.get(key), kind):
-            raise DataDamaged(f"model {name!r} is damaged: {key!r} is missing or no {kind.__name__}")
+            raise DataDamaged(f"model {name!r} is damaged: {key!r} is missing or not a {kind.__name__}")
     return cast("dict[str, Any]", content)
 
 
@@ -393,7 +393,7 @@ def _chosen(features: Features, names: Sequence[str]) -> Features:
 
 
 def worded(key: str, value: Any) -> tuple[str, str]:
-    """Return a key and its value as a person says them: `probing_force_n`, 20 as `probing force`, `20 N`."""
+    """Return a key and its value in words: `probing_force_n`, 20 as `probing force`, `20 N`."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         for ending, unit, factor in _UNITS:
             if key.endswith(ending):

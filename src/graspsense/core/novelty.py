@@ -1,9 +1,8 @@
-"""When a trial is unlike anything a model was trained on: one rule for every classifier.
+"""Novelty detection: whether a trial is unlike all training data, by one rule for every classifier.
 
-For each class and feature the model keeps the range of its training trials. A trial is unlike a class where one
-of its features lies further outside that range than `REACH` times the feature's standard deviation within
-classes (pooled over the classes). It is *unknown* where it is unlike every class, or has no feature at all.
-A missing feature is not judged.
+For each class and feature, the model has the range of the training trials. A trial is unlike a class if one of its
+features lies outside that range by more than `REACH` times the standard deviation of the feature within classes (pooled
+over the classes). It is *unknown* if it is unlike every class, or has no feature at all. Missing features are ignored.
 """
 
 from __future__ import annotations
@@ -21,18 +20,18 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 REACH: Final = 3.0
-"""Standard deviations outside of a class's own range that are still like it."""
+"""Distance from the range of a class, in standard deviations, up to which a trial is like the class."""
 _ROUNDING: Final = 1e-9
-"""Share of a value by which a feature that was constant in training may differ from it."""
+"""Relative difference allowed to a feature that was constant in training."""
 _ROWS_AT_ONCE: Final = 4096
 
 
 @frozen(kw_only=True, eq=False)
 class Novelty:
-    """What the training trials spanned.
+    """The ranges of the training trials.
 
-    `lowest` and `highest` have shape (classes, features), NaN where a class never had the feature; `spread` has
-    shape (features,): the standard deviation within classes, NaN where it is not known.
+    `lowest` and `highest` have shape (classes, features), NaN for a feature that a class never had; `spread`, the
+    standard deviation within classes, has shape (features,), NaN if unknown.
     """
 
     names: tuple[str, ...]
@@ -42,10 +41,10 @@ class Novelty:
     highest: NDArray[np.float64]
     spread: NDArray[np.float64]
     featureless: bool
-    """Whether a training trial had no feature at all, so that such a trial is nothing new."""
+    """Whether a training trial had no feature at all, so that such a trial is not new."""
 
     def unlike(self, features: Features) -> str | None:
-        """Return why this trial is unlike every class, or None where it is like one."""
+        """Return why this trial is unlike every class, or None if it is like one of them."""
         values = np.array([features[name] for name in self.names])
         if np.isnan(values).all():
             if self.featureless:
@@ -79,7 +78,7 @@ class Novelty:
         return unlike
 
     def _outside(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return in spreads how far outside each class's range each value lies; NaN where that is not known."""
+        """Return the distance of each value from the range of each class, in standard deviations; NaN if unknown."""
         rounding = _ROUNDING * np.maximum(np.abs(values), np.finfo(np.float64).tiny / _ROUNDING)
         scale = np.where(self.spread > 0.0, self.spread, rounding)
         with np.errstate(invalid="ignore"):
@@ -89,7 +88,7 @@ class Novelty:
             return outside / scale
 
     def to_json(self) -> dict[str, Any]:
-        """Return the ranges as values that JSON holds exactly; None stands for an unknown one."""
+        """Return the ranges as values that JSON represents exactly; an unknown one is None."""
         return {
             "reach": REACH,
             "featureless": self.featureless,
@@ -102,7 +101,7 @@ class Novelty:
 
 
 def novelty_of(table: FeatureTable, labels: Sequence[str]) -> Novelty:
-    """Return what these training trials span."""
+    """Return the ranges of these training trials."""
     values = table.values
     classes = tuple(sorted(set(labels)))
     given = np.array(labels)
@@ -120,7 +119,7 @@ def novelty_of(table: FeatureTable, labels: Sequence[str]) -> Novelty:
     with np.errstate(invalid="ignore", divide="ignore"):
         spread = np.sqrt(squares / freedom)
     for f in np.flatnonzero(freedom == 0).tolist():
-        # One trial a class: what differs between classes is all there is to judge by.
+        # With one trial in each class, the differences between classes are the only measure of spread.
         known = values[~np.isnan(values[:, f]), f]
         spread[f] = float(known.std()) if len(known) else math.nan
     return Novelty(
@@ -135,9 +134,9 @@ def novelty_of(table: FeatureTable, labels: Sequence[str]) -> Novelty:
 
 
 def novelty_from(names: Sequence[str], units: Sequence[str], kept: Mapping[str, Any]) -> Novelty:
-    """Return what `to_json` gave. Raises KeyError, TypeError or ValueError where it is no such thing."""
+    """Return the object that `to_json` described. Raises KeyError, TypeError or ValueError for other values."""
     if kept["reach"] != REACH:
-        raise ValueError(f"the rule for unknown things has reach {kept['reach']!r}, this version has {REACH}")
+        raise ValueError(f"the rule for unknown trials has reach {kept['reach']!r}, this version has {REACH}")
     classes = tuple(kept["ranges"])
     shape = (len(classes), len(names))
     lowest = np.array([kept["ranges"][label][0] for label in classes], dtype=np.float64).reshape(shape)
@@ -155,7 +154,7 @@ def novelty_from(names: Sequence[str], units: Sequence[str], kept: Mapping[str, 
 
 
 def _worst(outside: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the largest along the last axis; infinite where nothing there is known."""
+    """Return the maximum along the last axis, ignoring NaN; infinite if all are NaN."""
     known = ~np.isnan(outside)
     return np.where(known.any(axis=-1), np.where(known, outside, -1.0).max(axis=-1), np.inf)
 

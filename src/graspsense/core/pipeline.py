@@ -1,4 +1,4 @@
-"""A pipeline: gripper, controller, features and classifier wired together, ready to grasp."""
+"""A pipeline: a gripper, a controller, a feature set and a classifier that work together."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from graspsense.core.wiring import check
 
 @frozen(eq=False, kw_only=True)
 class Pipeline:
-    """A resolved and checked pipeline. Nothing is opened before `grasp`."""
+    """A resolved and checked pipeline. Only `grasp` opens the gripper."""
 
     settings: Settings
     options: tuple[str, ...] = ()
@@ -37,10 +37,10 @@ class Pipeline:
         sinks: Iterable[Sink] = (),
         on_event: Callable[[GraspEvent], None] | None = None,
     ) -> Trial:
-        """Do one grasp and return the trial, whatever its outcome.
+        """Run one grasp and return the trial, whatever its outcome.
 
-        `object` and `seed` stand for `gripper.object` and `run.seed`. Raises ConfigError where the gripper takes
-        no object, UnknownName for an object it does not know, NoDevice where it is not there.
+        `object` and `seed` override `gripper.object` and `run.seed`. Raises ConfigError if the gripper has no setting
+        `object`, UnknownName for an unknown object, NoDevice if the gripper is not connected.
         """
         if object is not None or seed is not None:
             flags = (Flag("object", "gripper.object", object), Flag("seed", "run.seed", seed))
@@ -60,7 +60,7 @@ def load_pipeline(
 ) -> Pipeline:
     """Return a pipeline by name or file, with options as after `-o` (`"controller.probing_force_n=17"`).
 
-    Raises ConfigError with every error at once, WiringError where components do not fit each other.
+    Raises ConfigError that lists all errors, WiringError if the components do not fit together.
     """
     plugins = installed() if plugins is None else plugins
     settings = resolve(str(pipeline), plugins=plugins, options=options)
@@ -77,8 +77,8 @@ def grasp_with(
     on_event: Callable[[GraspEvent], None] | None = None,
     on_open: Callable[[DeviceInfo], None] | None = None,
 ) -> Trial:
-    """Do one grasp with these settings: build the components, run, draw features, predict, tell the observers."""
-    # The model comes first: a missing one must not be found out after the grasp.
+    """Run one grasp with these settings: build the components, grasp, extract features, predict, notify observers."""
+    # The model is loaded first, because a missing model must be reported before the grasp.
     model = model_for(settings, plugins)
     backend, controller = settings.gripper.create(), settings.controller.create()
     feature_set = settings.features.create()
@@ -96,7 +96,7 @@ def grasp_with(
 
     plugins.run_starting(run)
     grasp = run_grasp(backend, controller, settings.run, sinks=sinks, on_event=tell, on_open=on_open)
-    # Whatever fails from here on, the grasp was made and its trace is kept.
+    # The grasp is done: its trace is kept whatever fails from here on.
     try:
         features = feature_set.extract(grasp.trace)
     except Exception as error:
@@ -127,7 +127,7 @@ def grasp_with(
 
 
 def _undefined(settings: Settings, why: str) -> Features:
-    """Return the declared features of the chosen set, all missing for this reason."""
+    """Return the declared features of the feature set, all missing for this reason."""
     entry = settings.features.component.entry
     assert isinstance(entry, FeatureSetEntry)
     names = tuple(feature.name for feature in entry.features)

@@ -1,7 +1,7 @@
-"""Plain values, as TOML gives them, into attrs classes and back: nothing is coerced, every error is kept.
+"""Conversion of plain values, as in TOML, to attrs classes and back. Nothing is coerced, and all errors are reported.
 
-cattrs picks the rule for each type; the rules here replace its own, which turn `"false"` into True, 2.9 into
-2 and 3 into "3".
+cattrs selects the rule for each type. The rules here replace those of cattrs, which turn `"false"` into True, 2.9
+into 2 and 3 into "3".
 """
 
 from __future__ import annotations
@@ -28,30 +28,30 @@ _NUMBER_WITH_UNIT: Final = re.compile(r"\s*([-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)
 
 @frozen
 class InvalidValue:
-    """What is wrong with the value at `path`."""
+    """A defect of the value at `path`."""
 
     path: KeyPath
     text: str
 
 
 class ValidationFailed(Exception):
-    """Values that do not make an instance; `problems` holds everything that is wrong with them."""
+    """Values that cannot be converted to an instance; `problems` holds all their defects."""
 
     def __init__(self, problems: Iterable[InvalidValue]) -> None:
         super().__init__()
         self.problems = tuple(problems)
 
     def under(self, key: str | int) -> list[InvalidValue]:
-        """Return the problems as seen from one level further out."""
+        """Return the problems with paths that begin with this key."""
         return [InvalidValue((key, *one.path), one.text) for one in self.problems]
 
 
 def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> ConfigT:
     """Return the instance of the attrs class `cls` that these values describe.
 
-    Numbers, text and booleans must be what the class declares (a whole number is taken for a number), keys
-    must be known, and validators keep their own words. `called` is how to name the table in errors. Raises
-    ValidationFailed with every problem at once.
+    Each value must have the type that the class declares (a whole number may stand for a number), each key must be
+    known, and the messages of validators are kept. `called` is the name of the table in errors. Raises ValidationFailed
+    with all problems.
     """
     attrs.resolve_types(cls)  # type: ignore[type-var]
     fields = {one.alias: one for one in attrs.fields(cls) if one.init}  # type: ignore[arg-type]
@@ -68,7 +68,7 @@ def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> Co
             )
         except ValidationFailed as misfit:
             problems += misfit.under(name)
-        except Exception as error:  # a type that is not among those below
+        except Exception as error:  # for a type without a rule below
             problems.append(InvalidValue((name,), f"cannot be read as {field.type}: {_words(error)}"))
     if not problems:
         try:
@@ -81,7 +81,7 @@ def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> Co
 
 
 def plain(config: object) -> dict[str, Any]:
-    """Return the values of an attrs instance as TOML has them, and None where a key is not set."""
+    """Return the values of an attrs instance as plain values; a key that is not set is None."""
     return {
         field.alias: _plain(getattr(config, field.name))
         for field in attrs.fields(type(config))  # type: ignore[arg-type]
@@ -90,7 +90,7 @@ def plain(config: object) -> dict[str, Any]:
 
 
 def keys_of(cls: type) -> dict[str, dict[str, Any]]:
-    """Return for each key of a config class its `type` in words, whether it is `required`, its `default`."""
+    """Return the `type` in words, `required` and `default` of each key of a config class."""
     attrs.resolve_types(cls)
     keys: dict[str, dict[str, Any]] = {}
     for field in attrs.fields(cls):
@@ -127,10 +127,10 @@ def _plain(value: Any) -> Any:
 def _complaints(
     cls: type, fields: Mapping[str, attrs.Attribute[Any]], given: Mapping[str, Any]
 ) -> list[InvalidValue]:
-    """Return what the validators of the given fields say, each on its own.
+    """Return the problems that the validators of the given fields report.
 
-    attrs stops at the first validator that objects, so the instance is made without them. Where a value that
-    is needed is missing or of the wrong type there is no instance to ask, and nothing is returned.
+    attrs stops at the first validator that raises, so the instance is made without validators. If a required value is
+    missing or has the wrong type, there is no instance, and nothing is returned.
     """
     try:
         with attrs.validators.disabled():
@@ -149,7 +149,7 @@ def _complaints(
 
 
 def _words(error: Exception) -> str:
-    """Return the text of an error; some of attrs' own carry the attribute and its value behind the text."""
+    """Return the text of an error, without the attribute and the value that errors of attrs append."""
     return (
         error.args[0] if error.args and isinstance(error.args[0], str) else f"{type(error).__name__}: {error}"
     )
@@ -212,7 +212,7 @@ def _str(value: object, _: object) -> str:
         raise _expected("text", value, ": put it in quotes, with -o as 'KEY=\"...\"'" if simple else "")
     try:
         value.encode()
-    except UnicodeEncodeError:  # bytes of a command line that were no text
+    except UnicodeEncodeError:  # bytes of a command line that are not text
         raise _expected("UTF-8 text", value) from None
     return value
 

@@ -1,6 +1,6 @@
-"""Where the keys of a TOML file stand: the line of each, which the standard library's reader does not tell.
+"""The lines of the keys of a TOML file, which `tomllib` does not give.
 
-Meant for text that `tomllib` has accepted; it finds keys and ends of values, and judges nothing.
+The text must be valid TOML: this only finds keys and the ends of values.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import tomllib
 from typing import Any, Final
 
 KeyPath = tuple[str | int, ...]
-"""Keys from the outermost table inwards; an integer is an index into an array."""
+"""The path to a value: keys from the outermost table inwards, and integers for indices of arrays."""
 
 _BLANK: Final = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _SPACE: Final = re.compile(r"[ \t]*")
@@ -108,7 +108,7 @@ class _Scanner:
             self.skip(_BLANK)
 
     def key(self) -> list[str]:
-        """Read a dotted key and leave the position behind it."""
+        """Read a dotted key, and set the position to its end."""
         parts: list[str] = []
         while True:
             self.skip(_SPACE)

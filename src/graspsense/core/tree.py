@@ -1,4 +1,4 @@
-"""A decision tree as a person reads it: what a classifier that has one gives for a page or a terminal."""
+"""The nodes of a decision tree in readable form, for reports and the terminal."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from attrs import frozen
 
 @frozen(kw_only=True)
 class TreeNode:
-    """A node: the label it would answer, how many training trials came to it, and how many of these it gets wrong.
+    """A node: its label, the number of training trials that reach it, and the number of these with another label.
 
-    `parent` is the number of the node above it, None for the root; `branch` says what leads here from there, in
-    words and units. A node that is nobody's parent is a leaf. Nodes come with parents before their sons.
+    `parent` is the index of the parent node, None for the root; `branch` is the condition under which the parent leads
+    here, in words and units. A node without children is a leaf. Parents come before their children.
     """
 
     label: str

@@ -1,4 +1,4 @@
-"""Where the user's own files are: settings, data and what can be made again. Nowhere, for a user without a home."""
+"""The folders of the user for settings, data and caches. A user without a home folder has none."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ NOWHERE: Final = "this user has no home directory: set HOME or {}, the folder to
 
 
 def config_folder() -> Path | None:
-    """Return the folder for settings, whether or not it exists; None where there is nowhere to keep any."""
+    """Return the folder for settings, whether or not it exists; None for a user without a home folder."""
     return _folder("XDG_CONFIG_HOME", ".config")
 
 
 def data_folder() -> Path | None:
-    """Return the folder for data, whether or not it exists; None where there is nowhere to keep any."""
+    """Return the folder for data, whether or not it exists; None for a user without a home folder."""
     return _folder("XDG_DATA_HOME", ".local", "share")
 
 
 def cache_folder() -> Path | None:
-    """Return the folder for what takes time to make and can be made again; None where it is not to be kept."""
-    # Nor in the system's temporary folder, where anybody could have put what is then run.
+    """Return the folder for caches, whether or not it exists; None for a user without a home folder."""
+    # The temporary folder of the system is no substitute: other users could put code there.
     return _folder("XDG_CACHE_HOME", ".cache")
 
 
@@ -32,5 +32,5 @@ def _folder(variable: str, *beside: str) -> Path | None:
     try:
         return Path.home().joinpath(*beside, "graspsense")
     except RuntimeError:
-        # Neither HOME nor an entry in the system's list of users, as in some containers.
+        # There is neither HOME nor an entry in the list of users, as in some containers.
         return None

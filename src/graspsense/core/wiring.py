@@ -1,4 +1,4 @@
-"""Whether the chosen components fit together, told from what they declare, before anything is opened."""
+"""Checks from their declarations that components fit together, before a gripper is opened."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from graspsense.core.plugins import Component
 def check(settings: Settings) -> None:
     """Check channels, units, rates and command kinds.
 
-    Raises WiringError with every misfit, each naming both components, what one has and what the other asks.
+    Raises WiringError that lists every mismatch, with both components, what one provides and what the other requires.
     """
     gripper = settings.gripper.component
     misfits = [
