@@ -36,9 +36,9 @@ from selection import controller_is_stable
 from graspsense.plugin_api import ConfigError, NotCompilable, bind, create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
+from graspsense_sim_gripper.exact.discretise import discretise
+from graspsense_sim_gripper.exact.propagate import bind_move
 from graspsense_sim_gripper.kernel import compiled, plant_of
-from graspsense_sim_gripper.linear import move_of
-from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.objects.library import find
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.setting import Setting, setting_of
@@ -83,11 +83,11 @@ def ready(config: SimConfig, spec: ObjectSpec) -> Ready:
     """Return the plant of this scene, by exact maps where it is piecewise linear, as the backend has it."""
     setting = setting_of(config, spec, 0)
     steps = plant_of(laws_of(setting.kinds))
-    found = linear_of(config, setting)
+    found = discretise(config, setting)
     if found is None:
         return Ready(setting=setting, params=setting.plant, move=steps, by="steps")
     params, shape = found
-    return Ready(setting=setting, params=params, move=move_of(setting.kinds, shape, steps), by="maps")
+    return Ready(setting=setting, params=params, move=bind_move(setting.kinds, shape, steps), by="maps")
 
 
 @cache

@@ -36,7 +36,7 @@ from graspsense_sim_gripper.checking import Control, checked_choice
 from graspsense_sim_gripper.compiled.padding import as_compiled
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
-from graspsense_sim_gripper.linear_scene import linear_of
+from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.reduction.error import Course, deviation
 from graspsense_sim_gripper.setting import Setting, setting_of
@@ -256,7 +256,7 @@ class Bench:
 
     def loop_of(self, config: SimConfig, setting: Setting, step: Any) -> Any:
         """Return the compiled loop of a setting: that of its steps, or of the exact maps that take it."""
-        by_maps = linear_of(config, setting, on_arrays=True)
+        by_maps = discretise(config, setting, on_arrays=True)
         shape = None if by_maps is None else by_maps[1]
         composition = Composition(setting.kinds, shape, setting.plant.steps.settle > 0.0)
         if composition not in self.compiled:

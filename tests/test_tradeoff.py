@@ -66,8 +66,8 @@ PEERS = {
     "other_4e-4_is": "Other 1.0 Euler over graspsense, as shipped",
     "other_1e-6": None,
     "grasps_per_s_by_count": {
-        "100": {"ms_of_processor_time_per_grasp": 0.5},
-        "1000": {"ms_of_processor_time_per_grasp": 0.6},
+        "100": {"ms_of_processor_a_grasp": 0.5},
+        "1000": {"ms_of_processor_a_grasp": 0.6},
     },
 }
 
@@ -89,7 +89,7 @@ def test_the_page_has_both_tables_with_date_and_versions():
     assert "numpy 2.4" in page
     assert "| Other 1.0 Euler | 100 | - | - |" in page
     assert "| `other_4e-4` | 44.5 | Other 1.0 Euler over graspsense, as shipped |" in page
-    assert "| `grasps_per_s_by_count` | 0.6 | ms of processor time per grasp in a batch of 1000 |" in page
+    assert "| `grasps_per_s_by_count` | 0.6 | ms of processor a grasp, of 1000 |" in page
     assert "other_1e-6" not in page
     assert "simulated" in page
     assert "Other" not in simulation_markdown(TRADE, None)
@@ -146,7 +146,7 @@ def test_the_simulator_gets_better_with_finer_steps(capsys, tmp_path):
     assert {p["failure"] for p in points} == {""}
     assert found["quantities"][-2:] == [PEAK, TRACE]
     assert all(p["seconds"] > 0.0 for p in points)
-    for method in ("fixed steps, explicit", "fixed steps, implicit"):
+    for method in ("even steps, explicit", "even steps, implicit"):
         curve = [p for p in points if p["method"] == method and p["role"] == "curve"]
         assert [p["step"] for p in curve] == ["1 ms", "0.5 ms", "0.2 ms", "0.1 ms"]
         errors = [p["errors"][TRACE] for p in curve]

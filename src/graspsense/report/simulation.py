@@ -1,4 +1,4 @@
-"""The accuracy of a simulator against its run time, as a table and as a picture, with other engines for comparison."""
+"""What a simulator's accuracy costs, as a table and as a picture; peers, measured on a scene of their own, beside."""
 
 from __future__ import annotations
 
@@ -15,35 +15,6 @@ from graspsense.report.confusion import MATPLOTLIB_HINT
 HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
 PEAK: Final = "peak force"
 TRACE: Final = "force trace, rms"
-RATIO: Final = (
-    "run time of the other engine over that of graspsense, fastest settings with an RMS error of at most"
-)
-FIGURES: Final = {
-    **{
-        f"{engine}_{error}": f"{RATIO} {error}"
-        for engine in ("mujoco", "drake", "lsoda", "radau")
-        for error in ("4e-4", "1e-6")
-    },
-    "mujoco_plant": "PR2 drive: run time of the nearest MuJoCo model divided by that of graspsense",
-    "mujoco_plant_model_error_rms": "PR2 drive: RMS error of the MuJoCo model with steps of a fiftieth of the tick",
-    "mujoco_plant_error_rms": "PR2 drive: RMS error of the MuJoCo model with steps of one tick",
-    "mujoco_plant_our_error_rms": "PR2 drive: RMS error of graspsense",
-    "mujoco_plant_our_ms": "PR2 drive: ms per grasp of graspsense",
-    "mujoco_plant_their_ms": "PR2 drive: ms per grasp of MuJoCo",
-    "gas_over_linear": "run time with gas and a vent over that of the linear scene, at an RMS error of at most 4e-4",
-    "gas_over_linear_1e-6": "the same at an RMS error of at most 1e-6",
-    "compile_cold_s": "seconds of processor time to compile the catalogue, with an empty cache",
-    "compile_cold_s_on_the_clock": "the same in seconds of wall time",
-    "compile_warm_s": "seconds of processor time to load the compiled catalogue from the cache",
-    "compile_warm_s_on_the_clock": "the same in seconds of wall time",
-    "grasps": "number of grasps in the largest batch",
-    "grasps_per_s_ideal": "grasps per second of that batch, with features, ideal sensor",
-    "grasps_per_s_ideal_if_both_cores_were_free": "the same, computed from processor time",
-    "grasps_per_s_full": "grasps per second of that batch, with features, pads as sensor",
-    "grasps_per_s_full_if_both_cores_were_free": "the same, computed from processor time",
-    "load_at_the_end": "load of the machine at the end",
-}
-"""Meaning of the figures of `benchmarks/simulation.py`."""
 NOUGHT: Final = 1e-9
 """What is smaller is drawn here: an error of nothing has no place on a logarithmic axis."""
 
@@ -94,7 +65,7 @@ def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple
     rows = []
     for one in trade.points:
         errors = [_short(one.errors.get(name, math.nan)) for name in trade.quantities]
-        note = one.failure or {"reference": "reference", "floor": "error of the model alone"}.get(
+        note = one.failure or {"reference": "the reference", "floor": "what is left is the model's"}.get(
             one.role, ""
         )
         seconds, setup = (f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * one.seconds, one.setup_s))
@@ -108,23 +79,20 @@ def simulation_markdown(
     """Return the page of both tables, and of the picture where there is one."""
     made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
     lines = [
-        "# Simulation speed",
+        "# What the simulator's accuracy costs",
         "",
-        "This page shows how much time each numerical method of the simulator needs for which error. It was written by "
-        "`graspsense tradeoff simulation`. All grasps are simulated. docs/numerics.md describes the methods.",
+        "Written by `graspsense tradeoff simulation`. Everything here is simulated.",
         "",
-        f"{len(trade.scenes)} scenes ({', '.join(trade.scenes)}), {len(trade.seeds)} seeds each, with the ideal "
-        "sensor. Times are processor time of one thread, measured on the same grasps as the errors. An error is the "
-        "largest of all grasps, relative to the value of the reference (or to 1 mm, 1 N, 50 ms, 1 mm/s or 1 N/s if the "
-        "value is smaller).",
-        "",
+        f"{len(trade.scenes)} scenes ({', '.join(trade.scenes)}), {len(trade.seeds)} seeds each, ideal sensor, one "
+        "thread, processor time of the very grasps that the errors are of. An error is the greatest of all grasps, "
+        "relative to the reference's value (to 1 mm, 1 N, 50 ms, 1 mm/s or 1 N/s where that is less).",
         f"Made with: {made}.",
         "",
         *([f"![Error against time]({picture})", ""] if picture else []),
         *_markdown(*simulation_rows(trade)),
     ]
     if peers is not None:
-        lines += ["", "## Comparison with other engines", "", *peers_markdown(peers)]
+        lines += ["", "## Beside other engines", "", *peers_markdown(peers)]
     return "\n".join(lines) + "\n"
 
 
@@ -146,7 +114,7 @@ def peers_markdown(peers: Mapping[str, Any]) -> list[str]:
         "",
         *_markdown(("ENGINE", "MS A GRASP", "FORCE TRACE, RMS", "PEAK FORCE"), rows),
         "",
-        *_markdown(("FIGURE", "VALUE", "MEANING"), [*_figures(peers)]),
+        *_markdown(("FIGURE", "VALUE", "OF"), [*_figures(peers)]),
     ]
 
 
@@ -154,16 +122,11 @@ def _figures(peers: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     """Yield each figure by its name in the file, and what it is of; one that depends on how many, a row a number."""
     for name, value in peers.items():
         if isinstance(value, int | float):
-            yield f"`{name}`", f"{value:.4g}", _meaning(name, str(peers.get(f"{name}_is", "")))
+            yield f"`{name}`", f"{value:.4g}", str(peers.get(f"{name}_is", ""))
         elif isinstance(value, Mapping) and name != "made":
             for count, figures in value.items():
                 for what, figure in figures.items():
-                    yield f"`{name}`", f"{figure:.4g}", f"{what.replace('_', ' ')} in a batch of {count}"
-
-
-def _meaning(name: str, of: str) -> str:
-    """Return what a figure of the benchmark means; `of` says which two runs a ratio is of."""
-    return ": ".join(part for part in (FIGURES.get(name, ""), of) if part)
+                    yield f"`{name}`", f"{figure:.4g}", f"{what.replace('_', ' ')}, of {count}"
 
 
 def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -217,7 +180,7 @@ def simulation_png(trade: SimulationTrade, peers: Mapping[str, Any] | None, path
             if math.isfinite(level):
                 style = ("--", ":", "-.")[k % 3]
                 line = ax.axhline(max(level, NOUGHT), color="0.45", lw=1.0, ls=style)
-                handles[f"error of the model alone, {floor.fidelity}"] = line
+                handles[f"the model's own error, {floor.fidelity}"] = line
         _axes(ax, name, "error, relative")
     if peers is not None:
         _draw_peers(axes[len(names)], peers)
@@ -227,7 +190,7 @@ def simulation_png(trade: SimulationTrade, peers: Mapping[str, Any] | None, path
     setup = max((p.setup_s for p in trade.points if math.isfinite(p.setup_s)), default=0.0)
     figure.suptitle(
         f"Simulated grasps ({', '.join(trade.scenes)}): error against processor time, one thread\n"
-        f"without set-up and compilation, which took at most {setup:.3g} s; {len(failed)} of {len(trade.points)} failed"
+        f"set-up and compiling apart, at most {setup:.3g} s; {len(failed)} of {len(trade.points)} failed"
         + (" (crosses)" if failed else ""),
         fontsize=10,
     )

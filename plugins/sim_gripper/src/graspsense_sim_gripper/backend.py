@@ -30,10 +30,10 @@ from graspsense.plugin_api import (
 from graspsense_sim_gripper.checking import Control, checked_choice, standard
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
+from graspsense_sim_gripper.exact.discretise import discretise
+from graspsense_sim_gripper.exact.propagate import ExactPlant, bind_move
 from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.kernel import plant_of
-from graspsense_sim_gripper.linear import Linear, move_of
-from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
 from graspsense_sim_gripper.plant import PlantParams
 from graspsense_sim_gripper.sensing import (
@@ -91,11 +91,11 @@ class SimBackend(BatchBackend[SimConfig]):
         self._move: Callable[[Any, PlantState, float, float], PlantState] = plant_of(
             laws_of(setting.kinds), settles=setting.plant.steps.settle > 0.0, **_PLANT_TUPLES
         )
-        by_maps = linear_of(self.config, setting)
-        self._plant: PlantParams | Linear = setting.plant
+        by_maps = discretise(self.config, setting)
+        self._plant: PlantParams | ExactPlant = setting.plant
         if by_maps is not None:
             self._plant, shape = by_maps
-            self._move = move_of(setting.kinds, shape, self._move, **_PLANT_TUPLES)
+            self._move = bind_move(setting.kinds, shape, self._move, **_PLANT_TUPLES)
         self._body, self._sensor = setting.body, setting.sensed
         self._ticks = 0
         zero = (CELL_OFFSET[0],) * CELLS
@@ -157,7 +157,7 @@ class SimBackend(BatchBackend[SimConfig]):
         report = _known(self._body, self._setting.kinds)
         choice = self._setting.choice
         if choice is not None:
-            if isinstance(self._plant, Linear):
+            if isinstance(self._plant, ExactPlant):
                 choice = choice.by_maps()
             report["selection"] = {
                 "fidelity": self.config.fidelity,

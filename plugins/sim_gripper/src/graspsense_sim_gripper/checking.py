@@ -39,8 +39,8 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import Motion
+from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.kernel import grasp_of
-from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.loop import COLUMNS, NOT_STARTED, Buffers, GraspParams, Progress, has_ended
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.plant import EXPLICIT, Steps
@@ -413,7 +413,7 @@ class _Trial:
         compiled = None if self.loops is None else self.loops(setting, step)
         on_arrays = compiled is not None
         loop, made = compiled or (None, setting)
-        by_maps = linear_of(self.config, made, on_arrays=on_arrays)
+        by_maps = discretise(self.config, made, on_arrays=on_arrays)
         # An ideal sensor reads none of these, but compiled code has them.
         zero, noise = np.zeros((2, CELLS)), np.zeros((1, 2 * CELLS))
         pads = PadBuffers(zero[0], zero[1], noise, np.full((1, 2, CELLS), math.nan))

@@ -10,9 +10,10 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from graspsense.plugin_api import CompileOptions, Inlining, bind, compile_function, tick
-from graspsense_sim_gripper import linear, plant
+from graspsense_sim_gripper import plant
 from graspsense_sim_gripper.dynamics.state import PlantState
-from graspsense_sim_gripper.linear_modes import Shape
+from graspsense_sim_gripper.exact.modes import Shape
+from graspsense_sim_gripper.exact.propagate import bind_move, cold_calls
 from graspsense_sim_gripper.loop import grasp
 from graspsense_sim_gripper.plant import PlantParams
 from graspsense_sim_gripper.terms.term import Law
@@ -94,12 +95,12 @@ def grasp_of(
 ) -> Callable[..., Any]:
     """Return `grasp` for an object of these terms under this control law, in plain Python.
 
-    `by_maps`: their names and the shape of the maps, where its plant parameters are a `Linear` and exact maps take the
-    ticks that they can. Not `settles`: for steps that need not.
+    `by_maps`: their names and the shape of their modes, where the plant parameters are an `ExactPlant` and exact
+    discretisation advances the ticks that it can. Not `settles`: for steps that need not.
     """
     move: Any = plant_of(laws, settles=settles)
     if by_maps is not None:
-        move = linear.move_of(*by_maps, move)
+        move = bind_move(*by_maps, move)
     return bind(grasp, move=move, control=bind(tick, step=step))
 
 
@@ -115,7 +116,7 @@ COMPILE_OPTIONS: Final = CompileOptions(
         before_typing=frozenset(
             function.__code__ for function in (plant.move, plant._driven, plant._settled, plant._stepped)
         ),
-        cold_calls=linear.seldom,
+        cold_calls=cold_calls,
     ),
     install="graspsense-sim-gripper[fast]",
 )

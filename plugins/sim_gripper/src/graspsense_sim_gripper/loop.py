@@ -27,7 +27,7 @@ COLUMNS: Final = (
 """The rows of the recorded table, each a column of the trace. The phases are integers and are kept beside it."""
 
 PlantModel = Any
-"""`PlantParams`, or `Linear` where exact discretisation advances the plant."""
+"""`PlantParams`, or `ExactPlant` where exact discretisation advances the plant."""
 Table = Any
 """Rows of numbers: an array in compiled code, a list of lists in the interpreter."""
 

@@ -12,19 +12,19 @@ from graspsense.plugin_api import SimulationVariant
 ACCURACIES: Final = (0.3, 0.1, 0.03, 0.01, 0.001, 1e-4)
 STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)
 FINE_S: Final = 2e-5
-"""Steps so short that only the error of the model remains."""
+"""Steps so short that what is left is the model's own error."""
 
 _FORMS: Final = (
     SimulationVariant(
-        method="step halving",
+        method="halved steps",
         fidelity="full",
-        step="until converged",
+        step="until all stands still",
         settings={"fidelity": "reference", "accuracy": 1e-4},
         role="reference",
     ),
     *(
         SimulationVariant(
-            method="adaptive steps",
+            method="steps by their error",
             fidelity=fidelity,
             step=f"{accuracy:g}",
             settings={"fidelity": fidelity, "accuracy": accuracy},
@@ -34,7 +34,7 @@ _FORMS: Final = (
     ),
     *(
         SimulationVariant(
-            method=f"fixed steps, {scheme}",
+            method=f"even steps, {scheme}",
             fidelity="full",
             step=f"{step_s * 1e3:g} ms",
             settings={"fidelity": "full", "scheme": scheme, "step_s": step_s},
@@ -43,14 +43,14 @@ _FORMS: Final = (
         for step_s in STEPS_S
     ),
     SimulationVariant(
-        method="interpreter",
+        method="in the interpreter",
         fidelity="scene",
         step="0.01",
         settings={"fidelity": "scene", "accuracy": 0.01, "compile": "never"},
     ),
     *(
         SimulationVariant(
-            method="fixed steps, explicit",
+            method="even steps, explicit",
             fidelity=f"scene at {accuracy:g}",
             step=f"{FINE_S * 1e3:g} ms",
             settings={"fidelity": "scene", "accuracy": accuracy, "scheme": "explicit", "step_s": FINE_S},

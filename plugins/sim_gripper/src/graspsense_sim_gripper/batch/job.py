@@ -29,9 +29,9 @@ from graspsense_sim_gripper.checking import Checking, Control, Loops
 from graspsense_sim_gripper.compiled.padding import as_compiled, as_own, layout_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
+from graspsense_sim_gripper.exact.discretise import discretise
+from graspsense_sim_gripper.exact.modes import Shape
 from graspsense_sim_gripper.kernel import grasp_of
-from graspsense_sim_gripper.linear_modes import Shape
-from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.loop import (
     COLUMNS,
     NOT_STARTED,
@@ -134,7 +134,7 @@ def _composed(config: SimConfig, setting: Setting, kinds: tuple[str, ...]) -> Co
 
 
 def _shape(config: SimConfig, setting: Setting) -> Shape | None:
-    found = linear_of(config, setting, on_arrays=True)
+    found = discretise(config, setting, on_arrays=True)
     return None if found is None else found[1]
 
 
@@ -196,7 +196,7 @@ def _run(
     if not on_arrays:
         # The interpreter indexes lists faster than arrays.
         buffers = as_lists(buffers)
-    exact = linear_of(job.config, setting, on_arrays=on_arrays)
+    exact = discretise(job.config, setting, on_arrays=on_arrays)
     params = GraspParams(
         plant=setting.plant if exact is None else exact[0],
         sensor=setting.sensor,

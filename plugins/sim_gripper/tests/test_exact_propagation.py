@@ -1,14 +1,11 @@
-"""Exact maps of piecewise linear scenes: the right motion however stiff, and the plant where they do not apply."""
+"""Propagation by the matrix exponential, against time steps, other integrators, closed forms and conservation laws."""
 
 import math
 
 import numpy as np
 import pytest
 from attrs import evolve
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
 from simulation_scene import CONFIG as PEERS
 
 from graspsense.core.runner import RunConfig, run_grasp
@@ -16,16 +13,14 @@ from graspsense.plugin_api import create
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.exact.discretise import discretise
+from graspsense_sim_gripper.exact.propagate import bind_move
 from graspsense_sim_gripper.kernel import plant_of
-from graspsense_sim_gripper.linear import move_of
-from graspsense_sim_gripper.linear_modes import HALVINGS, _exponentials
-from graspsense_sim_gripper.linear_scene import linear_of
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.setting import set_scene, setting_of
-from graspsense_sim_gripper.terms.registry import TERMS, laws_of
-from graspsense_sim_gripper.terms.term import OwnContact
+from graspsense_sim_gripper.terms.registry import laws_of
 
-RUBS = SimConfig(
+FRICTION = SimConfig(
     spread=False,
     sensor="ideal",
     transmission="straight",
@@ -49,34 +44,34 @@ SURFACE = ("surface", {"mass_kg": 0.02, "k_n_m": 2e3, "damping_n_s_m": 5.0, "con
 FOAM = ("foam", {"force_n": 20.0, "at_m": 0.01, "exponent": 1.0})
 
 
-def thing(*terms, **more):
-    return ObjectSpec(name="thing", width_m=0.05, **{"friction": 0.0, "terms": terms, **more})
+def object_of(*terms, **more):
+    return ObjectSpec(name="object", width_m=0.05, **{"friction": 0.0, "terms": terms, **more})
 
 
-def ready(config, spec, *, maps=True, on_arrays=False):
-    """Return what moves the fingers, its parameters, and the setting."""
+def ready(config, spec, *, exact=True, on_arrays=False):
+    """Return the function that advances the plant by a tick, its parameters, and the setting."""
     setting = set_scene(config, spec, 0) if isinstance(spec, str) else setting_of(config, spec, 0)
     move, params = plant_of(laws_of(setting.kinds)), setting.plant
-    if maps:
-        found = linear_of(config, setting, on_arrays=on_arrays)
-        assert found is not None
-        params, shape = found
-        move = move_of(setting.kinds, shape, move)
+    if exact:
+        result = discretise(config, setting, on_arrays=on_arrays)
+        assert result is not None
+        params, shape = result
+        move = bind_move(setting.kinds, shape, move)
     return move, params, setting
 
 
-def along(config, spec, efforts, *, maps=True, speed_m_s=0.0):
+def along(config, spec, efforts, *, exact=True, speed_m_s=0.0):
     """Return closure, force and closing speed at each tick under these efforts, and the last state."""
-    move, params, setting = ready(config, spec, maps=maps)
+    move, params, setting = ready(config, spec, exact=exact)
     motion = setting.body.motion
     motion = motion._replace(speed_rev_s=-speed_m_s / motion.jacobian_m_rev)
     state = setting.body._replace(motion=motion)
-    found = []
+    rows = []
     for effort in efforts:
         state = move(params, state, effort, setting.dt_s)
         speed = -state.motion.speed_rev_s * state.motion.jacobian_m_rev
-        found.append((setting.plant.thing.width_m - state.motion.gap_m, state.contact.left_n, speed))
-    return *np.array(found).T, state
+        rows.append((setting.plant.thing.width_m - state.motion.gap_m, state.contact.left_n, speed))
+    return *np.array(rows).T, state
 
 
 def squeeze_and_let_go(ticks):
@@ -87,111 +82,42 @@ def squeeze_and_let_go(ticks):
         yield 25.0 if x < 0.35 else swings if x < 0.5 else 10.0 if x < 0.6 else -12.0 if x < 0.75 else 30.0
 
 
-@pytest.mark.parametrize("halvings", [0, 3, 20, HALVINGS])
-def test_the_maps_and_their_integrals_are_those_of_scipy(halvings):
-    rates = np.array([[0.0, 1.0, 0.0], [-1e6, -250.0, 1e6], [0.0, 0.0, 0.0]])
-    maps, integrals = _exponentials(rates[None], 1e-3)
-    h = math.ldexp(1e-3, -halvings)
-    np.testing.assert_allclose(maps[0, halvings], expm(rates * h), rtol=1e-11, atol=1e-13)
-    both = np.block([[rates, np.eye(3)], [np.zeros((3, 6))]])
-    np.testing.assert_allclose(integrals[0, halvings], expm(both * h)[:3, 3:], rtol=1e-10, atol=1e-16)
+# ------------------------------------------------------------------------------------- against time steps
 
-
-# ------------------------------------------------------------------------------------- forms and laws
-
-NUMBER = st.floats(0.05, 20.0)
-
-
-LINEAR_WITH = {"elastic": {"k3_n_m3": 0.0}, "foam": {"exponent": 1.0}}
-
-
-@pytest.mark.parametrize("name", [name for name in TERMS if name not in ("gas", "rigid", "snap", "worn")])
-@settings(max_examples=30, deadline=None)
-@given(data=st.data())
-def test_a_terms_linear_form_is_its_law(name, data):
-    term = TERMS[name]
-    fields = {field: data.draw(NUMBER) for field in term.params._fields}
-    params = term.params(**fields | LINEAR_WITH.get(name, {}))
-    form, state = term.linear(params), term.at_rest
-    touching = data.draw(st.booleans())
-    d0, way, h = data.draw(NUMBER), data.draw(st.floats(-0.2, 0.2)), data.draw(st.floats(1e-4, 2e-2))
-    numbers = [data.draw(st.floats(-1.0, 1.0)) for _ in state]
-    if isinstance(form, OwnContact):
-        # So far on either side that it stays there.
-        numbers[0] = d0 - 5.0 if touching else d0 + 5.0
-        form = form.touching if touching else form.parted
-    if numbers:
-        state = type(state)(*numbers)
-    force, after = term.law(params, state, d0, d0 + way, h, way / h)
-    n = len(form.rates)
-    assert n == len(numbers)
-    # (s, d) along a straight path, d' beside them.
-    rates = np.zeros((n + 2, n + 2))
-    rates[n, n + 1] = 1.0
-    if n:
-        rates[:n, :n], rates[:n, n], rates[:n, n + 1] = form.rates, form.by_compression, form.by_speed
-    end = expm(rates * h) @ [*numbers, d0, way / h]
-    expected = form.spring_n_m * end[n] + form.damper_n_s_m * end[n + 1] + np.dot(form.force, end[:n])
-    assert force == pytest.approx(expected, rel=1e-7, abs=1e-7 * (1.0 + abs(form.spring_n_m * d0)))
-    if n:
-        np.testing.assert_allclose(after, end[:n], rtol=1e-7, atol=1e-7)
-
-
-def test_what_is_not_linear_is_the_plants():
-    for change in (
-        {"breakaway_n": 8.0},
-        {"transmission": "pr2"},
-        {"fidelity": "reference"},
-        {"scheme": "explicit"},
-        {"step_s": 1e-4},
-    ):
-        config = evolve(RUBS, **change)
-        assert linear_of(config, setting_of(config, thing(ELASTIC), 0)) is None, change
-    for spec in (
-        thing(("elastic", {"k1_n_m": 1e4, "k3_n_m3": 1.0})),
-        thing(ELASTIC, ("rigid", {"hertz_n_m15": 1e7})),
-        thing(ELASTIC, ("foam", {"force_n": 20.0, "at_m": 0.01, "exponent": 1.5})),
-        thing(ELASTIC, held=True, offset_m=1e-4),
-    ):
-        assert linear_of(RUBS, setting_of(RUBS, spec, 0)) is None, spec
-
-
-# ------------------------------------------------------------------------------------- against steps
-
-QUICK = ("covers", "rigid", "surface", "table")
+QUICK = ("pads", "rigid", "surface", "table")
 SCENES = {
-    "covers": ({}, thing(ELASTIC, MAXWELL, SLOSH)),
-    "rigid": (RIGID, thing(ELASTIC, LOSS)),
-    "surface": ({}, thing(SURFACE, ELASTIC)),
-    "elastic": (RIGID, thing(ELASTIC)),
-    "arm alone": ({}, thing(MAXWELL)),
-    "liquid": ({}, thing(ELASTIC, LOSS, LIQUID)),
-    "foam": ({}, thing(FOAM)),
-    "bare surface": (RIGID, thing(SURFACE)),
-    "damped covers": ({"skin_damping_n_s_m": 50.0}, thing(ELASTIC, MAXWELL)),
-    "creeping covers": ({"skin_creep_n_m": 2e4, "skin_creep_s": 0.1}, thing(ELASTIC, MAXWELL)),
-    "both": ({"skin_creep_n_m": 2e4, "skin_damping_n_s_m": 50.0}, thing(ELASTIC, SLOSH)),
-    "lag": ({"drive_lag_s": 0.02}, thing(ELASTIC, MAXWELL)),
-    "constant friction": ({"load_share": 0.0}, thing(ELASTIC)),
-    "friction of the load": ({"coulomb_n": 0.0, "breakaway_n": 0.0}, thing(ELASTIC, MAXWELL)),
-    "no friction": (FREE, thing(ELASTIC, MAXWELL)),
-    "held": ({}, thing(ELASTIC, MAXWELL, held=True)),
-    "table": ({}, thing(ELASTIC, MAXWELL, friction=0.3, mass_kg=0.5)),
-    "off centre": ({}, thing(ELASTIC, MAXWELL, offset_m=2e-4, friction=0.3, mass_kg=0.5)),
-    "nothing": ({}, thing()),
+    "pads": ({}, object_of(ELASTIC, MAXWELL, SLOSH)),
+    "rigid": (RIGID, object_of(ELASTIC, LOSS)),
+    "surface": ({}, object_of(SURFACE, ELASTIC)),
+    "elastic": (RIGID, object_of(ELASTIC)),
+    "branch alone": ({}, object_of(MAXWELL)),
+    "liquid": ({}, object_of(ELASTIC, LOSS, LIQUID)),
+    "foam": ({}, object_of(FOAM)),
+    "bare surface": (RIGID, object_of(SURFACE)),
+    "damped pads": ({"skin_damping_n_s_m": 50.0}, object_of(ELASTIC, MAXWELL)),
+    "creeping pads": ({"skin_creep_n_m": 2e4, "skin_creep_s": 0.1}, object_of(ELASTIC, MAXWELL)),
+    "both": ({"skin_creep_n_m": 2e4, "skin_damping_n_s_m": 50.0}, object_of(ELASTIC, SLOSH)),
+    "lag": ({"drive_lag_s": 0.02}, object_of(ELASTIC, MAXWELL)),
+    "constant friction": ({"load_share": 0.0}, object_of(ELASTIC)),
+    "friction of the load": ({"coulomb_n": 0.0, "breakaway_n": 0.0}, object_of(ELASTIC, MAXWELL)),
+    "no friction": (FREE, object_of(ELASTIC, MAXWELL)),
+    "held": ({}, object_of(ELASTIC, MAXWELL, held=True)),
+    "table": ({}, object_of(ELASTIC, MAXWELL, friction=0.3, mass_kg=0.5)),
+    "off centre": ({}, object_of(ELASTIC, MAXWELL, offset_m=2e-4, friction=0.3, mass_kg=0.5)),
+    "nothing": ({}, object_of()),
 }
 
 
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in SCENES]
 )
-def test_maps_agree_with_the_steps_at_a_tight_tolerance(name):
+def test_it_agrees_with_time_steps_of_a_tight_tolerance(name):
     change, spec = SCENES[name]
-    config = evolve(RUBS, **change)
+    config = evolve(FRICTION, **change)
     efforts = list(squeeze_and_let_go(1200))
     closure, force, _, state = along(config, spec, efforts, speed_m_s=0.02)
     fine = evolve(config, accuracy=1e-4)
-    closure1, force1, _, state1 = along(fine, spec, efforts, maps=False, speed_m_s=0.02)
+    closure1, force1, _, state1 = along(fine, spec, efforts, exact=False, speed_m_s=0.02)
     if name != "nothing":
         assert force.max() > 5.0
         assert (force == 0.0).any()
@@ -202,56 +128,57 @@ def test_maps_agree_with_the_steps_at_a_tight_tolerance(name):
     assert state.step.unresolved == 0
 
 
-def test_what_was_let_go_comes_back_while_the_fingers_stand_wide_open():
-    config = evolve(RUBS, skin_creep_n_m=2e4, skin_creep_s=2.0)
-    spec = thing(("maxwell", {"k_n_m": 3e3, "tau_s": 0.8}), ("elastic", {"k1_n_m": 5e3}))
+def test_a_released_object_recovers_while_the_fingers_stand_fully_open():
+    config = evolve(FRICTION, skin_creep_n_m=2e4, skin_creep_s=2.0)
+    spec = object_of(("maxwell", {"k_n_m": 3e3, "tau_s": 0.8}), ("elastic", {"k1_n_m": 5e3}))
     efforts = [25.0] * 400 + [-30.0] * 1200
-    found = [along(config, spec, efforts, maps=maps, speed_m_s=0.02)[-1] for maps in (True, False)]
-    state, by_steps = found
+    states = [along(config, spec, efforts, exact=exact, speed_m_s=0.02)[-1] for exact in (True, False)]
+    state, by_steps = states
     open_rev = ready(config, spec)[2].plant.drive.open_rev
     assert (state.motion.revolutions, state.motion.speed_rev_s, state.contact.touched) == (open_rev, 0.0, 1)
     assert by_steps.motion.revolutions == open_rev
     # It still is on its way, after a second.
     assert abs(state.contact.left.compression_m) > 1e-6
-    for one in ("compression_m", "pad_m"):
-        assert getattr(state.contact.left, one) == pytest.approx(
-            getattr(by_steps.contact.left, one), rel=5e-3
+    for name in ("compression_m", "pad_m"):
+        assert getattr(state.contact.left, name) == pytest.approx(
+            getattr(by_steps.contact.left, name), rel=5e-3
         )
     # And where it is closed again it meets the object where that then is.
     again = [
-        along(config, spec, [*efforts, *[30.0] * 900], maps=maps, speed_m_s=0.02)[1] for maps in (True, False)
+        along(config, spec, [*efforts, *[30.0] * 900], exact=exact, speed_m_s=0.02)[1]
+        for exact in (True, False)
     ]
     assert again[0][-1] > 10.0
     np.testing.assert_allclose(*again, atol=5e-3 * again[1].max())
 
 
-def test_what_closes_from_wide_open_is_braked_by_an_effort_that_opens():
+def test_an_opening_effort_brakes_fingers_that_close_from_fully_open():
     efforts = [-5.0] * 20
-    closure, _, speed, _ = along(RUBS, thing(ELASTIC), efforts, speed_m_s=0.02)
+    closure, _, speed, _ = along(FRICTION, object_of(ELASTIC), efforts, speed_m_s=0.02)
     assert speed[-1] == pytest.approx(0.02 - (7.0 + 5.0 + 10.0 * 0.0188) / 100.0 * 0.02, rel=1e-4)
     closure1, _, _, _ = along(
-        evolve(RUBS, accuracy=1e-4), thing(ELASTIC), efforts, maps=False, speed_m_s=0.02
+        evolve(FRICTION, accuracy=1e-4), object_of(ELASTIC), efforts, exact=False, speed_m_s=0.02
     )
     np.testing.assert_allclose(closure, closure1, atol=1e-9)
 
 
-@pytest.mark.parametrize("covers", [True, False])
-def test_maps_agree_with_an_integrator_while_it_slides_and_while_it_is_stuck(covers):
-    """A shell with an arm and a swinging column: written down once more, as a differential equation."""
-    spec = thing(ELASTIC, MAXWELL, LIQUID)
-    config = evolve(RUBS, open_gap_m=0.0501, **({} if covers else RIGID))
+@pytest.mark.parametrize("pads", [True, False])
+def test_it_agrees_with_an_ode_solver_while_sliding_and_stuck(pads):
+    """A shell, a Maxwell branch and a liquid column, as a differential equation of their own."""
+    spec = object_of(ELASTIC, MAXWELL, LIQUID)
+    config = evolve(FRICTION, open_gap_m=0.0501, **({} if pads else RIGID))
     _, force, speed, _ = along(config, spec, [25.0] * 600, speed_m_s=0.02)
     stuck = int(np.argmax(speed == 0.0))
     assert 50 < stuck < 500
     assert np.all(speed[stuck:] == 0.0)
-    skins = 0.5 * config.skin_n_m if covers else 0.0
+    skins = 0.5 * config.skin_n_m if pads else 0.0
     k, (k_m, tau) = 1e4, (3e3, 0.05)
     mass, weight, damping = 1e3 * 0.03 * 1e-6 / 3e-4, 1e3 * 9.80665 * 1e-6 / 3e-4, None
     damping = 8.0 * math.pi * 1e-3 * 0.03 * (1e-6 / 3e-4) / 3e-4
     wall = 1e-6 / 1e-9
 
     def compression(c, q, y):
-        return (skins * c - q + wall * y) / (skins + k + wall) if covers else c
+        return (skins * c - q + wall * y) / (skins + k + wall) if pads else c
 
     def own(d, q, y):
         return k * d + q + wall * (d - y)
@@ -261,7 +188,7 @@ def test_maps_agree_with_an_integrator_while_it_slides_and_while_it_is_stuck(cov
         d = compression(c, q, y)
         n = own(d, q, y)
         # Of the balance, differentiated; q' = k_m d' - q / tau.
-        rate = (skins * v + q / tau + wall * w) / (skins + k + wall + k_m) if covers else v
+        rate = (skins * v + q / tau + wall * w) / (skins + k + wall + k_m) if pads else v
         speeding = (25.0 - 7.0 - 1.5 * n - 10.0 * v) / 100.0 if v > 0.0 else 0.0
         return [v, speeding, k_m * rate - q / tau, w, (wall * (d - y) - weight * y - damping * w) / mass]
 
@@ -308,9 +235,11 @@ def test_maps_agree_with_an_integrator_while_it_slides_and_while_it_is_stuck(cov
 
 @pytest.mark.parametrize("stiffness", [1e3, 1e5, 1e9])
 def test_a_damped_oscillator_after_the_contact(stiffness):
-    config = evolve(RUBS, **FREE, **RIGID, damping_n_s_m=200.0, open_gap_m=0.05001)
+    config = evolve(FRICTION, **FREE, **RIGID, damping_n_s_m=200.0, open_gap_m=0.05001)
     times = 1e-3 * np.arange(1, 61)
-    _, force, _, state = along(config, thing(("elastic", {"k1_n_m": stiffness})), [0.0] * 60, speed_m_s=0.01)
+    _, force, _, state = along(
+        config, object_of(("elastic", {"k1_n_m": stiffness})), [0.0] * 60, speed_m_s=0.01
+    )
     a = 1.0
     # The way to the contact, 10 um, under the drive's damper; then half a swing.
     came = 1e-5
@@ -326,9 +255,9 @@ def test_a_damped_oscillator_after_the_contact(stiffness):
         assert state.peak_n == pytest.approx(peak, rel=1e-3)
 
 
-def test_it_slides_as_far_as_its_speed_and_friction_say_and_stands():
-    config = evolve(RUBS, load_share=0.0, damping_n_s_m=0.0, open_gap_m=0.08)
-    closure, _, speed, _ = along(config, thing(ELASTIC), [0.0] * 600, speed_m_s=0.03)
+def test_it_slides_the_distance_of_its_kinetic_energy_over_friction_and_stops():
+    config = evolve(FRICTION, load_share=0.0, damping_n_s_m=0.0, open_gap_m=0.08)
+    closure, _, speed, _ = along(config, object_of(ELASTIC), [0.0] * 600, speed_m_s=0.03)
     # v^2 m / (2 c), and exactly no further.
     assert closure[-1] - (0.05 - 0.08) == pytest.approx(0.03**2 * 100.0 / (2.0 * 7.0), rel=1e-9)
     stands = int(np.argmax(speed == 0.0))
@@ -336,9 +265,9 @@ def test_it_slides_as_far_as_its_speed_and_friction_say_and_stands():
     assert np.all(closure[stands:] == closure[-1])
 
 
-def test_below_breakaway_it_never_moves():
-    spec = thing(ELASTIC, MAXWELL)
-    move, params, setting = ready(RUBS, spec)
+def test_below_breakaway_the_fingers_do_not_creep():
+    spec = object_of(ELASTIC, MAXWELL)
+    move, params, setting = ready(FRICTION, spec)
     motion = setting.body.motion
     motion = motion._replace(speed_rev_s=-0.02 / motion.jacobian_m_rev)
     state = setting.body._replace(motion=motion)
@@ -347,26 +276,26 @@ def test_below_breakaway_it_never_moves():
     assert state.motion.speed_rev_s == 0.0
     before = state
     setting = evolve(setting, dt_s=1e3)
-    params, shape = linear_of(RUBS, setting)
-    move = move_of(setting.kinds, shape, plant_of(laws_of(setting.kinds)))
+    params, shape = discretise(FRICTION, setting)
+    move = bind_move(setting.kinds, shape, plant_of(laws_of(setting.kinds)))
     for _ in range(1000):
         state = move(params, state, 25.0, 1e3)
-    # The arm gives way, and the fingers hold.
+    # The branch relaxes, and friction holds the fingers.
     assert (state.motion.gap_m, state.motion.revolutions) == (before.motion.gap_m, before.motion.revolutions)
     assert state.motion.speed_rev_s == 0.0
-    covers = 0.5 * RUBS.skin_n_m
+    pads = 0.5 * FRICTION.skin_n_m
     assert state.contact.left_n == pytest.approx(
-        (0.05 - state.motion.gap_m) / (1.0 / covers + 1.0 / 1e4), rel=1e-9
+        (0.05 - state.motion.gap_m) / (1.0 / pads + 1.0 / 1e4), rel=1e-9
     )
 
 
-def test_what_relaxes_is_followed_up_to_the_edge_of_friction():
-    """An arm gives way under fingers whose drive comes up slowly: they stick and slip until nothing moves any more."""
-    spec = thing(ELASTIC, ("maxwell", {"k_n_m": 1e4, "tau_s": 0.2}))
-    config = evolve(RUBS, load_share=0.0, moving_mass_kg=1.0, drive_lag_s=0.1)
+def test_stick_and_slip_follow_a_relaxing_branch_to_the_limit_of_friction():
+    """A branch relaxes while the effort of the drive rises slowly: the fingers stick and slip until nothing moves."""
+    spec = object_of(ELASTIC, ("maxwell", {"k_n_m": 1e4, "tau_s": 0.2}))
+    config = evolve(FRICTION, load_share=0.0, moving_mass_kg=1.0, drive_lag_s=0.1)
     closure, force, speed, state = along(config, spec, [60.0] * 8000, speed_m_s=0.02)
     assert force[-1] == pytest.approx(60.0 - 7.0, rel=1e-6)
-    assert closure[-1] == pytest.approx(53.0 / (0.5 * RUBS.skin_n_m) + 53.0 / 1e4, rel=1e-6)
+    assert closure[-1] == pytest.approx(53.0 / (0.5 * FRICTION.skin_n_m) + 53.0 / 1e4, rel=1e-6)
     assert (speed == 0.0).any()
     assert state.step.unresolved == 0
 
@@ -383,9 +312,9 @@ def test_what_relaxes_is_followed_up_to_the_edge_of_friction():
         ({"skin_n_m": 2e4}, (("elastic", {"k1_n_m": 1e8}), ("loss", {"damping_n_s_m": 1e6}))),
     ],
 )
-def test_with_the_drive_off_stored_energy_never_rises(change, terms):
-    config = evolve(RUBS, **{**FREE, **change})
-    move, params, setting = ready(config, thing(*terms))
+def test_without_a_drive_stored_energy_does_not_increase(change, terms):
+    config = evolve(FRICTION, **{**FREE, **change})
+    move, params, setting = ready(config, object_of(*terms))
     motion = setting.body.motion
     motion = motion._replace(speed_rev_s=-0.05 / motion.jacobian_m_rev)
     state = setting.body._replace(motion=motion)
@@ -411,41 +340,43 @@ def test_with_the_drive_off_stored_energy_never_rises(change, terms):
 
 
 class Counting(list):
-    """Maps that count how many numbers of them were looked at."""
+    """Maps that count how many of their numbers were read."""
 
-    looked = 0
+    reads = 0
 
     def __getitem__(self, at):
-        Counting.looked += 1
+        Counting.reads += 1
         return super().__getitem__(at)
 
 
-def test_a_stiff_contact_costs_no_more_than_a_soft_one():
+def test_the_cost_does_not_grow_with_stiffness():
     costs = {}
     for stiffness in (1e4, 1e6, 1e9):
         move, params, setting = ready(
-            evolve(RUBS, **RIGID), thing(("elastic", {"k1_n_m": stiffness}), LOSS, MAXWELL)
+            evolve(FRICTION, **RIGID), object_of(("elastic", {"k1_n_m": stiffness}), LOSS, MAXWELL)
         )
-        params = params._replace(maps=Counting(params.maps))
+        params = params._replace(tables=params.tables._replace(maps=Counting(params.tables.maps)))
         motion = setting.body.motion
         motion = motion._replace(speed_rev_s=-0.02 / motion.jacobian_m_rev)
         state = setting.body._replace(motion=motion)
-        Counting.looked = 0
+        Counting.reads = 0
         for effort in squeeze_and_let_go(3000):
             state = move(params, state, effort, 1e-3)
-        costs[stiffness] = Counting.looked
+        costs[stiffness] = Counting.reads
         assert math.isfinite(state.contact.left_n)
-    # Steps would be a thousand times shorter; what there is of it are more rebounds, each of which is located.
+    # Time steps would be a thousand times shorter. A stiffer contact only has more rebounds to locate.
     assert costs[1e6] <= 1.5 * costs[1e4], costs
     assert costs[1e9] <= 2.5 * costs[1e4], costs
 
 
 def surface_of(contact_n_m, mass_kg=0.02):
-    return thing(("surface", {**SURFACE[1], "contact_n_m": contact_n_m, "mass_kg": mass_kg}), friction=0.0)
+    return object_of(
+        ("surface", {**SURFACE[1], "contact_n_m": contact_n_m, "mass_kg": mass_kg}), friction=0.0
+    )
 
 
 @pytest.mark.parametrize("contact_n_m", [1e3, 1e4, 1e6, 1e9])
-def test_however_stiff_it_comes_to_rest_at_the_same_force(contact_n_m):
+def test_the_force_at_rest_does_not_depend_on_stiffness(contact_n_m):
     closure, force, _, state = along(PEERS, surface_of(contact_n_m), [2.0] * 3000)
     assert np.all(np.isfinite(force))
     assert force[-1] == pytest.approx(2.0, rel=1e-3)
@@ -454,7 +385,7 @@ def test_however_stiff_it_comes_to_rest_at_the_same_force(contact_n_m):
     assert closure[-1] == pytest.approx(2.0 / 2e3 + 2.0 / contact_n_m, rel=1e-3)
 
 
-def test_a_surface_as_light_as_dust_is_not_tunnelled_through():
+def test_a_very_light_surface_is_not_penetrated():
     closure, force, _, _ = along(PEERS, surface_of(2e4, 1e-6), [2.0] * 2000)
     assert closure.max() < 4e-3
     assert np.all(np.isfinite(force))
@@ -463,7 +394,7 @@ def test_a_surface_as_light_as_dust_is_not_tunnelled_through():
 # ------------------------------------------------------------------------------------- as a whole grasp
 
 
-def test_the_report_says_that_maps_take_the_ticks(tmp_path):
+def test_the_report_names_the_exact_discretisation(tmp_path):
     """And that steps do if friction is greater at rest."""
     law = create("controller", "hybrid", probing_force_n=5.0)
     rests = {"coulomb_n": 1.0, "breakaway_n": 2.0}
@@ -479,8 +410,8 @@ def test_the_report_says_that_maps_take_the_ticks(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("config", [PEERS, evolve(RUBS, spread=True, drive_lag_s=0.01, open_gap_m=0.07)])
-def test_the_runner_and_many_grasps_give_one_trace(config):
+@pytest.mark.parametrize("config", [PEERS, evolve(FRICTION, spread=True, drive_lag_s=0.01, open_gap_m=0.07)])
+def test_single_and_compiled_grasps_have_the_same_trace(config):
     law = create("controller", "hybrid", probing_force_n=5.0)
     config = evolve(config, object="peers_surface")
     alone = run_grasp(SimBackend(config), law, RunConfig(seed=1))

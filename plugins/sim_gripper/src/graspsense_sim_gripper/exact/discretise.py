@@ -1,0 +1,111 @@
+"""Whether a grasp is discretised exactly, and the plant that is."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.exact.modes import LinearScene, Shape
+from graspsense_sim_gripper.exact.propagate import ExactPlant, workspace_size
+from graspsense_sim_gripper.exact.tables import Tables, listed_tables_of, tables_of
+from graspsense_sim_gripper.exact.term_states import n_numbers
+from graspsense_sim_gripper.terms.registry import find_term
+from graspsense_sim_gripper.terms.remainder import linear as lumped_form
+from graspsense_sim_gripper.terms.term import LinearForm, OwnContact
+
+if TYPE_CHECKING:
+    from graspsense_sim_gripper.setting import Setting
+
+
+def applicable(config: SimConfig, setting: Setting) -> str:
+    """Return why a grasp is not discretised exactly; empty if it is.
+
+    This is the only place that decides between time steps and the matrix exponential. Raises TypeError for a term whose
+    linear form has other states than its law.
+    """
+    drive, model, steps = setting.plant.drive, setting.plant.thing, setting.plant.steps
+    if config.scheme != "auto" or steps.longest_s < math.inf or steps.settle > 0.0:
+        return "the scheme or the length of its steps is prescribed"
+    if drive.link.finger_m != 0.0:
+        return "the ratio of the linkage varies with the gap"
+    if drive.breakaway_n != drive.coulomb_n:
+        return "friction is greater at rest than while sliding"
+    if model.held == 1 and setting.body.contact.offset_m != 0.0:
+        return "the object is held off the centre line, so that each half would have modes of its own"
+    nonlinear = [kind for kind, form in _forms(setting) if form is None]
+    if nonlinear:
+        return f"terms are not linear: {', '.join(nonlinear)}"
+    if _tables(setting, on_arrays=True) is None:
+        return "the forces leave the motion of a mode undetermined"
+    return ""
+
+
+def discretise(
+    config: SimConfig, setting: Setting, *, on_arrays: bool = False
+) -> tuple[ExactPlant, Shape] | None:
+    """Return the plant of a grasp with the matrices of its modes, and their shape; None if it is not `applicable`.
+
+    `on_arrays`: as compiled code takes them; the interpreter is faster with lists. Raises TypeError as `applicable`.
+    """
+    if applicable(config, setting):
+        return None
+    found = _tables(setting, on_arrays=on_arrays)
+    assert found is not None
+    shape, tables = found
+    size = workspace_size(shape)
+    workspace: Any = np.zeros(size) if on_arrays else [0.0] * size
+    return ExactPlant(setting.plant, tables, workspace), shape
+
+
+def _tables(setting: Setting, *, on_arrays: bool) -> tuple[Shape, Tables] | None:
+    drive, model = setting.plant.drive, setting.plant.thing
+    scene = LinearScene(
+        drive.inertia / setting.body.motion.jacobian_m_rev**2,
+        drive.damping_n_s_m,
+        drive.breakaway_n > 0.0,
+        drive.load_share,
+        drive.lag_s,
+        model.skins_n_m,
+        model.skin,
+        tuple(form for _, form in _forms(setting) if form is not None),
+    )
+    return tables_of(scene, setting.dt_s) if on_arrays else listed_tables_of(scene, setting.dt_s)
+
+
+def _forms(setting: Setting) -> list[tuple[str, LinearForm | OwnContact | None]]:
+    """Return the kinds of the terms that the model keeps, with their linear forms."""
+    lumped, *terms = setting.plant.thing.terms
+    forms: list[tuple[str, LinearForm | OwnContact | None]] = []
+    if lumped.kept == 1:
+        forms.append(("", lumped_form(lumped.params)))
+    forms += [
+        (kind, _form(kind, term.params))
+        for kind, term in zip(setting.kinds, terms, strict=True)
+        if term.kept == 1
+    ]
+    return forms
+
+
+@lru_cache(maxsize=256)
+def _form(kind: str, params: Any) -> LinearForm | OwnContact | None:
+    """Return a term's linear form. Raises TypeError where it has other states than the law."""
+    term = find_term(kind)[1]
+    form = term.linear(params)
+    if form is None:
+        return None
+    n_states = n_numbers(term.at_rest)
+    for part in (form.touching, form.parted) if isinstance(form, OwnContact) else (form,):
+        if len(part.rates) not in (0, n_states):
+            raise TypeError(
+                f"term {kind!r}: its linear form has {len(part.rates)} states and the state of its law is "
+                f"{term.at_rest!r}; give the form as many states as that has fields, all of them floats"
+            )
+    if isinstance(form, LinearForm) and not form.rates and n_states:
+        # States that the form does not change are states with a rate of zero.
+        zeros = (0.0,) * n_states
+        return form._replace(rates=(zeros,) * n_states, by_compression=zeros, by_speed=zeros, force=zeros)
+    return form

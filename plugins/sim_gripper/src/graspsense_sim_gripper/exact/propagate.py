@@ -1,0 +1,528 @@
+"""One tick of the plant by precomputed matrix exponentials, with the events that end a mode located in it.
+
+The workspace of a tick is one flat table with these vectors at fixed places:
+
+    X0     x at the beginning of a piece of the tick, and the inputs
+    X1     x at its end, followed by the outputs there
+    Y0     the outputs at its beginning
+    BOUND  bounds on the change of the outputs within the tick
+    DX     the change of x in modal coordinates
+
+Compiled code then knows that they do not overlap, and keeps most of the numbers in registers. The names in capitals and
+the products of matrices are globals that `bind_move` fills in, so that all loops have a constant length.
+
+Events are located by bisection between precomputed maps, unlike those of the time-stepping schemes (`stepping`), which
+locate events by Newton or secant iterations on the solution of a step. Here no iteration is needed: a map for any
+duration tick / 2^k is there, and each costs one product of a matrix with a vector.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from types import FunctionType
+from typing import Any, Final, NamedTuple
+
+from graspsense.plugin_api import bind
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
+from graspsense_sim_gripper.exact.expm import MAX_BISECTIONS
+from graspsense_sim_gripper.exact.modes import (
+    CLOSING,
+    FIRST_GUARD,
+    FORCE,
+    FORCE_RATE,
+    GAP_TOL_M,
+    OPENING,
+    STUCK,
+    Shape,
+)
+from graspsense_sim_gripper.exact.tables import GROUP, Table, Tables, padded
+from graspsense_sim_gripper.exact.term_states import term_state_functions
+from graspsense_sim_gripper.plant import IN_SHAPE_M, PlantParams
+
+INDEX_MASK: Final = 0x3FFFFFFF
+"""An index after `&` with this is known not to be negative, which compiled code otherwise checks at each access."""
+TICK_UNITS: Final = 1 << MAX_BISECTIONS
+"""The length of a tick, in the shortest pieces."""
+MAX_EVENTS: Final = 64
+"""After this many events in a tick the last mode is kept to its end, and the step counts as unresolved."""
+PEAK_TOL: Final = 2e-3
+"""An oscillation inside a tick that exceeds the peak force by less than this part of it may be missed."""
+VECTORS: Final = ("X0", "X1", "Y0", "BOUND", "DX")
+
+
+class ExactPlant(NamedTuple):
+    """A plant with the matrices of its modes."""
+
+    plant: PlantParams
+    tables: Tables
+    workspace: Table
+
+
+class Mode(NamedTuple):
+    """The mode in which a piece of the tick begins."""
+
+    compressed: int
+    """1: the pads compress the object; 0: it is separated from them. 1 as well if it is not separable."""
+    motion: int
+    """STUCK, CLOSING or OPENING."""
+    contacts: int
+    """A bit for each contact of the terms' own that is closed."""
+    at_rest: bool
+    """Whether the speed is 0, so that it has to be checked whether friction holds the fingers."""
+
+
+class TickResult(NamedTuple):
+    """How a tick ended, beside the state vector X1."""
+
+    compressed: int
+    touched: int
+    peak_n: float
+    n_events: int
+
+
+# ------------------------------------------------------------------------------------------------------- binding
+
+
+def bind_move(
+    kinds: Sequence[str], shape: Shape, step_move: Callable[..., PlantState], **constructors: Any
+) -> Callable[[Any, PlantState, float, float], PlantState]:
+    """Return `move` for an object of these terms and modes of this shape.
+
+    `step_move` advances the plant by time steps in the ticks that are not linear. `constructors` are of the plant's
+    named tuples, where the interpreter has faster ones than the classes (`graspsense.plugin_api.maker`).
+    """
+    constants = _constants(shape)
+    n, n_outputs = shape.n_states, padded(FIRST_GUARD + shape.n_guards)
+    x0, x1, y0, bound, dx = (constants[name] for name in VECTORS)
+    change = {"COLUMNS": n, "FROM": x1, "OF_CHANGE": 1, "X0": x0}
+    products = {
+        "map_step": bind(_product, ROWS=constants["MAP_ROWS"], COLUMNS=shape.n_columns, FROM=x0, TO=x1),
+        "map_outputs": bind(_product, ROWS=n_outputs, COLUMNS=shape.n_columns, FROM=x0, TO=y0),
+        "bound_directly": bind(_product, ROWS=n_outputs, TO=bound, OF_MAGNITUDE=1, **change),
+        "project_change": bind(_product, ROWS=padded(2 * n), TO=dx, **change),
+        "bound_by_modes": bind(_product, ROWS=n_outputs, COLUMNS=2 * n, FROM=dx, TO=bound, OF_MAGNITUDE=1),
+    }
+    pack, unpack = term_state_functions(kinds)
+    parts = {**constants, **products, **constructors, "pack": pack, "unpack": unpack, "step_move": step_move}
+    bound_move: Callable[[Any, PlantState, float, float], PlantState] = _bind_called(move, parts, {})
+    return bound_move
+
+
+def cold_calls(function: Callable[..., Any]) -> tuple[str, ...]:
+    """Return what a part of `move` seldom calls: not inlined, it leaves compiled code the registers for the rest."""
+    code = function.__code__
+    if code is move.__code__:
+        return ("step_move",)
+    return ("locate_events",) if code is propagate.__code__ else ()
+
+
+def workspace_size(shape: Shape) -> int:
+    """Return how many numbers the workspace of a tick has."""
+    return len(VECTORS) * _vector_size(shape)
+
+
+def _vector_size(shape: Shape) -> int:
+    return padded(max(shape.n_columns, shape.n_states + FIRST_GUARD + shape.n_guards, 2 * shape.n_states))
+
+
+def _constants(shape: Shape) -> dict[str, int]:
+    """Return the values of the globals in capitals."""
+    return {
+        **{name.upper(): number for name, number in shape._asdict().items()},
+        **{name: k * _vector_size(shape) for k, name in enumerate(VECTORS)},
+        "OUTPUT_ROWS": padded(FIRST_GUARD + shape.n_guards),
+        "MAP_ROWS": padded(shape.n_states + FIRST_GUARD + shape.n_guards),
+        "PROJECTION_ROWS": padded(2 * shape.n_states),
+        "TERM_STATES": 2 + shape.separable + 2 * shape.pad_states,
+    }
+
+
+def _bind_called(function: Any, parts: dict[str, Any], done: dict[str, Any]) -> Any:
+    """Return a copy of `function` in which it, and the functions of this module that it calls, see these parts."""
+    if function.__name__ not in done:
+        names = {name: function.__globals__.get(name) for name in function.__code__.co_names}
+        called = {
+            name: _bind_called(value, parts, done)
+            for name, value in names.items()
+            if name not in parts and isinstance(value, FunctionType) and value.__module__ == __name__
+        }
+        done[function.__name__] = bind(
+            function, **called, **{name: parts[name] for name in names.keys() & parts}
+        )
+    return done[function.__name__]
+
+
+# --------------------------------------------------------------------------------------------------------- a tick
+
+
+def _no_steps(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
+    raise TypeError("no time-stepping plant is bound: use bind_move")
+
+
+def _no_terms(*given: Any) -> Any:
+    raise TypeError("no terms are bound: use bind_move")
+
+
+step_move: Any = _no_steps
+pack: Any = _no_terms
+unpack: Any = _no_terms
+N_STATES = N_COLUMNS = SEPARABLE = PAD_STATES = LAGS = N_MOTIONS = N_CONTACTS = N_GUARDS = 0
+"""The fields of `Shape`."""
+OUTPUT_ROWS = MAP_ROWS = PROJECTION_ROWS = 0
+"""Rows of the tables, with the padding."""
+TERM_STATES = 0
+"""The place of the first state of a term in x."""
+X0 = X1 = Y0 = BOUND = DX = 0
+ROWS = COLUMNS = FROM = TO = 0
+"""Of a product: the shape of the matrix, and the places of its operand and result."""
+OF_CHANGE = OF_MAGNITUDE = 0
+"""1: the operand is taken less X0; the magnitudes of the operand are taken."""
+
+
+def _product(table: Table, at: int, ws: Table) -> None:
+    """Write the matrix that begins at place `at` of the table, times the operand at FROM, to TO."""
+    at &= INDEX_MASK
+    for group in range(ROWS // GROUP):
+        i = group * GROUP
+        sum0 = sum1 = sum2 = sum3 = 0.0
+        for j in range(COLUMNS):
+            k, value = at + j * ROWS + i, ws[FROM + j]
+            if OF_CHANGE == 1:
+                value -= ws[X0 + j]
+            if OF_MAGNITUDE == 1:
+                value = abs(value)
+            sum0 += table[k] * value
+            sum1 += table[k + 1] * value
+            sum2 += table[k + 2] * value
+            sum3 += table[k + 3] * value
+        i += TO
+        ws[i], ws[i + 1], ws[i + 2], ws[i + 3] = sum0, sum1, sum2, sum3
+
+
+map_step = map_outputs = bound_directly = project_change = bound_by_modes = _product
+
+
+def _row_product(rows: Table, at: int, ws: Table) -> float:
+    """Return the row that begins at place `at`, times X0."""
+    at &= INDEX_MASK
+    total = 0.0
+    for j in range(N_COLUMNS):
+        total += rows[at + j] * ws[X0 + j]
+    return total
+
+
+def _mode_index(mode: Mode) -> int:
+    """Return the place of a mode among the modes. Without friction the motion is STUCK, which is 0."""
+    return ((mode.compressed * SEPARABLE * N_MOTIONS + mode.motion) << N_CONTACTS) + mode.contacts
+
+
+def move(params: ExactPlant, state: PlantState, effort_n: float, dt: float) -> PlantState:
+    """Return the plant after a tick of `dt` (s), the one that the matrices are for, under this commanded effort."""
+    linear, after = propagate(params, state, effort_n, dt)
+    if not linear:
+        return step_move(params.plant, state, effort_n, dt)  # type: ignore[no-any-return]
+    return after
+
+
+def propagate(params: ExactPlant, state: PlantState, effort_n: float, dt: float) -> tuple[bool, PlantState]:
+    """Return whether the tick is linear between events, and the plant after it.
+
+    It is not where the object is off the centre line, and where the fingers reach an end of their travel. Fingers that
+    are pushed against the open end stand still under an effort of 0, while the object recovers its shape.
+    """
+    contact, drive = state.contact, params.plant.drive
+    at_open_end = state.motion.revolutions >= drive.open_rev and effort_n <= 0.0
+    if (
+        (at_open_end and (LAGS == 1 or state.motion.speed_rev_s != 0.0 or contact.left.force_n > 0.0))
+        or contact.offset_m != 0.0
+        or contact.left_n != contact.right_n
+        or contact.pending_s > 0.0
+    ):
+        return False, state
+    mode = _load(params, state, 0.0 if at_open_end else effort_n)
+    if no_event(params, mode, state.peak_n, dt):
+        peak_n = max(state.peak_n, params.workspace[X1 + N_STATES + FORCE])
+        result = TickResult(mode.compressed, contact.touched, peak_n, 0)
+    else:
+        result = locate_events(params, mode, contact.touched, state.peak_n, dt)
+    return _store(params, state, result, at_open_end)
+
+
+def _load(params: ExactPlant, state: PlantState, effort_n: float) -> Mode:
+    """Write X0, and return the mode. Which of the terms' own contacts are closed is a guess that the guards correct."""
+    drive, model, ws = params.plant.drive, params.plant.thing, params.workspace
+    left = state.contact.left
+    closure = model.width_m - state.motion.gap_m
+    ws[X0] = closure
+    ws[X0 + 1] = -state.motion.speed_rev_s * state.motion.jacobian_m_rev
+    compressed = 1
+    if SEPARABLE == 1:
+        compression, pad = left.compression_m, 0.0
+        if PAD_STATES == 1:
+            pad = left.pad_m
+            ws[X0 + 3], ws[X0 + 4] = pad, left.branch_n
+        if left.force_n <= 0.0 and closure - compression - pad < -GAP_TOL_M:
+            compressed = 0
+        elif model.skins_n_m == math.inf:
+            compression = closure
+        ws[X0 + 2] = compression
+    pack(model.terms, left.states, ws, X0 + TERM_STATES)
+    ws[X0 + N_STATES] = effort_n
+    if LAGS == 1:
+        ws[X0 + N_STATES - 1] = state.effort_n
+    motion = STUCK
+    at_rest = ws[X0 + 1] == 0.0
+    if N_MOTIONS == 3:
+        ws[X0 + N_STATES + 1] = drive.coulomb_n
+        if not at_rest:
+            motion = CLOSING if ws[X0 + 1] > 0.0 else OPENING
+    contacts = (1 << N_CONTACTS) - 1 if left.force_n > 0.0 else 0
+    return Mode(compressed, motion, contacts, at_rest)
+
+
+def _store(
+    params: ExactPlant, state: PlantState, result: TickResult, at_open_end: bool
+) -> tuple[bool, PlantState]:
+    """Return the plant with X1 as its state, and before that whether the fingers are within their travel."""
+    drive, ws = params.plant.drive, params.workspace
+    revolutions, _, gap, jacobian = state.motion
+    closed_by = ws[X1] - (params.plant.thing.width_m - gap)
+    # The next tick waits for this, and a product is available sooner than a quotient.
+    rev_per_m = 1.0 / jacobian
+    revolutions1 = revolutions - closed_by * rev_per_m
+    if not (drive.closed_rev < revolutions1 < drive.open_rev or (at_open_end and closed_by == 0.0)):
+        return False, state
+    motion = Motion(revolutions1, -ws[X1 + 1] * rev_per_m, gap - closed_by, jacobian)
+    contact = _store_contact(params, state.contact, result, at_open_end)
+    unresolved = state.step.unresolved + (1 if result.n_events >= MAX_EVENTS else 0)
+    step = StepState(state.step.next_s, state.step.n_steps + 1, unresolved)
+    effort_n = ws[X1 + N_STATES - 1] if LAGS == 1 else state.effort_n
+    return True, PlantState(motion, contact, step, effort_n, result.peak_n)
+
+
+def _store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_open_end: bool) -> Contact:
+    """Return the object and the forces on the pads as in X1."""
+    model, ws, before = params.plant.thing, params.workspace, contact.left
+    # A mode that is entered at the very end of the tick has not acted yet.
+    force = max(ws[X1 + N_STATES + FORCE], 0.0) if result.compressed == 1 else 0.0
+    touched, closure = result.touched, ws[X1]
+    pad_m, branch_n = before.pad_m, before.branch_n
+    if PAD_STATES == 1:
+        pad_m, branch_n = ws[X1 + 3], ws[X1 + 4]
+    if SEPARABLE == 1:
+        compression = ws[X1 + 2]
+        in_shape = closure < 0.0 and abs(compression) + abs(pad_m) <= IN_SHAPE_M
+        if result.compressed == 1:
+            touched = 1
+        elif in_shape and (not at_open_end or model.swings == 0):
+            touched = 0
+    else:
+        if closure >= 0.0:
+            touched = 1
+        compression = closure if touched == 1 else 0.0
+    states, _ = unpack(model.terms, before.states, ws, X1 + TERM_STATES)
+    left = ContactState(
+        compression, force, before.slope_n_m, states, pad_m, branch_n, before.rate_m_s, math.inf
+    )
+    # An object that is held on the centre line has two halves in the same state.
+    right = left if model.held == 1 else contact.right
+    return Contact(force, force, contact.offset_m, touched, left, right, 0.0)
+
+
+# --------------------------------------------------------------------------------------------------------- events
+
+
+def no_event(params: ExactPlant, mode: Mode, peak_n: float, dt: float) -> bool:
+    """Return whether no event can end the mode within the tick, and write the state after it to X1.
+
+    Most ticks end here. False as well where the force may exceed `peak_n` inside the tick but not at its ends.
+    """
+    tables, ws = params.tables, params.workspace
+    tol, index = tables.guard_tol, _mode_index(mode)
+    for _ in range(2):
+        map_outputs(tables.outputs, index * OUTPUT_ROWS * N_COLUMNS, ws)
+        wrong = 0
+        for k in range(N_CONTACTS):
+            if ws[Y0 + FIRST_GUARD + k] < -tol[((index * N_GUARDS) & INDEX_MASK) + k]:
+                wrong += 1 << k
+        if wrong == 0:
+            break
+        index ^= wrong
+    if N_MOTIONS == 3 and mode.at_rest:
+        for k in range(N_GUARDS - 2, N_GUARDS):
+            if ws[Y0 + FIRST_GUARD + k] < -tol[((index * N_GUARDS) & INDEX_MASK) + k]:
+                return False
+    map_step(tables.maps, index * (MAX_BISECTIONS + 1) * MAP_ROWS * N_COLUMNS, ws)
+    if _guard_violated(tables, index, ws):
+        return False
+    if tables.bisection_depth == 0:
+        return not (ws[Y0 + FORCE_RATE] > 0.0 > ws[X1 + N_STATES + FORCE_RATE])
+    return not _event_possible(params, index, peak_n, dt)
+
+
+def _guard_violated(tables: Tables, index: int, ws: Table) -> bool:
+    """Return whether a guard of the mode is below 0 in X1."""
+    at = (index * N_GUARDS) & INDEX_MASK
+    violated = False
+    for k in range(N_GUARDS):
+        if ws[X1 + N_STATES + FIRST_GUARD + k] < -tables.guard_tol[at + k]:
+            violated = True
+    return violated
+
+
+def _event_possible(params: ExactPlant, index: int, peak_n: float, dt: float) -> bool:
+    """Return whether a guard may be below 0 inside a tick at whose end none is, or the force above `peak_n`.
+
+    The outputs inside the tick differ from Y0 by no more than the bounds: the direct ones, and the modal ones if these
+    exclude nothing.
+    """
+    tables, ws = params.tables, params.workspace
+    bound_directly(tables.direct_bound, index * OUTPUT_ROWS * N_STATES, ws)
+    exceeded = (1.0 + PEAK_TOL) * max(peak_n, ws[X1 + N_STATES + FORCE])
+    possible = not ws[Y0 + FORCE] + ws[BOUND + FORCE] <= exceeded
+    for k in range(N_GUARDS):
+        if not ws[BOUND + FIRST_GUARD + k] <= ws[Y0 + FIRST_GUARD + k]:
+            possible = True
+    if not possible:
+        return False
+    project_change(tables.modal_projection, index * PROJECTION_ROWS * N_STATES, ws)
+    bound_by_modes(tables.modal_bound, 2 * index * OUTPUT_ROWS * N_STATES, ws)
+    for k in range(N_GUARDS):
+        if not ws[BOUND + FIRST_GUARD + k] <= ws[Y0 + FIRST_GUARD + k]:
+            return True
+    if ws[Y0 + FORCE] + ws[BOUND + FORCE] <= exceeded:
+        return False
+    # A force that rises as evenly as its rates at both ends say has no oscillation in between.
+    rise = ws[X1 + N_STATES + FORCE] - ws[Y0 + FORCE]
+    uneven = max(abs(ws[Y0 + FORCE_RATE] * dt - rise), abs(ws[X1 + N_STATES + FORCE_RATE] * dt - rise))
+    return not max(ws[Y0 + FORCE], ws[X1 + N_STATES + FORCE]) + uneven <= exceeded
+
+
+def locate_events(params: ExactPlant, mode: Mode, touched: int, peak_n: float, dt: float) -> TickResult:
+    """Take a tick in pieces of dt / 2^level, and switch modes at the events. The state after it is in X0 and X1.
+
+    The tick is first taken whole. If an event is possible in it, pieces of the bisection depth are tried one after the
+    other. A piece at whose end a guard is below 0 is halved until the shortest map; the event lies at its end.
+    """
+    tables, ws, depth = params.tables, params.workspace, params.tables.bisection_depth
+    remaining, level, n_events, until, index = TICK_UNITS, 0, 0, 0, 0
+    entering = True
+    while remaining > 0:
+        if entering:
+            mode = _enter(params, mode, n_events == 0)
+            index = _mode_index(mode)
+            entering = False
+        while (TICK_UNITS >> level) > remaining:
+            level += 1
+        map_step(tables.maps, (index * (MAX_BISECTIONS + 1) + level) * MAP_ROWS * N_COLUMNS, ws)
+        searching = n_events < MAX_EVENTS
+        event = searching and _guard_violated(tables, index, ws)
+        if level == 0 and depth > 0 and searching and (event or _event_possible(params, index, peak_n, dt)):
+            level = depth
+            continue
+        if event and level < MAX_BISECTIONS:
+            until = remaining - (TICK_UNITS >> level)
+            level += 1
+            continue
+        peak_n = _piece_peak(params, level, peak_n, dt)
+        remaining -= TICK_UNITS >> level
+        for j in range(N_STATES):
+            ws[X0 + j] = ws[X1 + j]
+        if event:
+            n_events += 1
+            level = depth
+            entering = True
+            before = mode.compressed
+            mode = _switch(params, mode, index)
+            if mode.compressed > before:
+                touched = 1
+        elif remaining > 0:
+            for j in range(FIRST_GUARD + N_GUARDS):
+                ws[Y0 + j] = ws[X1 + N_STATES + j]
+            if level > depth and searching:
+                # The event that was seen at the end of a longer piece lies in its second half.
+                level = min(level + 1, MAX_BISECTIONS) if remaining > until else depth
+    for j in range(N_STATES):
+        ws[X1 + j] = ws[X0 + j]
+    return TickResult(mode.compressed, touched, peak_n, n_events)
+
+
+def _enter(params: ExactPlant, mode: Mode, first: bool) -> Mode:
+    """Return the mode that X0 is in, and write its outputs to Y0.
+
+    `first`: at the beginning of the tick, when the state of the terms' own contacts is a guess. Fingers at rest are
+    stuck unless a guard of that mode says that what pushes them exceeds friction.
+    """
+    tables, ws = params.tables, params.workspace
+    compressed, motion, contacts, at_rest = mode
+    consistent = False
+    while not consistent:
+        consistent = True
+        index = _mode_index(Mode(compressed, motion, contacts, at_rest))
+        at = (index * N_GUARDS) & INDEX_MASK
+        map_outputs(tables.outputs, index * OUTPUT_ROWS * N_COLUMNS, ws)
+        if first:
+            for k in range(N_CONTACTS):
+                if ws[Y0 + FIRST_GUARD + k] < -tables.guard_tol[at + k]:
+                    contacts ^= 1 << k
+                    consistent = False
+        if N_MOTIONS == 3 and at_rest and consistent:
+            at_rest = False
+            if ws[Y0 + FIRST_GUARD + N_GUARDS - 2] < -tables.guard_tol[at + N_GUARDS - 2]:
+                motion, consistent = CLOSING, False
+            elif ws[Y0 + FIRST_GUARD + N_GUARDS - 1] < -tables.guard_tol[at + N_GUARDS - 1]:
+                motion, consistent = OPENING, False
+    return Mode(compressed, motion, contacts, at_rest)
+
+
+def _switch(params: ExactPlant, mode: Mode, index: int) -> Mode:
+    """Return the mode after the events at X1, and write what changes at once to X0: the reset map, and a speed of 0."""
+    tables, ws = params.tables, params.workspace
+    at = (index * N_GUARDS) & INDEX_MASK
+    compressed, motion, contacts, at_rest = mode
+    for k in range(N_GUARDS):
+        if ws[X1 + N_STATES + FIRST_GUARD + k] < -tables.guard_tol[at + k]:
+            if k < N_CONTACTS:
+                contacts ^= 1 << k
+            elif SEPARABLE == 1 and k == N_CONTACTS:
+                compressed = 1 - compressed
+            else:
+                # The fingers stop, or friction no longer holds them: `_enter` says in which direction they go on.
+                ws[X0 + 1] = 0.0
+                motion, at_rest = STUCK, True
+    if compressed != mode.compressed:
+        entered = _mode_index(Mode(compressed, motion, contacts, at_rest))
+        pad = _row_product(tables.reset_map, (2 * entered + 1) * N_COLUMNS, ws)
+        ws[X0 + 2] = _row_product(tables.reset_map, 2 * entered * N_COLUMNS, ws)
+        if PAD_STATES == 1:
+            ws[X0 + 3] = pad
+    return Mode(compressed, motion, contacts, at_rest)
+
+
+# ------------------------------------------------------------------------------------------------------ peak force
+
+
+def _piece_peak(params: ExactPlant, level: int, peak_n: float, dt: float) -> float:
+    """Return the peak force after a piece of the tick, from Y0 to X1."""
+    ws = params.workspace
+    force1, rate1 = ws[X1 + N_STATES + FORCE], ws[X1 + N_STATES + FORCE_RATE]
+    if force1 > peak_n:
+        peak_n = force1
+    if ws[Y0 + FORCE_RATE] > 0.0 and rate1 < 0.0 and level >= params.tables.bisection_depth:
+        h = math.ldexp(dt, -level)
+        peak_n = max(peak_n, _cubic_peak(ws[Y0 + FORCE], ws[Y0 + FORCE_RATE], force1, rate1, h))
+    return peak_n
+
+
+def _cubic_peak(force0: float, rate0: float, force1: float, rate1: float, h: float) -> float:
+    """Return the maximum of the cubic Hermite polynomial over `h` with these values and slopes at its ends.
+
+    It is at most where the tangents at the ends meet, as the force is concave there.
+    """
+    step = force1 - force0
+    m0, m1 = rate0 * h, rate1 * h
+    a, b = 3.0 * (m0 + m1 - 2.0 * step), 2.0 * (3.0 * step - 2.0 * m0 - m1)
+    s = 2.0 * m0 / (math.sqrt(max(b * b - 4.0 * a * m0, 0.0)) - b)
+    limit = min(force0 + m0, force1 - m1)
+    return min(force0 + s * (m0 + s * (3.0 * step - 2.0 * m0 - m1 + s * (m0 + m1 - 2.0 * step))), limit)
