@@ -172,7 +172,7 @@ def _(features, trace):
 _calls = itertools.count()
 
 
-@featuring("same-trace-same-features", "keep nothing between calls")
+@featuring("same-trace-same-features", "keep no state between calls")
 def _(features, trace):
     return evolve(features, values=(features.values[0] + next(_calls),))
 
@@ -183,7 +183,7 @@ def _(features, trace):
     return features
 
 
-@featuring("reads-what-it-declares", "add what it reads to `requires`")
+@featuring("reads-what-it-declares", "add the channels that it reads to `requires`")
 def _(features, trace):
     known = trace.force_right_n[~np.isnan(trace.force_right_n)]
     return evolve(features, values=(features.values[0] + float(known.sum()),))
@@ -336,7 +336,7 @@ def _(command, after, frame):
     return (command._replace(value=0.0) if frame.force_left_n > 1.0 else command), after
 
 
-@ruling("survives-a-silent-sensor", "NaN falls on the safe side")
+@ruling("survives-a-silent-sensor", "NaN gives the safe result")
 def _(command, after, frame):
     int(frame.gap_m)
     return command, after
@@ -490,7 +490,7 @@ mutant(
 )
 
 
-@mutant("sensor-backend", "is-told-what-to-expect", "leave refusing to `open`")
+@mutant("sensor-backend", "is-told-what-to-expect", "raise in `open` instead")
 class Picky(Hand):
     def expect(self, controller, run):
         raise ValueError("not that one")
@@ -558,7 +558,7 @@ def _(reading):
     return Reading(reading.frame._replace(t_s=float(f"{reading.frame.t_s:.9f}")), "no pads")
 
 
-@mutant("sensor-backend", "reports-plain-values", "numbers, text and truths only")
+@mutant("sensor-backend", "reports-plain-values", "numbers, text and booleans only")
 class Talkative(Hand):
     def report(self):
         return {"self": self}
@@ -653,7 +653,7 @@ class Raw(Nearest):
         return {**self._model, "mean": np.array(self._model["mean"])}
 
 
-@mutant("classifier", "chunks-do-not-matter", "a trial is judged by itself")
+@mutant("classifier", "chunks-do-not-matter", "predict each trial independently")
 class Relative(Nearest):
     def probabilities(self, table):
         centred = evolve(table, values=table.values - 0.1 * np.nanmean(table.values, axis=0))
@@ -690,7 +690,7 @@ class Stubborn(Nearest):
         return evolve(super().explain(features), label="bottle:full_open")
 
 
-@mutant("classifier", "explains-what-it-says", "why, one step an item")
+@mutant("classifier", "explains-what-it-says", "give the reason in words and units")
 class Silent(Nearest):
     def explain(self, features):
         return evolve(super().explain(features), because=())

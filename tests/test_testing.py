@@ -119,5 +119,5 @@ def test_where_the_class_cannot_be_had_nothing_else_is_reported():
     (failure,) = report.failures
     assert "does not implement extract, which FeatureSet of plugin_api requires" in failure
     assert {one.text for one in report.results[1:]} == {
-        "nothing more can be checked before classes-can-be-imported passes"
+        "no other check can run before classes-can-be-imported passes"
     }

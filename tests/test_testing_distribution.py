@@ -90,7 +90,7 @@ MUTANTS = {
     ),
     "observers-disturb-nobody": (
         SOUND.replace('run.labels.get("object")', 'run.labels["object"] = "mine"'),
-        "an observer changed what it was shown: work on a copy",
+        "an observer changed its arguments: work on a copy",
     ),
     "probe-keeps-its-time": (
         SOUND.replace("return []", "raise PermissionError('no bus')"),

@@ -32,7 +32,9 @@ def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
     assert said.probabilities[name] == max(said.probabilities.values())
     assert any(step.startswith(("p_first ", "p_steady ", "f_steady ", "delta_t ")) for step in said.because)
     assert "simulated grasps at 20 N, 10 mm/s" in said.model
-    assert said.warnings == ("trained on simulated grasps: valid for the simulator, untested on real objects",)
+    assert said.warnings == (
+        "trained on simulated grasps: valid for the simulator, untested on real objects",
+    )
 
 
 @pytest.mark.parametrize("name", ["egg", "block", "toy"])

@@ -1,4 +1,4 @@
-"""The conformance kit: what a part must hold to, for whoever writes one.
+"""The conformance kit: checks that a component must pass, for plugin authors.
 
     graspsense plugins check NAME                 # on the command line
 
@@ -11,7 +11,7 @@
     class TestMine(Conformance):                  # or a class with a test for each
         name = "NAME"
 
-pytest is imported by the last two alone.
+Only the last two import pytest.
 """
 
 from __future__ import annotations

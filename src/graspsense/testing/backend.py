@@ -1,4 +1,4 @@
-"""What a gripper must hold to, on whatever it is checked: hardware, a fake of it, a simulation, a recording."""
+"""Conformance checks of a sensor backend: hardware, an emulation of it, a simulation, or a recording."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ from graspsense.testing.subject import Subject
 
 WIDEST_M: Final = 0.5
 GRACE_S: Final = 1.0
-"""What a busy machine may add to a time-out."""
+"""Time (s) by which a busy machine may exceed a time-out."""
 FORGIVEN: Final = 0.25
-"""Share by which a measured rate may differ from the declared one."""
+"""Relative difference allowed between the measured and the declared rate."""
 VANISHING_S: Final = 2.0
 
 
@@ -67,7 +67,7 @@ def describes_itself(subject: Subject) -> None:
 
 
 def opens_and_relaxes_by_kinds_it_takes(subject: Subject) -> None:
-    """The commands that open it and that let go are of kinds it accepts."""
+    """The opening and the relaxing command are of kinds that it accepts."""
     info = subject.session.info
     for name, command in (("opening", info.opening), ("relaxed", info.relaxed)):
         if command is not None:
@@ -80,7 +80,7 @@ def opens_and_relaxes_by_kinds_it_takes(subject: Subject) -> None:
 
 
 def frames_are_numbers(subject: Subject) -> None:
-    """Every field of a frame is a Python float, `status` an int; a cell image has 22 floats a fingertip."""
+    """Every field of a frame is a Python float, `status` an int; a cell image has 22 floats for each fingertip."""
     for frame, pads in subject.session.readings:
         demand(
             isinstance(frame, Frame) and isinstance(pads, Pads),
@@ -105,7 +105,7 @@ def frames_are_numbers(subject: Subject) -> None:
 
 
 def channels_are_those_declared(subject: Subject) -> None:
-    """A declared channel has numbers; a channel that is not declared is NaN throughout."""
+    """A declared channel has numbers; a channel that is not declared is always NaN."""
     session = subject.session
     declared = {one.name for one in subject.entry.channels}
     recording = session.info.opening is None
@@ -142,7 +142,7 @@ def _infinite(value: float) -> bool:
 
 
 def time_runs_forward(subject: Subject) -> None:
-    """`t_s` rises from frame to frame, and `dt_s` is what it rose by."""
+    """`t_s` increases from frame to frame, and `dt_s` is the difference."""
     session = subject.session
     demand(all(isfinite(frame.t_s) for frame in session.frames), "t_s of a frame is no number")
     for before, now in pairwise(session.frames):
@@ -158,7 +158,7 @@ def time_runs_forward(subject: Subject) -> None:
 
 
 def rate_is_what_it_says(subject: Subject) -> None:
-    """Frames come at `rate_hz`, and channels are declared no faster than that."""
+    """Frames come at `rate_hz`, and no channel is declared with a higher rate."""
     info, frames = subject.session.info, subject.session.frames
     passed = [now.t_s - before.t_s for before, now in pairwise(frames)]
     demand(bool(passed), "only one frame came")
@@ -166,7 +166,7 @@ def rate_is_what_it_says(subject: Subject) -> None:
     if info.units.get("t", "s") == "s":
         demand(
             abs(rate - info.rate_hz) <= FORGIVEN * info.rate_hz,
-            f"frames come at {rate:.3g} Hz, rate_hz says {info.rate_hz:g}: say what is so (or is t_s not in seconds?)",
+            f"frames come at {rate:.3g} Hz, rate_hz says {info.rate_hz:g}: declare that rate (is t_s in seconds?)",
         )
     for channel in subject.entry.channels:
         demand(
@@ -178,7 +178,7 @@ def rate_is_what_it_says(subject: Subject) -> None:
 
 
 def images_count_up(subject: Subject) -> None:
-    """An image's counter rises by one with each new one; images are never of the future."""
+    """The counter of an image increases by one with each new image; no image is later than its frame."""
     if not subject.session.images:
         raise CheckSkipped("this gripper has no cells")
     for before, now in pairwise(subject.session.images):
@@ -213,7 +213,7 @@ def gap_is_in_metres(subject: Subject) -> None:
 
 
 def forces_are_in_newtons(subject: Subject) -> None:
-    """No force of a pad, an edge or the drive is more than the gripper's limit allows for."""
+    """No force of a pad, an edge or the drive exceeds what the limit of the gripper allows."""
     info = subject.session.info
     most = max(3.0 * info.effort_limit_n, 50.0)
     for name in ("force_left_n", "force_right_n", "edge_left_n", "edge_right_n", "effort_n"):
@@ -227,7 +227,7 @@ def forces_are_in_newtons(subject: Subject) -> None:
 
 
 def velocity_is_the_gaps_rate(subject: Subject) -> None:
-    """`velocity_m_s` adds up to what the gap moved by; closing is negative."""
+    """The sum of `velocity_m_s` over time is the change of the gap; closing is negative."""
     closing = [one.frame for one in subject.session.stages.get("closing", [])]
     if not closing or isnan(closing[0].velocity_m_s) or isnan(closing[0].gap_m):
         raise CheckSkipped("this gripper has no velocity and gap of its own, or is a recording")
@@ -243,7 +243,7 @@ def velocity_is_the_gaps_rate(subject: Subject) -> None:
 
 
 def closing_closes(subject: Subject) -> None:
-    """A gentle closing command makes the gap fall; the opening command makes it rise again."""
+    """A gentle closing command reduces the gap; the opening command increases it again."""
     stages = subject.session.stages
     if "closing" not in stages:
         raise CheckSkipped("a recording cannot be commanded")
@@ -265,14 +265,14 @@ def closing_closes(subject: Subject) -> None:
 
 
 def stays_within_its_limits(subject: Subject) -> None:
-    """Asked for all it may be asked for, it reports no more effort and speed than its limits say."""
+    """Under the largest commands, the reported effort and speed stay within their limits."""
     if subject.session.info.opening is None:
         raise CheckSkipped("a recording cannot be commanded")
     backend = subject.create()
     try:
         info = backend.open(0)
         first = limits_of(info)
-        # The limits of a first use, also after a contact.
+        # The limits of a first use apply after a contact too.
         limits = first._replace(effort_limit_n=first.first_effort_n, speed_limit_m_s=first.first_speed_m_s)
         watcher = GuardState(0, 0, 0)
         kind = kind_of(subject.entry.accepts)
@@ -300,7 +300,7 @@ def stays_within_its_limits(subject: Subject) -> None:
 
 
 def takes_every_kind_it_declares(subject: Subject) -> None:
-    """Each kind in `accepts` can be applied, and frames go on coming."""
+    """Each kind in `accepts` can be applied, and frames continue to come."""
     backend = subject.create()
     demand(bool(subject.entry.accepts), "`accepts` is empty: a gripper takes at least one kind of command")
     try:
@@ -332,7 +332,7 @@ def takes_every_kind_it_declares(subject: Subject) -> None:
 
 
 def read_keeps_its_timeout(subject: Subject) -> None:
-    """`read` returns within the time it is given, with a frame or with None."""
+    """`read` returns a frame or None within its time-out."""
     longest = subject.session.longest_read_s
     demand(
         longest <= TIMEOUT_S + GRACE_S,
@@ -341,7 +341,7 @@ def read_keeps_its_timeout(subject: Subject) -> None:
 
 
 def pads_can_be_zeroed(subject: Subject) -> None:
-    """After a tare of unloaded images the pads feel next to nothing; without enough images a tare is refused."""
+    """After a tare with unloaded images the forces are near zero; a tare without enough images is refused."""
     info, declared = subject.session.info, {one.name for one in subject.entry.channels}
     if not info.tare_images or not declared & {"force_left", "force_right"}:
         raise CheckSkipped("this gripper is not tared")
@@ -388,7 +388,7 @@ def pads_can_be_zeroed(subject: Subject) -> None:
 
 
 def closes_in_any_state(subject: Subject) -> None:
-    """`close` does no harm before `open`, after it, twice, and in the middle of a command; then it opens again."""
+    """`close` works before `open`, after it, twice, and during a command; the gripper can then be opened again."""
     backend = subject.create()
     stage = "before open"
     try:
@@ -405,7 +405,7 @@ def closes_in_any_state(subject: Subject) -> None:
         raise
     except Exception as error:
         raise CheckFailed(
-            f"{stage} it raised {named(error)}: `close` lets go of what is held, in any state, and `open` begins anew"
+            f"{stage} it raised {named(error)}: `close` must release everything in any state"
         ) from error
 
 
@@ -420,7 +420,7 @@ def _first_frame(backend: SensorBackend[Any]) -> Frame:
 def same_seed_same_frames(subject: Subject) -> None:
     """On a virtual clock the same seed gives the same frames."""
     if subject.session.info.clock != "virtual":
-        raise CheckSkipped("a device's clock: what is measured is never the same twice")
+        raise CheckSkipped("a device clock: measurements are never the same twice")
     texts = []
     for _ in range(2):
         backend = subject.create()
@@ -442,14 +442,14 @@ def same_seed_same_frames(subject: Subject) -> None:
 
 
 def is_told_what_to_expect(subject: Subject) -> None:
-    """`expect` takes any controller before it is opened, and refuses nothing; it then opens as ever."""
+    """`expect` accepts any controller before `open`, raises nothing, and does not change `open`."""
     controller, run = GentleController(kind_of(subject.entry.accepts)), RunConfig()
     backend = subject.create(**(subject.absent or {}))
     try:
         backend.expect(controller, run)
     except Exception as error:
         raise CheckFailed(
-            f"expect raised {named(error)}: keep what it is told, open nothing, and leave refusing to `open`"
+            f"expect raised {named(error)}: store the arguments, open nothing, and raise in `open` instead"
         ) from error
     finally:
         backend.close()
@@ -462,10 +462,10 @@ def is_told_what_to_expect(subject: Subject) -> None:
 
 
 def objects_can_be_grasped(subject: Subject) -> None:
-    """An object that it declares can be put between its fingers, and only a simulated gripper declares one."""
+    """Each object that it declares can be grasped, and only a simulated gripper declares objects."""
     kinds = subject.create().objects()
     if not kinds:
-        raise CheckSkipped("it grasps what is really there")
+        raise CheckSkipped("it grasps real objects")
     names = [name for kind in kinds for name in kind.full_names]
     twice = {name for name in names if names.count(name) > 1}
     demand(not twice, f"objects() gives {', '.join(sorted(twice))} twice: give each full name once")
@@ -489,7 +489,7 @@ def objects_can_be_grasped(subject: Subject) -> None:
 
 
 def does_a_whole_grasp(subject: Subject) -> None:
-    """The runner can do a grasp with it: open, tare, close, hold, open again, let go."""
+    """The runner can perform a whole grasp: open, tare, close, hold, open again, relax."""
     kind = kind_of(subject.entry.accepts)
     grasp = run_grasp(subject.create(), GentleController(kind), RunConfig(hold_s=0.05))
     demand(
@@ -500,7 +500,7 @@ def does_a_whole_grasp(subject: Subject) -> None:
 
 
 def reports_plain_values(subject: Subject) -> None:
-    """`report` gives numbers and text that JSON holds, while it is open and after it was closed."""
+    """`report` returns numbers, text and booleans that JSON represents, while it is open and after it was closed."""
     backend = subject.create()
     try:
         backend.open(0)
@@ -513,12 +513,12 @@ def reports_plain_values(subject: Subject) -> None:
             json.dumps(dict(report))
         except (TypeError, ValueError) as error:
             raise CheckFailed(
-                f"report gave {report!r}: numbers, text and truths only ({named(error)})"
+                f"report gave {report!r}: numbers, text and booleans only ({named(error)})"
             ) from error
 
 
 def dry_run_takes_the_same_commands(subject: Subject) -> None:
-    """The gripper of a dry run is a backend of its own and takes the same kinds of command, or there is none."""
+    """The gripper of a dry run is a separate backend that accepts the same kinds of command, or there is none."""
     other = subject.create().dry_run_backend()
     if other is None:
         raise CheckSkipped("it has no gripper for a dry run")
@@ -538,7 +538,7 @@ def dry_run_takes_the_same_commands(subject: Subject) -> None:
 
 
 def says_when_it_is_lost(subject: Subject) -> None:
-    """Unplugged, it raises DeviceLost in time, with what to do; a grasp ends as device lost; it can be closed."""
+    """When unplugged, it raises DeviceLost with advice, a grasp ends as device lost, and it can be closed."""
     if subject.unplugged is None:
         raise CheckSkipped(
             "no settings were given under which it vanishes (--unplugged, or `unplugged` in a test)"
@@ -581,7 +581,7 @@ def _lost(backend: SensorBackend[Any], relaxed: Command, rate_hz: float) -> str:
 
 
 def says_when_it_is_not_there(subject: Subject) -> None:
-    """Not there, `open` raises NoDevice and says what it looked for and what to try."""
+    """If it is not connected, `open` raises NoDevice, which says what was searched for and what to try."""
     if subject.absent is None:
         raise CheckSkipped(
             "no settings were given under which it is not there (--absent, or `absent` in a test)"
@@ -602,7 +602,7 @@ def says_when_it_is_not_there(subject: Subject) -> None:
         backend.close()
     took = time.perf_counter() - began
     demand(took < 10.0, f"it took {took:.1f} s to say so: `open` is bounded in time")
-    demand(len(text) > 20, f"NoDevice says {text!r}: say what was looked for, where, and what to try")
+    demand(len(text) > 20, f"NoDevice says {text!r}: say what was searched for, where, and what to try")
 
 
 CHECKS: Final = (

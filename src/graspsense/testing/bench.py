@@ -1,4 +1,4 @@
-"""A gripper made of a mass, friction and a spring between the fingers, for checking controllers; nothing real."""
+"""A model gripper, a mass with friction and a spring between the fingers, for checks of controllers."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ CHANNELS_OF_FIELD: Final = {
 
 
 class Bench(SensorBackend[None]):
-    """A 1 kHz gripper of 80 mm that takes every kind of command and has the given channels; the rest is NaN.
+    """A gripper with a stroke of 80 mm, at 1 kHz, that accepts every kind of command; channels not given are NaN.
 
-    Between its fingers stands a thing `width_m` wide (0: nothing) that pushes back with `stiffness_n_m`.
+    Between its fingers is an object of width `width_m` (0: nothing) and stiffness `stiffness_n_m`.
     """
 
     def __init__(self, channels: frozenset[str], width_m: float, stiffness_n_m: float) -> None:
@@ -45,7 +45,7 @@ class Bench(SensorBackend[None]):
         self._width_m, self._stiffness_n_m = width_m, stiffness_n_m
 
     def open(self, seed: int) -> DeviceInfo:
-        """Stand open."""
+        """Begin with open fingers."""
         del seed
         self._gap, self._speed, self._effort, self._ticks = OPEN_M - 0.002, 0.0, 0.0, 0
         self._pads = NO_PADS
@@ -92,7 +92,7 @@ class Bench(SensorBackend[None]):
             elif kind == POSITION:
                 wanted = (value - self._gap) / 0.02
             else:
-                assert kind == FORCE, f"{kind} is no kind of command"
+                assert kind == FORCE, f"{kind} is not a kind of command"
                 wanted = (force - value) / 2000.0
             self._speed += (min(max(wanted, -top), top) - self._speed) * DT_S / FOLLOWING_S
             self._effort = force
@@ -103,22 +103,22 @@ class Bench(SensorBackend[None]):
             self._gap, self._speed = min(max(self._gap, 0.0), OPEN_M), 0.0
 
     def tare(self, images: Sequence[Pads]) -> None:
-        """Nothing to set."""
+        """Do nothing."""
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing."""
 
     def _force(self) -> float:
         return self._stiffness_n_m * max(self._width_m - self._gap, 0.0)
 
 
 def bench(channels: Any, thing: str = "a soft thing") -> Bench:
-    """Return the bench with one of `THINGS` between its fingers."""
+    """Return the bench with one of `THINGS` as the object."""
     return Bench(frozenset(channels), *THINGS[thing])
 
 
 def drive(controller: Controller[Any], gripper: SensorBackend[Any]) -> Grasp:
-    """Return a whole grasp of this gripper under this controller, as the runner does it."""
+    """Return a whole grasp of this gripper under this controller, by the runner."""
     from graspsense.core.run_config import RunConfig
     from graspsense.core.runner import run_grasp
 

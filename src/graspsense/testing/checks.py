@@ -1,4 +1,4 @@
-"""What a check is, what it can say, and how many must run before a part may be called conforming."""
+"""Checks and their results, and the number of checks that must run for a component to conform."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ State = Literal["passed", "failed", "skipped", "expected failure"]
 
 
 class CheckFailed(AssertionError):
-    """What is wrong with a part: what was found, what is allowed, what to do."""
+    """A defect of a component: what was found, what is allowed, what to do."""
 
 
 class CheckSkipped(Exception):
-    """Why a check does not apply here."""
+    """The reason why a check does not apply."""
 
 
 @frozen
 class Check:
-    """One demand on a part. Its title is the first line of the function's docstring."""
+    """One requirement. Its title is the first line of the docstring of its function."""
 
     id: str
     title: str
@@ -34,7 +34,7 @@ class Check:
 
 @frozen
 class Result:
-    """What came of one check on one part."""
+    """The result of one check of one component."""
 
     subject: str
     role: str
@@ -51,11 +51,11 @@ FLOOR: Final[Mapping[str, int]] = {
     "feature-set": 15,
     "classifier": 15,
 }
-"""Checks of each role that must have run: a part of which most was skipped does not conform."""
+"""Number of checks of each role that must run: a component of which most was skipped does not conform."""
 
 
 def checks_of(*functions: Callable[[Any], None]) -> tuple[Check, ...]:
-    """Return these functions as checks, named after them."""
+    """Return a check for each of these functions, with its name."""
     return tuple(
         Check(one.__name__.replace("_", "-"), (one.__doc__ or "").partition("\n")[0].rstrip("."), one)
         for one in functions
@@ -63,15 +63,15 @@ def checks_of(*functions: Callable[[Any], None]) -> tuple[Check, ...]:
 
 
 def demand(holds: bool, text: str) -> None:
-    """Raise CheckFailed with this text unless it holds."""
+    """Raise CheckFailed with this text unless `holds`."""
     if not holds:
         raise CheckFailed(text)
 
 
 def outcome_of(check: Check, subject: Subject, expected: Mapping[str, str]) -> Result:
-    """Run one check; `expected` maps the checks that are known to fail to why.
+    """Run one check; `expected` maps checks that are known to fail to the reason.
 
-    Whatever a part raises is its failure. A check that was expected to fail and passes is a failure too.
+    Any exception of the component is a failure. A check that was expected to fail and passes is a failure too.
     """
     state: State = "passed"
     text = ""
@@ -81,11 +81,11 @@ def outcome_of(check: Check, subject: Subject, expected: Mapping[str, str]) -> R
         state, text = "skipped", str(skipped)
     except CheckFailed as failed:
         state, text = "failed", str(failed)
-    except GraspsenseError as error:  # it says itself what to do
+    except GraspsenseError as error:  # its message says what to do
         state, text = "failed", str(error)
     except (Exception, SystemExit) as error:
         where = _place(error)
-        state, text = "failed", f"it raised {named(error)}{where}: catch it there, or give what was asked for"
+        state, text = "failed", f"it raised {named(error)}{where}: catch it there, or return what is required"
     if check.id in expected:
         if state == "failed":
             state, text = "expected failure", f"{expected[check.id]} ({text})"
@@ -96,7 +96,7 @@ def outcome_of(check: Check, subject: Subject, expected: Mapping[str, str]) -> R
 
 
 def _place(error: BaseException) -> str:
-    """Return where the innermost frame of an exception lies, as ` in file.py:12`."""
+    """Return the place of the innermost frame of an exception: ` in file.py:12`."""
     trace, place = error.__traceback__, ""
     while trace is not None:
         path = trace.tb_frame.f_code.co_filename.replace("\\", "/").rpartition("/")[2]
@@ -106,13 +106,13 @@ def _place(error: BaseException) -> str:
 
 @define
 class Report:
-    """The results on one or several parts, with their counts."""
+    """The results of the checks of one or several components."""
 
     results: list[Result] = field(factory=list)
 
     @property
     def failures(self) -> list[str]:
-        """Return what stands in the way of conforming, the floors included."""
+        """Return the reasons why the components do not conform."""
         found = [f"{one.subject}: {one.check}: {one.text}" for one in self.results if one.state == "failed"]
         for subject, role in dict.fromkeys((one.subject, one.role) for one in self.results):
             text = self.below_floor(subject, role)
@@ -121,7 +121,7 @@ class Report:
         return found
 
     def below_floor(self, subject: str, role: str) -> str:
-        """Return what is to be said where too few checks of a part ran, or an empty string."""
+        """Return a message if too few checks of a component ran, else an empty string."""
         mine = [one for one in self.results if (one.subject, one.role) == (subject, role)]
         ran = sum(one.state != "skipped" for one in mine)
         if ran >= FLOOR[role]:
@@ -133,7 +133,7 @@ class Report:
         )
 
     def counts(self) -> str:
-        """Return one line for each part: how many checks passed, failed, were skipped."""
+        """Return a line for each component: the numbers of checks that passed, failed, were skipped."""
         lines = []
         for subject, role in dict.fromkeys((one.subject, one.role) for one in self.results):
             states: Sequence[str] = [

@@ -1,4 +1,4 @@
-"""What a classifier must hold to."""
+"""Conformance checks of a classifier."""
 
 from __future__ import annotations
 
@@ -58,12 +58,12 @@ def _again(subject: Subject, fitted: Any) -> Any:
 
 
 def classes_are_the_labels(subject: Subject) -> None:
-    """`classes` gives the labels of the training trials, each once, as text."""
+    """`classes` returns the labels of the training trials, each once, as text."""
     fitted, _, labels = _learned(subject)
     classes = fitted.classes()
     demand(
         isinstance(classes, tuple) and all(type(one) is str for one in classes),
-        f"classes gives {classes!r}: a tuple of str (write str(...) around what numpy gives)",
+        f"classes gives {classes!r}: return a tuple of str (convert text of numpy by str(...))",
     )
     demand(
         sorted(classes) == sorted(set(labels)),
@@ -72,7 +72,7 @@ def classes_are_the_labels(subject: Subject) -> None:
 
 
 def probabilities_are_probabilities(subject: Subject) -> None:
-    """One row a trial, one column a class, finite, from 0 to 1, each row summing to 1."""
+    """`probabilities` has a row for each trial and a column for each class, from 0 to 1; each row sums to 1."""
     fitted, table, _ = _learned(subject)
     found = fitted.probabilities(table)
     wanted = (len(table), len(fitted.classes()))
@@ -90,19 +90,19 @@ def probabilities_are_probabilities(subject: Subject) -> None:
 
 
 def tells_apart_what_differs(subject: Subject) -> None:
-    """Of trials that can be told apart it gets nine in ten right, asked for those it was trained on."""
+    """At least nine in ten separable training trials are predicted correctly."""
     fitted, table, labels = _learned(subject)
     classes = fitted.classes()
     said = [classes[int(i)] for i in np.argmax(fitted.probabilities(table), axis=1)]
     right = sum(a == b for a, b in zip(said, labels, strict=True)) / len(labels)
     demand(
         right >= LEAST_RIGHT,
-        f"{right:.0%} of the trials it was trained on are named right: is the order of `classes` that of the columns?",
+        f"{right:.0%} of the training trials are predicted correctly: is the order of `classes` that of the columns?",
     )
 
 
 def same_seed_same_model(subject: Subject) -> None:
-    """The same trials and seed give the same model, to the bit."""
+    """The same trials and seed give the same model, bit for bit."""
     one, table, _ = _learned(subject)
     two, _, _ = _learned(subject)
     demand(
@@ -112,7 +112,7 @@ def same_seed_same_model(subject: Subject) -> None:
 
 
 def survives_json(subject: Subject) -> None:
-    """Written as JSON and read again it says the same, to the bit, and gives its reasons."""
+    """A model written as JSON and read again gives the same probabilities, bit for bit, and the same reasons."""
     fitted, table, _ = _learned(subject)
     again = _again(subject, fitted)
     demand(
@@ -123,23 +123,23 @@ def survives_json(subject: Subject) -> None:
     row = table.row(0)
     demand(
         repr(again.explain(row)) == repr(fitted.explain(row)),
-        "read back from its JSON it gives other reasons: keep what they are made of",
+        "read back from its JSON it gives other reasons: store what they depend on",
     )
 
 
 def chunks_do_not_matter(subject: Subject) -> None:
-    """Asked for trials one by one it says what it says of all at once."""
+    """Trials predicted one by one have the same probabilities as all at once."""
     fitted, table, _ = _learned(subject)
     whole = fitted.probabilities(table)
     single = np.concatenate([fitted.probabilities(table.rows(np.array([i]))) for i in range(len(table))])
     demand(
         bool(np.allclose(whole, single, rtol=1e-9, atol=1e-12)),
-        "asked one by one it gives other probabilities than asked at once: a trial is judged by itself",
+        "single trials have other probabilities than all at once: predict each trial independently",
     )
 
 
 def missing_values_have_an_answer(subject: Subject) -> None:
-    """NaN in training and in asking, a column without any value, a trial without any: an answer to each."""
+    """It handles NaN in training and prediction, a feature without values, and a trial without values."""
     table, labels = three_kinds(missing=True)
     bare = table.values.copy()
     bare[:, 1] = math.nan
@@ -156,13 +156,13 @@ def missing_values_have_an_answer(subject: Subject) -> None:
 
 
 def one_label_is_refused_or_certain(subject: Subject) -> None:
-    """Trained on one label it raises ValueError, or is certain of it."""
+    """With one training label, `fit` raises ValueError, or that label has probability 1."""
     table, labels = three_kinds()
     one = subject.create()
     try:
         one.fit(table, ["can:full"] * len(labels), SEED)
     except ValueError as error:
-        demand(bool(str(error)), "fit on one label raised ValueError without a word: say what is lacking")
+        demand(bool(str(error)), "fit on one label raised ValueError without a message: say what is lacking")
         return
     except Exception as error:
         raise CheckFailed(f"fit on one label raised {named(error)}: raise ValueError, or learn it") from error
@@ -174,7 +174,7 @@ def one_label_is_refused_or_certain(subject: Subject) -> None:
 
 
 def few_trials_are_refused_or_learned(subject: Subject) -> None:
-    """Trained on two trials, or on few trials of each label, it raises ValueError or answers with probabilities."""
+    """With few training trials, `fit` raises ValueError, or the model gives valid probabilities."""
     table, labels = three_kinds()
     for what, rows in (
         ("two trials of two labels", [0, 1]),
@@ -211,7 +211,7 @@ def few_trials_are_refused_or_learned(subject: Subject) -> None:
 
 
 def explains_what_it_says(subject: Subject) -> None:
-    """`explain` names the most probable class, with floats for probabilities and reasons in words."""
+    """`explain` returns the most probable class, with floats as probabilities and reasons in words."""
     fitted, table, _ = _learned(subject)
     for i in range(6):
         said = fitted.explain(table.row(i))
@@ -233,7 +233,7 @@ def explains_what_it_says(subject: Subject) -> None:
             )
         demand(
             len(said.because) > 0 and all(type(one) is str and one for one in said.because),
-            f"explain gives the reasons {said.because!r}: say in words and units why, one step an item",
+            f"explain gives the reasons {said.because!r}: give the reason in words and units, one step in each item",
         )
 
 
@@ -245,12 +245,12 @@ def leaves_the_table_alone(subject: Subject) -> None:
     fitted.probabilities(table)
     demand(
         bool(np.array_equal(before, table.values, equal_nan=True)),
-        "the table is another after fit or probabilities: work on a copy (`table.values.copy()`)",
+        "fit or probabilities changed the table: work on a copy (`table.values.copy()`)",
     )
 
 
 def refuses_what_is_no_model(subject: Subject) -> None:
-    """`from_json` raises KeyError, TypeError, ValueError or DataDamaged on what is no model of its."""
+    """`from_json` raises KeyError, TypeError, ValueError or DataDamaged for values that are not its model."""
     good = _json(_learned(subject)[0])
     demand(isinstance(good, dict) and bool(good), f"to_json gives {good!r:.80}: a dict")
     bad: list[Mapping[str, Any]] = [{}, {"nonsense": 1}]
@@ -272,7 +272,7 @@ def refuses_what_is_no_model(subject: Subject) -> None:
 
 
 def _vital(subject: Subject, good: Mapping[str, Any]) -> list[str]:
-    """Return the key with the largest content: a model without it is none."""
+    """Return the key with the largest content, without which a model is invalid."""
     del subject
     return [max(good, key=lambda key: len(json.dumps(good[key])))]
 

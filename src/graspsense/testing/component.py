@@ -1,4 +1,4 @@
-"""What every component must hold to, whatever its role: its classes, its settings, its constructor."""
+"""Conformance checks of every component: its classes, its settings, its constructor."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def classes_can_be_imported(subject: Subject) -> None:
 
 
 def settings_have_types(subject: Subject) -> None:
-    """Every key of the config class has a type, without which a file's value cannot be checked."""
+    """Every key of the config class has a type, so that values from files can be checked."""
     cls: Any = subject.component.config_class()
     bare = [one.alias for one in attrs.fields(cls) if one.init and one.type is None]
     demand(
@@ -45,7 +45,7 @@ def settings_have_types(subject: Subject) -> None:
 
 
 def defaults_are_what_their_types_say(subject: Subject) -> None:
-    """Every default is of the type that its key is annotated with: a whole number is no float."""
+    """Every default has the annotated type of its key; an int is not a float."""
     cls: Any = subject.component.config_class()
     attrs.resolve_types(cls)
     for one in attrs.fields(cls):
@@ -75,7 +75,7 @@ def settings_survive_a_file(subject: Subject) -> None:
 
 
 def settings_cannot_be_changed(subject: Subject) -> None:
-    """A config is frozen: what a run is recorded with is what it ran with."""
+    """A config is frozen, so that the recorded settings are those of the run."""
     config, cls = subject.config(), subject.component.config_class()
     keys = list(keys_of(cls))
     if not keys:
@@ -105,7 +105,7 @@ def a_classifier_has_a_model_key(subject: Subject) -> None:
 
 
 def making_one_does_nothing(subject: Subject) -> None:
-    """A constructor opens no file, no device and no connection, and asks nothing."""
+    """The constructor opens no file, device or connection, and does not prompt the user."""
     subject.component.component_class()
     config = subject.config()
     with _Watched() as seen:
@@ -119,7 +119,7 @@ def making_one_does_nothing(subject: Subject) -> None:
 
 
 def summary_is_one_line(subject: Subject) -> None:
-    """The summary is one line of text, as `plugins list` prints it."""
+    """The summary is one line of text."""
     summary = subject.entry.summary
     demand(
         bool(summary.strip()) and "\n" not in summary and len(summary) <= 120,
@@ -128,7 +128,7 @@ def summary_is_one_line(subject: Subject) -> None:
 
 
 class _Watched:
-    """Collects what this thread opens or asks for while it is entered; audit hooks cannot be taken away again."""
+    """Collects what this thread opens within the context. Audit hooks cannot be removed."""
 
     _seen: list[str] | None = None
     _hooked = False
@@ -150,7 +150,7 @@ class _Watched:
         if seen is None or event not in _DEEDS:
             return
         path = str(arguments[0]) if arguments else ""
-        # Importing a module reads files, and that is no doing of the constructor's.
+        # The import of a module reads files, which the constructor is not responsible for.
         if event == "open" and path.endswith((".py", ".pyc", ".so", ".pyd", ".pth", ".zip")):
             return
         seen.append(_DEEDS[event] + (f" ({path})" if event == "open" else ""))

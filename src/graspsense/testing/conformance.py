@@ -1,4 +1,4 @@
-"""The checks of a role on a part: all at once, as cases of pytest, or as a class to inherit from."""
+"""Runs the checks of a component: all at once, as cases of pytest, or by a class to inherit from."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CHECKS: Final[Mapping[str, tuple[Check, ...]]] = {
 
 
 def checks_for(subject: Subject | Package) -> tuple[Check, ...]:
-    """Return the checks of the role of this part, and for a distribution those that other plugins contribute."""
+    """Return the checks of a component or distribution, with those that other plugins contribute."""
     contributed = package.contributed_checks(subject) if isinstance(subject, Package) else ()
     return (*CHECKS[subject.role], *contributed)
 
@@ -35,7 +35,7 @@ FLOOR_CASE: Final = "enough-checks-ran"
 
 @define(eq=False)
 class BoundCheck:
-    """One check on one part. `run` raises what a test is to fail or to be skipped with."""
+    """One check of one component. `run` raises the outcome that pytest expects."""
 
     check: Check
     subject: Subject | Package
@@ -43,15 +43,15 @@ class BoundCheck:
 
     @property
     def id(self) -> str:
-        """The part and the check, as pytest shows them."""
+        """The component and the check, as pytest shows them."""
         return f"{self.subject.name}:{self.check.id}"
 
     def result(self) -> Result:
-        """Return what came of it; it is run once."""
+        """Return the result; the check is run once."""
         return self.examined.result(self.subject, self.check)
 
     def run(self) -> None:
-        """Fail, or be skipped, under pytest as it should."""
+        """Run it as a test of pytest."""
         import pytest
 
         result = self.result()
@@ -65,18 +65,18 @@ class BoundCheck:
 
 @define(eq=False)
 class FloorCase:
-    """That enough checks of a part ran."""
+    """The requirement that enough checks of a component ran."""
 
     subject: Subject | Package
     examined: Examined
 
     @property
     def id(self) -> str:
-        """The part and the name of this case."""
+        """The component and the name of this case."""
         return f"{self.subject.name}:{FLOOR_CASE}"
 
     def run(self) -> None:
-        """Fail where too few checks of the part ran."""
+        """Fail if too few checks of the component ran."""
         import pytest
 
         report = Report([self.examined.result(self.subject, one) for one in checks_for(self.subject)])
@@ -88,14 +88,14 @@ class FloorCase:
 
 @define(eq=False)
 class Examined:
-    """Parts under check, with the results so far."""
+    """Components under check, with the results so far."""
 
     subjects: tuple[Subject | Package, ...]
     expected: Mapping[str, str] = field(factory=dict)
     _results: dict[tuple[str, str], Result] = field(factory=dict, init=False)
 
     def result(self, subject: Subject | Package, check: Check) -> Result:
-        """Return the result of one check, run now where it has not been."""
+        """Return the result of one check, which is run at the first call."""
         key = (f"{subject.role} {subject.name}", check.id)
         if key not in self._results:
             self._results[key] = self._run(subject, check)
@@ -104,19 +104,19 @@ class Examined:
     def _run(self, subject: Subject | Package, check: Check) -> Result:
         first = CHECKS[subject.role][0]
         if check is not first and self.result(subject, first).state == "failed":
-            why = f"nothing more can be checked before {first.id} passes"
+            why = f"no other check can run before {first.id} passes"
             return Result(subject.name, subject.role, check.id, check.title, "skipped", why)
         return outcome_of(check, subject, self.expected)  # type: ignore[arg-type]
 
     def cases(self) -> Iterator[BoundCheck | FloorCase]:
-        """Yield every check of every part, and after each part's whether enough of them ran."""
+        """Yield every check of every component, and after each component whether enough of them ran."""
         for subject in self.subjects:
             for check in checks_for(subject):
                 yield BoundCheck(check, subject, self)
             yield FloorCase(subject, self)
 
     def report(self, told: Callable[[Result], None] = lambda _: None) -> Report:
-        """Run every check and return the results; `told` hears each as it comes."""
+        """Run every check and return the results; `told` is called with each of them."""
         report = Report()
         for subject in self.subjects:
             for check in checks_for(subject):
@@ -136,11 +136,11 @@ def examine(
     wheel: bool = True,
     plugins: Plugins | None = None,
 ) -> Examined:
-    """Return the part of this name, ready to be checked.
+    """Return the components with this name, ready to be checked.
 
-    `name` is a distribution, which means itself and all its components, or a component (`NAME` or
-    `DISTRIBUTION/NAME`). `keys` are settings as in a pipeline file, `expected_failures` maps a check's id to why it
-    fails. Raises UnknownName.
+    `name` is a distribution, for itself and all its components, or a component (`NAME` or `DISTRIBUTION/NAME`). `keys`
+    are settings as in a pipeline file. `expected_failures` maps the id of a check to the reason of its failure. Raises
+    UnknownName.
     """
     plugins = installed() if plugins is None else plugins
     whole = package_of(name, plugins, builds=wheel)
@@ -156,10 +156,10 @@ def examine(
 
     def under(component: Component) -> Subject:
         mine = dict(keys or {})
-        if whole is not None:  # each of several components takes the keys that it has
+        if whole is not None:  # each of several components gets the keys that it has
             try:
                 known = keys_of(component.config_class())
-            except PluginUnavailable:  # the first check says so
+            except PluginUnavailable:  # the first check reports it
                 known = {}
             mine = {key: value for key, value in mine.items() if key in known}
         return Subject(component=component, keys=mine, unplugged=unplugged, absent=absent)
@@ -170,7 +170,7 @@ def examine(
 
 
 def parametrize_checks(name: str, **options: Any) -> Any:
-    """Return the pytest mark that gives a test every check of a part, as the argument `check`.
+    """Return the pytest mark that runs a test with every check of a component, as the argument `check`.
 
     The test is `def test_conformance(check): check.run()`; the options are those of `examine`.
     """
@@ -181,7 +181,7 @@ def parametrize_checks(name: str, **options: Any) -> Any:
 
 
 class Conformance:
-    """Inherit from this in a class `Test...`: a test for each check of the part `name`.
+    """Base class for a class `Test...` with a test for each check of the component `name`.
 
     `keys`, `unplugged`, `absent`, `expected_failures` and `wheel` are as in `examine`.
     """

@@ -1,4 +1,4 @@
-"""What a control law must hold to."""
+"""Conformance checks of a control law."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ LONGEST_S: Final = 60.0
 
 
 class Tick(NamedTuple):
-    """One tick of a law: what it was given and what it returned."""
+    """One tick of a law: its arguments and its result."""
 
     before: Any
     frame: Frame
@@ -43,7 +43,7 @@ class Tick(NamedTuple):
 
 
 def ticks_of(subject: Subject, thing: str = "a soft thing") -> list[Tick]:
-    """Return the ticks of this law on the bench until it ends the grasp, at most four seconds of them; done once."""
+    """Return the ticks of this law on the bench, until it ends the grasp or for four seconds; computed once."""
     kept: dict[str, list[Tick]] = subject.kept.setdefault("ticks", {})
     if thing not in kept:
         kept[thing] = fresh_ticks(subject, thing)
@@ -53,9 +53,9 @@ def ticks_of(subject: Subject, thing: str = "a soft thing") -> list[Tick]:
 def fresh_ticks(
     subject: Subject, thing: str = "a soft thing", channels: Any = None, first: int = 0
 ) -> list[Tick]:
-    """Return such ticks done anew.
+    """Return such ticks, computed again.
 
-    Before tick `first`, where it is given, the state is made anew from plain numbers.
+    Before tick `first`, if given, the state is rebuilt from plain numbers.
     """
     law = subject.create()
     step, params, state = type(law).step, law.params(), law.init()
@@ -91,7 +91,7 @@ def _required(subject: Subject) -> set[str]:
 
 
 def _made_again(value: Any) -> Any:
-    """Return the same named tuples around numbers that went through JSON."""
+    """Return the same named tuples after their numbers were written as JSON and read."""
     if isinstance(value, tuple) and hasattr(value, "_fields"):
         return type(value)(*(_made_again(one) for one in value))
     if isinstance(value, tuple):
@@ -136,7 +136,7 @@ def step_is_a_plain_function(subject: Subject) -> None:
     raw = inspect.getattr_static(cls, "step")
     demand(
         isinstance(raw, staticmethod),
-        f"step of {cls.__name__} is no static method: write a module function `step(params, state, "
+        f"step of {cls.__name__} is not a static method: write a module function `step(params, state, "
         "frame, pads)` and in "
         "the class `step = staticmethod(step)`",
     )
@@ -147,12 +147,12 @@ def step_is_a_plain_function(subject: Subject) -> None:
 
 
 def params_are_numbers(subject: Subject) -> None:
-    """`params()` is a named tuple of floats and ints, each as it is annotated."""
+    """`params()` is a named tuple of floats and ints, with the annotated types."""
     _demand_numbers(subject.create().params(), "params")
 
 
 def state_is_numbers(subject: Subject) -> None:
-    """`init()` is a named tuple of floats and ints, each as it is annotated."""
+    """`init()` is a named tuple of floats and ints, with the annotated types."""
     _demand_numbers(subject.create().init(), "state")
 
 
@@ -168,7 +168,7 @@ def begins_in_the_approach(subject: Subject) -> None:
 
 
 def types_stay(subject: Subject) -> None:
-    """No number of the state changes its type, and every state is of the first one's class."""
+    """No number of the state changes its type, and every state has the class of the first one."""
     for tick in ticks_of(subject):
         demand(
             type(tick.after) is type(tick.before),
@@ -187,7 +187,7 @@ def types_stay(subject: Subject) -> None:
 
 
 def commands_are_numbers(subject: Subject) -> None:
-    """Every command is a Command of an int kind and three floats."""
+    """Every command is a Command with an integer kind and three floats."""
     for tick in ticks_of(subject):
         command = tick.command
         demand(
@@ -222,7 +222,7 @@ def commands_are_of_declared_kinds(subject: Subject) -> None:
 
 
 def commands_are_finite(subject: Subject) -> None:
-    """Values are finite, limits are not negative and no NaN, whatever is between the fingers."""
+    """Values are finite, and limits are neither negative nor NaN, with any object between the fingers."""
     for thing in THINGS:
         for tick in ticks_of(subject, thing):
             command = tick.command
@@ -241,20 +241,20 @@ def commands_are_finite(subject: Subject) -> None:
 
 
 def same_tick_same_answer(subject: Subject) -> None:
-    """`step` is pure: each tick asked again, in another order, gives the same command and state."""
+    """`step` is pure: each tick, repeated in another order, gives the same command and state."""
     ticks, law = ticks_of(subject), subject.create()
     step, params = type(law).step, law.params()
     for tick in reversed(ticks[::7]):
         command, after = step(params, tick.before, tick.frame, tick.pads)
         demand(
             repr((command, after)) == repr((tick.command, tick.after)),
-            f"asked again for t = {tick.frame.t_s:.3f} s, step gives {command} instead of {tick.command}: it may know "
+            f"repeated for t = {tick.frame.t_s:.3f} s, step gives {command} instead of {tick.command}: it may know "
             "nothing but its arguments (no clock, no global, no list that lives on)",
         )
 
 
 def state_is_all_it_remembers(subject: Subject) -> None:
-    """Stopped half way, its state and params written down and read again, it goes on as it would have."""
+    """Continued from a state and params that were written and read again, it gives the same commands."""
     whole = ticks_of(subject)
     resumed = fresh_ticks(subject, first=max(len(whole) // 2, 1))
     demand(
@@ -265,18 +265,18 @@ def state_is_all_it_remembers(subject: Subject) -> None:
 
 
 def two_runs_do_not_meet(subject: Subject) -> None:
-    """Two grasps in turn give what each gives alone: no state is shared."""
+    """Two alternating grasps give the same commands as each alone: no state is shared."""
     first = ticks_of(subject)
     fresh_ticks(subject, "nothing")
     again = fresh_ticks(subject)
     demand(
         [repr(one.command) for one in first] == [repr(one.command) for one in again],
-        "a second grasp is not like the first: keep nothing in the class or the module",
+        "a second grasp differs from the first: keep no state in the class or the module",
     )
 
 
 def reads_what_it_declares(subject: Subject) -> None:
-    """A gripper with the channels in `requires` is enough: without the others the commands are the same."""
+    """The channels in `requires` suffice: without the others, the commands are the same."""
     full, own = ticks_of(subject), fresh_ticks(subject, channels=_required(subject))
     demand(
         [repr(one.command) for one in full] == [repr(one.command) for one in own],
@@ -287,7 +287,7 @@ def reads_what_it_declares(subject: Subject) -> None:
 
 
 def survives_a_silent_sensor(subject: Subject) -> None:
-    """A frame of NaN raises nothing, and what follows is a command."""
+    """A frame of NaN does not raise, and gives a command."""
     law = subject.create()
     step, params, state = type(law).step, law.params(), law.init()
     silent = Frame(0.001, 0.001, *(nan,) * 7, 0)
@@ -296,13 +296,13 @@ def survives_a_silent_sensor(subject: Subject) -> None:
         command, _ = step(params, state, silent, pads)
     except Exception as error:
         raise CheckFailed(
-            f"step raised {named(error)} on a frame without any number: compare so that NaN falls on the safe side"
+            f"step raised {named(error)} on a frame of NaN: write comparisons so that NaN gives the safe result"
         ) from error
-    demand(isinstance(command, Command), f"step returned {command!r} on a frame without any number")
+    demand(isinstance(command, Command), f"step returned {command!r} on a frame of NaN")
 
 
 def phases_are_a_laws_own(subject: Subject) -> None:
-    """The phases are APPROACH, SQUEEZE and HOLD, and never go back."""
+    """The phases are APPROACH, SQUEEZE and HOLD, in this order."""
     for thing in THINGS:
         latest = APPROACH
         for tick in ticks_of(subject, thing):
@@ -320,10 +320,10 @@ def phases_are_a_laws_own(subject: Subject) -> None:
 
 
 def ends_every_grasp(subject: Subject) -> None:
-    """On a soft thing, on a hard one and on nothing it ends the grasp by itself, with an outcome there is."""
+    """With a soft object, a hard object and nothing, it ends the grasp by itself with a valid outcome."""
     for thing in THINGS:
         gripper = bench(_all_channels(), thing)
-        # The runner's own end of a controller that never gives up comes after three openings more.
+        # The runner ends a controller that does not end the grasp, after three more opening times.
         grasp = run_grasp(gripper, subject.create(), RunConfig(grasp_timeout_s=LONGEST_S))
         demand(
             grasp.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RUNNING),

@@ -1,4 +1,4 @@
-"""What a feature set must hold to."""
+"""Conformance checks of a feature set."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _features(subject: Subject, trace: Trace, of: str = "a whole grasp") -> Feat
 
 
 def _own(subject: Subject) -> Trace:
-    """Return the whole grasp, as a gripper with just the channels that the set declares would give it."""
+    """Return a whole grasp of a gripper that has only the channels in `requires`."""
     return masked(squeeze(), {one.name for one in subject.entry.requires})
 
 
@@ -49,7 +49,7 @@ def _same(a: Features, b: Features) -> bool:
 
 
 def gives_what_it_declares(subject: Subject) -> None:
-    """The names and units are those of the entry, in its order, on every trace."""
+    """Names and units are those of the entry, in its order, for every trace."""
     declared = tuple((feature.name, feature.unit) for feature in subject.entry.features)
     for of, trace in {"a whole grasp": squeeze(), **odd_traces()}.items():
         features = _features(subject, trace, of)
@@ -66,7 +66,7 @@ def _listed(features: tuple[tuple[str, str], ...]) -> str:
 
 
 def values_are_floats(subject: Subject) -> None:
-    """Every value is a Python float: no int, no scalar of numpy's."""
+    """Every value is a Python float, not an int or a scalar of numpy."""
     for of, trace in {"a whole grasp": squeeze(), **odd_traces()}.items():
         features = _features(subject, trace, of)
         for name, value in zip(features.names, features.values, strict=True):
@@ -77,7 +77,7 @@ def values_are_floats(subject: Subject) -> None:
 
 
 def something_is_defined_on_a_whole_grasp(subject: Subject) -> None:
-    """On a whole grasp of a springy thing at least one feature is defined."""
+    """For a whole grasp of an elastic object, at least one feature is defined."""
     features = _features(subject, squeeze())
     demand(
         any(value == value for value in features.values),
@@ -87,13 +87,13 @@ def something_is_defined_on_a_whole_grasp(subject: Subject) -> None:
 
 
 def answers_every_trace(subject: Subject) -> None:
-    """Empty, short, without contact, without a channel, with holes: defined, or NaN with a reason."""
+    """Any trace (empty, short, without contact, without a channel, with gaps) gives values, or NaN with a reason."""
     for of, trace in odd_traces().items():
         _features(subject, trace, of)
 
 
 def answers_a_trace_cut_anywhere(subject: Subject) -> None:
-    """`extract(trace.until(t))` is defined for every t: early recognition asks it."""
+    """`extract(trace.until(t))` works for every t, as early recognition needs it."""
     whole = squeeze()
     for k in range(CUTS):
         t = float(whole.t_s[-1]) * k / (CUTS - 1)
@@ -101,20 +101,20 @@ def answers_a_trace_cut_anywhere(subject: Subject) -> None:
 
 
 def same_trace_same_features(subject: Subject) -> None:
-    """The same trace gives the same features, by the same instance and by another."""
+    """The same trace gives the same features with the same and with another instance."""
     set_, trace = subject.create(), squeeze()
     first = set_.extract(trace)
     set_.extract(squeeze(stiffness_n_m=500.0))
     for again in (set_.extract(trace), subject.create().extract(trace)):
         demand(
             _same(first, again),
-            f"asked again it gives {again.as_dict()} instead of {first.as_dict()}: keep nothing between calls and draw "
+            f"called again it gives {again.as_dict()}, not {first.as_dict()}: keep no state between calls and draw "
             "nothing at random",
         )
 
 
 def leaves_the_trace_alone(subject: Subject) -> None:
-    """The trace is as it was afterwards."""
+    """`extract` does not change the trace."""
     trace = copied(squeeze())
     before = {name: getattr(trace, name).tobytes() for name in columns_of(trace)}
     _features(subject, trace)
@@ -127,19 +127,19 @@ def leaves_the_trace_alone(subject: Subject) -> None:
 
 
 def reads_what_it_declares(subject: Subject) -> None:
-    """A gripper with the channels in `requires` is enough: without the others the features are the same."""
+    """The channels in `requires` suffice: without the others, the features are the same."""
     full, own = _features(subject, squeeze()), _features(subject, _own(subject), "a grasp")
     required = {one.name for one in subject.entry.requires}
     others = [name for name in COLUMNS_OF_CHANNEL if name not in required]
     demand(
         _same(full, own),
         f"without the channels it does not declare ({', '.join(others)}) it gives {own.as_dict()} instead of "
-        f"{full.as_dict()}: add what it reads to `requires`",
+        f"{full.as_dict()}: add the channels that it reads to `requires`",
     )
 
 
 def does_not_hang_on_the_start_of_the_clock(subject: Subject) -> None:
-    """A clock that began earlier changes no feature, beyond rounding."""
+    """A shift of all times changes no feature beyond rounding."""
     early, late = _features(subject, squeeze()), _features(subject, shifted(squeeze(), 64.0))
     for name, a, b in zip(early.names, early.values, late.values, strict=True):
         demand(
@@ -150,7 +150,7 @@ def does_not_hang_on_the_start_of_the_clock(subject: Subject) -> None:
 
 
 def chunks_do_not_matter(subject: Subject) -> None:
-    """A view of a longer trace gives what the same ticks give by themselves."""
+    """A view of a longer trace gives the same features as a copy of its ticks."""
     view = squeeze().until(1.7)
     demand(
         _same(_features(subject, view), _features(subject, copied(view))),
@@ -160,13 +160,13 @@ def chunks_do_not_matter(subject: Subject) -> None:
 
 
 def survives_json(subject: Subject) -> None:
-    """The features are the same after they were written as JSON and read again."""
+    """The features survive being written as JSON and read again."""
     for of, trace in {"a whole grasp": squeeze(), **odd_traces()}.items():
         features = _features(subject, trace, of)
         again = json.loads(json.dumps(features.as_dict(), allow_nan=False))
         demand(again == features.as_dict(), f"on {of} {features.as_dict()} became {again} through JSON")
         text = json.loads(json.dumps(dict(features.reasons)))
-        demand(text == dict(features.reasons), f"the reasons {features.reasons!r} are no plain text")
+        demand(text == dict(features.reasons), f"the reasons {features.reasons!r} are not plain text")
 
 
 CHECKS: Final = (

@@ -1,4 +1,4 @@
-"""The law by which a gripper is closed while it is checked: slow, weak, and for every kind of command."""
+"""A slow and weak control law, for every kind of command, by which a gripper under check is closed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from graspsense.core.signals import (
 SPEED_M_S: Final = 0.01
 EFFORT_N: Final = 12.0
 EFFORT_RATE_N_S: Final = 15.0
-"""An effort is raised until the fingers move: below their breakaway they do not."""
+"""Rate at which an effort rises until the fingers move, which takes the breakaway effort."""
 FORCE_N: Final = 2.0
 REST_SPEED_M_S: Final = 5e-4
 REST_S: Final = 0.5
@@ -35,13 +35,13 @@ LONGEST_S: Final = 6.0
 
 
 class GentleParams(NamedTuple):
-    """Which kind of command to close with."""
+    """The kind of command."""
 
     kind: int
 
 
 class GentleState(NamedTuple):
-    """Since when, and since when at rest."""
+    """The start of the grasp, the last gap, and the stillness."""
 
     phase: int
     outcome: int
@@ -52,9 +52,9 @@ class GentleState(NamedTuple):
 
 
 def closing(kind: int, seconds: float, before_m: float, frame: Frame) -> Command:
-    """Return the command of this kind that closes gently, so long after its beginning.
+    """Return the command of this kind that closes gently, this many seconds after the start.
 
-    `before_m` is the gap of the frame before: the gripper's own velocity is still to be checked.
+    `before_m` is the gap of the previous frame, because the velocity of the gripper is not yet checked.
     """
     if kind == VELOCITY:
         return Command(VELOCITY, -SPEED_M_S, EFFORT_N, inf)
@@ -69,7 +69,7 @@ def closing(kind: int, seconds: float, before_m: float, frame: Frame) -> Command
 
 
 def step(params: GentleParams, state: GentleState, frame: Frame, pads: Pads) -> tuple[Command, GentleState]:
-    """Close until the gap has stood still, or for six seconds."""
+    """Close until the gap is at rest, or for six seconds."""
     begun, gap, still = state.begun_t_s, state.gap_m, state.still
     if begun != begun:
         begun, gap, still = frame.t_s, frame.gap_m, Stillness(frame.t_s, frame.gap_m)
@@ -101,8 +101,10 @@ class GentleController(Controller[int]):
 
 
 def kind_of(accepts: tuple[str, ...]) -> int:
-    """Return the kind of command to close a gripper with that takes these."""
+    """Return the kind of command by which to close a gripper that accepts these."""
     for kind in (VELOCITY, POSITION, FORCE, EFFORT):
         if KINDS[kind] in accepts:
             return kind
-    raise ValueError("a gripper that takes no kind of command cannot be closed: give `accepts` in its entry")
+    raise ValueError(
+        "a gripper that accepts no kind of command cannot be closed: give `accepts` in its entry"
+    )

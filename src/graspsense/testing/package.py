@@ -1,4 +1,4 @@
-"""What a distribution must hold to: its plugins load, and lightly; all they name is there, also in its wheel."""
+"""Conformance checks of a distribution: its plugins load quickly, and all that they name exists, also in its wheel."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ PROBE_S: Final = 1.0
 
 
 def plugins_load(package: Package) -> None:
-    """Every plugin of the distribution is loaded: it can be imported, is for this API, and breaks no rule."""
+    """Every plugin of the distribution can be imported, is written for this API, and violates no rule."""
     for status in package.statuses:
         demand(
             status.state == "loaded",
@@ -50,7 +50,7 @@ def plugins_load(package: Package) -> None:
 
 
 def _place(traceback: str) -> str:
-    """Return where a traceback last was in the plugin's own files, in words."""
+    """Return the last place of a traceback within the files of the plugin, in words."""
     own = [
         (path, line)
         for path, line in re.findall(r'File "([^"<]+)", line (\d+)', traceback)
@@ -60,7 +60,7 @@ def _place(traceback: str) -> str:
 
 
 def plugin_modules_are_light(package: Package) -> None:
-    """Listing it imports no numpy and no driver, and takes no time one would notice."""
+    """Listing it imports neither numpy nor a driver, and takes no noticeable time."""
     code = (
         "import json, sys\n"
         "import graspsense.core.plugins as p\n"
@@ -94,7 +94,7 @@ def plugin_modules_are_light(package: Package) -> None:
 
 
 def everything_declared_is_there(package: Package) -> None:
-    """Every class, config, pipeline, model, reader and command that it declares can be had."""
+    """Every class, config, pipeline, model, reader and command that it declares can be loaded."""
     for component in package.components:
         component.config_class()
         component.component_class()
@@ -106,7 +106,7 @@ def everything_declared_is_there(package: Package) -> None:
 
 
 def names_are_free(package: Package) -> None:
-    """No other distribution here uses the name of one of its parts."""
+    """No other installed distribution uses the name of one of its components or resources."""
     others: list[Any] = [
         *package.plugins.components(),
         *package.plugins.pipelines(),
@@ -138,7 +138,7 @@ def pipelines_fit_together(package: Package) -> None:
 
 
 def observers_disturb_nobody(package: Package) -> None:
-    """Observers take a whole run without raising, return nothing and leave what they are shown as it is."""
+    """Observers raise nothing, return nothing, and do not change their arguments."""
     mine = [(status, name) for status in package.statuses for name in status.hooks if name in OBSERVERS]
     if not mine:
         raise CheckSkipped("it observes nothing")
@@ -166,12 +166,12 @@ def observers_disturb_nobody(package: Package) -> None:
             demand(not results, f"{hook} returned {results}: an observer returns nothing")
     demand(
         (run.settings, run.components, run.labels) == before and trial.trace.gap_m.tobytes() == column,
-        "an observer changed what it was shown: work on a copy",
+        "an observer changed its arguments: work on a copy",
     )
 
 
 def probe_keeps_its_time(package: Package) -> None:
-    """Looking for devices ends in time and raises nothing, whatever is plugged in."""
+    """The search for devices ends in time and raises nothing, whatever is connected."""
     if not any("graspsense_probe_devices" in one.hooks for one in package.statuses):
         raise CheckSkipped("it looks for no devices")
     began = time.perf_counter()
@@ -188,10 +188,10 @@ def probe_keeps_its_time(package: Package) -> None:
 
 
 def wheel_is_complete(package: Package) -> None:
-    """What is installed holds all that is needed; of an editable installation a wheel is built to see that."""
+    """The installed files are complete; for an editable installation, a wheel is built and examined."""
     folder = _editable_folder(package.distribution)
     if folder is None:
-        return  # installed from a wheel already: the other checks look at what was in it
+        return  # Installed from a wheel: the other checks examine its content.
     if not package.builds:
         raise CheckSkipped("no wheel was asked for (--no-wheel)")
     with tempfile.TemporaryDirectory() as scratch:

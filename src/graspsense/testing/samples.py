@@ -1,4 +1,4 @@
-"""Traces, tables and runs that parts are checked on: made here, not measured, and the same every time."""
+"""Traces, tables and runs for checks: synthetic, and the same every time."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ COLUMNS_OF_CHANNEL: Final = {
     "edge_right": ("edge_right_n",),
     "pads": PAD_COLUMNS,
 }
-"""Channel to the columns of a trace that hold it."""
+"""The columns of a trace for each channel."""
 
 
 def squeeze(stiffness_n_m: float = 4000.0, contacts: tuple[float, float] = (0.06, 0.0598)) -> Trace:
     """Return a whole grasp: approach at 10 mm/s, squeeze by 4 mm, hold with relaxation, release.
 
-    The pads touch at these gaps (m); one below 0 is never reached.
+    The pads touch at the gaps `contacts` (m); a gap below 0 is never reached.
     """
     dt = 1.0 / RATE_HZ
     times = np.arange(0.0, 2.4, dt)
@@ -42,7 +42,7 @@ def squeeze(stiffness_n_m: float = 4000.0, contacts: tuple[float, float] = (0.06
     )
     velocity = np.gradient(gap, dt)
     relaxed = np.where(times > 1.5, 0.85 + 0.15 * np.exp(-(times - 1.5) / 0.1), 1.0)
-    # A ripple stands for noise: small, and the same every time.
+    # A small ripple takes the place of noise, and is the same every time.
     ripple = 0.004 * np.sin(2.0 * np.pi * 61.0 * times)
     force = [stiffness_n_m * np.maximum(at - gap, 0.0) * relaxed + ripple for at in contacts]
     frames = [
@@ -55,7 +55,7 @@ def squeeze(stiffness_n_m: float = 4000.0, contacts: tuple[float, float] = (0.06
 
 
 def _image(frame: _Frame, counter: int) -> Pads:
-    """Return the cell image of this frame: the force as a blob on the gripping face."""
+    """Return the cell image of this frame, with the force distributed smoothly on the gripping face."""
     rows, columns = np.divmod(np.arange(CELLS - FIRST_PAD_CELL), 3)
     blob = np.exp(-(((rows - 2.0) / 1.2) ** 2) - ((columns - 1.0) / 0.8) ** 2)
     cells = []
@@ -78,12 +78,12 @@ def masked(trace: Trace, channels: set[str]) -> Trace:
 
 
 def shifted(trace: Trace, seconds: float) -> Trace:
-    """Return the trace as it were had its clock begun earlier."""
+    """Return the trace with all times shifted."""
     return evolve(trace, t_s=trace.t_s + seconds, pad_t_s=trace.pad_t_s + seconds)
 
 
 def copied(trace: Trace) -> Trace:
-    """Return a trace with arrays of its own."""
+    """Return a trace with copied arrays."""
     columns = {name: getattr(trace, name).copy() for name in columns_of(trace)}
     return evolve(trace, **columns)
 
@@ -94,18 +94,18 @@ def columns_of(trace: Trace) -> list[str]:
 
 
 def odd_traces() -> dict[str, Trace]:
-    """Return the traces that a feature set must have an answer to, by what is odd about them."""
+    """Return the unusual traces that a feature set must handle, by their description."""
     whole = squeeze()
     return {
         "an empty trace": whole.until(-1.0),
         "a trace of one tick": whole.until(0.0),
         "a trace that ends before contact": whole.until(0.5),
-        "a trace that ends at the very contact": whole.until(1.02),
+        "a trace that ends at contact": whole.until(1.02),
         "a trace that ends in the squeeze": whole.until(1.3),
         "a trace in which nothing was there": squeeze(contacts=(-1.0, -1.0)),
         "a trace in which one pad touched": squeeze(contacts=(0.06, -1.0)),
         "a trace with contact from the first tick on": squeeze(contacts=(0.08, 0.08)),
-        "a trace of a thing without any stiffness": squeeze(stiffness_n_m=0.0),
+        "a trace of an object without stiffness": squeeze(stiffness_n_m=0.0),
         "a trace without cell images": masked(whole, set(COLUMNS_OF_CHANNEL) - {"pads"}),
         "a trace without any channel": masked(whole, set()),
         "a trace with gaps in its numbers": _holed(whole),
@@ -122,7 +122,7 @@ def _holed(trace: Trace) -> Trace:
 
 
 def three_kinds(trials: int = 45, missing: bool = False) -> tuple[FeatureTable, list[str]]:
-    """Return a table of trials of three labels that can be told apart, and their labels."""
+    """Return a table of trials with three separable labels, and their labels."""
     rng = np.random.default_rng(5)
     labels = [("bottle:full_open", "bottle:empty_open", "can:full")[i % 3] for i in range(trials)]
     values = rng.normal(size=(trials, 4)) * [1e-3, 1e-3, 0.5, 0.02]

@@ -1,4 +1,4 @@
-"""What a gripper gives while it is opened, closed gently, and opened again; recorded once and looked at often."""
+"""The readings of a gripper while it is opened, closed gently, and opened again; recorded once for all checks."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ RECORDED_FRAMES: Final = 2000
 
 @define
 class Session:
-    """One use of a gripper, by stages `opening`, `closing`, `open again`; a recording has `recording` alone."""
+    """The readings by stage: `opening`, `closing`, `open again`; or `recording` for a recording."""
 
     info: DeviceInfo
     stages: dict[str, list[Reading]] = field(factory=dict)
@@ -38,7 +38,7 @@ class Session:
 
     @property
     def readings(self) -> list[Reading]:
-        """Return everything that was read, in order."""
+        """Return all readings, in order."""
         return [one for stage in self.stages.values() for one in stage]
 
     @property
@@ -57,7 +57,7 @@ class Session:
 
 
 def recorded(subject: Subject) -> Session:
-    """Open the gripper, use it for some seconds of its own clock, close it, and return what it gave."""
+    """Open the gripper, use it for some seconds of its own clock, close it, and return the readings."""
     backend: SensorBackend[Any] = subject.create()
     try:
         info = backend.open(0)
@@ -81,14 +81,12 @@ def recorded(subject: Subject) -> Session:
     finally:
         backend.close()
     if not session.frames:
-        raise CheckFailed(
-            f"no frame came within {TIMEOUT_S} s, {session.silent} times: is its rate what it says?"
-        )
+        raise CheckFailed(f"no frame came within {TIMEOUT_S} s, {session.silent} times: is its rate correct?")
     return session
 
 
 def limits_of(info: DeviceInfo) -> GuardParams:
-    """Return the limits that hold at the first use of a gripper."""
+    """Return the limits for the first use of a gripper."""
     return GuardParams(info.effort_limit_n, info.speed_limit_m_s, EFFORT_N, FIRST_SPEED_M_S, CONTACT_FORCE_N)
 
 
@@ -99,7 +97,7 @@ def _ticks(info: DeviceInfo, seconds: float) -> int:
 def _use(
     session: Session, backend: SensorBackend[Any], stage: str, ticks: int, command: Command | int | None
 ) -> None:
-    """Read so often, and command each time: a command as it is, or the kind to close with."""
+    """Read `ticks` times, and apply after each the given command, or one of the given kind that closes."""
     readings = session.stages.setdefault(stage, [])
     watcher, limits = GuardState(0, 0, 0), limits_of(session.info)
     for _ in range(ticks):

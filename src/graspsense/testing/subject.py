@@ -1,4 +1,4 @@
-"""What is checked: a component with the settings to check it under, or a whole distribution."""
+"""The subject of a check: a component with the settings to check it with, or a distribution."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 class Subject:
     """A component under check.
 
-    `keys` are the settings it is checked with, as in its table of a pipeline file. `unplugged` are keys with which
-    the gripper vanishes within two seconds of use, `absent` keys with which it is not there at all; without them
-    the checks that need them are skipped.
+    `keys` are the settings to check it with, as in its table of a pipeline file. With the keys in `unplugged`, the
+    gripper disappears within two seconds of use; with those in `absent`, it is not connected. Without them, the checks
+    that need them are skipped.
     """
 
     component: Component
@@ -29,7 +29,7 @@ class Subject:
     unplugged: Mapping[str, Any] | None = None
     absent: Mapping[str, Any] | None = None
     kept: dict[str, Any] = field(factory=dict, init=False)
-    """What several checks look at, made once."""
+    """Values that several checks use, computed once."""
 
     @property
     def name(self) -> str:
@@ -43,11 +43,11 @@ class Subject:
 
     @property
     def entry(self) -> Any:
-        """What its plugin declares about it."""
+        """The entry by which its plugin declares it."""
         return self.component.entry
 
     def config(self, **keys: Any) -> Any:
-        """Return its config, made from `keys` as strictly as from a file."""
+        """Return its config, checked as strictly as one from a file."""
         return build(self.component, {**self.keys, **keys})
 
     def create(self, **keys: Any) -> Any:
@@ -56,7 +56,7 @@ class Subject:
 
     @cached_property
     def session(self) -> Session:
-        """Return what a gripper gave while it was opened, closed and opened again; recorded once."""
+        """Return the readings of the gripper while it is opened, closed and opened again; recorded once."""
         from graspsense.testing.session import recorded
 
         return recorded(self)
@@ -73,7 +73,7 @@ class Package:
     resources: tuple[Resource[Any], ...]
     plugins: Plugins
     builds: bool = True
-    """Whether a wheel is built to see that nothing is missing from it."""
+    """Whether a wheel is built to check that it is complete."""
 
     @property
     def name(self) -> str:
