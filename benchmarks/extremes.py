@@ -34,14 +34,18 @@ from numpy.typing import NDArray
 from selection import controller_is_stable
 
 from graspsense.plugin_api import ConfigError, NotCompilable, bind, create
+from graspsense_sim_gripper.build import instantiate, problem_of
+from graspsense_sim_gripper.compiled.compose import plant_move
+from graspsense_sim_gripper.compiled.jit import compile_part
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.exact.propagate import bind_move
-from graspsense_sim_gripper.kernel import compiled, plant_of
 from graspsense_sim_gripper.objects.library import find
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.setting import Setting, setting_of
+from graspsense_sim_gripper.problem import GraspSetup
+from graspsense_sim_gripper.reduction.model import Reduction
+from graspsense_sim_gripper.reduction.propose import grip_of, propose
 from graspsense_sim_gripper.terms.registry import laws_of
 
 Row = dict[str, Any]
@@ -73,7 +77,8 @@ def _pressing(params: Any, state: Any, carrying_n: float, effort_n: float, dt: f
 class Ready:
     """A plant as a user's run of this config has it."""
 
-    setting: Setting
+    setup: GraspSetup
+    reduction: Reduction
     params: Any
     move: Callable[[Any, PlantState, float, float], PlantState]
     by: str
@@ -81,21 +86,22 @@ class Ready:
 
 def ready(config: SimConfig, spec: ObjectSpec) -> Ready:
     """Return the plant of this scene, by exact maps where it is piecewise linear, as the backend has it."""
-    setting = setting_of(config, spec, 0)
-    steps = plant_of(laws_of(setting.kinds))
-    found = discretise(config, setting)
-    if found is None:
-        return Ready(setting=setting, params=setting.plant, move=steps, by="steps")
-    params, shape = found
-    return Ready(setting=setting, params=params, move=bind_move(setting.kinds, shape, steps), by="maps")
+    problem = problem_of(config, spec)
+    reduction = propose(problem, grip_of(problem))
+    setup = instantiate(problem, reduction, 0)
+    params, move, by = setup.plant, plant_move(laws_of(setup.kinds)), "steps"
+    exact = discretise(config, setup)
+    if exact is not None:
+        params, move, by = exact[0], bind_move(setup.kinds, exact[1], move), "maps"
+    return Ready(setup=setup, reduction=reduction, params=params, move=move, by=by)
 
 
 @cache
 def _compiled(kinds: tuple[str, ...]) -> Callable[..., Any]:
     """Return the squeeze of an object of these terms in steps, compiled where that is to be had."""
-    plain = bind(_pressing, move=plant_of(laws_of(kinds)))
+    plain = bind(_pressing, move=plant_move(laws_of(kinds)))
     try:
-        return compiled(plain)
+        return compile_part(plain)
     except NotCompilable:
         return plain
 
@@ -118,15 +124,13 @@ def press(
         expected_force_n=max(effort_n, 1.0),
     )
     plant = ready(config, spec)
-    drive, state, dt = plant.setting.plant.drive, plant.setting.body, plant.setting.dt_s
+    drive, state, dt = plant.setup.plant.drive, plant.setup.state, plant.setup.dt_s
     # It comes with its speed, so that the tick of a slow controller does not blur it.
     motion = state.motion
     state = state._replace(motion=motion._replace(speed_rev_s=-speed_m_s / motion.jacobian_m_rev))
     carrying = drive.coulomb_n + drive.damping_n_s_m * speed_m_s
     forces = np.zeros(max(round(seconds / dt), 1))
-    loop = (
-        _compiled(plant.setting.kinds) if fast and plant.by == "steps" else bind(_pressing, move=plant.move)
-    )
+    loop = _compiled(plant.setup.kinds) if fast and plant.by == "steps" else bind(_pressing, move=plant.move)
     state = loop(plant.params, state, carrying, effort_n, dt, forces)
     return forces, state, plant
 
@@ -140,8 +144,7 @@ def against_reference(config: SimConfig, spec: ObjectSpec, **how: Any) -> Row:
     """Return errors of peak and trace, whether all is finite, and what the simulator says of the peak itself."""
     forces, state, plant = press(config, spec, **how)
     expected, wanted, _ = press(evolve(config, fidelity="reference"), spec, **how)
-    choice = plant.setting.choice
-    flagged = choice is not None and choice.contact.decision == "peak not resolved"
+    flagged = plant.reduction.contact.decision == "peak not resolved"
     return {
         "by": plant.by,
         "peak_error": abs(state.peak_n - wanted.peak_n) / max(wanted.peak_n, 1.0),
@@ -248,8 +251,7 @@ def across(case: str, of: Callable[[float], ObjectSpec], values: Sequence[float]
     """Yield a row for each place between these values where the model changes: no jump there beyond the accuracy."""
 
     def made(value: float) -> tuple[str, ...]:
-        choice = press(BASE, of(value), seconds=1e-3)[2].setting.choice
-        return () if choice is None else choice.made
+        return press(BASE, of(value), seconds=1e-3)[2].reduction.treatment
 
     for least, most in pairwise(values):
         if made(least) == made(most):
@@ -336,13 +338,13 @@ def energy(quick: bool) -> Iterator[Row]:
                     ("elastic", {"k1_n_m": k1, "k3_n_m3": k3}), ("loss", {"damping_n_s_m": contents})
                 )
                 plant = ready(config, spec)
-                state = plant.setting.body
+                state = plant.setup.state
                 motion = state.motion
                 state = state._replace(motion=motion._replace(speed_rev_s=-0.05 / motion.jacobian_m_rev))
                 most, first = -math.inf, 0.5 * mass * 0.05**2
                 last = first
                 for _ in range(400):
-                    state = plant.move(plant.params, state, 0.0, plant.setting.dt_s)
+                    state = plant.move(plant.params, state, 0.0, plant.setup.dt_s)
                     speed, d = speed_of(state), state.contact.left.compression_m
                     now = 0.5 * (mass * speed * speed + k1 * d * d + 0.5 * k3 * d**4)
                     most, last = max(most, (now - last) / first), now
@@ -362,9 +364,9 @@ def stuck(quick: bool) -> Iterator[Row]:
         for effort in (0.0, 5.0, 6.99, 8.01, 30.0, 100.0):
             config = evolve(BASE, transmission="pr2" if geared else "straight", breakaway_n=friction)
             plant = ready(config, bottle if geared else object_of(SHELL))
-            begin = state = a_turn_closer(plant.setting.body)
+            begin = state = a_turn_closer(plant.setup.state)
             for _ in range(1000):
-                state = plant.move(plant.params, state, effort, plant.setting.dt_s)
+                state = plant.move(plant.params, state, effort, plant.setup.dt_s)
             moved = state.motion.revolutions != begin.motion.revolutions
             yield {
                 "case": "effort, below breakaway and above",
@@ -374,7 +376,7 @@ def stuck(quick: bool) -> Iterator[Row]:
                 "holds": moved == (effort > friction),
             }
     steps = ready(evolve(BASE, transmission="pr2"), bottle)
-    begin = a_turn_closer(steps.setting.body)
+    begin = a_turn_closer(steps.setup.state)
     state = steps.move(steps.params, begin, 7.9, 1e6)
     yield {
         "case": "hold of 1e6 s",
@@ -388,7 +390,7 @@ def stuck(quick: bool) -> Iterator[Row]:
     config = evolve(BASE, breakaway_n=BASE.coulomb_n, rate_hz=10.0)
     _, held, maps = press(config, object_of(SHELL, ("maxwell", {"k_n_m": 100.0, "tau_s": 0.1})), seconds=5.0)
     yield _hold("straight, an hour", maps, held, 0.1, 36_000)
-    steps = evolve(maps, params=maps.setting.plant, move=plant_of(laws_of(maps.setting.kinds)), by="steps")
+    steps = evolve(maps, params=maps.setup.plant, move=plant_move(laws_of(maps.setup.kinds)), by="steps")
     yield _hold("straight", steps, held, 1e3)
 
 
@@ -474,7 +476,7 @@ def _looped(rate_hz: float) -> Row:
     spec = object_of(SHELL, width_m=0.01)
     gain = create("controller", "hybrid").config.velocity_gain_n_s_m
     plant, exact = ready(config, spec), ready(evolve(config, fidelity="reference"), spec)
-    state, same, dt = plant.setting.body, exact.setting.body, plant.setting.dt_s
+    state, same, dt = plant.setup.state, exact.setup.state, plant.setup.dt_s
     speeds, expected = [], []
     for _ in range(round(2.0 / dt)):
         effort = min(max(gain * (0.02 + speed_of(state)), -100.0), 100.0)
@@ -484,7 +486,7 @@ def _looped(rate_hz: float) -> Row:
         expected.append(speed_of(same))
     error = max(abs(a - b) for a, b in zip(speeds, expected, strict=True)) / 0.02
     late = speeds[-max(len(speeds) // 5, 5) :]
-    unstable = not controller_is_stable(plant.setting)
+    unstable = not controller_is_stable(plant.setup, plant.reduction)
     swings = max(late) - min(late) > 0.02
     return {
         "case": "control tick, the sampled controller",
@@ -501,7 +503,7 @@ def sizes(quick: bool) -> Iterator[Row]:
     wrong: dict[str, Callable[[], Any]] = {
         "width_m nan": lambda: object_of(width_m=math.nan),
         "width_m -0.01": lambda: object_of(width_m=-0.01),
-        "width_m 0.2": lambda: setting_of(BASE, object_of(width_m=0.2, file="wide.toml"), 0),
+        "width_m 0.2": lambda: ready(BASE, object_of(width_m=0.2, file="wide.toml")),
         "rotor_kg_m2 1e-30": lambda: SimConfig(rotor_kg_m2=1e-30),
         "noise_counts inf": lambda: SimConfig(noise_counts=math.inf),
         "damping_n_s_m inf": lambda: SimConfig(damping_n_s_m=math.inf),

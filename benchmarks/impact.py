@@ -18,8 +18,8 @@ import numpy as np
 
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.setting import set_scene
 
 PHASES, EGGS = 41, 200
 
@@ -51,7 +51,7 @@ def block() -> dict[str, float]:
         controller = create("controller", name, probing_force_n=23.0)
         for k in range(PHASES):
             config = SimConfig(spread=False, open_gap_m=0.086 + k * 1e-5)
-            found.append(run_many(config, controller, ["block"], [0], compiled=True)[0].body.peak_n)
+            found.append(run_many(config, controller, ["block"], [0], compiled=True)[0].state.peak_n)
     return {
         "block_hybrid_least_n": min(peak["hybrid"]),
         "block_hybrid_most_n": max(peak["hybrid"]),
@@ -63,14 +63,17 @@ def block() -> dict[str, float]:
 
 def eggs() -> dict[str, float]:
     crush = np.array(
-        [set_scene(SimConfig(), "egg", s).plant.thing.terms[1].params.crush_force_n for s in range(EGGS)]
+        [
+            unverified_setup(SimConfig(), "egg", s).plant.thing.terms[1].params.crush_force_n
+            for s in range(EGGS)
+        ]
     )
     result: dict[str, float] = {"eggs": EGGS, "egg_weakest_n": float(crush.min())}
     for name in ("hybrid", "force"):
         controller = create("controller", name, probing_force_n=20.0)
         done = run_many(SimConfig(), controller, ["egg"] * EGGS, range(EGGS))
-        peaks = np.array([one.body.peak_n for one in done])
-        broken = sum(one.body.contact.left.states[1].broken for one in done)
+        peaks = np.array([one.state.peak_n for one in done])
+        broken = sum(one.state.contact.left.states[1].broken for one in done)
         result[f"egg_{name}_broken"] = broken
         result[f"egg_{name}_peak_most_n"] = float(peaks.max())
         if name == "hybrid":

@@ -1,4 +1,5 @@
-"""Whether the choice of a model keeps its word, and what it saves: random scenes against their references. Simulated.
+"""Whether reduced models have the accuracy asked for, and what they save, on random scenes. Simulated.
+Simulated.
 
     python benchmarks/selection.py [--scenes 500] [--first 0] [--costs 100] [--json | --table]
 
@@ -22,26 +23,25 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from datetime import date
-from functools import partial
 from importlib.metadata import version
 from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, frozen
 
-from graspsense.plugin_api import HOLD, ConfigError, RunConfig, create, entry_point, first_call
-from graspsense_sim_gripper import kernel
-from graspsense_sim_gripper.batch.job import Composition, Done, Job, Storage, grasp_once, loop_of
-from graspsense_sim_gripper.checking import Control, checked_choice
-from graspsense_sim_gripper.compiled.padding import as_compiled
+from graspsense.plugin_api import HOLD, ConfigError, RunConfig, create, entry_point
+from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Storage, grasp_once
+from graspsense_sim_gripper.build import instantiate, problem_of
+from graspsense_sim_gripper.compiled.compose import Composition
+from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
+from graspsense_sim_gripper.compiled.padding import composition_of, padded
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.state import PlantState
-from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.reduction.error import Course, deviation
-from graspsense_sim_gripper.setting import Setting, setting_of
-from graspsense_sim_gripper.terms.registry import find_term, in_order
-from graspsense_sim_gripper.terms.remainder import Kept
+from graspsense_sim_gripper.problem import GraspController, GraspSetup
+from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
+from graspsense_sim_gripper.reduction.model import Reduction
+from graspsense_sim_gripper.reduction.select import select
+from graspsense_sim_gripper.terms.registry import in_order
 
 ACCURACIES: Final = (0.1, 0.01, 0.001)
 CASES: Final = (*((f"{accuracy:g}", accuracy, "scene") for accuracy in ACCURACIES), ("full", 0.01, "full"))
@@ -50,24 +50,13 @@ REFERENCE: Final = 1e-4
 COSTS_AT: Final = 0.01
 REPEATS: Final = 7
 KINDS: Final = ("elastic", "rigid", "maxwell", "gas", "loss", "foam", "surface", "liquid", "slosh")
-"""Every scene is run as one composition of all these, its own kept: so there are few to compile. What it costs is
-measured in a loop of what its model keeps."""
-DUMMIES: Final = {
-    "elastic": (1.0, 0.0),
-    "rigid": (1.0, math.inf, 0.0),
-    "maxwell": (1.0, 1.0),
-    "gas": (1e-3, 0.0, 1e-4, 1e5, 1.0, 1e-10, 0.0, math.inf),
-    "loss": (1.0,),
-    "foam": (1.0, 0.01, 1.5, 0.0, 1.0, 0.0, 1.0),
-    "surface": (1.0, 1.0, 1.0, 1.0),
-    "liquid": (1e-3, 1e-4, 0.1, 1e-10, 1e3, 1e-3),
-    "slosh": (1.0, 1.0, 0.1),
-}
+"""Every scene is compiled with all of these kinds, of which it keeps its own, so that there are few compositions. Its
+cost is measured in a loop that is compiled for the terms that its model keeps."""
 
 
 @frozen(kw_only=True)
 class Scene:
-    """One scene of the distribution."""
+    """A scene of the distribution."""
 
     number: int
     spec: ObjectSpec
@@ -140,17 +129,17 @@ def scene_of(number: int) -> Scene:
     return Scene(number=number, spec=spec, config=config, speed_m_s=speed)
 
 
-def controller_is_stable(setting: Setting) -> bool:
-    """Return whether the sampled velocity loop is, on the free mass and on the stiffest contact of the scene.
+def controller_is_stable(setup: GraspSetup, reduction: Reduction) -> bool:
+    """Return whether the sampled velocity loop is stable, on the free mass and on the stiffest contact of the scene.
 
-    Eigenvalues within the unit circle, of closure, speed and integral from tick to tick, the effort held between.
+    The eigenvalues lie within the unit circle, for closure, speed and integral from tick to tick with a constant effort
+    in between.
     """
-    assert setting.choice is not None
     loop = create("controller", "hybrid").config
-    dt, damping = setting.dt_s, setting.plant.drive.damping_n_s_m
-    mass = setting.plant.drive.inertia / setting.body.motion.jacobian_m_rev**2
-    gain, integral = loop.velocity_gain_n_s_m, loop.integral_gain_n_m * setting.dt_s
-    for stiffness in (0.0, mass * (setting.choice.contact.number / dt) ** 2):
+    dt, damping = setup.dt_s, setup.plant.drive.damping_n_s_m
+    mass = setup.plant.drive.inertia / setup.state.motion.jacobian_m_rev**2
+    gain, integral = loop.velocity_gain_n_s_m, loop.integral_gain_n_m * setup.dt_s
+    for stiffness in (0.0, mass * (reduction.contact.number / dt) ** 2):
         rates = np.array([[0.0, 1.0, 0.0], [-stiffness / mass, -damping / mass, 1.0 / mass], [0.0, 0.0, 0.0]])
         ahead = np.eye(3)
         for k in range(30, 0, -1):
@@ -164,45 +153,25 @@ def controller_is_stable(setting: Setting) -> bool:
     return True
 
 
-def in_full(setting: Setting) -> Setting:
-    """Return the setting as a composition of all kinds, of which it keeps its own."""
-    places = {kind: i + 1 for i, kind in enumerate(setting.kinds)}
-    terms, states = [setting.plant.thing.terms[0]], [setting.body.contact.left.states[0]]
-    for kind in KINDS:
-        if kind in places:
-            terms.append(setting.plant.thing.terms[places[kind]])
-            states.append(setting.body.contact.left.states[places[kind]])
-        else:
-            term = find_term(kind)[1]
-            terms.append(Kept(0, term.params(*DUMMIES[kind])))
-            states.append(term.at_rest)
-    thing = setting.plant.thing._replace(terms=tuple(terms))
-    object_ = setting.body.contact.left._replace(states=tuple(states))
-    contact = setting.body.contact._replace(left=object_, right=object_)
-    body: PlantState = setting.body._replace(contact=contact)
-    return evolve(setting, kinds=KINDS, plant=setting.plant._replace(thing=thing), body=body)
-
-
-def course_of(done: Done, dt_s: float) -> Course:
+def record_of(grasp: FinishedGrasp, dt_s: float) -> GraspRecord:
     """Return what a grasp is compared by."""
-    trace = done.kept
-    assert trace is not None
-    return Course(
-        outcome=int(done.outcome),
+    trace = grasp.trace
+    return GraspRecord(
+        outcome=int(grasp.outcome),
         dt_s=dt_s,
         gap_m=trace.gap_m,
         speed_m_s=trace.velocity_m_s,
         left_n=trace.force_left_n,
         right_n=trace.force_right_n,
-        ended=int(np.sum(trace.phase <= HOLD)),
-        peak_n=done.body.peak_n,
+        n_rows=int(np.sum(trace.phase <= HOLD)),
+        peak_n=grasp.state.peak_n,
     )
 
 
-def error_of(done: Done, reference: Done) -> tuple[float, str]:
-    """Return the largest error of all quantities, and whose it is."""
+def error_of(grasp: FinishedGrasp, reference: FinishedGrasp) -> tuple[float, str]:
+    """Return the largest error of all quantities, and the quantity."""
     dt = 1.0 / SimConfig().rate_hz
-    return deviation(course_of(done, dt), course_of(reference, dt))
+    return deviation(record_of(grasp, dt), record_of(reference, dt))
 
 
 class Bench:
@@ -211,96 +180,93 @@ class Bench:
     def __init__(self) -> None:
         self.compiled: dict[Composition, Any] = {}
         self.storage = Storage()
-        self.choice_s = self.compile_s = 0.0
+        self.selection_s = self.compile_s = 0.0
 
-    def grasp(self, scene: Scene, accuracy: float, fidelity: str) -> tuple[Done, Setting, Job]:
-        """Return the grasp, its setting and its job. Raises ConfigError for a refusal."""
+    def grasp(
+        self, scene: Scene, accuracy: float, fidelity: str
+    ) -> tuple[FinishedGrasp, GraspSetup, Reduction, Job]:
+        """Return the grasp, its setup, its reduced model and its job. Raises ConfigError for a refusal."""
         controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
         config = evolve(scene.config, accuracy=accuracy, fidelity=fidelity)
         run = RunConfig(grasp_timeout_s=20.0)
-
-        def loops(setting: Setting, step: Any) -> tuple[Any, Setting]:
-            whole = in_full(setting)
-            return self.loop_of(config, whole, step), whole
-
-        chooser = partial(checked_choice, control=Control(controller, run), loops=loops)
-        compiling, began = self.compile_s, time.thread_time()
-        setting = setting_of(config, scene.spec, 0, chooser=chooser)
-        self.choice_s = time.thread_time() - began - (self.compile_s - compiling)
+        problem = problem_of(config, scene.spec)
+        began = time.thread_time()
+        reduction = select(problem, GraspController(controller, run), compiled=True, padding=KINDS)
+        self.selection_s = time.thread_time() - began
+        setup = instantiate(problem, reduction, 0)
         job = Job(config=config, controller=controller, run=run, extract=None, traces=True)
-        whole = in_full(setting)
-        loop = self.loop_of(config, whole, type(controller).step)
-        return grasp_once(job, whole, loop, self.storage, on_arrays=True), setting, job
+        full = padded(setup, KINDS)
+        loop = self.loop_of(config, full, type(controller).step)
+        return grasp_once(job, full, loop, self.storage, on_arrays=True), setup, reduction, job
 
-    def costs_s(self, grasps: Sequence[tuple[Setting, Job]]) -> list[float]:
-        """Return the seconds that each takes in the loop that is compiled for what its model keeps, taken in turn."""
+    def costs_s(self, grasps: Sequence[tuple[GraspSetup, Job]]) -> list[float]:
+        """Return the seconds that each takes in the loop that is compiled for its model, measured in turn."""
         best = [math.inf] * len(grasps)
         for _ in range(REPEATS):
-            for i, (setting, job) in enumerate(grasps):
-                best[i] = min(best[i], self._cost_s(as_compiled(setting), job))
+            for i, (setup, job) in enumerate(grasps):
+                best[i] = min(best[i], self._cost_s(padded(setup), job))
         return best
 
-    def _cost_s(self, setting: Setting, job: Job) -> float:
-        loop = self.loop_of(job.config, setting, type(job.controller).step)
+    def _cost_s(self, setup: GraspSetup, job: Job) -> float:
+        loop = self.loop_of(job.config, setup, type(job.controller).step)
         spent = 0.0
 
-        def timed(*given: Any) -> Any:
+        def timed(*args: Any) -> Any:
             nonlocal spent
             began = time.thread_time()
-            result = loop(*given)
+            result = loop(*args)
             spent += time.thread_time() - began
             return result
 
-        grasp_once(job, setting, timed, self.storage, on_arrays=True)
+        grasp_once(job, setup, timed, self.storage, on_arrays=True)
         return spent
 
-    def loop_of(self, config: SimConfig, setting: Setting, step: Any) -> Any:
-        """Return the compiled loop of a setting: that of its steps, or of the exact maps that take it."""
-        by_maps = discretise(config, setting, on_arrays=True)
-        shape = None if by_maps is None else by_maps[1]
-        composition = Composition(setting.kinds, shape, setting.plant.steps.settle > 0.0)
+    def loop_of(self, config: SimConfig, setup: GraspSetup, step: Any) -> Any:
+        """Return the compiled loop of a padded setup."""
+        composition = composition_of(config, setup, pad=False)
         if composition not in self.compiled:
             began = time.process_time()
-            loop = kernel.compiled(loop_of(composition, step))
+            loop = compiled_loop(composition, step)
             controller = create("controller", "hybrid")
             short = RunConfig(grasp_timeout_s=0.01)
             job = Job(config=config, controller=controller, run=short, extract=None, traces=True)
-            with first_call(slp_vectorize=by_maps is not None):
-                grasp_once(job, setting, loop, self.storage, on_arrays=True)
-            # As grasps of a batch are run: without a look at the types, in storage that was there before.
+            with compiling(composition):
+                grasp_once(job, setup, loop, self.storage, on_arrays=True)
+            # As in a batch: without a look at the types of the arguments, and with buffers that exist already.
             self.compiled[composition] = entry_point(loop)
             self.compile_s += time.process_time() - began
         return self.compiled[composition]
 
 
 def measure(bench: Bench, numbers: range, costs: int = 0) -> dict[str, Any]:
-    """Return what came of these scenes; of the first `costs` of them also what they cost."""
+    """Return the errors of these scenes, and for the first `costs` of them also the times."""
     rows: list[dict[str, Any]] = []
     unstable = 0
     for number in numbers:
         scene = scene_of(number)
-        reference, setting, _ = bench.grasp(scene, REFERENCE, "reference")
-        if not controller_is_stable(setting):
+        reference, setup, reduction, _ = bench.grasp(scene, REFERENCE, "reference")
+        if not controller_is_stable(setup, reduction):
             unstable += 1
             continue
         row: dict[str, Any] = {"scene": number, "outcome": reference.outcome.name}
-        grasps: dict[str, tuple[Setting, Job]] = {}
+        grasps: dict[str, tuple[GraspSetup, Job]] = {}
         for name, accuracy, fidelity in CASES:
-            one: dict[str, Any] = {"error": math.inf}
-            row[name] = one
+            case: dict[str, Any] = {"error": math.inf}
+            row[name] = case
             try:
-                done, chosen, job = bench.grasp(scene, accuracy, fidelity)
+                done, setup, reduction, job = bench.grasp(scene, accuracy, fidelity)
             except ConfigError as error:
-                one["refused"] = str(error)
+                case["refused"] = str(error)
                 continue
-            one["error"], one["whose"] = error_of(done, reference)
-            one["steps"], one["choice_s"] = done.body.step.n_steps, bench.choice_s
+            case["error"], case["quantity"] = error_of(done, reference)
+            case["steps"], case["selection_s"] = done.state.step.n_steps, bench.selection_s
             if accuracy == COSTS_AT:
-                grasps[name] = chosen, job
-            choice = chosen.choice
-            if choice is not None:
-                one["rung"], one["made"] = choice.rung, {d.term: d.decision for d in choice.decisions}
-                one["checked"] = None if choice.check is None else choice.check.error
+                grasps[name] = setup, job
+            level = reduction.level
+            case["level"] = f"{level.model_tol / accuracy:.3g}/{level.step_tol / accuracy:.3g}"
+            case["decisions"] = {decision.term: decision.decision for decision in reduction.decisions}
+            verification = reduction.verification
+            case["verified"] = None if verification is None else verification.error
         if len(rows) < costs and len(grasps) == 2:
             for name, spent in zip(grasps, bench.costs_s(list(grasps.values())), strict=True):
                 row[name]["s"] = spent
@@ -311,8 +277,8 @@ def measure(bench: Bench, numbers: range, costs: int = 0) -> dict[str, Any]:
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the figures that count, by accuracy where they have one."""
-    within, worst, middle, refused, rungs, choice = {}, {}, {}, {}, {}, {}
+    """Return the figures of these scenes, by accuracy where they have one."""
+    within, worst, middle, refused, levels, selection = {}, {}, {}, {}, {}, {}
     for name, accuracy, fidelity in CASES:
         if fidelity != "scene":
             continue
@@ -322,8 +288,9 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         worst[accuracy] = max(run, default=math.inf)
         middle[accuracy] = float(np.median(run)) * accuracy if run else math.inf
         refused[accuracy] = sum("refused" in case for case in cases)
-        rungs[accuracy] = dict(Counter(case.get("rung", "refused") for case in cases))
-        choice[accuracy] = float(np.median([case["choice_s"] for case in cases if "choice_s" in case]) * 1e3)
+        levels[accuracy] = dict(Counter(case.get("level", "refused") for case in cases))
+        seconds = [case["selection_s"] for case in cases if "selection_s" in case]
+        selection[accuracy] = float(np.median(seconds) * 1e3)
     both = [(row["0.01"], row["full"]) for row in rows if "s" in row["0.01"] and "s" in row["full"]]
     costs = np.array([[case["s"] for case in pair] for pair in both]).reshape(-1, 2)
     steps = np.array([[case["steps"] for case in pair] for pair in both]).reshape(-1, 2)
@@ -335,8 +302,8 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "worst": worst,
         "median_error": middle,
         "refused": refused,
-        "rungs": rungs,
-        "choice_ms": choice,
+        "levels": levels,
+        "selection_ms": selection,
         "costs_of": len(both),
         "cost_ratio": float(cost / full_cost),
         "cost_ratio_a_scene": float(np.median(costs[:, 0] / costs[:, 1])) if both else math.nan,
@@ -351,26 +318,26 @@ def table(result: dict[str, Any]) -> str:
     """Return the figures in Markdown."""
     lines = [
         f"{result['scenes']} scenes, seeds {result['seeds'][0]} to {result['seeds'][1]}, "
-        f"{result['left_out_unstable']} more left out for a controller that is itself unstable; {result['date']}, "
+        f"{result['left_out_unstable']} more left out because the controller itself is unstable; {result['date']}, "
         f"{result['machine']}, Python {result['python']}.",
         "",
-        "| accuracy asked for | within | median error | largest, over what was asked for | refused | rungs |",
+        "| accuracy | within | median error | largest error over accuracy | refused | levels: tolerances over it |",
         "|---|---|---|---|---|---|",
     ]
     for accuracy in ACCURACIES:
         within = round(result["within"][accuracy] * result["scenes"])
-        rungs = ", ".join(f"{name} {n}" for name, n in sorted(result["rungs"][accuracy].items()))
+        levels = ", ".join(f"{name}: {n}" for name, n in sorted(result["levels"][accuracy].items()))
         lines.append(
             f"| {accuracy:g} | {within} of {result['scenes']} | {result['median_error'][accuracy]:.1e} "
-            f"| {result['worst'][accuracy]:.2f} | {result['refused'][accuracy]} | {rungs} |"
+            f"| {result['worst'][accuracy]:.2f} | {result['refused'][accuracy]} | {levels} |"
         )
     lines += [
         "",
-        f"At 1 % a grasp in the chosen model takes {result['cost_ms']:.2f} ms of the compiled loop "
-        f"({result['steps']:.0f} steps), one with every term kept {result['full_cost_ms']:.2f} ms "
+        f"At 1 % a grasp in the reduced model takes {result['cost_ms']:.2f} ms of the compiled loop "
+        f"({result['steps']:.0f} steps), in the full model {result['full_cost_ms']:.2f} ms "
         f"({result['full_steps']:.0f} steps): {result['cost_ratio']:.0%} (medians of {result['costs_of']} scenes; "
         f"{result['cost_ratio_a_scene']:.0%} scene by scene). "
-        f"Choosing took {result['choice_ms'][0.01]:.0f} ms.",
+        f"Selecting took {result['selection_ms'][0.01]:.0f} ms.",
     ]
     return "\n".join(lines)
 
@@ -381,7 +348,7 @@ def main() -> None:
     )
     parser.add_argument("--scenes", type=int, default=500)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--costs", type=int, default=100, help="scenes whose costs are measured, the first")
+    parser.add_argument("--costs", type=int, default=100, help="number of scenes whose times are measured")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true")
     form.add_argument("--table", action="store_true", help="Markdown, as in docs/simulator.md")
@@ -409,11 +376,11 @@ def main() -> None:
     print("\nmisses")
     for row in rows:
         for name, accuracy, _ in CASES:
-            one = row[name]
-            if one["error"] > accuracy:
-                what = (
-                    one.get("refused")
-                    or f"{one['error']:<10.3g} {one['whose']:<10} {one['checked']} {one['rung']} {one['made']}"
+            case = row[name]
+            if case["error"] > accuracy:
+                what = case.get("refused") or (
+                    f"{case['error']:<10.3g} {case['quantity']:<10} {case['verified']} {case['level']} "
+                    f"{case['decisions']}"
                 )
                 print(f"{row['scene']:>6} {name:<8}{what}")
 

@@ -37,10 +37,10 @@ from simulation_scene import CONFIG, SETTINGS, Ours, Run, exact_closed, exact_op
 from graspsense import __version__
 from graspsense.plugin_api import APPROACH, HOLD, RunConfig, create
 from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue
 from graspsense_sim_gripper.plant import PlantParams
-from graspsense_sim_gripper.setting import set_scene
 
 HERE = Path(__file__).parent
 REPEATS = 7
@@ -204,7 +204,7 @@ def plant() -> dict[str, Any]:
     ].trace
     n = int(np.sum((trace.phase >= APPROACH) & (trace.phase <= HOLD)))
     us = run.u[:n]
-    params: PlantParams = set_scene(config, config.object, 0).plant
+    params: PlantParams = unverified_setup(config, config.object, 0).plant
     drive, thing = params.drive, params.thing
     _, rate = contact_rate(config)
     spring = 20000.0

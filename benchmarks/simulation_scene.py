@@ -27,12 +27,12 @@ from graspsense.plugin_api import (
     Controller,
     RunConfig,
     entry_point,
-    first_call,
 )
-from graspsense_sim_gripper import kernel
-from graspsense_sim_gripper.batch.job import Job, Storage, composition_of, grasp_compiled, loop_of
+from graspsense_sim_gripper.batch.job import Job, Storage, grasp_compiled
+from graspsense_sim_gripper.build import unverified_setup
+from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
+from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.setting import set_scene
 
 M, B, LIGHT, C, K, KC, X0 = 1.0, 20.0, 0.02, 5.0, 2e3, 2e4, 0.02
 TICK, TICKS = 1e-3, 7000
@@ -234,23 +234,23 @@ class Ours:
 
     def __init__(self, what: str, config: SimConfig, law: Controller[Any] | None = None) -> None:
         self.what = f"graspsense, {what}"
-        self.setting = set_scene(config, config.object, 0)
+        self.setup = unverified_setup(config, config.object, 0)
         self.law = law or Law(None)
         # The trace is kept: what is measured includes recording it and making its columns.
         self.job = Job(
             config=config, controller=self.law, run=RunConfig(hold_s=0.0), extract=None, traces=True
         )
-        composition = composition_of(config, self.setting)
-        self.loop = kernel.compiled(loop_of(composition, type(self.law).step))
+        composition = composition_of(config, self.setup)
+        self.loop = compiled_loop(composition, type(self.law).step)
         self.storage = Storage()
-        with first_call(slp_vectorize=composition.shape is not None):
+        with compiling(composition):
             self.once()
         self.loop = entry_point(self.loop)
 
     def once(self) -> Run:
         """Return one run."""
         began = time.thread_time()
-        trace = grasp_compiled(self.job, self.setting, self.loop, self.storage).trace
+        trace = grasp_compiled(self.job, self.setup, self.loop, self.storage).trace
         seconds = time.thread_time() - began
         part = slice(0, TICKS)
         return Run(

@@ -11,10 +11,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from graspsense_sim_gripper.build import unverified_setup
+from graspsense_sim_gripper.compiled.compose import plant_move
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.setting import setting_of
 from graspsense_sim_gripper.terms.registry import laws_of
 
 MASS, B, COULOMB, LOAD, EFFORT, SPEED, SECONDS = 100.0, 10.0, 7.0, 0.5, 23.0, 0.02, 0.12
@@ -119,15 +119,15 @@ def test_the_reference_is_what_radau_finds(terms, cover):
         open_gap_m=0.06,
     )
     spec = ObjectSpec(name="radau", width_m=0.05, friction=0.0, terms=tuple(terms.items()))
-    setting = setting_of(config, spec, 0)
-    move = plant_of(laws_of(setting.kinds))
-    link = setting.plant.drive.link
+    setup = unverified_setup(config, spec, 0)
+    move = plant_move(laws_of(setup.kinds))
+    link = setup.plant.drive.link
     # It begins where the fingers touch, at their speed.
-    state = setting.body._replace(
-        motion=setting.body.motion._replace(
+    state = setup.state._replace(
+        motion=setup.state.motion._replace(
             revolutions=0.05 / link.pitch_m, gap_m=0.05, speed_rev_s=-SPEED / link.pitch_m
         ),
-        contact=setting.body.contact._replace(touched=1),
+        contact=setup.state.contact._replace(touched=1),
     )
     side, force_of = rates(terms, cover)
     start = [0.0, SPEED, 0.0, 0.0, 0.0, 0.0, 0.0]
@@ -140,7 +140,7 @@ def test_the_reference_is_what_radau_finds(terms, cover):
     exact = solve_ivp(side, (0.0, SECONDS), start, "Radau", times, events=stands, rtol=1e-10, atol=1e-13)
     forces = []
     for _ in exact.t:
-        state = move(setting.plant, state, EFFORT, 1e-3)
+        state = move(setup.plant, state, EFFORT, 1e-3)
         forces.append(state.contact.left_n)
     expected = np.array([force_of(s) for s in exact.y.T])
     assert len(expected) > 5

@@ -17,12 +17,12 @@ from graspsense.plugin_api import EFFORT, Command, ControllerEntry, Outcome, Tra
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import job as batch_job
 from graspsense_sim_gripper.batch import threads, worker
-from graspsense_sim_gripper.batch.job import Job, chooser_of, composition_of, plainly
+from graspsense_sim_gripper.batch.job import Job, Scenes, grasp_plain
 from graspsense_sim_gripper.batch.threads import SLICE, WORTH_A_PROCESS, run_many
 from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
+from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue, shipped_scenes
-from graspsense_sim_gripper.setting import set_scene
 
 HYBRID = create("controller", "hybrid")
 FEATURES = create("feature-set", "chitta")
@@ -49,15 +49,15 @@ def test_the_number_of_workers_decides_nothing_to_the_bit():
     for a, b, c in zip(one, two, five, strict=True):
         assert bits(a.trace) == bits(b.trace) == bits(c.trace)
         assert a.extracted == b.extracted == c.extracted or any(np.isnan(a.extracted.values))
-        assert a.body == b.body == c.body
+        assert a.state == b.state == c.state
     # What stands in the common composition for terms that an object lacks changes no bit, and is not handed back.
     odd = ["odwalla:full_open", "egg", "none"]
     alone = run_many(SimConfig(), HYBRID, odd, range(3), compiled=False)
     common = run_many(SimConfig(), HYBRID, odd, range(3), compiled=True)
     for a, b in zip(alone, common, strict=True):
         np.testing.assert_allclose(b.trace.force_left_n, a.trace.force_left_n, rtol=1e-9, atol=1e-12)
-        assert [type(state) for state in b.body.contact.left.states] == [
-            type(state) for state in a.body.contact.left.states
+        assert [type(state) for state in b.state.contact.left.states] == [
+            type(state) for state in a.state.contact.left.states
         ]
 
 
@@ -140,6 +140,10 @@ def test_a_law_no_other_process_can_find_runs_here_and_the_warning_says_so(monke
     assert [one.outcome for one in done] == [Outcome.ABORTED] * n
 
 
+def plainly(job, scene, seed):
+    return grasp_plain(job, Scenes(job).setup(scene, seed))
+
+
 def job(controller=HYBRID, **more):
     return Job(
         controller=controller,
@@ -151,30 +155,30 @@ def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit(
     run = RunConfig(hold_s=math.inf, grasp_timeout_s=0.01, opening_timeout_s=0.1)
     odd = job(config=SimConfig(skin_n_m=math.inf, noise_counts=0.0, step_s=1e-4), run=run)
     names = [*catalogue(), *shipped_scenes(), "none"]
-    with PlainProcess(odd) as process:
+    with PlainProcess(Scenes(odd)) as process:
         apart = process.run(names, np.arange(len(names)))
     # Nothing is there: channels that were never felt are NaN, and so are the features drawn.
     assert {one.outcome for one in apart} == {Outcome.ABORTED}
     for name, seed, one in zip(names, range(len(names)), apart, strict=True):
         here = plainly(odd, name, seed)
         assert (one.outcome, one.reason) == (here.outcome, here.reason)
-        assert repr(one.body) == repr(here.body)
-        assert [type(part) for part in one.body.contact.left.states] == [
-            type(part) for part in here.body.contact.left.states
+        assert repr(one.state) == repr(here.state)
+        assert [type(part) for part in one.state.contact.left.states] == [
+            type(part) for part in here.state.contact.left.states
         ]
         assert bits(one.trace) == bits(here.trace)
 
 
 def test_no_trace_is_handed_over_where_nobody_wants_one():
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
-    with PlainProcess(job(run=run, traces=False)) as process:
+    with PlainProcess(Scenes(job(run=run, traces=False))) as process:
         (one,) = process.run(["none"], [0])
     assert one.kept is None
     assert one.extracted is None
     told = []
     # A closure, which no other process could be handed: it is called here.
     with PlainProcess(
-        job(run=run, traces=False, extract=lambda trace: told.append(len(trace)) or "felt")
+        Scenes(job(run=run, traces=False, extract=lambda trace: told.append(len(trace)) or "felt"))
     ) as process:
         (one,) = process.run(["none"], [0])
     assert (one.kept, one.extracted) == (None, "felt")
@@ -210,10 +214,10 @@ def test_what_is_not_all_in_names_and_values_is_not_handed_over():
     altered = create("controller", "hybrid")
     numbers = altered.params()
     altered.params = lambda: numbers._replace(ramp_s=numbers.ramp_s + 1.0)
-    with pytest.raises(NotHandedOver, match="hybrid made of its settings has other numbers"):
-        PlainProcess(job(altered))
+    with pytest.raises(NotHandedOver, match="hybrid with its settings has other numbers"):
+        PlainProcess(Scenes(job(altered)))
     with pytest.raises(NotHandedOver, match="Endless is not a controller that a plugin declares"):
-        PlainProcess(job(Endless(HYBRID.config)))
+        PlainProcess(Scenes(job(Endless(HYBRID.config))))
 
 
 def test_what_fails_in_another_process_is_said():
@@ -232,12 +236,12 @@ def test_what_fails_in_another_process_is_said():
                 commands=("effort",),
             )
 
-    with IsolatedPlugins(Here), PlainProcess(job(Endless(HYBRID.config))) as process:
+    with IsolatedPlugins(Here), PlainProcess(Scenes(job(Endless(HYBRID.config)))) as process:
         for _ in range(2):
             with pytest.raises(NotHandedOver, match="no controller named 'graspsense-test/endless'"):
                 process.run(["none"], [0])
     with (
-        PlainProcess(job()) as process,
+        PlainProcess(Scenes(job())) as process,
         pytest.raises(NotHandedOver, match="UnknownName: no object named 'blok'"),
     ):
         process.run(["blok"], [0])
@@ -332,11 +336,11 @@ def test_a_dropped_term_is_not_compiled_and_changes_no_bit(tmp_path, spread):
     path.write_text(THINNED)
     config = SimConfig(object=str(path), spread=spread, sensor="ideal")
     job = Job(config=config, controller=HYBRID, run=RunConfig(), extract=None, traces=True)
-    setting = set_scene(config, str(path), 1, chooser_of(job))
-    assert setting.kinds == ("elastic", "loss", "slosh")
-    assert "slosh" not in composition_of(config, setting).kinds
+    setup = Scenes(job).setup(str(path), 1)
+    assert setup.kinds == ("elastic", "loss", "slosh")
+    assert "slosh" not in composition_of(config, setup).kinds
     plain, fast = (
         run_many(config, HYBRID, [str(path)], [1], compiled=compiled)[0] for compiled in (False, True)
     )
-    assert fast.body == plain.body
+    assert fast.state == plain.state
     assert np.array_equal(fast.trace.force_left_n, plain.trace.force_left_n)

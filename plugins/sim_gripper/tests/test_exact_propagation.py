@@ -12,12 +12,12 @@ from graspsense.core.runner import RunConfig, run_grasp
 from graspsense.plugin_api import create
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.build import unverified_setup
+from graspsense_sim_gripper.compiled.compose import plant_move
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.exact.propagate import bind_move
-from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.setting import set_scene, setting_of
 from graspsense_sim_gripper.terms.registry import laws_of
 
 FRICTION = SimConfig(
@@ -49,28 +49,28 @@ def object_of(*terms, **more):
 
 
 def ready(config, spec, *, exact=True, on_arrays=False):
-    """Return the function that advances the plant by a tick, its parameters, and the setting."""
-    setting = set_scene(config, spec, 0) if isinstance(spec, str) else setting_of(config, spec, 0)
-    move, params = plant_of(laws_of(setting.kinds)), setting.plant
+    """Return the function that advances the plant by a tick, its parameters, and the setup."""
+    setup = unverified_setup(config, spec, 0)
+    move, params = plant_move(laws_of(setup.kinds)), setup.plant
     if exact:
-        result = discretise(config, setting, on_arrays=on_arrays)
+        result = discretise(config, setup, on_arrays=on_arrays)
         assert result is not None
         params, shape = result
-        move = bind_move(setting.kinds, shape, move)
-    return move, params, setting
+        move = bind_move(setup.kinds, shape, move)
+    return move, params, setup
 
 
 def along(config, spec, efforts, *, exact=True, speed_m_s=0.0):
     """Return closure, force and closing speed at each tick under these efforts, and the last state."""
-    move, params, setting = ready(config, spec, exact=exact)
-    motion = setting.body.motion
+    move, params, setup = ready(config, spec, exact=exact)
+    motion = setup.state.motion
     motion = motion._replace(speed_rev_s=-speed_m_s / motion.jacobian_m_rev)
-    state = setting.body._replace(motion=motion)
+    state = setup.state._replace(motion=motion)
     rows = []
     for effort in efforts:
-        state = move(params, state, effort, setting.dt_s)
+        state = move(params, state, effort, setup.dt_s)
         speed = -state.motion.speed_rev_s * state.motion.jacobian_m_rev
-        rows.append((setting.plant.thing.width_m - state.motion.gap_m, state.contact.left_n, speed))
+        rows.append((setup.plant.thing.width_m - state.motion.gap_m, state.contact.left_n, speed))
     return *np.array(rows).T, state
 
 
@@ -267,17 +267,17 @@ def test_it_slides_the_distance_of_its_kinetic_energy_over_friction_and_stops():
 
 def test_below_breakaway_the_fingers_do_not_creep():
     spec = object_of(ELASTIC, MAXWELL)
-    move, params, setting = ready(FRICTION, spec)
-    motion = setting.body.motion
+    move, params, setup = ready(FRICTION, spec)
+    motion = setup.state.motion
     motion = motion._replace(speed_rev_s=-0.02 / motion.jacobian_m_rev)
-    state = setting.body._replace(motion=motion)
+    state = setup.state._replace(motion=motion)
     for _ in range(500):
         state = move(params, state, 25.0, 1e-3)
     assert state.motion.speed_rev_s == 0.0
     before = state
-    setting = evolve(setting, dt_s=1e3)
-    params, shape = discretise(FRICTION, setting)
-    move = bind_move(setting.kinds, shape, plant_of(laws_of(setting.kinds)))
+    setup = evolve(setup, dt_s=1e3)
+    params, shape = discretise(FRICTION, setup)
+    move = bind_move(setup.kinds, shape, plant_move(laws_of(setup.kinds)))
     for _ in range(1000):
         state = move(params, state, 25.0, 1e3)
     # The branch relaxes, and friction holds the fingers.
@@ -314,10 +314,10 @@ def test_stick_and_slip_follow_a_relaxing_branch_to_the_limit_of_friction():
 )
 def test_without_a_drive_stored_energy_does_not_increase(change, terms):
     config = evolve(FRICTION, **{**FREE, **change})
-    move, params, setting = ready(config, object_of(*terms))
-    motion = setting.body.motion
+    move, params, setup = ready(config, object_of(*terms))
+    motion = setup.state.motion
     motion = motion._replace(speed_rev_s=-0.05 / motion.jacobian_m_rev)
-    state = setting.body._replace(motion=motion)
+    state = setup.state._replace(motion=motion)
     k, arm = terms[0][1]["k1_n_m"], dict(terms).get("maxwell", {}).get("k_n_m", 1.0)
 
     def energy():
@@ -325,7 +325,7 @@ def test_without_a_drive_stored_energy_does_not_increase(change, terms):
         q = state.contact.left.states[2][0] if "maxwell" in dict(terms) else 0.0
         cover = (
             0.05 - state.motion.gap_m - d
-            if setting.plant.thing.skins_n_m < math.inf and state.contact.left_n > 0
+            if setup.plant.thing.skins_n_m < math.inf and state.contact.left_n > 0
             else 0.0
         )
         stored = k * d * d + q * q / arm + (0.5 * config.skin_n_m * cover * cover if cover else 0.0)
@@ -352,13 +352,13 @@ class Counting(list):
 def test_the_cost_does_not_grow_with_stiffness():
     costs = {}
     for stiffness in (1e4, 1e6, 1e9):
-        move, params, setting = ready(
+        move, params, setup = ready(
             evolve(FRICTION, **RIGID), object_of(("elastic", {"k1_n_m": stiffness}), LOSS, MAXWELL)
         )
         params = params._replace(tables=params.tables._replace(maps=Counting(params.tables.maps)))
-        motion = setting.body.motion
+        motion = setup.state.motion
         motion = motion._replace(speed_rev_s=-0.02 / motion.jacobian_m_rev)
-        state = setting.body._replace(motion=motion)
+        state = setup.state._replace(motion=motion)
         Counting.reads = 0
         for effort in squeeze_and_let_go(3000):
             state = move(params, state, effort, 1e-3)
@@ -399,7 +399,7 @@ def test_the_report_names_the_exact_discretisation(tmp_path):
     law = create("controller", "hybrid", probing_force_n=5.0)
     rests = {"coulomb_n": 1.0, "breakaway_n": 2.0}
     for change, scheme in (
-        ({}, "exact maps"),
+        ({}, "exact discretisation"),
         (rests, "Verlet"),
         ({**rests, "fidelity": "full"}, "Verlet"),
     ):
@@ -419,7 +419,7 @@ def test_single_and_compiled_grasps_have_the_same_trace(config):
         run_many(config, law, [config.object], [1], compiled=compiled)[0] for compiled in (False, True)
     )
     assert plain.outcome == alone.outcome
-    assert plain.body == fast.body
+    assert plain.state == fast.state
     for name in ("force_left_n", "gap_m", "velocity_m_s", "command"):
         assert np.array_equal(getattr(plain.trace, name), getattr(fast.trace, name)), name
         assert np.array_equal(getattr(plain.trace, name), getattr(alone.trace, name)), name

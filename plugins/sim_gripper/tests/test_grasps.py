@@ -20,7 +20,7 @@ def grasp(controller, seed=0, **config):
 def peaks(name, force_n, scene, seeds):
     controller = create("controller", name, probing_force_n=force_n)
     done = run_many(SimConfig(), controller, [scene] * len(seeds), seeds)
-    return done, np.array([one.body.peak_n for one in done])
+    return done, np.array([one.state.peak_n for one in done])
 
 
 # A few in the quick run, all of them in the slow one.
@@ -35,7 +35,7 @@ def test_on_the_block_pure_force_slams_at_least_three_times_the_hybrids_peak(pha
             config = SimConfig(spread=False, open_gap_m=0.086 + k * 0.41e-3 / phases)
             done = run_many(config, controller, ["block"], [0], compiled=phases > 10)[0]
             assert done.outcome is Outcome.STEADY
-            peaks_n.append(done.body.peak_n)
+            peaks_n.append(done.state.peak_n)
     # The worst hybrid grasp stands against the gentlest slam.
     assert min(peak["force"]) > 3.0 * max(peak["hybrid"])
     # And the phase of the clock does matter: the loop pushes on until the next image.
@@ -47,8 +47,8 @@ def test_the_egg_survives_the_hybrid_and_not_pure_force(eggs):
     seeds = range(eggs)
     hybrid, gentle = peaks("hybrid", 20.0, "egg", seeds)
     slammed, _ = peaks("force", 20.0, "egg", seeds)
-    assert [one.body.contact.left.states[1].broken for one in hybrid] == [0] * eggs
-    assert [one.body.contact.left.states[1].broken for one in slammed] == [1] * eggs
+    assert [one.state.contact.left.states[1].broken for one in hybrid] == [0] * eggs
+    assert [one.state.contact.left.states[1].broken for one in slammed] == [1] * eggs
     # The margin: the weakest of these eggs breaks at 23 N, and no hybrid grasp goes over 22 N.
     assert gentle.max() < 22.0
     assert {one.outcome for one in slammed} == {Outcome.CRUSHED}

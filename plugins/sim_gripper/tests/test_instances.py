@@ -6,11 +6,12 @@ from attrs import evolve
 
 from graspsense.core.errors import UnknownName
 from graspsense.plugin_api import RunConfig, create
-from graspsense_sim_gripper.batch.job import Job, chooser_of
+from graspsense_sim_gripper.build import build, unverified_setup
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.instance import sample
 from graspsense_sim_gripper.objects.library import find, split_number
-from graspsense_sim_gripper.setting import set_scene
+from graspsense_sim_gripper.problem import GraspController
+from graspsense_sim_gripper.reduction.select import select
 
 
 def drawn(name, seed):
@@ -39,24 +40,22 @@ def test_other_numbers_and_kinds_are_other_things():
 
 
 def test_the_number_changes_nothing_else_of_a_trial():
-    with_number, without = (set_scene(SimConfig(), name, 7) for name in ("can:full_open#2", "can:full_open"))
+    with_number, without = (
+        unverified_setup(SimConfig(), name, 7) for name in ("can:full_open#2", "can:full_open")
+    )
 
     assert with_number.sensor == without.sensor
     assert with_number.plant.drive == without.plant.drive
-    assert with_number.body.contact.offset_m == without.body.contact.offset_m
+    assert with_number.state.contact.offset_m == without.state.contact.offset_m
     assert with_number.plant.thing.width_m != without.plant.thing.width_m
 
 
 def test_a_numbered_instance_has_the_model_of_all_of_its_kind():
     config = SimConfig(object="toy#2", spread=False, sensor="ideal")
-    controller = create("controller", "hybrid")
-    chooser = chooser_of(
-        Job(config=config, controller=controller, run=RunConfig(), extract=None, traces=True)
-    )
-    numbered, again = (set_scene(config, "toy#2", seed, chooser).choice for seed in (0, 1))
-    spread = set_scene(evolve(config, spread=True), "toy", 0, chooser).choice
-    assert numbered is again
-    assert (numbered.made, numbered.steps) == (spread.made, spread.steps)
+    controller = GraspController(create("controller", "hybrid"), RunConfig())
+    numbered, other = (select(build(config, name), controller) for name in ("toy#2", "toy#3"))
+    spread = select(build(evolve(config, spread=True), "toy"), controller)
+    assert numbered is other is spread
 
 
 @pytest.mark.parametrize(
@@ -64,4 +63,4 @@ def test_a_numbered_instance_has_the_model_of_all_of_its_kind():
 )
 def test_a_wrong_number_is_refused(name):
     with pytest.raises(UnknownName, match="number of an instance"):
-        set_scene(SimConfig(), name, 0)
+        unverified_setup(SimConfig(), name, 0)

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graspsense.plugin_api import bind, gap_and_rate, revolutions_at, straight_linkage
-from graspsense_sim_gripper.drive_models import LINKAGES
+from graspsense_sim_gripper.compiled.compose import plant_move, sum_of
+from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState
-from graspsense_sim_gripper.kernel import plant_of, sum_of
 from graspsense_sim_gripper.plant import (
     EXPLICIT,
     MEAN_FORCE,
@@ -25,7 +25,6 @@ from graspsense_sim_gripper.plant import (
     rubbing,
     squeeze,
 )
-from graspsense_sim_gripper.setting import STRAIGHT
 from graspsense_sim_gripper.terms.elastic import Elastic, elastic
 from graspsense_sim_gripper.terms.foam import Foam
 from graspsense_sim_gripper.terms.gas import Gas
@@ -75,7 +74,7 @@ SPRING = (Elastic(2000.0, 0.0),)
 
 
 def run(params, state, effort, seconds, laws=(elastic,), dt=TICK):
-    move = plant_of(laws)
+    move = plant_move(laws)
     for _ in range(round(seconds / dt)):
         state = move(params, state, effort, dt)
     return state
@@ -143,7 +142,7 @@ def test_friction_that_changes_from_its_greatest_within_a_tick_is_seen():
 @pytest.mark.parametrize("effort", [8.5, 25.0, 0.0])
 def test_halving_the_tick_quarters_the_error_of_a_way_in_the_free(effort):
     """Where friction falls with the speed, and the linkage's ratio is another every millimetre."""
-    params, move = PlantParams(drive(), thing(width=-1.0), Steps(inf)), plant_of([])
+    params, move = PlantParams(drive(), thing(width=-1.0), Steps(inf)), plant_move([])
 
     def end(dt):
         state = at(0.05, (), speed_m_s=-3e-3)
@@ -187,7 +186,7 @@ def energy(params, state):
 def test_with_the_drive_off_stored_energy_never_rises(stiffness, speed, coulomb, load):
     params = PlantParams(drive(coulomb, coulomb, load, 0.0), thing(Elastic(stiffness, 0.0)), FINE)
     state = at(0.0503, (NoState(),), speed_m_s=-speed)
-    move = plant_of([elastic])
+    move = plant_move([elastic])
     first = before = energy(params, state)
     for _ in range(400):
         state = move(params, state, 0.0, TICK)
@@ -208,7 +207,7 @@ def test_without_friction_a_squeeze_and_the_letting_go_create_no_energy(stiffnes
     # By TR-BDF2, as where the damper makes it stiff.
     params = PlantParams(drive(0.0, 0.0, 0.0, 0.0, link), thing(*terms), Steps(2e-4, STIFF))
     params = params._replace(drive=params.drive._replace(inertia=100.0 * link.pitch_m**2))
-    state, move = at(0.0503, (NoState(), NoState()), speed_m_s=-speed, link=link), plant_of([elastic, loss])
+    state, move = at(0.0503, (NoState(), NoState()), speed_m_s=-speed, link=link), plant_move([elastic, loss])
     first = before = 50.0 * speed * speed
     for _ in range(400):
         state = move(params, state, 0.0, TICK)
@@ -234,7 +233,7 @@ def test_what_swings_keeps_its_energy_by_the_mean_force_even_where_it_stiffens(
     )
     if link is not LINK:
         params = params._replace(drive=params.drive._replace(inertia=100.0 * link.pitch_m**2))
-    state, move = at(0.0503, (NoState(),), speed_m_s=-speed, link=link), plant_of([elastic])
+    state, move = at(0.0503, (NoState(),), speed_m_s=-speed, link=link), plant_move([elastic])
     first = before = 0.5 * params.drive.inertia * state.motion.speed_rev_s**2
     for _ in range(400):
         state = move(params, state, 0.0, TICK)
@@ -264,7 +263,7 @@ def test_what_is_let_go_at_first_comes_back_from_the_tick_on_in_which_it_was(dam
 def test_a_step_on_an_undamped_spring_overshoots_to_twice_its_rest():
     params = PlantParams(drive(0.0, 0.0, 0.0, 0.0), thing(Elastic(5e4, 0.0)), FINE)
     state = at(0.05, (NoState(),))
-    move, peak = plant_of([elastic]), 0.0
+    move, peak = plant_move([elastic]), 0.0
     for _ in range(400):
         state = move(params, state, 20.0, TICK)
         peak = max(peak, state.peak_n)
@@ -281,7 +280,7 @@ def test_the_slam_of_a_constant_effort_is_as_large_as_estimated(stiffness, speed
     numbers = drive(8.0, 8.0, 0.0, 10.0)._replace(inertia=100.0 * at_contact**2)
     params = PlantParams(numbers, thing(Elastic(stiffness, 0.0), width=0.03), FINE)
     state = run(params, at(0.06, (NoState(),)), 23.0, 0.62)
-    move, impact = plant_of([elastic]), 0.0
+    move, impact = plant_move([elastic]), 0.0
     for _ in range(600):
         impact = max(impact, -state.motion.speed_rev_s * state.motion.jacobian_m_rev)
         state = move(params, state, 23.0, TICK)
@@ -317,7 +316,7 @@ def test_covers_in_series_share_the_compression():
 def test_nothing_pulls_when_the_fingers_open_faster_than_the_object_recovers():
     params = PlantParams(drive(), thing(Elastic(500.0, 0.0), Maxwell(3000.0, 0.5), skins=1e4), FINE)
     state = run(params, at(0.0501, (NoState(), MaxwellState(0.0))), 40.0, 1.0, (elastic, maxwell))
-    move = plant_of([elastic, maxwell])
+    move = plant_move([elastic, maxwell])
     for _ in range(500):
         state = move(params, state, -60.0, TICK)
         assert state.contact.left_n >= 0.0
@@ -328,7 +327,7 @@ def test_nothing_pulls_when_the_fingers_open_faster_than_the_object_recovers():
 
 def test_the_finger_that_touches_first_pushes_with_the_tables_friction_until_both_touch():
     params = PlantParams(drive(), thing(*SPRING, table=1.5), FINE)
-    state, move = at(0.06, (NoState(),), offset=0.003), plant_of([elastic])
+    state, move = at(0.06, (NoState(),), offset=0.003), plant_move([elastic])
     pushed = []
     while state.contact.left.force_n < 3.0:
         state = move(params, state, 12.0, TICK)
@@ -370,7 +369,7 @@ def test_what_is_pressed_at_the_closed_end_is_pressed_as_far_as_the_travel_goes(
 @pytest.mark.parametrize("mass_share", [1e-2, 1e-4, 1e-6])
 def test_no_moving_mass_is_too_light_for_the_stops(mass_share):
     numbers = drive()._replace(inertia=drive().inertia * mass_share)
-    params, move = PlantParams(numbers, thing(width=-1.0), FINE), plant_of([])
+    params, move = PlantParams(numbers, thing(width=-1.0), FINE), plant_move([])
     for effort in (100.0, -100.0):
         state = at(0.04, ())
         for _ in range(200):
@@ -389,7 +388,7 @@ def test_a_stuck_gripper_does_not_creep_over_a_long_hold():
 def test_a_damper_in_the_contents_lengthens_the_squeeze():
     def until_still(*terms, laws, states):
         params = PlantParams(drive(), thing(*terms, skins=1.5e4), FINE)
-        state, move = at(0.0501, states), plant_of(laws)
+        state, move = at(0.0501, states), plant_move(laws)
         for k in range(5000):
             state = move(params, state, 23.0, TICK)
             if state.contact.touched and abs(state.motion.speed_rev_s * state.motion.jacobian_m_rev) < 1e-4:
@@ -410,7 +409,7 @@ def test_steps_that_grow_slowly_see_what_rings_after_a_touch(tolerance):
     start = at(0.0501, (OscillatorState(0.0, 0.0),), speed_m_s=-0.1, link=STRAIGHT)
 
     def force(steps):
-        return plant_of([surface])(PlantParams(free, body, steps), start, 0.0, 5e-3).contact.left_n
+        return plant_move([surface])(PlantParams(free, body, steps), start, 0.0, 5e-3).contact.left_n
 
     exact = force(Steps(inf, EXPLICIT, 1e-6))
     errors = [abs(force(Steps(tolerance, growth=growth)) - exact) / exact for growth in (2.0, 1.1, 1.03)]
@@ -425,7 +424,7 @@ def test_a_tick_that_is_to_settle_is_halved_even_where_no_error_asks_for_it():
     start = at(0.06, (NoState(),), speed_m_s=-0.05, link=STRAIGHT)
     speeds = []
     for settle in (0.0, 1e-9):
-        after = plant_of([elastic])(
+        after = plant_move([elastic])(
             PlantParams(free, thing(*SPRING), Steps(1e9, EXPLICIT, inf, settle)), start, 0.0, TICK
         )
         speeds.append(after.motion.speed_rev_s * after.motion.jacobian_m_rev)

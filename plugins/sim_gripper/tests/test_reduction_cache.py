@@ -1,4 +1,4 @@
-"""A choice that a trial grasp has checked is found again, by the same code alone."""
+"""A verified model is found again by its content, in memory and on disk, and by the same code alone."""
 
 import os
 import pwd
@@ -7,11 +7,12 @@ import pytest
 from attrs import evolve
 
 from graspsense.plugin_api import RunConfig, create
-from graspsense_sim_gripper import checking
-from graspsense_sim_gripper.checking import Control, checked_choice
+from graspsense_sim_gripper.build import problem_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.problem import GraspController
 from graspsense_sim_gripper.reduction import cache
+from graspsense_sim_gripper.reduction import select as selection
 
 CONFIG = SimConfig(sensor="ideal", spread=False)
 
@@ -19,89 +20,114 @@ CONFIG = SimConfig(sensor="ideal", spread=False)
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return tmp_path / "graspsense" / "choices"
+    return tmp_path / "graspsense" / "reductions"
 
 
 @pytest.fixture
 def trials(monkeypatch):
-    """Return the list of the choices that were tried by a grasp."""
-    tried, check = [], checking._check
+    """Return the list of the models that were selected by trial grasps."""
+    selected, select = [], selection._select
 
     def counted(*given):
-        tried.append(check(*given))
-        return tried[-1]
+        selected.append(select(*given))
+        return selected[-1]
 
-    monkeypatch.setattr(checking, "_check", counted)
-    return tried
-
-
-def choice(config=CONFIG, k1=2000.0, **settings):
-    """Return what a process that begins would choose."""
-    checking._CHECKED.clear()
-    spec = ObjectSpec(name="made up", width_m=0.05, terms=(("elastic", {"k1_n_m": k1, "k3_n_m3": 2e6}),))
-    return checked_choice(config, spec, Control(create("controller", "hybrid", **settings), RunConfig()))
+    monkeypatch.setattr(selection, "_select", counted)
+    return selected
 
 
-def test_the_next_process_finds_what_was_chosen(trials, folder):
-    made = choice()
-    assert choice() == made
+def shell(k1=2000.0):
+    return ObjectSpec(name="made up", width_m=0.05, terms=(("elastic", {"k1_n_m": k1, "k3_n_m3": 2e6}),))
+
+
+def select(config=CONFIG, spec=None, **settings):
+    """Return the model that a process selects which begins now."""
+    selection._SELECTED.clear()
+    return again(config, spec, **settings)
+
+
+def again(config=CONFIG, spec=None, **settings):
+    """Return the model that this process selects."""
+    controller = GraspController(create("controller", "hybrid", **settings), RunConfig())
+    return selection.select(problem_of(config, spec or shell()), controller)
+
+
+def test_memory_finds_a_model_by_content_and_not_by_object(trials):
+    first = select()
+    # Another object of Python with the same content, and other settings that no model depends on.
+    assert again(spec=shell()) is again(evolve(CONFIG, noise_counts=9.0)) is first
+    assert again(spec=shell(2001.0)) is not first
+    assert len(trials) == 2
+
+
+def test_memory_is_bounded(monkeypatch, trials):
+    monkeypatch.setattr(cache, "MAX_IN_MEMORY", 3)
+    select()
+    for k in range(5):
+        again(spec=shell(1000.0 + k))
+    assert len(selection._SELECTED) == 3
+
+
+def test_the_next_process_finds_what_was_selected(trials, folder):
+    made = select()
+    assert select() == made
     assert len(trials) == len(list(folder.iterdir())) == 1
 
 
 def test_another_object_accuracy_or_controller_is_tried_by_itself(trials):
-    first = choice()
-    others = choice(k1=2001.0), choice(evolve(CONFIG, accuracy=0.03)), choice(probing_force_n=19.0)
+    first = select()
+    others = select(spec=shell(2001.0)), select(evolve(CONFIG, accuracy=0.03)), select(probing_force_n=19.0)
     assert len(trials) == 4
     assert first not in others
 
 
 def test_what_decides_nothing_of_the_model_finds_it_too(trials):
-    choice()
-    choice(evolve(CONFIG, sensor="pads", noise_counts=9.0))
+    select()
+    select(evolve(CONFIG, sensor="pads", noise_counts=9.0))
     assert len(trials) == 1
 
 
 def test_edited_code_finds_nothing_of_before(trials, monkeypatch):
-    made = choice()
+    made = select()
     step = type(create("controller", "hybrid")).step
     monkeypatch.setattr(step, "__code__", step.__code__.replace(co_consts=(*step.__code__.co_consts, 7)))
-    assert choice() == made
+    assert select() == made
     assert len(trials) == 2
 
 
-@pytest.mark.parametrize("damage", [b"", b"{", b"[]", b'{"check": null}', b"\xff\xfe"])
+@pytest.mark.parametrize("damage", [b"", b"{", b"[]", b'{"verification": null}', b"\xff\xfe"])
 def test_a_damaged_one_is_made_anew(trials, folder, damage):
-    made = choice()
+    made = select()
     (kept,) = folder.iterdir()
     kept.write_bytes(damage)
-    assert choice() == made
-    assert choice() == made
+    assert select() == made
+    assert select() == made
     assert len(trials) == 2
 
 
 def test_a_folder_that_cannot_be_made_costs_nothing_but_time(trials, folder):
     folder.parent.write_text("no folder")
-    assert choice() == choice()
+    assert select() == select()
     assert len(trials) == 2
 
 
 def test_the_older_half_makes_room(monkeypatch, folder):
-    monkeypatch.setattr(cache, "MOST", 4)
+    monkeypatch.setattr(cache, "MAX_FILES", 4)
     for k in range(4):
-        choice(k1=1000.0 + k)
+        select(spec=shell(1000.0 + k))
         newest = max(folder.iterdir(), key=lambda path: path.stat().st_mtime_ns)
         os.utime(newest, (k, k))
-    choice(k1=1900.0)
+    select(spec=shell(1900.0))
     assert len(list(folder.iterdir())) == 3
     assert min(path.stat().st_mtime for path in folder.iterdir()) == 2.0
 
 
-def test_without_a_home_nothing_is_kept_and_every_process_chooses_anew(trials, monkeypatch):
+def test_without_a_home_nothing_is_kept_and_every_process_selects_anew(trials, monkeypatch):
     def unknown(uid):
         raise KeyError(f"getpwuid(): uid not found: {uid}")
 
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.delenv("HOME", raising=False)
     monkeypatch.setattr(pwd, "getpwuid", unknown)
-    assert choice() == choice()
+    assert select() == select()
     assert len(trials) == 2

@@ -10,7 +10,7 @@ from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import HOLD, STEADY, RunConfig, create
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.reduction.error import Course, deviation
+from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
 
 SPEED, TAU, STIFFNESS = 0.01, 0.05, 2000.0
 
@@ -23,14 +23,14 @@ def squeeze(dt=1e-3, late=0.0, stiffness=STIFFNESS, outcome=STEADY):
     speed = np.where(t < 0.1, SPEED, SPEED * np.exp(-after / TAU))
     gap = 0.0455 - travel
     force = stiffness * np.maximum(0.045 - gap, 0.0)
-    return Course(
+    return GraspRecord(
         outcome=outcome,
         dt_s=dt,
         gap_m=gap,
         speed_m_s=-speed,
         left_n=force,
         right_n=force,
-        ended=len(t),
+        n_rows=len(t),
         peak_n=float(force.max()),
     )
 
@@ -82,14 +82,14 @@ def test_they_are_the_feature_sets_own_to_a_tick():
     backend = SimBackend(SimConfig(sensor="ideal", spread=False))
     trace = run_grasp(backend, create("controller", "hybrid"), RunConfig()).trace
     drawn = create("feature-set", "chitta").extract(trace).as_dict()
-    found = Course(
+    found = GraspRecord(
         outcome=STEADY,
         dt_s=1e-3,
         gap_m=trace.gap_m,
         speed_m_s=trace.velocity_m_s,
         left_n=trace.force_left_n,
         right_n=trace.force_right_n,
-        ended=int(np.sum(trace.phase <= HOLD)),
+        n_rows=int(np.sum(trace.phase <= HOLD)),
         peak_n=0.0,
     ).quantities()
     # The feature set's rest is told from the way in 50 ms, which begins a little before the speed is as low.

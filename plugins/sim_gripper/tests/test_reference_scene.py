@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from simulation_scene import CONFIG, OPEN_M, TICK, exact
 
-from graspsense_sim_gripper.kernel import plant_of
-from graspsense_sim_gripper.setting import set_scene
+from graspsense_sim_gripper.build import unverified_setup
+from graspsense_sim_gripper.compiled.compose import plant_move
 from graspsense_sim_gripper.terms.registry import laws_of
 
 
@@ -17,11 +17,11 @@ def profile(t):
 
 @pytest.mark.parametrize("ticks", [600, pytest.param(7000, marks=pytest.mark.long)])
 def test_the_open_loop_profile_gives_the_exact_trace(ticks):
-    setting = set_scene(CONFIG, CONFIG.object, 0)
-    move, state = plant_of(laws_of(setting.kinds)), setting.body
+    setup = unverified_setup(CONFIG, CONFIG.object, 0)
+    move, state = plant_move(laws_of(setup.kinds)), setup.state
     gaps, forces = [], []
     for tick in range(ticks):
-        state = move(setting.plant, state, profile(tick * TICK), TICK)
+        state = move(setup.plant, state, profile(tick * TICK), TICK)
         gaps.append(state.motion.gap_m)
         forces.append(state.contact.left_n)
     # Its columns are of the beginning of each tick, the plant's of the end.

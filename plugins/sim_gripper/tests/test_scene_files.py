@@ -17,10 +17,10 @@ from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import ConfigError, UnknownName, create
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.build import unverified_setup
+from graspsense_sim_gripper.compiled.compose import plant_move
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.objects.library import find, shipped_scenes
-from graspsense_sim_gripper.setting import set_scene
 from graspsense_sim_gripper.terms.registry import laws_of
 
 HYBRID = create("controller", "hybrid")
@@ -58,7 +58,7 @@ def test_a_file_needs_no_more_than_a_width_and_its_terms(scene):
 def test_every_shipped_scene_is_grasped_and_stays_steady(name):
     done = run_many(SimConfig(sensor="ideal"), HYBRID, [name], [0])[0]
     assert done.outcome.name == "STEADY"
-    assert 10.0 < done.body.peak_n < 40.0
+    assert 10.0 < done.state.peak_n < 40.0
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_every_shipped_scene_is_grasped_and_stays_steady(name):
 )
 def test_a_file_that_makes_no_sense_is_refused_by_file_table_and_field(scene, text, says):
     with pytest.raises(ConfigError, match=says):
-        set_scene(SimConfig(), scene(text), 0)
+        unverified_setup(SimConfig(), scene(text), 0)
 
 
 def test_a_file_that_is_not_there_and_a_name_that_nothing_has(tmp_path):
@@ -105,13 +105,13 @@ def test_a_file_that_is_not_there_and_a_name_that_nothing_has(tmp_path):
 
 
 def pressed(config, effort_n, seconds, **changes):
-    """Press with this effort for so long; return the setting and the plant at each millisecond."""
-    setting = set_scene(config, changes.pop("scene"), 0)
-    move, body, bodies = plant_of(laws_of(setting.kinds)), setting.body, []
-    for _ in range(round(seconds / setting.dt_s)):
-        body = move(setting.plant, body, effort_n, setting.dt_s)
+    """Press with this effort for so long; return the setup and the plant at each millisecond."""
+    setup = unverified_setup(config, changes.pop("scene"), 0)
+    move, body, bodies = plant_move(laws_of(setup.kinds)), setup.state, []
+    for _ in range(round(seconds / setup.dt_s)):
+        body = move(setup.plant, body, effort_n, setup.dt_s)
         bodies.append(body)
-    return setting, bodies
+    return setup, bodies
 
 
 def test_an_object_held_fast_is_pressed_by_the_finger_that_meets_it_first(scene):
@@ -170,13 +170,13 @@ def test_a_bottle_with_a_deep_snap_stays_dented(scene):
         k2_n_m = 3000.0
     """
     config = SimConfig(spread=False)
-    setting = set_scene(config, scene(text), 0)
-    move, body = plant_of(laws_of(setting.kinds)), setting.body
+    setup = unverified_setup(config, scene(text), 0)
+    move, body = plant_move(laws_of(setup.kinds)), setup.state
     for _ in range(3000):
-        body = move(setting.plant, body, 25.0, 1e-3)
+        body = move(setup.plant, body, 25.0, 1e-3)
     assert body.contact.left.force_n > 8.0
     for _ in range(3000):
-        body = move(setting.plant, body, -30.0, 1e-3)
+        body = move(setup.plant, body, -30.0, 1e-3)
     assert body.contact.left.force_n == 0.0
     # On the second branch, where it crosses zero: 6 - 8 + 3000 (d - 0.007) = 0.
     assert body.contact.left.compression_m == pytest.approx(0.007 + 2.0 / 3000.0, rel=1e-3)
@@ -202,7 +202,7 @@ def test_the_explanation_adds_up_to_the_force_that_was_felt():
 def test_run_explains_the_model_in_the_terminal_and_in_json():
     shown = CliRunner().invoke(cli, ["run", "--object", "leaking_bottle", "--explain-model"])
     assert shown.exit_code == 0
-    table = shown.output[shown.output.index("model       1") :].splitlines()
+    table = shown.output[shown.output.index("model       peak force 1") :].splitlines()
     assert table[1].split()[:2] == ["term", "peak"]
     assert [line.split()[0] for line in table[2:4]] == ["elastic", "gas"]
     assert "relaxes in 5 s" in table[3]
@@ -254,7 +254,7 @@ PROGRAM = """
 
     law, (scene, *compiled) = create("controller", "hybrid"), sys.argv[1:]
     done = [run_many(SimConfig(spread=False), law, [scene], [0], compiled=one == "yes")[0] for one in compiled]
-    print(done[0].outcome.name, done[0].body.contact.left.force_n, done[0].body.peak_n)
+    print(done[0].outcome.name, done[0].state.contact.left.force_n, done[0].state.peak_n)
     print(all(np.array_equal(done[0].trace.gap_m, one.trace.gap_m) for one in done))
 """
 

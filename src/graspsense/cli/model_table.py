@@ -12,14 +12,14 @@ def print_model(model: Mapping[str, Any]) -> None:
     """Print what a simulated gripper reports as `model`: one row a term."""
     click.echo()
     if not model["touched"]:
-        click.echo("model       nothing was touched, so no term did anything")
+        click.echo("model       no contact, so no term contributed")
         return
     click.echo(
-        f"model       {model['peak_n']:.2f} N at most, {model['compression_m'] * 1e3:.3f} mm pressed in, "
-        f"{model['covers_m'] * 1e3:.3f} mm of the fingertips' covers"
+        f"model       peak force {model['peak_n']:.2f} N, compression {model['compression_m'] * 1e3:.3f} mm, "
+        f"of the pads {model['pads_m'] * 1e3:.3f} mm"
     )
     click.echo(
-        f"{'term':<16}{'peak':>10}{'at the top':>12}{'share':>8}{'work':>11}{'lost':>11}{'expected':>11}"
+        f"{'term':<16}{'peak':>10}{'at peak':>12}{'share':>8}{'work':>11}{'lost':>11}{'expected':>11}"
         "  time constants"
     )
     for row in model["terms"]:
@@ -31,17 +31,17 @@ def print_model(model: Mapping[str, Any]) -> None:
 
 
 def print_selection(selection: Mapping[str, Any]) -> None:
-    """Print what a simulated gripper reports as `selection`: what became of each term, why, and what it may cost."""
+    """Print what a simulated gripper reports as `selection`: what became of each term, why, and the error of that."""
     click.echo()
+    level, verified = selection["level"], selection["verified"]
     click.echo(
-        f"accuracy    {selection['accuracy']:.3g} asked for, {selection['error']:.2g} given away by estimate "
-        f"(rung: {selection['rung']}); {selection['steps']} steps"
+        f"accuracy    {selection['accuracy']:.3g} required, {selection['error']:.2g} estimated for what is left out "
+        f"(tolerance {level['model_tol']:.2g}); {selection['steps']} steps (tolerance {level['step_tol']:.2g})"
     )
-    checked = selection["checked"]
     click.echo(
-        "checked     not by a trial grasp"
-        if checked is None
-        else f"checked     {checked['error']:.2g} in {checked['quantity']}, of {checked['grasps']} trial grasps, at "
+        "verified    not by a trial grasp"
+        if verified is None
+        else f"verified    {verified['error']:.2g} in {verified['quantity']}, by {verified['grasps']} trial grasps, at "
         f"{selection['expected_force_n']:.3g} N and {selection['expected_speed_m_s'] * 1e3:.3g} mm/s"
     )
     for row in selection["decisions"]:

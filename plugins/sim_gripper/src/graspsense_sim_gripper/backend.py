@@ -1,10 +1,9 @@
-"""The simulated gripper as a backend: one grasp in the interpreter, many compiled."""
+"""The simulated gripper as a backend: one grasp in the interpreter, many grasps compiled."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from typing import Any, Unpack
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, Unpack
 
 from attrs import evolve
 
@@ -16,58 +15,53 @@ from graspsense.plugin_api import (
     Command,
     Controller,
     DeviceInfo,
-    Frame,
     Grasped,
     ObjectKind,
     Pads,
     Reading,
     RunConfig,
     SimulationVariant,
-    bind,
+    create,
     maker,
     tare,
 )
-from graspsense_sim_gripper.checking import Control, checked_choice, standard
+from graspsense_sim_gripper.build import CELL_OFFSET, EFFORT_LIMIT_N, build, device_info, instantiate
+from graspsense_sim_gripper.compiled.compose import INTERPRETED, Composition, bind_reachable, composed_move
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
+from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.exact.discretise import discretise
-from graspsense_sim_gripper.exact.propagate import ExactPlant, bind_move
+from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
-from graspsense_sim_gripper.kernel import plant_of
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
 from graspsense_sim_gripper.plant import PlantParams
-from graspsense_sim_gripper.sensing import (
-    PAD_COUNTS_PER_N,
-    Encoder,
-    PadBuffers,
-    SensorState,
-    _read_encoder,
-    apply_tare,
-    sense,
-)
-from graspsense_sim_gripper.setting import CELL_OFFSET, device_info, set_scene
-from graspsense_sim_gripper.terms.registry import find_term, laws_of
+from graspsense_sim_gripper.problem import GraspController
+from graspsense_sim_gripper.reduction.propose import FORCE_N, SPEED_M_S
+from graspsense_sim_gripper.reduction.select import select
+from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N, PadBuffers, apply_tare, sense
+from graspsense_sim_gripper.terms.registry import find_term
 
-# Where a tick runs in the interpreter, making its tuples is a good part of its cost.
-_sense = bind(
-    sense,
-    Frame=maker(Frame),
-    SensorState=maker(SensorState),
-    _read_encoder=bind(_read_encoder, Encoder=maker(Encoder)),
-)
+_sense = bind_reachable(sense, {}, INTERPRETED)
 _reading = maker(Reading)
-_COMPILED: Mapping[str, bool | None] = {"worth": None, "always": True, "never": False}
-_PLANT_TUPLES = {
-    kind.__name__: maker(kind) for kind in (PlantState, Motion, Contact, ContactState, StepState)
-}
+_COMPILED: Final[Mapping[str, bool | None]] = {"worth": None, "always": True, "never": False}
+
+
+def default_controller(config: SimConfig) -> GraspController:
+    """Return the controller for which a model is selected where none is given: that of the paper.
+
+    It has the speed and the force that the config expects.
+    """
+    force = min(config.expected_force_n or FORCE_N, EFFORT_LIMIT_N)
+    speed = config.expected_speed_m_s or SPEED_M_S
+    controller = create("controller", "hybrid", probing_force_n=force, closing_speed_m_s=speed)
+    return GraspController(controller, RunConfig())
 
 
 class SimBackend(BatchBackend[SimConfig]):
-    """A PR2 gripper, its fingertips and an object, as a model. Everything it says is simulated."""
+    """A model of a PR2 gripper, its fingertips and an object."""
 
     def __init__(self, config: SimConfig) -> None:
         super().__init__(config)
-        self._control: Control | None = None
+        self._controller: GraspController | None = None
 
     def objects(self) -> tuple[ObjectKind, ...]:
         """Return the objects of the catalogue and of the shipped scenes."""
@@ -78,55 +72,57 @@ class SimBackend(BatchBackend[SimConfig]):
         return SimBackend(evolve(self.config, object=name))
 
     def expect(self, controller: Controller[Any], run: RunConfig) -> None:
-        """Take the controller for which the model of the object is to be chosen."""
-        self._control = Control(controller, run)
+        """Set the controller for which the model of the object is selected."""
+        self._controller = GraspController(controller, run)
 
     def open(self, seed: int) -> DeviceInfo:
-        """Set the scene that the config and the seed describe.
+        """Prepare the grasp that the config and the seed describe.
 
-        Raises UnknownName for an unknown object, ConfigError where no model is as exact as asked for.
+        Raises UnknownName for an unknown object, ConfigError where no model has the accuracy asked for.
         """
-        chooser = partial(checked_choice, control=self._control or standard(self.config))
-        self._setting = setting = set_scene(self.config, self.config.object, seed, chooser)
-        self._move: Callable[[Any, PlantState, float, float], PlantState] = plant_of(
-            laws_of(setting.kinds), settles=setting.plant.steps.settle > 0.0, **_PLANT_TUPLES
+        problem = build(self.config, self.config.object)
+        self._reduction = None
+        if problem.spec is not None:
+            self._reduction = select(problem, self._controller or default_controller(self.config))
+        self._setup = setup = instantiate(problem, self._reduction, seed)
+        exact = discretise(self.config, setup)
+        self._plant: PlantParams | ExactPlant = setup.plant if exact is None else exact[0]
+        composition = Composition(
+            setup.kinds, None if exact is None else exact[1], setup.plant.steps.settle > 0.0
         )
-        by_maps = discretise(self.config, setting)
-        self._plant: PlantParams | ExactPlant = setting.plant
-        if by_maps is not None:
-            self._plant, shape = by_maps
-            self._move = bind_move(setting.kinds, shape, self._move, **_PLANT_TUPLES)
-        self._body, self._sensor = setting.body, setting.sensed
+        self._move = composed_move(composition)
+        self._state, self._sensor = setup.state, setup.sensor_state
         self._ticks = 0
         zero = (CELL_OFFSET[0],) * CELLS
-        self._blocks = setting.noise()
+        self._blocks = setup.noise()
         self._buffers = PadBuffers(zero, zero, [], [])
         self._pads = NO_PADS
         self._effort_n: float | None = None
         self._explains = self.config.explain
         # Compression and force at each tick since the first contact, where they are to be explained.
-        self._pressed: list[tuple[float, float]] = []
+        self._compressions: list[tuple[float, float]] = []
         return device_info(self.config)
 
     def read(self, timeout_s: float) -> Reading:
-        """Return the next tick; it is always there."""
+        """Return the next tick, which is always available."""
         del timeout_s
-        setting, effort = self._setting, self._effort_n
-        dt = setting.dt_s
+        setup, effort = self._setup, self._effort_n
+        dt = setup.dt_s
         if effort is None:
             effort = 0.0
         else:
-            self._body = self._move(self._plant, self._body, effort, dt)
+            self._state = self._move(self._plant, self._state, effort, dt)
             self._ticks += 1
-            if self._explains and self._body.contact.touched == 1:
-                # Of an object that is held fast the half that is pressed harder.
-                half = max(self._body.contact.left, self._body.contact.right, key=lambda one: one.force_n)
-                self._pressed.append((half.compression_m, half.force_n))
+            contact = self._state.contact
+            if self._explains and contact.touched == 1:
+                # Of an object that is fixed in place, the half that is pressed harder.
+                half = max(contact.left, contact.right, key=lambda half: half.force_n)
+                self._compressions.append((half.compression_m, half.force_n))
         buffers = self._buffers
         if self._sensor.images >= len(buffers.images):
             self._draw_noise()
         frame, self._sensor = _sense(
-            setting.sensor, self._sensor, self._body, self._ticks * dt, dt, effort, buffers
+            setup.sensor, self._sensor, self._state, self._ticks * dt, dt, effort, buffers
         )
         count = self._sensor.images
         if count != self._pads.counter:
@@ -135,7 +131,7 @@ class SimBackend(BatchBackend[SimConfig]):
         return _reading(frame, self._pads)
 
     def apply(self, command: Command) -> None:
-        """Take an effort for the next tick."""
+        """Set the effort of the next tick."""
         self._effort_n = command.value
 
     def tare(self, images: Sequence[Pads]) -> None:
@@ -147,28 +143,27 @@ class SimBackend(BatchBackend[SimConfig]):
         self._sensor = apply_tare(self._sensor, self._buffers)
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: there is no device to release."""
 
     def report(self) -> Mapping[str, Any]:
         """Return what only the model knows: the true peak force on the pads, and whether something broke.
 
-        With `explain` in the settings, also how much each term of the object did, under `model`.
+        With `explain` in the settings, also how much each term of the object contributed, under `model`.
         """
-        report = _known(self._body, self._setting.kinds)
-        choice = self._setting.choice
-        if choice is not None:
+        setup, reduction = self._setup, self._reduction
+        report = _model_report(self._state, setup.kinds)
+        if reduction is not None:
+            valid = reduction.valid_for(self._state.peak_n)
             if isinstance(self._plant, ExactPlant):
-                choice = choice.by_maps()
+                reduction = reduction.with_exact_discretisation()
             report["selection"] = {
                 "fidelity": self.config.fidelity,
-                **choice.plain(),
-                "steps": self._body.step.n_steps,
-                "within": choice.covers(self._body.peak_n),
+                **reduction.as_values(),
+                "steps": self._state.step.n_steps,
+                "within": valid,
             }
         if self.config.explain:
-            setting = self._setting
-            path, forces = [d for d, _ in self._pressed], [f for _, f in self._pressed]
-            report["model"] = explain(setting.kinds, setting.terms, setting.plant, path, forces, setting.dt_s)
+            report["model"] = explain(setup, self._compressions)
         return report
 
     def _draw_noise(self) -> None:
@@ -190,35 +185,36 @@ class SimBackend(BatchBackend[SimConfig]):
         seeds: Sequence[int],
         **options: Unpack[BatchOptions],
     ) -> list[Grasped]:
-        """Grasp each object with its seed; compiled, on all cores, where numba is installed and it pays."""
-        # Imported here: one grasp in the terminal needs neither threads nor compiling.
+        """Grasp each object with its seed; compiled, on all cores, where numba is installed and it saves time."""
+        # Imported here, since a single grasp needs neither threads nor compiling.
         from graspsense_sim_gripper.batch.threads import grasps
 
         done = grasps(self.config, controller, scenes, seeds, _COMPILED[self.config.compile], options)
         return [
             Grasped(
-                outcome=one.outcome,
-                reason=one.reason,
-                extracted=one.extracted,
-                trace=one.kept,
-                report=_known(one.body, kinds_in(scene)),
+                outcome=grasp.outcome,
+                reason=grasp.reason,
+                extracted=grasp.extracted,
+                trace=grasp.kept,
+                report=_model_report(grasp.state, kinds_in(scene)),
             )
-            for one, scene in zip(done, scenes, strict=True)
+            for grasp, scene in zip(done, scenes, strict=True)
         ]
 
 
-def _known(body: PlantState, kinds: Sequence[str]) -> dict[str, Any]:
+def _model_report(state: PlantState, kinds: Sequence[str]) -> dict[str, Any]:
     """Return what only the model knows at the end of a grasp."""
-    states = (
-        (kind, half.states[i])
-        for half in (body.contact.left, body.contact.right)
+    contact = state.contact
+    warnings = {
+        f"{kind}: {reason}": None
+        for half in (contact.left, contact.right)
         for i, kind in enumerate(kinds, 1)
-    )
-    beyond = {f"{kind}: {why}": None for kind, state in states if (why := find_term(kind)[1].beyond(state))}
+        if (reason := find_term(kind)[1].beyond(half.states[i]))
+    }
     return {
         "simulated": True,
-        "true_peak_force_n": body.peak_n,
-        "resolved": body.step.unresolved == 0,
-        "broken": any(getattr(state, "broken", 0) == 1 for state in body.contact.left.states),
-        "beyond": "; ".join(beyond),
+        "true_peak_force_n": state.peak_n,
+        "resolved": state.step.unresolved == 0,
+        "broken": any(getattr(term, "broken", 0) == 1 for term in contact.left.states),
+        "beyond": "; ".join(warnings),
     }

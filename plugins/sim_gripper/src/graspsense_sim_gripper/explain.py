@@ -1,75 +1,78 @@
-"""How much each term of the object did in a grasp: its law run once more along the compressions of that grasp."""
+"""How much each term of the object contributed to a grasp: its law evaluated again along the grasp's compressions."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-from graspsense_sim_gripper.plant import PlantParams
+from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import WorkingPoint
 
+TermParams = Any
+"""The parameters of a term: a named tuple of the term's own type."""
 
-def explain(
-    kinds: Sequence[str],
-    terms: Sequence[Any],
-    plant: PlantParams,
-    path_m: Sequence[float],
-    forces_n: Sequence[float],
-    dt_s: float,
-) -> dict[str, Any]:
-    """Return the size of every term, as plain values, whether it was kept in this grasp's model or not.
 
-    `path_m` holds the compression of the object at each tick from the first contact on, `forces_n` the force that
-    went with it. A term has its greatest force (`peak_n`), its force and its share of the whole where the whole
-    is greatest (`at_peak_n`, `share`), the work done on it until then (`work_j`), what it had not given back at
-    the end (`lost_j`), what its law alone expects of such a grasp (`expected_n`), and its `rates`.
+def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> dict[str, Any]:
+    """Return the contribution of every term as plain values, whether this grasp's model kept it or not.
+
+    `compressions` holds the compression (m) and the force (N) of the object at each tick from the first contact on. For
+    each term there are its largest force (`peak_n`), its force and its share of the total at the peak of the total
+    (`at_peak_n`, `share`), the work done on it until then (`work_j`), the work that it has not returned at the end
+    (`lost_j`), the force that its law alone predicts for such a grasp (`expected_n`), and its `rates`.
     """
-    if not path_m:
+    if not compressions:
         return {"touched": False, "terms": []}
-    path = [0.0, *path_m]
-    top = max(range(len(forces_n)), key=forces_n.__getitem__)
-    pressed = max(path)
+    path = [0.0, *(compression_m for compression_m, _ in compressions)]
+    forces_n = [force_n for _, force_n in compressions]
+    peak = max(range(len(forces_n)), key=forces_n.__getitem__)
+    deepest = max(path)
     point = WorkingPoint(
-        compression_m=pressed,
-        speed_m_s=pressed / (max(path.index(pressed), 1) * dt_s),
-        seconds=len(path_m) * dt_s,
+        compression_m=deepest,
+        speed_m_s=deepest / (max(path.index(deepest), 1) * setup.dt_s),
+        seconds=len(forces_n) * setup.dt_s,
     )
-    rows: list[dict[str, Any]] = []
-    for name, params in zip(kinds, terms, strict=True):
-        term = find_term(name)[1]
-        state, force, work, put_in = term.at_rest, 0.0, 0.0, 0.0
-        along: list[float] = []
-        for i in range(len(path_m)):
-            before = force
-            # The rate between this tick and the next, as far as ticks tell.
-            ahead = path[i + 2] if i + 2 < len(path) else path[i + 1]
-            speed = 0.5 * (ahead - path[i]) / dt_s
-            force, state = term.law(params, state, path[i], path[i + 1], dt_s, speed)
-            along.append(force)
-            work += 0.5 * (before + force) * (path[i + 1] - path[i])
-            if i == top:
-                put_in = work
-        rows.append(
-            {
-                "term": name,
-                "peak_n": max(along, key=abs),
-                "at_peak_n": along[top],
-                "work_j": put_in,
-                "lost_j": work,
-                "expected_n": term.importance(params, point),
-                "rates": [{"what": rate.what, "per_s": rate.per_s} for rate in term.rates(params, point)],
-            }
-        )
-    whole = sum(row["at_peak_n"] for row in rows)
+    rows = [
+        _contribution(kind, params, path, peak, setup.dt_s, point)
+        for kind, params in zip(setup.kinds, setup.terms, strict=True)
+    ]
+    total = sum(row["at_peak_n"] for row in rows)
     for row in rows:
-        row["share"] = row["at_peak_n"] / whole if whole != 0.0 else 0.0
+        row["share"] = row["at_peak_n"] / total if total != 0.0 else 0.0
     return {
         "touched": True,
-        "peak_n": forces_n[top],
-        "compression_m": pressed,
-        "covers_m": forces_n[top] / plant.thing.skins_n_m,
+        "peak_n": forces_n[peak],
+        "compression_m": deepest,
+        "pads_m": forces_n[peak] / setup.plant.thing.skins_n_m,
         "speed_m_s": point.speed_m_s,
         "seconds": point.seconds,
         "terms": rows,
+    }
+
+
+def _contribution(
+    kind: str, params: TermParams, path: Sequence[float], peak: int, dt_s: float, point: WorkingPoint
+) -> dict[str, Any]:
+    """Return the contribution of a term; `path` is the compression before the first tick and after each."""
+    term = find_term(kind)[1]
+    state, force, work, work_to_peak = term.at_rest, 0.0, 0.0, 0.0
+    forces: list[float] = []
+    for i in range(len(path) - 1):
+        before = force
+        # The mean rate over this tick and the next.
+        after = path[i + 2] if i + 2 < len(path) else path[i + 1]
+        speed = 0.5 * (after - path[i]) / dt_s
+        force, state = term.law(params, state, path[i], path[i + 1], dt_s, speed)
+        forces.append(force)
+        work += 0.5 * (before + force) * (path[i + 1] - path[i])
+        if i == peak:
+            work_to_peak = work
+    return {
+        "term": kind,
+        "peak_n": max(forces, key=abs),
+        "at_peak_n": forces[peak],
+        "work_j": work_to_peak,
+        "lost_j": work,
+        "expected_n": term.importance(params, point),
+        "rates": [{"what": rate.what, "per_s": rate.per_s} for rate in term.rates(params, point)],
     }

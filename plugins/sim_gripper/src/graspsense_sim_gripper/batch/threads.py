@@ -1,8 +1,8 @@
-"""Many grasps at once: the compiled loop on all cores where numba is there, the plain one where it is not.
+"""Many grasps at once: compiled on all cores where numba is installed, in the interpreter where it is not.
 
-Threads take slices of the batch in turn. A compiled loop runs in its thread, without the interpreter's lock; a plain
-one in a process of that thread's, since plain loops would wait for each other. What a grasp gives follows from its
-scene and seed alone, so the number of workers decides nothing but the time.
+Threads process slices of the batch in turn. A compiled loop runs in its thread without the interpreter's lock. A loop
+in the interpreter runs in a process of its thread, since such loops would otherwise wait for each other. The result of
+a grasp follows from its scene and seed alone, so the number of workers changes times only.
 """
 
 from __future__ import annotations
@@ -18,42 +18,35 @@ from typing import Any, Final, Unpack
 
 from attrs import define, field
 
-from graspsense.plugin_api import (
-    BatchOptions,
-    Controller,
-    NotCompilable,
-    RunConfig,
-    entry_point,
-    first_call,
-)
-from graspsense_sim_gripper import kernel
+from graspsense.plugin_api import BatchOptions, Controller, NotCompilable, RunConfig, entry_point
 from graspsense_sim_gripper.batch.job import (
-    Composition,
-    Done,
+    FinishedGrasp,
+    GraspLoop,
     Job,
+    Scenes,
     Storage,
-    chooser_of,
-    composition_of,
     grasp_compiled,
-    loop_of,
-    plainly,
+    grasp_plain,
+    scene_key,
 )
 from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
-from graspsense_sim_gripper.compiled.padding import as_compiled, compiled_kinds
+from graspsense_sim_gripper.compiled.compose import Composition
+from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
+from graspsense_sim_gripper.compiled.padding import compiled_kinds, composition_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import kinds_in, split_number
-from graspsense_sim_gripper.setting import Chooser, Setting, set_scene
+from graspsense_sim_gripper.objects.library import kinds_in
+from graspsense_sim_gripper.problem import GraspSetup
 
 WORTH_COMPILING: Final = 50
-"""Grasps of one composition from which compiling it takes less time than it saves."""
+"""Grasps of one composition from which on compiling saves more time than it takes."""
 WORTH_A_PROCESS: Final = 16
-"""Plain grasps a worker from which starting a process for them, half a second, takes less time than it saves."""
+"""Grasps a worker in the interpreter from which on a process for them, which starts in half a second, saves time."""
 SLICE: Final = 16
-AHEAD: Final = 8
-"""Slices a worker that are done before one that takes long."""
-REPORT_S: Final = 0.2
-
-_COMPILING: Final = threading.Lock()
+"""Grasps that a worker takes at once."""
+MAX_AHEAD: Final = 8
+"""Slices a worker that may be finished before an earlier one that takes long."""
+PROGRESS_S: Final = 0.2
+"""Time between two calls of the progress callback."""
 
 
 def run_many(
@@ -64,12 +57,12 @@ def run_many(
     *,
     compiled: bool | None = None,
     **options: Unpack[BatchOptions],
-) -> list[Done]:
-    """Grasp each scene with its seed and return what came of each in that order, the same for any number of workers.
+) -> list[FinishedGrasp]:
+    """Grasp each scene with its seed and return the results in that order, the same for any number of workers.
 
-    Traces are kept unless the options say otherwise. `compiled` asks for compiling or forbids it; by default a
-    composition is compiled from `WORTH_COMPILING` grasps on. Where a controller or a term cannot be compiled the
-    plain loop runs, and a warning says why.
+    Traces are kept unless the options say otherwise. `compiled` requires or forbids compiling; by default a composition
+    is compiled from `WORTH_COMPILING` grasps on. Where a controller or a term cannot be compiled the loop runs in the
+    interpreter, and a warning gives the reason.
     """
     return list(grasps(config, controller, scenes, seeds, compiled, {"traces": True, **options}))
 
@@ -81,8 +74,8 @@ def grasps(
     seeds: Sequence[int],
     compiled: bool | None,
     options: BatchOptions,
-) -> Iterator[Done]:
-    """Yield what `run_many` returns, one after the other."""
+) -> Iterator[FinishedGrasp]:
+    """Yield what `run_many` returns, grasp by grasp."""
     unknown = options.keys() - BatchOptions.__annotations__.keys()
     if unknown:
         raise TypeError(f"run_many has no {sorted(unknown)}; it has {sorted(BatchOptions.__annotations__)}")
@@ -112,38 +105,44 @@ class _Batch:
     workers: int
     compiled: bool | None
     notes: dict[str, None] = field(factory=dict, init=False)
-    """What is to be said of how they ran, each once."""
-    chooser: Chooser = field(init=False)
-    of_kinds: Counter[tuple[str, ...]] = field(factory=Counter, init=False)
+    """Remarks on how the grasps ran, each once."""
+    models: Scenes = field(init=False)
     counts: Counter[Composition] = field(factory=Counter, init=False)
-    fast: dict[Composition, bool] = field(factory=dict, init=False)
-    """Which compositions run compiled."""
-    loops: dict[Composition, Callable[..., Any]] = field(factory=dict, init=False)
+    """Grasps of each composition."""
+    is_compiled: dict[Composition, bool] = field(factory=dict, init=False)
+    loops: dict[Composition, GraspLoop] = field(factory=dict, init=False)
     """The compiled loops that have run once."""
-    own: threading.local = field(factory=threading.local, init=False)
+    local: threading.local = field(factory=threading.local, init=False)
+    """What belongs to a thread: its storage, and its process for grasps in the interpreter."""
     processes: ExitStack = field(factory=ExitStack, init=False)
 
-    def grasps(self, progress: Callable[[int, int], None] | None) -> Iterator[Done]:
-        """Run them all; yield what came of each in order, so that who keeps little of it holds little."""
+    @models.default
+    def _models(self) -> Scenes:
+        return Scenes(self.job)
+
+    def grasps(self, progress: Callable[[int, int], None] | None) -> Iterator[FinishedGrasp]:
+        """Run all grasps and yield them in order, so that a caller that keeps little needs little memory."""
         total = len(self.scenes)
         self._plan()
         slices = range(0, total, SLICE)
         workers = max(1, min(self.workers, len(slices)))
-        running: dict[Future[list[Done]], int] = {}
-        ready: dict[int, list[Done]] = {}
+        running: dict[Future[list[FinishedGrasp]], int] = {}
+        ready: dict[int, list[FinishedGrasp]] = {}
         asked = given = finished = 0
         with self.processes, ThreadPoolExecutor(max_workers=workers) as pool:
             try:
                 while True:
-                    # A slice a worker and one in reserve: nothing piles up, and an interruption is soon heard.
-                    while len(running) < 2 * workers and asked < min(len(slices), given + AHEAD * workers):
+                    # A slice a worker and one in reserve: nothing piles up, and an interruption takes effect soon.
+                    while len(running) < 2 * workers and asked < min(
+                        len(slices), given + MAX_AHEAD * workers
+                    ):
                         running[pool.submit(self._slice, slices[asked])] = asked
                         asked += 1
                     if progress is not None:
                         progress(finished, total)
                     if not running:
                         break
-                    for future in wait(running, REPORT_S, FIRST_COMPLETED).done:
+                    for future in wait(running, PROGRESS_S, FIRST_COMPLETED).done:
                         k = running.pop(future)
                         ready[k] = future.result()
                         finished += len(ready[k])
@@ -152,113 +151,92 @@ class _Batch:
                         given += 1
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
-                # Whoever waits for a process is then told that it has gone.
+                # A thread that waits for a process then learns that it has ended.
                 self.processes.close()
                 raise
 
-    def __attrs_post_init__(self) -> None:
-        self.chooser = chooser_of(self.job, self._trial_loop)
-
     def _plan(self) -> None:
-        """Decide what is compiled, and choose the models; names that nobody knows are refused here."""
-        names = Counter(scene if scene == "none" else split_number(scene)[0] for scene in self.scenes)
-        for name, n in names.items():
-            self.of_kinds[compiled_kinds(kinds_in(name))] += n
-        for name, n in names.items():
-            composition = composition_of(self.job.config, self._setting(name, 0))
-            self.counts[composition] += n
+        """Select the models and decide what is compiled. Raises UnknownName for a name that is not known."""
+        # In the order of the scenes, so that the first unknown name is reported.
+        counts = Counter(scene_key(scene) for scene in self.scenes)
+        examples = {scene_key(scene): scene for scene in reversed(self.scenes)}
+        of_kinds: Counter[tuple[str, ...]] = Counter()
+        for key, n in counts.items():
+            of_kinds[compiled_kinds(kinds_in(examples[key]))] += n
+        # A straight drive has exact grasps, but its trial grasps have steps, which would be compiled for these alone.
+        may_compile = self.job.config.transmission != "straight"
+        for key, n in counts.items():
+            worth = self._worth(of_kinds[compiled_kinds(kinds_in(examples[key]))])
+            self.models.add(examples[key], compiled=may_compile and worth)
+            self.counts[composition_of(self.job.config, self.models.setup(examples[key], 0))] += n
         for composition, n in self.counts.items():
-            self.fast[composition] = self._worth(n)
+            self.is_compiled[composition] = self._worth(n)
 
     def _worth(self, n: int) -> bool:
         return n >= WORTH_COMPILING if self.compiled is None else self.compiled
 
-    def _setting(self, scene: str, seed: int) -> Setting:
-        return set_scene(self.job.config, scene, seed, self.chooser)
-
-    def _trial_loop(
-        self, setting: Setting, step: Callable[..., Any]
-    ) -> tuple[Callable[..., Any], Setting] | None:
-        """Return the compiled loop for a trial grasp, that of the grasps themselves; None where those run plain."""
-        composition = composition_of(self.job.config, setting)
-        # What maps may take is checked by steps, which would be compiled for that alone.
-        config = self.job.config
-        if config.transmission == "straight" or not self._worth(self.of_kinds[compiled_kinds(setting.kinds)]):
-            return None
-        try:
-            loop = kernel.compiled(loop_of(composition, step))
-        except NotCompilable:
-            return None
-
-        def guarded(*given: Any) -> Any:
-            with _COMPILING, first_call():
-                return loop(*given)
-
-        return guarded, as_compiled(setting)
-
-    def _slice(self, begin: int) -> list[Done]:
+    def _slice(self, begin: int) -> list[FinishedGrasp]:
         """Run the slice that begins there."""
         scenes, seeds = self.scenes[begin : begin + SLICE], self.seeds[begin : begin + SLICE]
-        found: dict[int, Done] = {}
+        done: dict[int, FinishedGrasp] = {}
         plain: list[int] = []
         for i, (scene, seed) in enumerate(zip(scenes, seeds, strict=True)):
-            setting = self._setting(scene, seed)
-            one = self._fast(setting)
-            if one is None:
+            grasp = self._compiled(self.models.setup(scene, seed))
+            if grasp is None:
                 plain.append(i)
             else:
-                found[i] = one
+                done[i] = grasp
         if plain:
-            done = self._plain([scenes[i] for i in plain], [seeds[i] for i in plain])
-            found.update(zip(plain, done, strict=True))
-        return [found[i] for i in range(len(scenes))]
+            grasps = self._plain([scenes[i] for i in plain], [seeds[i] for i in plain])
+            done.update(zip(plain, grasps, strict=True))
+        return [done[i] for i in range(len(scenes))]
 
-    def _fast(self, setting: Setting) -> Done | None:
-        """Run one grasp compiled; None where it is to run plain."""
-        kinds = composition_of(self.job.config, setting)
-        if kinds not in self.fast:
-            # Friction drawn anew may leave it piecewise linear in one trial and not in the next.
-            self.fast[kinds] = any(fast for one, fast in self.fast.items() if one.kinds == kinds.kinds)
-        if not self.fast[kinds]:
+    def _compiled(self, setup: GraspSetup) -> FinishedGrasp | None:
+        """Run a grasp compiled; None where it is to run in the interpreter."""
+        composition = composition_of(self.job.config, setup)
+        if composition not in self.is_compiled:
+            # The friction drawn may leave it piecewise linear in one trial and not in the next.
+            self.is_compiled[composition] = any(
+                compiled for other, compiled in self.is_compiled.items() if other.kinds == composition.kinds
+            )
+        if not self.is_compiled[composition]:
             return None
-        loop = self.loops.get(kinds)
-        if loop is None:
-            # The first call compiles; meanwhile the others wait, for they would compile the same once more.
-            with _COMPILING:
-                try:
-                    plain = loop_of(kinds, type(self.job.controller).step)
-                    loop = kernel.compiled(plain)
-                    with first_call(slp_vectorize=kinds.shape is not None):
-                        one = grasp_compiled(self.job, setting, loop, self._storage())
-                    self.loops[kinds] = entry_point(loop)
-                    return one
-                except NotCompilable as error:
-                    self.fast[kinds] = False
-                    self._slowly(str(error))
-                    return None
-        return grasp_compiled(self.job, setting, loop, self._storage())
+        loop = self.loops.get(composition)
+        if loop is not None:
+            return grasp_compiled(self.job, setup, loop, self._storage())
+        try:
+            loop = compiled_loop(composition, type(self.job.controller).step)
+            with compiling(composition):
+                grasp = grasp_compiled(self.job, setup, loop, self._storage())
+                self.loops[composition] = entry_point(loop)
+                return grasp
+        except NotCompilable as error:
+            self.is_compiled[composition] = False
+            self._note_plain(str(error))
+            return None
 
-    def _slowly(self, why: str) -> None:
-        how = f"on {self.workers} cores" if self._apart() else "on one core"
-        self.notes[f"these grasps run in plain Python {how}, about a hundred times slower: {why}"] = None
+    def _note_plain(self, reason: str) -> None:
+        how = f"on {self.workers} cores" if self._worth_processes() else "on one core"
+        self.notes[f"these grasps run in plain Python {how}, about a hundred times slower: {reason}"] = None
 
-    def _apart(self) -> bool:
-        """Return whether plain grasps are worth processes of their own."""
-        plain = sum(n for kinds, n in self.counts.items() if not self.fast[kinds])
+    def _worth_processes(self) -> bool:
+        """Return whether the grasps in the interpreter are worth processes of their own."""
+        plain = sum(n for composition, n in self.counts.items() if not self.is_compiled[composition])
         return self.workers > 1 and plain >= WORTH_A_PROCESS * self.workers
 
-    def _plain(self, scenes: Sequence[str], seeds: Sequence[int]) -> list[Done]:
-        if self._apart() and not getattr(self.own, "alone", False):
+    def _plain(self, scenes: Sequence[str], seeds: Sequence[int]) -> list[FinishedGrasp]:
+        local = self.local
+        if self._worth_processes() and not getattr(local, "without_process", False):
             try:
-                if not hasattr(self.own, "process"):
-                    self.own.process = self.processes.enter_context(PlainProcess(self.job))
-                return self.own.process.run(scenes, seeds)  # type: ignore[no-any-return]
+                if not hasattr(local, "process"):
+                    local.process = self.processes.enter_context(PlainProcess(self.models))
+                return local.process.run(scenes, seeds)  # type: ignore[no-any-return]
             except NotHandedOver as error:
-                self.own.alone = True
+                local.without_process = True
                 self.notes[f"plain grasps run on one core: {error}"] = None
-        return [plainly(self.job, scene, seed) for scene, seed in zip(scenes, seeds, strict=True)]
+        return [grasp_plain(self.job, self.models.setup(*grasp)) for grasp in zip(scenes, seeds, strict=True)]
 
     def _storage(self) -> Storage:
-        if not hasattr(self.own, "storage"):
-            self.own.storage = Storage()
-        return self.own.storage  # type: ignore[no-any-return]
+        if not hasattr(self.local, "storage"):
+            self.local.storage = Storage()
+        return self.local.storage  # type: ignore[no-any-return]

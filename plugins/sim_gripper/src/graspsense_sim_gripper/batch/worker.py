@@ -1,9 +1,8 @@
-"""Plain grasps in a process of their own: two loops in the interpreter of one process would wait for each other.
+"""Grasps in the interpreter of a process of their own, since loops in one process would wait for each other.
 
-The process is a fresh interpreter with `main` as its program, so that nothing of the caller's script runs a
-second time. It is handed names and numbers: a line of JSON with the settings and the controller's registered name,
-then a line with scenes and seeds at a time. It answers each with a line, and the traces behind it in numpy's own
-format. The caller extracts features from the traces.
+The process is a new interpreter with `main` as its program, so that nothing of the caller's script runs a second time.
+It reads a line of JSON with the settings and the controller's registered name, and then lines with scenes and seeds. It
+answers each with a line, followed by the traces in numpy's own format. Features are extracted by the caller.
 """
 
 from __future__ import annotations
@@ -22,27 +21,27 @@ import numpy as np
 from attrs import asdict, fields
 
 from graspsense.plugin_api import Outcome, RunConfig, Trace, create, recipe_of
-from graspsense_sim_gripper.batch.job import Done, Job, chooser_of, done_of, plainly
+from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, finished, grasp_plain
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.setting import set_scene
 
-_ARRAYS: Final = tuple(one.name for one in fields(Trace) if one.name != "units")
+_ARRAYS: Final = tuple(column.name for column in fields(Trace) if column.name != "units")
 
 
 class NotHandedOver(Exception):
-    """The job cannot be given to another process; the text says what of it and why."""
+    """A job that cannot be given to another process; the text gives the reason."""
 
 
 class PlainProcess:
-    """A process that runs plain grasps of one job. Use it as a context: it ends with it."""
+    """A process that runs the grasps of a job in the interpreter. It ends with the context that it is used as."""
 
-    def __init__(self, job: Job) -> None:
-        self._job = job
+    def __init__(self, scenes: Scenes) -> None:
+        self._scenes = scenes
+        job = scenes.job
         try:
             self._greeting = _line(
                 {
-                    # What names a class must be found where it is read: the same places, in the same order.
-                    "path": [one or os.getcwd() for one in sys.path],
+                    # The classes that are named have to be found there: the same folders, in the same order.
+                    "path": [folder or os.getcwd() for folder in sys.path],
                     "config": asdict(job.config),
                     "controller": _named(job.controller),
                     "run": asdict(job.run),
@@ -66,16 +65,16 @@ class PlainProcess:
         self._process.kill()
         self._process.communicate()
 
-    def run(self, scenes: Sequence[str], seeds: Sequence[int]) -> list[Done]:
-        """Grasp these and return what came of each.
+    def run(self, scenes: Sequence[str], seeds: Sequence[int]) -> list[FinishedGrasp]:
+        """Grasp these scenes with these seeds and return the results.
 
-        Raises NotHandedOver, also where a grasp raised there: run here, it raises here.
+        Raises NotHandedOver, also where a grasp raised there: it raises here when it is run here.
         """
         to, of = self._process.stdin, self._process.stdout
         assert to is not None
         assert of is not None
         try:
-            to.write(self._greeting + _line({"scenes": list(scenes), "seeds": [int(one) for one in seeds]}))
+            to.write(self._greeting + _line({"scenes": list(scenes), "seeds": [int(seed) for seed in seeds]}))
             to.flush()
             self._greeting = b""
             answer = _read_line(of)
@@ -84,19 +83,20 @@ class PlainProcess:
             raise NotHandedOver(f"the process for plain grasps has ended ({error})") from error
         if "refused" in answer:
             raise NotHandedOver(answer["refused"])
-        job, found, chooser = self._job, [], chooser_of(self._job)
-        for scene, seed, (outcome, reason, body) in zip(scenes, seeds, answer["done"], strict=True):
-            begun = set_scene(job.config, scene, seed, chooser).body
+        job = self._scenes.job
+        results = []
+        for scene, seed, (outcome, reason, values) in zip(scenes, seeds, answer["done"], strict=True):
+            initial = self._scenes.setup(scene, seed).state
             trace = _read_trace(traces) if job.traces or job.extract is not None else None
-            found.append(done_of(job, Outcome(outcome), reason, _like(begun, body), trace))
-        return found
+            results.append(finished(job, Outcome(outcome), reason, _like(initial, values), trace))
+        return results
 
 
 def main() -> None:
     """Serve one caller until it hangs up."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), "wb")
-    # What anything here prints must not get between the answers.
+    # What anything prints here must not get between the answers.
     os.dup2(2, 1)
     asked = sys.stdin.buffer
     try:
@@ -104,7 +104,7 @@ def main() -> None:
     except EOFError:
         return
     sys.path[:] = greeting["path"]
-    job: Job | None = None
+    scenes: Scenes | None = None
     while True:
         try:
             wanted = _read_line(asked)
@@ -112,15 +112,16 @@ def main() -> None:
             return
         traces = io.BytesIO()
         try:
-            job = job or _job(greeting)
-            done = [plainly(job, *one) for one in zip(wanted["scenes"], wanted["seeds"], strict=True)]
-            for one in done:
-                if one.kept is not None:
-                    _write_trace(traces, one.kept)
-            answer = {"done": [[one.outcome.value, one.reason, one.body] for one in done]}
+            scenes = scenes or Scenes(_job(greeting))
+            setups = (scenes.setup(*grasp) for grasp in zip(wanted["scenes"], wanted["seeds"], strict=True))
+            done = [grasp_plain(scenes.job, setup) for setup in setups]
+            for grasp in done:
+                if grasp.kept is not None:
+                    _write_trace(traces, grasp.kept)
+            answer = {"done": [[grasp.outcome.value, grasp.reason, grasp.state] for grasp in done]}
             line = _line({**answer, "bytes": traces.tell()})
         except Exception as error:
-            what = "a plain grasp" if job is not None else "the controller"
+            what = "a plain grasp" if scenes is not None else "the controller"
             traces = io.BytesIO()
             refused = f"{what} fails in another process: {type(error).__name__}: {error}"
             line = _line({"refused": refused, "bytes": 0})
@@ -140,12 +141,12 @@ def _job(greeting: dict[str, Any]) -> Job:
 
 
 def _named(controller: Any) -> tuple[str, dict[str, Any]]:
-    """Return the controller's name and settings, which must be all that there is to it."""
+    """Return the controller's name and settings. Raises ValueError where it does not follow from these alone."""
     name, values = recipe_of("controller", controller)
     twin = create("controller", name, **values)
     # As text, for NaN is not equal to itself.
     if repr((twin.params(), twin.init())) != repr((controller.params(), controller.init())):
-        raise ValueError(f"another {name} made of its settings has other numbers")
+        raise ValueError(f"another {name} with its settings has other numbers")
     return name, values
 
 
@@ -156,15 +157,15 @@ def _line(value: Any) -> bytes:
 def _read_line(stream: IO[bytes]) -> Any:
     line = stream.readline()
     if not line.endswith(b"\n"):
-        raise EOFError("nothing more came from it")
+        raise EOFError("it gave no answer")
     return json.loads(line)
 
 
 def _read(stream: IO[bytes], n: int) -> bytes:
-    found = stream.read(n)
-    if len(found) < n:
-        raise EOFError("it broke off in an answer")
-    return found
+    data = stream.read(n)
+    if len(data) < n:
+        raise EOFError("an answer is incomplete")
+    return data
 
 
 def _write_trace(to: IO[bytes], trace: Trace) -> None:
@@ -178,7 +179,7 @@ def _read_trace(of: IO[bytes]) -> Trace:
 
 
 def _like(pattern: Any, values: Any) -> Any:
-    """Return these values, lists in lists, as tuples of the kinds that `pattern` is made of."""
+    """Return these values, lists in lists, as tuples of the types in `pattern`."""
     if not isinstance(pattern, tuple):
         return values
     parts = [_like(*one) for one in zip(pattern, values, strict=True)]

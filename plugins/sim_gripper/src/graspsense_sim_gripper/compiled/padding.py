@@ -1,145 +1,156 @@
-"""What a grasp is compiled as: one composition for the whole catalogue, and of any other object what its model keeps.
+"""Padding a grasp with unused terms, so that few compositions have to be compiled.
 
-Every composition takes seconds to compile. The terms of the catalogue's objects are few, so all of these objects are
-compiled as one that has each of them once; a term that an object lacks is one that its model drops. Forces are summed
-from the last term to the first, so that a term which adds nothing changes no bit: neither do those that are left out
-of the composition of an object with terms of its own.
+Compiling takes seconds for each composition. The objects of the catalogue have few kinds of terms among them, so all of
+them are compiled as one composition with each kind once, in which the terms that an object does not have are dropped.
+Another object is compiled with the terms that its reduced model keeps. Forces are summed from the last term to the
+first, so that a term of no force changes no bit.
 """
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from attrs import evolve
 
+from graspsense_sim_gripper.compiled.compose import Composition
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.state import PlantState
+from graspsense_sim_gripper.dynamics.state import ContactState, PlantState
+from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.objects.library import catalogue
+from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.sensing import PadCells
-from graspsense_sim_gripper.setting import Setting, setting_of
 from graspsense_sim_gripper.terms.registry import find_term, in_order
 from graspsense_sim_gripper.terms.remainder import Kept
 
-
-def _as_array(cells: PadCells) -> PadCells:
-    return PadCells(np.array(cells.weights, float), np.array(cells.offset, float))
-
-
-IDEAL: Final = _as_array(setting_of(SimConfig(sensor="ideal"), None, 0).sensor.left)
-"""The cells of an ideal sensor, which nothing reads."""
+TermState = Any
+"""The state of a term: a named tuple of the term's own type."""
 
 
 class Filler(NamedTuple):
-    """What stands in for a term that an object lacks: parameters nobody looks at, and its state at rest."""
+    """What fills the place of a term that an object does not have: unused parameters, and the state at rest."""
 
     params: Kept
-    state: Any
-
-
-@cache
-def common_kinds() -> tuple[str, ...]:
-    """Return the terms of the catalogue's objects, each once, in the canonical order."""
-    names = sorted({kind for spec in catalogue().values() for kind, _ in spec.terms})
-    return tuple(names[i] for i in in_order(names))
-
-
-def is_common(kinds: tuple[str, ...]) -> bool:
-    """Return whether an object of these terms fits: none that the catalogue lacks, and none twice."""
-    return len(set(kinds)) == len(kinds) and set(kinds) <= set(common_kinds())
+    state: TermState
 
 
 NOTHING: Final = Filler(Kept(0, None), None)
 
 
 class Layout(NamedTuple):
-    """In which composition a grasp is compiled, and where its parts stand there, the remainder first."""
+    """The terms of a composition, and where those of an object are in it; the lumped spring and damper is first."""
 
     kinds: tuple[str, ...]
-    places: tuple[tuple[int, Filler], ...]
-    """For each place which of the object's own it is (-1: none), and what fills it then."""
-    own: tuple[tuple[int, Any], ...]
-    """For each of the object's own its place (-1: none), and its state then."""
+    sources: tuple[tuple[int, Filler], ...]
+    """For each place the index of the object's own term (-1: none), and what fills it then."""
+    places: tuple[tuple[int, TermState], ...]
+    """For each of the object's own terms its place (-1: none), and its state then."""
 
 
-def layout_of(setting: Setting) -> Layout:
-    """Return the composition in which this grasp is compiled."""
-    if compiled_kinds(setting.kinds) is common_kinds():
-        return _layout(setting.kinds, ())
-    return _layout(setting.kinds, tuple([one.kept for one in setting.plant.thing.terms[1:]]))
+def layout_of(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> Layout:
+    """Return the layout in which a grasp is compiled: with these kinds, or by default as in a batch."""
+    if kinds is not None:
+        return _with_kinds(setup.kinds, kinds)
+    if is_common(setup.kinds):
+        return _with_kinds(setup.kinds, common_kinds())
+    return _with_kept(setup.kinds, tuple([term.kept for term in setup.plant.thing.terms[1:]]))
 
 
 @cache
+def common_kinds() -> tuple[str, ...]:
+    """Return the kinds of terms of the catalogue's objects, each once, in the canonical order."""
+    names = sorted({kind for spec in catalogue().values() for kind, _ in spec.terms})
+    return tuple(names[i] for i in in_order(names))
+
+
+@lru_cache(maxsize=1024)
+def is_common(kinds: tuple[str, ...]) -> bool:
+    """Return whether these terms fit into the catalogue's composition: all of its kinds, and none twice."""
+    return len(set(kinds)) == len(kinds) and set(kinds) <= set(common_kinds())
+
+
 def compiled_kinds(kinds: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the composition in which an object of these terms is compiled where its model keeps them all."""
+    """Return the kinds with which an object of these terms is compiled if its model keeps all of them."""
     return common_kinds() if is_common(kinds) else kinds
 
 
-@cache
-def _layout(kinds: tuple[str, ...], kept: tuple[int, ...]) -> Layout:
-    if kept:
-        # Each kind once or more, those that its model keeps.
-        there = [i for i, one in enumerate(kept) if one == 1]
-        places = [(i + 1, NOTHING) for i in there]
-        found = [(there.index(i) + 1 if i in there else -1, i) for i in range(len(kinds))]
-        names = tuple(kinds[i] for i in there)
-    else:
-        names = common_kinds()
-        places = [(kinds.index(k) + 1 if k in kinds else -1, _filler(k)) for k in names]
-        found = [(names.index(kind) + 1, i) for i, kind in enumerate(kinds)]
-    own = [(place, find_term(kinds[i])[1].at_rest) for place, i in found]
-    return Layout(names, ((0, NOTHING), *places), ((0, None), *own))
+def composition_of(config: SimConfig, setup: GraspSetup, *, pad: bool = True) -> Composition:
+    """Return the composition in which a grasp is compiled; not `pad`: with the object's own terms."""
+    exact = discretise(config, setup, on_arrays=True)
+    kinds = layout_of(setup).kinds if pad else setup.kinds
+    return Composition(kinds, None if exact is None else exact[1], setup.plant.steps.settle > 0.0)
 
 
-def as_compiled(setting: Setting) -> Setting:
-    """Return the same grasp as a compiled loop takes it: in that composition, the cells' figures as arrays."""
-    # As tuples these would be handed over number by number, and looked up by a chain of comparisons.
-    sensor = setting.sensor
-    cells = (IDEAL, IDEAL) if sensor.ideal == 1 else (_as_array(sensor.left), _as_array(sensor.right))
+def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetup:
+    """Return the same grasp as a compiled loop takes it: in its `layout_of`, with the cells' numbers in arrays."""
+    # As tuples they would be passed number by number, and indexed by a chain of comparisons.
+    sensor = setup.sensor
+    cells = (IDEAL_CELLS, IDEAL_CELLS)
+    if sensor.ideal == 0:
+        cells = _as_arrays(sensor.left), _as_arrays(sensor.right)
     sensor = sensor._replace(left=cells[0], right=cells[1])
-    kinds, plant, body = setting.kinds, setting.plant, setting.body
-    layout = layout_of(setting)
-    if kinds != layout.kinds:
-        thing, places = plant.thing, layout.places
-        own, state = thing.terms, body.contact.left.states
-        terms = tuple([own[i] if i >= 0 else filler.params for i, filler in places])
-        left = body.contact.left._replace(states=tuple([state[i] if i >= 0 else f.state for i, f in places]))
-        right = left
-        if body.contact.right is not body.contact.left:
-            state = body.contact.right.states
-            right = body.contact.right._replace(
-                states=tuple([state[i] if i >= 0 else f.state for i, f in places])
-            )
-        kinds, plant = layout.kinds, plant._replace(thing=thing._replace(terms=terms))
-        body = body._replace(contact=body.contact._replace(left=left, right=right))
-    return Setting(
-        kinds=kinds,
-        terms=setting.terms,
-        plant=plant,
-        body=body,
-        sensor=sensor,
-        sensed=setting.sensed,
-        dt_s=setting.dt_s,
-        choice=setting.choice,
-        drawn=setting.drawn,
+    layout, plant, state = layout_of(setup, kinds), setup.plant, setup.state
+    if setup.kinds != layout.kinds:
+        own = plant.thing.terms
+        terms = tuple([own[i] if i >= 0 else filler.params for i, filler in layout.sources])
+        plant = plant._replace(thing=plant.thing._replace(terms=terms))
+        left = _padded_state(state.contact.left, layout)
+        both_same = state.contact.right is state.contact.left
+        right = left if both_same else _padded_state(state.contact.right, layout)
+        state = state._replace(contact=state.contact._replace(left=left, right=right))
+    return evolve(setup, kinds=layout.kinds, plant=plant, state=state, sensor=sensor)
+
+
+def unpadded(state: PlantState, setup: GraspSetup) -> PlantState:
+    """Return the plant's state after a compiled grasp with the object's own terms, those of `setup`."""
+    layout = layout_of(setup)
+    if layout.kinds == setup.kinds:
+        return state
+    contact = state.contact
+    left, right = (_unpadded_state(half, layout) for half in (contact.left, contact.right))
+    return state._replace(contact=contact._replace(left=left, right=right))
+
+
+def _padded_state(contact: ContactState, layout: Layout) -> ContactState:
+    own = contact.states
+    return contact._replace(states=tuple([own[i] if i >= 0 else f.state for i, f in layout.sources]))
+
+
+def _unpadded_state(contact: ContactState, layout: Layout) -> ContactState:
+    states = contact.states
+    return contact._replace(states=tuple([states[i] if i >= 0 else rest for i, rest in layout.places]))
+
+
+@lru_cache(maxsize=256)
+def _with_kinds(own: tuple[str, ...], kinds: tuple[str, ...]) -> Layout:
+    sources = tuple((own.index(kind) + 1 if kind in own else -1, _filler(kind)) for kind in kinds)
+    places = tuple((kinds.index(kind) + 1, find_term(kind)[1].at_rest) for kind in own)
+    return Layout(kinds, ((0, NOTHING), *sources), ((0, None), *places))
+
+
+@lru_cache(maxsize=256)
+def _with_kept(own: tuple[str, ...], kept: tuple[int, ...]) -> Layout:
+    """Return the layout with the terms that a model keeps, each kind once or more."""
+    indices = [i for i, keeps in enumerate(kept) if keeps == 1]
+    sources = tuple((i + 1, NOTHING) for i in indices)
+    places = tuple(
+        (indices.index(i) + 1 if i in indices else -1, find_term(kind)[1].at_rest)
+        for i, kind in enumerate(own)
     )
+    return Layout(tuple(own[i] for i in indices), ((0, NOTHING), *sources), ((0, None), *places))
 
 
-def as_own(body: PlantState, setting: Setting) -> PlantState:
-    """Return the plant as it is at the end of a compiled grasp, with the object's own terms again."""
-    layout = layout_of(setting)
-    if layout.kinds == setting.kinds:
-        return body
-    own = layout.own
-    left, right = (
-        half._replace(states=tuple([half.states[i] if i >= 0 else rests for i, rests in own]))
-        for half in (body.contact.left, body.contact.right)
-    )
-    return body._replace(contact=body.contact._replace(left=left, right=right))
-
-
-@cache
+@lru_cache(maxsize=256)
 def _filler(kind: str) -> Filler:
     _, term = find_term(kind)
-    # Compiled code is of types: floats, as any parameters of it.
+    # Compiled code distinguishes types: floats, as all its parameters.
     return Filler(Kept(0, term.params(*(1.0 for _ in term.params._fields))), term.at_rest)
+
+
+def _as_arrays(cells: PadCells) -> PadCells:
+    return PadCells(np.array(cells.weights, float), np.array(cells.offset, float))
+
+
+IDEAL_CELLS: Final = _as_arrays(PadCells((1.0 / 15.0,) * 15, (0.0,) * 22))
+"""The cells of an ideal sensor, which nothing reads."""

@@ -18,73 +18,73 @@ from graspsense_sim_gripper.terms.remainder import linear as lumped_form
 from graspsense_sim_gripper.terms.term import LinearForm, OwnContact
 
 if TYPE_CHECKING:
-    from graspsense_sim_gripper.setting import Setting
+    from graspsense_sim_gripper.problem import GraspSetup
 
 
-def applicable(config: SimConfig, setting: Setting) -> str:
+def applicable(config: SimConfig, setup: GraspSetup) -> str:
     """Return why a grasp is not discretised exactly; empty if it is.
 
     This is the only place that decides between time steps and the matrix exponential. Raises TypeError for a term whose
     linear form has other states than its law.
     """
-    drive, model, steps = setting.plant.drive, setting.plant.thing, setting.plant.steps
+    drive, model, steps = setup.plant.drive, setup.plant.thing, setup.plant.steps
     if config.scheme != "auto" or steps.longest_s < math.inf or steps.settle > 0.0:
         return "the scheme or the length of its steps is prescribed"
     if drive.link.finger_m != 0.0:
         return "the ratio of the linkage varies with the gap"
     if drive.breakaway_n != drive.coulomb_n:
         return "friction is greater at rest than while sliding"
-    if model.held == 1 and setting.body.contact.offset_m != 0.0:
+    if model.held == 1 and setup.state.contact.offset_m != 0.0:
         return "the object is held off the centre line, so that each half would have modes of its own"
-    nonlinear = [kind for kind, form in _forms(setting) if form is None]
+    nonlinear = [kind for kind, form in _forms(setup) if form is None]
     if nonlinear:
         return f"terms are not linear: {', '.join(nonlinear)}"
-    if _tables(setting, on_arrays=True) is None:
+    if _tables(setup, on_arrays=True) is None:
         return "the forces leave the motion of a mode undetermined"
     return ""
 
 
 def discretise(
-    config: SimConfig, setting: Setting, *, on_arrays: bool = False
+    config: SimConfig, setup: GraspSetup, *, on_arrays: bool = False
 ) -> tuple[ExactPlant, Shape] | None:
     """Return the plant of a grasp with the matrices of its modes, and their shape; None if it is not `applicable`.
 
     `on_arrays`: as compiled code takes them; the interpreter is faster with lists. Raises TypeError as `applicable`.
     """
-    if applicable(config, setting):
+    if applicable(config, setup):
         return None
-    found = _tables(setting, on_arrays=on_arrays)
+    found = _tables(setup, on_arrays=on_arrays)
     assert found is not None
     shape, tables = found
     size = workspace_size(shape)
     workspace: Any = np.zeros(size) if on_arrays else [0.0] * size
-    return ExactPlant(setting.plant, tables, workspace), shape
+    return ExactPlant(setup.plant, tables, workspace), shape
 
 
-def _tables(setting: Setting, *, on_arrays: bool) -> tuple[Shape, Tables] | None:
-    drive, model = setting.plant.drive, setting.plant.thing
+def _tables(setup: GraspSetup, *, on_arrays: bool) -> tuple[Shape, Tables] | None:
+    drive, model = setup.plant.drive, setup.plant.thing
     scene = LinearScene(
-        drive.inertia / setting.body.motion.jacobian_m_rev**2,
+        drive.inertia / setup.state.motion.jacobian_m_rev**2,
         drive.damping_n_s_m,
         drive.breakaway_n > 0.0,
         drive.load_share,
         drive.lag_s,
         model.skins_n_m,
         model.skin,
-        tuple(form for _, form in _forms(setting) if form is not None),
+        tuple(form for _, form in _forms(setup) if form is not None),
     )
-    return tables_of(scene, setting.dt_s) if on_arrays else listed_tables_of(scene, setting.dt_s)
+    return tables_of(scene, setup.dt_s) if on_arrays else listed_tables_of(scene, setup.dt_s)
 
 
-def _forms(setting: Setting) -> list[tuple[str, LinearForm | OwnContact | None]]:
+def _forms(setup: GraspSetup) -> list[tuple[str, LinearForm | OwnContact | None]]:
     """Return the kinds of the terms that the model keeps, with their linear forms."""
-    lumped, *terms = setting.plant.thing.terms
+    lumped, *terms = setup.plant.thing.terms
     forms: list[tuple[str, LinearForm | OwnContact | None]] = []
     if lumped.kept == 1:
         forms.append(("", lumped_form(lumped.params)))
     forms += [
         (kind, _form(kind, term.params))
-        for kind, term in zip(setting.kinds, terms, strict=True)
+        for kind, term in zip(setup.kinds, terms, strict=True)
         if term.kept == 1
     ]
     return forms

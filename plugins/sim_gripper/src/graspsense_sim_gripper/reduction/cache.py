@@ -1,7 +1,8 @@
-"""Choices that trial grasps have checked, kept on disk from one process to the next.
+"""The cache of reduced models: in memory and on disk, by the content of everything that a model follows from.
 
-A choice follows from the settings, the object and the controller, and from the code that makes it. All of that is in
-the mark it is kept under, so that what was made by other code is never found. What cannot be read is made anew.
+A model follows from the settings, the object and the controller, and from the code of all of these and of the
+simulator. In memory the key holds the settings, the object and the controller. On disk it is a digest of these and of
+the code, so that a model of other code is never used. A file that cannot be read is ignored.
 """
 
 from __future__ import annotations
@@ -11,113 +12,184 @@ import json
 import os
 import sys
 import tempfile
+import threading
+from collections import OrderedDict
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from attrs import asdict
 
 import graspsense.plugin_api as plugin_api
 from graspsense.plugin_api import NotCompilable, cache_folder, fingerprint
-from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant import Steps
-from graspsense_sim_gripper.selection import Check, Choice, Decision
+from graspsense_sim_gripper.problem import ControllerStep, GraspController, Problem
+from graspsense_sim_gripper.reduction.levels import Level
+from graspsense_sim_gripper.reduction.model import Decision, Reduction, Verification
 from graspsense_sim_gripper.terms.registry import laws_of
 from graspsense_sim_gripper.terms.term import WorkingPoint
 
-MOST: Final = 4000
-"""Files of some 2 kB; where there are more the older half goes."""
+MAX_IN_MEMORY: Final = 512
+"""Models in memory, of some 5 kB each; the least recently used is dropped first."""
+MAX_FILES: Final = 4000
+"""Files on disk, of some 2 kB each; at that number the older half is deleted."""
 
 
-def mark_of(spec: ObjectSpec, step: Any, *settings: Any) -> str | None:
-    """Return what a choice is kept under: a mark of the object, a controller's step, the settings, and all their code.
+class Key(NamedTuple):
+    """Everything that a model follows from, but for the code."""
 
-    None where the code of a term or of the controller cannot be told from other code.
+    config: SimConfig
+    kinds: tuple[str, ...]
+    spec: str
+    step: ControllerStep
+    controller: str
+
+
+class ReductionCache:
+    """Reduced models by their content. Threads may share it."""
+
+    def __init__(self) -> None:
+        self._models: OrderedDict[Key, Reduction] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def key(self, problem: Problem, controller: GraspController) -> Key:
+        """Return the key of the model for a problem under a controller. Raises TypeError where there is no object."""
+        if problem.spec is None:
+            raise TypeError("where there is no object there is no model to reduce")
+        spec = problem.spec
+        return Key(problem.model_config, spec.kinds, spec.content, controller.step, controller.content)
+
+    def get(self, key: Key) -> Reduction | None:
+        """Return the model of this key, from memory or else from disk; None where there is none."""
+        with self._lock:
+            if key in self._models:
+                self._models.move_to_end(key)
+                return self._models[key]
+        name = _file_name(key)
+        model = None if name is None else _read(name)
+        if model is not None:
+            self._remember(key, model)
+        return model
+
+    def put(self, key: Key, model: Reduction) -> None:
+        """Cache a model. Only a verified one is worth a file."""
+        self._remember(key, model)
+        if model.verification is not None:
+            name = _file_name(key)
+            if name is not None:
+                _write(name, model)
+
+    def clear(self) -> None:
+        """Forget the models in memory."""
+        with self._lock:
+            self._models.clear()
+
+    def __len__(self) -> int:
+        return len(self._models)
+
+    def _remember(self, key: Key, model: Reduction) -> None:
+        with self._lock:
+            self._models[key] = model
+            self._models.move_to_end(key)
+            while len(self._models) > MAX_IN_MEMORY:
+                self._models.popitem(last=False)
+
+
+def _file_name(key: Key) -> str | None:
+    """Return the name of a model's file: a digest of its key and of all code that it follows from.
+
+    None where the code of a term or of the controller cannot be identified.
     """
     digest = hashlib.sha256(_own_code())
-    functions = (step, *laws_of(spec.kinds))
+    functions = (key.step, *laws_of(key.kinds))
     try:
-        marks = [fingerprint(one) for one in functions]
-        # Beside its law a term says how fast it is, and what may stand for it.
-        stamps = [_stamp(Path(str(sys.modules[one.__module__].__file__))) for one in functions]
+        marks = [fingerprint(function) for function in functions]
+        # Beside its law, the file of a term holds its rates and limits.
+        stamps = [_stamp(Path(str(sys.modules[function.__module__].__file__))) for function in functions]
     except (NotCompilable, KeyError, AttributeError, OSError):
         return None
-    for item in (repr(spec), *map(repr, settings), *marks, *stamps):
+    for item in (key.spec, repr(key.config), key.controller, *marks, *stamps):
         digest.update(item.encode())
         digest.update(b"\0")
-    return digest.hexdigest()[:32]
+    return f"{digest.hexdigest()[:32]}.json"
 
 
 @cache
 def _own_code() -> bytes:
-    """Return a mark of our own code as it stands on disk."""
+    """Return what identifies the code of the simulator and of the core as it is on disk."""
     packages = (Path(__file__).parent.parent, Path(plugin_api.__file__).parent / "core")
-    return "".join(_stamp(source) for one in packages for source in sorted(one.rglob("*.py"))).encode()
+    return "".join(_stamp(source) for folder in packages for source in sorted(folder.rglob("*.py"))).encode()
 
 
 def _stamp(source: Path) -> str:
-    found = source.stat()
-    return f"{source} {found.st_size} {found.st_mtime_ns}\n"
+    status = source.stat()
+    return f"{source} {status.st_size} {status.st_mtime_ns}\n"
 
 
-def find(mark: str) -> Choice | None:
-    """Return the choice that is kept under this mark, if one is."""
+def _read(name: str) -> Reduction | None:
     folder = _folder()
     if folder is not None:
         with suppress(OSError, ValueError, TypeError, KeyError):
-            return _choice(json.loads((folder / f"{mark}.json").read_text(encoding="utf-8")))
+            return _from_values(json.loads((folder / name).read_text(encoding="utf-8")))
     return None
 
 
-def keep(mark: str, choice: Choice) -> None:
-    """Keep a choice under this mark, where that can be written."""
+def _write(name: str, model: Reduction) -> None:
+    """Write a model to disk where that is possible."""
     folder = _folder()
     if folder is None:
         return
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
-        _make_room(folder)
-        # Whole or not at all, whoever else writes the same.
+        _delete_old_files(folder)
+        # Replaced in one piece, whichever other process writes the same file.
         with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".part", delete=False) as part:
             try:
-                json.dump(_plain(choice), part)
+                json.dump(_as_values(model), part)
                 part.close()
-                os.replace(part.name, folder / f"{mark}.json")
+                os.replace(part.name, folder / name)
             except BaseException:
                 os.unlink(part.name)
                 raise
 
 
 def _folder() -> Path | None:
-    kept = cache_folder()
-    return None if kept is None else kept / "choices"
+    parent = cache_folder()
+    return None if parent is None else parent / "reductions"
 
 
-def _make_room(folder: Path) -> None:
+def _delete_old_files(folder: Path) -> None:
     files = list(folder.iterdir())
-    if len(files) < MOST:
+    if len(files) < MAX_FILES:
         return
     for path in sorted(files, key=lambda path: path.stat().st_mtime)[: len(files) // 2]:
         path.unlink(missing_ok=True)
 
 
-def _plain(choice: Choice) -> dict[str, Any]:
-    values = asdict(choice, recurse=True)
-    return {**values, "point": choice.point._asdict(), "steps": choice.steps._asdict()}
+def _as_values(model: Reduction) -> dict[str, Any]:
+    values = asdict(model, recurse=True)
+    tuples = {
+        "point": model.point._asdict(),
+        "steps": model.steps._asdict(),
+        "level": model.level._asdict(),
+    }
+    return {**values, **tuples}
 
 
-def _choice(values: dict[str, Any]) -> Choice:
-    check = values["check"]
-    return Choice(
+def _from_values(values: dict[str, Any]) -> Reduction:
+    verification = values["verification"]
+    return Reduction(
         **{
             **values,
-            "made": tuple(values["made"]),
+            "treatment": tuple(values["treatment"]),
             "point": WorkingPoint(**values["point"]),
             "steps": Steps(**values["steps"]),
-            "decisions": tuple(Decision(**one) for one in values["decisions"]),
+            "decisions": tuple(Decision(**decision) for decision in values["decisions"]),
             "scheme": Decision(**values["scheme"]),
             "contact": Decision(**values["contact"]),
-            "check": None if check is None else Check(**check),
+            "level": Level(**values["level"]),
+            "verification": None if verification is None else Verification(**verification),
         }
     )

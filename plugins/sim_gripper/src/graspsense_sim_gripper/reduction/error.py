@@ -32,7 +32,7 @@ TRACE_SCALE_N: Final = 1.0
 
 
 @frozen(kw_only=True, eq=False)
-class Course:
+class GraspRecord:
     """What a grasp is compared by: a row a tick from the approach on, how it ended, and the true peak force."""
 
     outcome: int
@@ -41,7 +41,7 @@ class Course:
     speed_m_s: NDArray[np.float64]
     left_n: NDArray[np.float64]
     right_n: NDArray[np.float64]
-    ended: int
+    n_rows: int
     """How many rows there are until the fingers open."""
     peak_n: float
 
@@ -66,14 +66,14 @@ class Course:
             found["df_dt"] = (found["f_steady"] - _at(force, first)) / found["delta_t"]
         return found
 
-    def touched_at_m_s(self) -> float:
+    def contact_speed_m_s(self) -> float:
         """Return how fast the gap closed when a pad first felt anything; 0 where none did."""
         felt = np.flatnonzero(np.maximum(self.left_n, self.right_n) > 0.0)
         return float(-self.speed_m_s[max(int(felt[0]) - 1, 0)]) if len(felt) else 0.0
 
     def _touch(self) -> float | None:
         """Return the row, and the part of one, at which both pads feel the contact force."""
-        felt = np.minimum(self.left_n, self.right_n)[: self.ended] - CONTACT_FORCE_N
+        felt = np.minimum(self.left_n, self.right_n)[: self.n_rows] - CONTACT_FORCE_N
         over = np.flatnonzero(felt >= 0.0)
         if not len(over):
             return None
@@ -85,10 +85,10 @@ class Course:
 
         In the very row of the contact there is no rate, as the feature set has it.
         """
-        speed = np.abs(self.speed_m_s[: self.ended]) - REST_SPEED_M_S
+        speed = np.abs(self.speed_m_s[: self.n_rows]) - REST_SPEED_M_S
         window = round(REST_WINDOW_S / self.dt_s)
         begin = math.ceil(first)
-        moving = [begin - 1, *(np.flatnonzero(speed[begin:] > 0.0) + begin).tolist(), self.ended]
+        moving = [begin - 1, *(np.flatnonzero(speed[begin:] > 0.0) + begin).tolist(), self.n_rows]
         for i, following in pairwise(moving):
             if following - i > window:
                 stops = i + float(speed[i] / (speed[i] - speed[i + 1])) if speed[i] > 0.0 else first
@@ -100,7 +100,7 @@ def _at(column: Any, place: float) -> float:
     return float(np.interp(place, np.arange(len(column)), column))
 
 
-def deviation(one: Course, expected: Course) -> tuple[float, str]:
+def deviation(one: GraspRecord, expected: GraspRecord) -> tuple[float, str]:
     """Return the largest error of all, and which quantity it is of; infinite where they are not of one kind."""
     if one.outcome != expected.outcome:
         return math.inf, "outcome"
@@ -115,7 +115,7 @@ def deviation(one: Course, expected: Course) -> tuple[float, str]:
     n = min(len(one.gap_m), len(expected.gap_m))
     if n == 0:
         return worst, whose
-    mine, other = (0.5 * (course.left_n[:n] + course.right_n[:n]) for course in (one, expected))
+    mine, other = (0.5 * (record.left_n[:n] + record.right_n[:n]) for record in (one, expected))
     trace = float(np.sqrt(np.mean((mine - other) ** 2)) / max(np.sqrt(np.mean(other**2)), TRACE_SCALE_N))
     if not trace <= worst:
         worst, whose = (math.inf if math.isnan(trace) else trace), "trace"

@@ -1,4 +1,4 @@
-"""The choice of a model is tried before it is taken: a ladder from bold to careful, and a refusal at its end."""
+"""A model is tried before it is used: levels from large to small tolerances, and a refusal where none suffices."""
 
 import math
 from typing import NamedTuple
@@ -10,16 +10,18 @@ from selection import error_of
 
 from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import HOLD, ConfigError, Controller, Outcome, RunConfig, create
-from graspsense_sim_gripper import checking
-from graspsense_sim_gripper.backend import SimBackend
+from graspsense_sim_gripper.backend import SimBackend, default_controller
 from graspsense_sim_gripper.batch import run_many
-from graspsense_sim_gripper.checking import Control, checked_choice, standard
+from graspsense_sim_gripper.build import problem_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue, find
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.reduction.error import Course, deviation
-from graspsense_sim_gripper.selection import BOLD, CAREFUL, LADDER
-from graspsense_sim_gripper.setting import choice_of
+from graspsense_sim_gripper.problem import GraspController
+from graspsense_sim_gripper.reduction import levels, verify
+from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
+from graspsense_sim_gripper.reduction.levels import SCENE_SCALES, UNVERIFIED, LevelScale
+from graspsense_sim_gripper.reduction.propose import grip_of, propose
+from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.terms import Term
 from graspsense_sim_gripper.terms.registry import TERMS
 
@@ -33,7 +35,11 @@ def _nothing_kept(tmp_path, monkeypatch):
 
 
 def hybrid(**settings):
-    return Control(create("controller", "hybrid", **settings), RunConfig())
+    return GraspController(create("controller", "hybrid", **settings), RunConfig())
+
+
+def selected(config, spec, controller):
+    return select(problem_of(config, spec), controller)
 
 
 def thing(*terms):
@@ -42,13 +48,13 @@ def thing(*terms):
 
 @pytest.mark.parametrize("accuracy", [0.1, 0.001])
 @pytest.mark.parametrize(("change", "part"), [({"spread": True}, 0.5), ({}, 0.8)])
-def test_a_checked_choice_says_what_a_trial_grasp_found(accuracy, change, part):
+def test_a_verified_model_says_what_a_trial_grasp_found(accuracy, change, part):
     """Where the grasp is to differ from what is tried it has the rest of the accuracy."""
     config = evolve(CONFIG, accuracy=accuracy, **change)
-    choice = checked_choice(config, find("naked:full_open"), hybrid())
-    assert choice.check.error <= part * accuracy
-    assert choice.check.grasps >= 2
-    assert choice.plain()["checked"].keys() == {"error", "quantity", "grasps"}
+    model = selected(config, find("naked:full_open"), hybrid())
+    assert model.verification.error <= part * accuracy
+    assert model.verification.grasps >= 2
+    assert model.as_values()["verified"].keys() == {"error", "quantity", "grasps"}
 
 
 @pytest.mark.parametrize("name", ["toy", "can:empty_open"])
@@ -65,33 +71,34 @@ def test_the_model_of_a_single_instance_is_as_accurate_as_requested(name):
 def test_what_the_paths_say_too_boldly_the_trial_grasp_takes_back(monkeypatch):
     # Without its creep the shell is at rest much sooner.
     spec, config = thing(SHELL, ("maxwell", {"k_n_m": 2000.0, "tau_s": 0.2})), evolve(CONFIG, accuracy=0.1)
-    rash = BOLD._replace(model_share=5.0)
-    monkeypatch.setattr(checking, "LADDER", (rash, CAREFUL))
-    assert choice_of(config, spec, rung=rash).decisions[-1].decision != "kept"
-    choice = checked_choice(config, spec, hybrid())
-    # The first one, one in each of the two, and two more in that which holds.
-    assert (choice.rung, choice.check.grasps) == ("careful", 5)
+    rash = LevelScale(5.0)
+    monkeypatch.setattr(levels, "SCENE_SCALES", (rash, UNVERIFIED))
+    problem = problem_of(config, spec)
+    assert propose(problem, grip_of(problem), rash).decisions[-1].decision != "kept"
+    model = selected(config, spec, hybrid())
+    # The first one, one in each of the two, and two more in the accepted one.
+    assert (model.level, model.verification.grasps) == (UNVERIFIED.at(0.1), 5)
 
 
 def test_force_and_speed_are_those_of_the_controller_unless_the_settings_say_others():
     spec = thing(SHELL)
     slow, fast = (
-        checked_choice(CONFIG, spec, hybrid(closing_speed_m_s=v, probing_force_n=f)).point
+        selected(CONFIG, spec, hybrid(closing_speed_m_s=v, probing_force_n=f)).point
         for v, f in ((0.01, 10.0), (0.04, 40.0))
     )
     assert (slow.speed_m_s, fast.speed_m_s) == (pytest.approx(0.01, rel=0.05), pytest.approx(0.04, rel=0.05))
     assert fast.force_n > 2.0 * slow.force_n
     told = evolve(CONFIG, expected_force_n=55.0, expected_speed_m_s=0.002)
-    point = checked_choice(told, spec, hybrid()).point
+    point = selected(told, spec, hybrid()).point
     assert (point.force_n, point.speed_m_s) == (55.0, 0.002)
-    assert standard(told).controller.config.closing_speed_m_s == 0.002
+    assert default_controller(told).controller.config.closing_speed_m_s == 0.002
 
 
 def test_a_slow_approach_is_taken_up_near_the_object(monkeypatch):
-    monkeypatch.setattr(checking, "LONGEST_S", 4.0)
-    choice = checked_choice(CONFIG, thing(SHELL), hybrid(closing_speed_m_s=0.002))
-    assert choice.check is not None
-    assert choice.point.speed_m_s == pytest.approx(0.002, rel=0.05)
+    monkeypatch.setattr(verify, "MAX_SECONDS", 4.0)
+    model = selected(CONFIG, thing(SHELL), hybrid(closing_speed_m_s=0.002))
+    assert model.verification is not None
+    assert model.point.speed_m_s == pytest.approx(0.002, rel=0.05)
 
 
 class Ragged(NamedTuple):
@@ -106,17 +113,17 @@ def test_a_law_that_hangs_on_its_steps_is_refused_by_name(monkeypatch):
     term = Term(name="ragged", summary="", params=Ragged, law=ragged)
     monkeypatch.setitem(TERMS, "ragged", term)
     spec = thing(SHELL, ("ragged", {"k_n_m": 1000.0}))
-    # The finest rungs would find the same, and take seconds in the interpreter.
-    monkeypatch.setattr(checking, "LADDER", (CAREFUL,))
+    # The finest levels would find the same, and take seconds in the interpreter.
+    monkeypatch.setattr(levels, "SCENE_SCALES", (UNVERIFIED,))
     with pytest.raises(ConfigError) as refused:
-        checked_choice(CONFIG, spec, hybrid())
+        selected(CONFIG, spec, hybrid())
     said = str(refused.value)
     assert "'made up'" in said
     assert "'ragged'" in said
     assert "gripper.accuracy" in said
     assert 'gripper.fidelity = "reference"' in said
     # As a reference it is what it is, and says that nothing was checked.
-    assert checked_choice(evolve(CONFIG, fidelity="reference"), spec, hybrid()).check is None
+    assert selected(evolve(CONFIG, fidelity="reference"), spec, hybrid()).verification is None
 
 
 STIFF = 'width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 1e5\n[[terms]]\ntype = "loss"\ndamping_n_s_m = 200.0\n'
@@ -127,14 +134,14 @@ def course(config, contact_force_n):
     law = create("controller", "hybrid", closing_speed_m_s=0.0125, contact_force_n=contact_force_n)
     grasp = run_grasp(SimBackend(config), law, RunConfig())
     trace = grasp.trace
-    return Course(
+    return GraspRecord(
         outcome=int(grasp.outcome),
         dt_s=1.0 / config.rate_hz,
         gap_m=trace.gap_m,
         speed_m_s=trace.velocity_m_s,
         left_n=trace.force_left_n,
         right_n=trace.force_right_n,
-        ended=int(np.sum(trace.phase <= HOLD)),
+        n_rows=int(np.sum(trace.phase <= HOLD)),
         peak_n=grasp.report["true_peak_force_n"],
     )
 
@@ -175,16 +182,18 @@ def test_a_threshold_that_is_nearly_met_at_a_tick_is_decided_as_by_the_reference
 def test_every_object_of_the_catalogue_has_a_model_of_ordinary_steps():
     for spec in catalogue().values():
         for config in (CONFIG, evolve(CONFIG, spread=True)):
-            choice = checked_choice(config, spec, hybrid())
-            assert choice.check is not None, spec.name
-            assert choice.rung in [rung.name for rung in LADDER if rung.model_share > 0.0], spec.name
+            model = selected(config, spec, hybrid())
+            assert model.verification is not None, spec.name
+            assert model.level in [
+                scale.at(config.accuracy) for scale in SCENE_SCALES if scale.model > 0.0
+            ], spec.name
 
 
-def test_forced_steps_and_contacts_beyond_the_tick_are_not_checked():
+def test_forced_steps_and_contacts_beyond_the_tick_are_not_verified():
     for config in (evolve(CONFIG, step_s=1e-4), evolve(CONFIG, scheme="implicit")):
-        assert checked_choice(config, thing(SHELL), hybrid()).check is None
-    hard = checked_choice(evolve(CONFIG, skin_n_m=math.inf), thing(("elastic", {"k1_n_m": 1e9})), hybrid())
-    assert (hard.contact.decision, hard.check) == ("peak not resolved", None)
+        assert selected(config, thing(SHELL), hybrid()).verification is None
+    hard = selected(evolve(CONFIG, skin_n_m=math.inf), thing(("elastic", {"k1_n_m": 1e9})), hybrid())
+    assert (hard.contact.decision, hard.verification) == ("peak not resolved", None)
 
 
 def failing(params, state, frame, pads):

@@ -7,9 +7,10 @@ from attrs import evolve, fields
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import EFFORT, Command, Trace, bind, create, fingerprint
-from graspsense_sim_gripper import kernel
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.compiled.compose import sum_of
+from graspsense_sim_gripper.compiled.jit import compile_part
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.terms.elastic import Elastic, elastic
 from graspsense_sim_gripper.terms.loss import Loss, loss
@@ -101,7 +102,7 @@ def test_a_law_that_cannot_be_compiled_runs_plain_and_the_warning_says_why():
 
     law = Odd(HYBRID.config)
     seeds = range(2)
-    with pytest.warns(UserWarning, match=r"plain Python.*test_kernel.py:\d+"):
+    with pytest.warns(UserWarning, match=r"plain Python.*test_loop.py:\d+"):
         done = run_many(SimConfig(), law, ["toy"] * 2, seeds, compiled=True)
     expected = run_many(SimConfig(), HYBRID, ["toy"] * 2, seeds, compiled=False)
     for one, other in zip(done, expected, strict=True):
@@ -112,8 +113,8 @@ def test_a_law_that_cannot_be_compiled_runs_plain_and_the_warning_says_why():
 
 
 def test_compositions_of_terms_have_fingerprints_of_their_own():
-    one, two = kernel.sum_of([elastic, loss]), kernel.sum_of([loss, elastic])
-    assert fingerprint(one) == fingerprint(kernel.sum_of([elastic, loss]))
+    one, two = sum_of([elastic, loss]), sum_of([loss, elastic])
+    assert fingerprint(one) == fingerprint(sum_of([elastic, loss]))
     assert fingerprint(one) != fingerprint(two)
 
 
@@ -121,11 +122,11 @@ def test_a_sum_of_many_terms_is_the_sum_of_each():
     laws = [elastic, loss, elastic, loss, elastic]
     params = (Elastic(1.0, 0.0), Loss(10.0), Elastic(100.0, 0.0), Loss(1e3), Elastic(1e4, 0.0))
     states = (NoState(),) * 5
-    force, after = kernel.sum_of(laws)(params, states, 0.0, 1.0, 1.0, 1.0 / 1.0)
+    force, after = sum_of(laws)(params, states, 0.0, 1.0, 1.0, 1.0 / 1.0)
     assert force == pytest.approx(11111.0)
     assert after == states
-    assert kernel.compiled(kernel.sum_of(laws))(params, states, 0.0, 1.0, 1.0, 1.0 / 1.0)[0] == force
-    assert kernel.sum_of([])((), (), 0.0, 1.0, 1.0, 1.0 / 1.0) == (0.0, ())
+    assert compile_part(sum_of(laws))(params, states, 0.0, 1.0, 1.0, 1.0 / 1.0)[0] == force
+    assert sum_of([])((), (), 0.0, 1.0, 1.0, 1.0 / 1.0) == (0.0, ())
 
 
 def test_bind_refuses_what_it_cannot_bind():

@@ -1,0 +1,212 @@
+"""Composing the functions of a scene: the sum of its terms, the plant that presses it, and the loop of a grasp.
+
+A generic function names its parts as globals, and `bind` (of `graspsense.plugin_api`) fills them in. `bind_reachable`
+does that wherever a part is named in the functions that a function calls, at any depth. Everything composed here runs
+as it is in the interpreter, and `compiled.jit` compiles it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from types import FunctionType
+from typing import Any, Final, NamedTuple, TypeVar
+
+from graspsense.plugin_api import Frame, bind, maker, tick
+from graspsense_sim_gripper import plant
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
+from graspsense_sim_gripper.exact.modes import Shape
+from graspsense_sim_gripper.exact.propagate import bind_move
+from graspsense_sim_gripper.loop import Progress, grasp
+from graspsense_sim_gripper.plant import PlantParams, Thing
+from graspsense_sim_gripper.problem import ControllerStep
+from graspsense_sim_gripper.sensing import Encoder, SensorState
+from graspsense_sim_gripper.terms.registry import find_term, laws_of
+from graspsense_sim_gripper.terms.remainder import Kept, Remainder
+from graspsense_sim_gripper.terms.term import NO_STATE, Law
+
+FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
+TermStates = Any
+"""A tuple with a state of its own type for each term."""
+TermParams = Any
+"""A tuple with parameters of its own type for each term."""
+PlantMove = Callable[[Any, PlantState, float, float], PlantState]
+"""Takes the plant's model, its state, the effort and the length of the tick."""
+ContactSolver = Callable[[Thing, ContactState, float, float, float], ContactState]
+
+INTERPRETED: Final[Mapping[Any, Any]] = {
+    kind: maker(kind)
+    for kind in (PlantState, Motion, Contact, ContactState, StepState, SensorState, Encoder, Frame)
+}
+"""Named tuples that a tick creates, each with a constructor that the interpreter runs in half the time."""
+
+
+def bind_reachable(
+    function: FunctionT, parts: Mapping[str, Any], constructors: Mapping[Any, Any] | None = None
+) -> FunctionT:
+    """Return a copy of `function` in which it, and every function that it calls, sees these parts as its globals.
+
+    A part replaces the global of its name wherever that is read. A class among the keys of `constructors` is replaced
+    by its value wherever that is read, whatever its name. Functions that reach neither stay as they are, and so do the
+    parts themselves. Raises TypeError for a part that nothing reads.
+    """
+    unread = set(parts)
+    bound: FunctionT = _bound(function, parts, constructors or {}, unread, {})
+    if unread:
+        raise TypeError(f"nothing that {function.__qualname__} calls names a part {sorted(unread)}")
+    return bound
+
+
+def _bound(
+    function: Any,
+    parts: Mapping[str, Any],
+    constructors: Mapping[Any, Any],
+    unread: set[str],
+    done: dict[int, Any],
+) -> Any:
+    if id(function) in done:
+        return done[id(function)]
+    replaced = {}
+    for name in function.__code__.co_names:
+        if name not in function.__globals__:
+            continue
+        value = function.__globals__[name]
+        if name in parts:
+            replaced[name] = parts[name]
+            unread.discard(name)
+        elif isinstance(value, FunctionType):
+            called = _bound(value, parts, constructors, unread, done)
+            if called is not value:
+                replaced[name] = called
+        elif isinstance(value, type) and value in constructors:
+            replaced[name] = constructors[value]
+    done[id(function)] = bind(function, **replaced) if replaced else function
+    return done[id(function)]
+
+
+# ------------------------------------------------------------------------------------------ the object's terms
+
+
+def _no_terms(
+    params: TermParams, states: TermStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermStates]:
+    return 0.0, ()
+
+
+first: Law = _no_terms
+second: Law = _no_terms
+third: Law = _no_terms
+rest: Law = _no_terms
+
+
+def _sum_of_1(
+    params: TermParams, states: TermStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermStates]:
+    force, state = first(params[0], states[0], d0, d1, h, v1)
+    return force, (state,)
+
+
+def _sum_of_2(
+    params: TermParams, states: TermStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermStates]:
+    force1, state1 = first(params[0], states[0], d0, d1, h, v1)
+    force2, state2 = second(params[1], states[1], d0, d1, h, v1)
+    return force1 + force2, (state1, state2)
+
+
+def _sum_of_3(
+    params: TermParams, states: TermStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermStates]:
+    force1, state1 = first(params[0], states[0], d0, d1, h, v1)
+    force2, state2 = second(params[1], states[1], d0, d1, h, v1)
+    force3, state3 = third(params[2], states[2], d0, d1, h, v1)
+    return force1 + (force2 + force3), (state1, state2, state3)
+
+
+def _sum_of_more(
+    params: TermParams, states: TermStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermStates]:
+    force1, state1 = first(params[0], states[0], d0, d1, h, v1)
+    force2, state2 = second(params[1], states[1], d0, d1, h, v1)
+    force3, state3 = third(params[2], states[2], d0, d1, h, v1)
+    force, others = rest(params[3:], states[3:], d0, d1, h, v1)
+    return force1 + (force2 + (force3 + force)), (state1, state2, state3, *others)
+
+
+def sum_of(laws: Sequence[Law]) -> Law:
+    """Return one law that is the sum of these: parameters and states become tuples in the same order.
+
+    Forces are summed from the last to the first, so that a term of no force changes no bit.
+    """
+    if not laws:
+        return _no_terms
+    if len(laws) == 1:
+        return bind(_sum_of_1, first=laws[0])
+    if len(laws) == 2:
+        return bind(_sum_of_2, first=laws[0], second=laws[1])
+    if len(laws) == 3:
+        return bind(_sum_of_3, first=laws[0], second=laws[1], third=laws[2])
+    return bind(_sum_of_more, first=laws[0], second=laws[1], third=laws[2], rest=sum_of(laws[3:]))
+
+
+def all_kept(terms: Sequence[Any]) -> tuple[Kept, ...]:
+    """Return the parameters of these terms as the sum of `laws_of` takes them: all kept, and nothing lumped."""
+    return (Kept(0, Remainder(0.0, 0.0)), *(Kept(1, params) for params in terms))
+
+
+def uncompressed(kinds: Sequence[str]) -> ContactState:
+    """Return the state of an object of these terms that nothing has pressed yet."""
+    states = (NO_STATE, *(find_term(kind)[1].at_rest for kind in kinds))
+    return ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0, 0.0, math.inf)
+
+
+# ------------------------------------------------------------------------------------------ plant and loop
+
+
+class Composition(NamedTuple):
+    """What a loop is composed of."""
+
+    kinds: tuple[str, ...]
+    """The kinds of the object's terms."""
+    shape: Shape | None
+    """That of the exact discretisation, where it advances the plant."""
+    converges: bool
+    """Whether the steps of a tick are halved until the result no longer changes."""
+
+
+@lru_cache(maxsize=64)
+def contact_solver(kinds: tuple[str, ...]) -> ContactSolver:
+    """Return `squeeze` for an object of these terms."""
+    return bind(plant.squeeze, advance=sum_of(laws_of(kinds)))
+
+
+def plant_move(
+    laws: Sequence[Law], *, converges: bool = True
+) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
+    """Return `move` for an object whose force is the sum of these laws.
+
+    `converges`: whether the steps of a tick may be halved until the result no longer changes.
+    """
+    move = bind(plant.move, _driven=plant._settled if converges else plant._driven)
+    return bind_reachable(move, {"advance": sum_of(laws)})
+
+
+@lru_cache(maxsize=64)
+def composed_move(composition: Composition, *, interpreted: bool = True) -> PlantMove:
+    """Return what advances the plant by a tick; not `interpreted`: to be compiled."""
+    kinds = composition.kinds
+    move: PlantMove = plant_move(laws_of(kinds), converges=composition.converges)
+    if composition.shape is not None:
+        move = bind_move(kinds, composition.shape, move)
+    return bind_reachable(move, {}, INTERPRETED) if interpreted else move
+
+
+@lru_cache(maxsize=64)
+def grasp_loop(
+    composition: Composition, step: ControllerStep, *, interpreted: bool = True
+) -> Callable[..., Progress]:
+    """Return the loop of a grasp under a controller with this step; not `interpreted`: to be compiled."""
+    control = bind_reachable(tick, {"step": step})
+    loop = bind_reachable(grasp, {"move": composed_move(composition, interpreted=False), "control": control})
+    return bind_reachable(loop, {}, INTERPRETED) if interpreted else loop

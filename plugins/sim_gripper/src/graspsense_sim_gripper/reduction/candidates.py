@@ -1,0 +1,76 @@
+"""What may stand for a term or for the pads in a reduced model, and the reduced model of an instance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from attrs import evolve
+
+from graspsense_sim_gripper.plant import PlantParams, Thing
+from graspsense_sim_gripper.problem import GraspSetup
+from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction
+from graspsense_sim_gripper.terms.registry import find_term
+from graspsense_sim_gripper.terms.remainder import Kept, Remainder
+from graspsense_sim_gripper.terms.term import WorkingPoint
+
+Candidate = tuple[str, Thing]
+"""The name of a simplification, and the model with it."""
+RIGID_PADS: Final = "rigid"
+ELASTIC_PADS: Final = "springs"
+RELAXED_PADS: Final = "springs that do not creep"
+
+
+def without_term(model: Thing, kinds: Sequence[str], i: int, point: WorkingPoint) -> Iterator[Candidate]:
+    """Yield the model with term `i` dropped, then with each of the term's limits."""
+    params = model.terms[i + 1].params
+    yield DROPPED, _with(model, i, Kept(0, params), 0.0, 0.0)
+    for limit in find_term(kinds[i])[1].limits(params, point):
+        if limit.params == params and limit.spring_n_m == 0.0 and limit.damper_n_s_m == 0.0:
+            continue
+        term = Kept(0, params)
+        if limit.params is not None:
+            term = Kept(1, params._make(float(value) for value in limit.params))
+        yield limit.name, _with(model, i, term, limit.spring_n_m, limit.damper_n_s_m)
+
+
+def simpler_pads(model: Thing) -> Iterator[Candidate]:
+    """Yield the model with simpler pads, the simplest first."""
+    skin = model.skin
+    if model.skins_n_m < math.inf:
+        yield RIGID_PADS, model._replace(skins_n_m=math.inf)
+    if skin.damping_n_s_m > 0.0 or skin.arm_n_m > 0.0:
+        elastic = skin._replace(damping_n_s_m=0.0, arm_n_m=0.0)
+        yield ELASTIC_PADS, model._replace(skin=elastic)
+        yield RELAXED_PADS, model._replace(skins_n_m=model.skins_n_m + skin.arm_n_m, skin=elastic)
+
+
+def named(name: str, candidates: Iterator[Candidate]) -> Thing:
+    """Return the model of the candidate with this name."""
+    return next(model for candidate, model in candidates if candidate == name)
+
+
+def reduced(setup: GraspSetup, reduction: Reduction) -> GraspSetup:
+    """Return the grasp of an instance with all its terms as the reduction simulates it, with its steps."""
+    model = reduce_model(setup.plant.thing, setup.kinds, reduction)
+    return evolve(setup, plant=PlantParams(setup.plant.drive, model, reduction.steps))
+
+
+def reduce_model(model: Thing, kinds: Sequence[str], reduction: Reduction) -> Thing:
+    """Return the full model of an instance as the reduction simulates it."""
+    for i, treatment in enumerate(reduction.treatment[:-1]):
+        if treatment != KEPT:
+            model = named(treatment, without_term(model, kinds, i, reduction.point))
+    if reduction.treatment[-1] != KEPT:
+        model = named(reduction.treatment[-1], simpler_pads(model))
+    return model._replace(swings=1 if reduction.oscillates else 0)
+
+
+def _with(model: Thing, i: int, term: Kept, spring_n_m: float, damper_n_s_m: float) -> Thing:
+    """Return the model with another term `i`, and with more of the spring and damper that limits leave."""
+    before = model.terms[0].params
+    spring, damper = before.spring_n_m + spring_n_m, before.damper_n_s_m + damper_n_s_m
+    lumped = Kept(1 if spring > 0.0 or damper > 0.0 else 0, Remainder(spring, damper))
+    terms = (lumped, *model.terms[1 : i + 1], term, *model.terms[i + 2 :])
+    return model._replace(terms=terms)

@@ -1,0 +1,207 @@
+"""Proposing the reduced model of a level: what becomes of each term, and which scheme steps it.
+
+The object is pressed along three paths by the laws of its own terms (see `probe`). A term may be left out where that
+changes the force on those paths by little, relative to the force itself. Decisions therefore depend on rates and
+shares, never on names, and a term of another distribution is treated like any other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+from graspsense.plugin_api import gap_and_rate, revolutions_at
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.plant import EXPLICIT, MEAN_FORCE, STIFF, Drive, Steps, Thing
+from graspsense_sim_gripper.problem import GraspSetup, Problem
+from graspsense_sim_gripper.reduction.candidates import named, simpler_pads, without_term
+from graspsense_sim_gripper.reduction.levels import (
+    FULL_SCALES,
+    UNVERIFIED,
+    LevelScale,
+    step_growth,
+    step_tolerance,
+    steps_for,
+)
+from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Decision, Reduction
+from graspsense_sim_gripper.reduction.probe import Grip, damping, stiffness
+from graspsense_sim_gripper.terms.registry import find_term
+from graspsense_sim_gripper.terms.term import NO_STATE, WorkingPoint, no_rates
+
+FORCE_N: Final = 20.0
+SPEED_M_S: Final = 0.01
+"""The gripping force and the closing speed that are assumed without other information: those of the paper."""
+REFERENCE_ACCURACY: Final = 1e-3
+"""The accuracy with which the steps of a reference begin."""
+CONVERGED: Final = 1e-7
+"""A reference halves the steps of a tick until speed and force change by less than this part of the accuracy."""
+STIFFEST_N_M: Final = 1e6
+"""Peak forces on contacts up to this stiff agree with their reference."""
+SCHEMES: Final = {EXPLICIT: "Verlet", STIFF: "TR-BDF2", MEAN_FORCE: "mean force"}
+
+TermParams = Any
+
+
+def has_forced_steps(config: SimConfig) -> bool:
+    """Return whether the settings prescribe the scheme or the length of the steps."""
+    return config.scheme != "auto" or config.step_s is not None
+
+
+def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | None = None) -> Grip:
+    """Return the nominal object as it is gripped with this force, after the fingers touch it at this speed.
+
+    What the settings expect of the grasp takes precedence over these. Raises TypeError where there is no object.
+    """
+    config, setup = problem.model_config, _nominal(problem)
+    drive = setup.plant.drive
+    return Grip(
+        setup.plant.thing,
+        setup.kinds,
+        config.expected_force_n or force_n or FORCE_N,
+        config.expected_speed_m_s or speed_m_s or SPEED_M_S,
+        _mass_kg(drive, min(max(setup.plant.thing.width_m, 0.0), config.open_gap_m)),
+    )
+
+
+def propose(problem: Problem, grip: Grip, scale: LevelScale = UNVERIFIED) -> Reduction:
+    """Return the reduced model of a level, without trying it in a grasp."""
+    config, drive, dt_s = problem.model_config, _nominal(problem).plant.drive, _nominal(problem).dt_s
+    if config.fidelity != "scene" and scale.model > 0.0:
+        scale = FULL_SCALES[0]
+    level = scale.at(config.accuracy)
+    treatment, decisions, error, model = _reduce(grip, level.model_tol)
+    rate = (drive.damping_n_s_m + damping(grip, model, dt_s)) / grip.mass_kg
+    contact = _resolution(grip, dt_s)
+    scheme = _scheme(config.accuracy, rate, contact.number / dt_s, dt_s, config.coulomb_n > 0.0)
+    return Reduction(
+        accuracy=config.accuracy,
+        treatment=treatment,
+        point=grip.point,
+        steps=_with_settings(steps_for(level, scheme, dt_s), config),
+        decisions=decisions,
+        scheme=Decision(
+            term="steps",
+            decision=SCHEMES[scheme],
+            what="damping rate times tick",
+            number=rate * dt_s,
+            error=config.accuracy * max(1.0 - scale.model, 0.0),
+        ),
+        contact=contact,
+        error=error,
+        oscillates=any(
+            reduced.kept == 1 and _oscillates(kind, full.params, grip.point)
+            for kind, full, reduced in zip(grip.kinds, grip.model.terms[1:], model.terms[1:], strict=True)
+        ),
+        level=level,
+    )
+
+
+def _mass_kg(drive: Drive, gap_m: float) -> float:
+    """Return the mass that moves with the gap: the rotor's inertia through the linkage."""
+    _, jacobian = gap_and_rate(drive.link, revolutions_at(drive.link, gap_m))
+    return drive.inertia / (jacobian * jacobian)
+
+
+def _nominal(problem: Problem) -> GraspSetup:
+    if problem.nominal is None:
+        raise TypeError("where there is no object there is no model to reduce")
+    return problem.nominal
+
+
+def _scheme(accuracy: float, damping_rate: float, frequency: float, dt_s: float, has_friction: bool) -> int:
+    """Return the scheme for these rates (1/s)."""
+    if damping_rate * dt_s > 1.0:
+        return STIFF
+    # With Verlet the energy of an oscillation varies by a share of it, which shows only where nothing dissipates it.
+    undamped = frequency * (6.0 * step_tolerance(accuracy)) ** (2.0 / 3.0) / 4.0
+    return MEAN_FORCE if damping_rate < undamped and not has_friction else EXPLICIT
+
+
+def _with_settings(steps: Steps, config: SimConfig) -> Steps:
+    """Return the steps as the settings modify them."""
+    if config.scheme != "auto":
+        steps = steps._replace(scheme=(steps.scheme or STIFF) if config.scheme == "implicit" else EXPLICIT)
+    if config.step_s is not None:
+        steps = steps._replace(tolerance=math.inf, longest_s=float(config.step_s))
+    if config.fidelity == "reference":
+        steps = steps._replace(
+            tolerance=min(steps.tolerance, step_tolerance(REFERENCE_ACCURACY)),
+            settle=CONVERGED * config.accuracy,
+            growth=min(steps.growth, step_growth(REFERENCE_ACCURACY)),
+        )
+    return steps
+
+
+def _oscillates(kind: str, params: TermParams, point: WorkingPoint) -> bool:
+    term = find_term(kind)[1]
+    if term.rates is no_rates:
+        return bool(term.at_rest != NO_STATE)
+    return any(rate.what == "swings" for rate in term.rates(params, point))
+
+
+def _resolution(grip: Grip, dt_s: float) -> Decision:
+    """Return whether the peak force of the contact is resolved, and its natural frequency times the tick."""
+    within_tick, at_once = stiffness(grip, dt_s)
+    number = math.sqrt(max(within_tick, 0.0) / grip.mass_kg) * dt_s
+    resolved = max(within_tick, at_once) <= 1.05 * STIFFEST_N_M and number <= 1.05
+    return Decision(
+        term="contact",
+        decision="peak resolved" if resolved else "peak not resolved",
+        what="natural frequency times tick",
+        number=number,
+        error=0.0 if resolved else math.inf,
+    )
+
+
+def _reduce(grip: Grip, max_error: float) -> tuple[tuple[str, ...], tuple[Decision, ...], float, Thing]:
+    """Return what becomes of each term and of the pads, why, the error of all that, and the reduced model."""
+    kinds, point = grip.kinds, grip.point
+    treatment, errors, spent, model = [KEPT] * (len(kinds) + 1), [0.0] * len(kinds), 0.0, grip.model
+    decisions: list[Decision] = []
+    if max_error > 0.0:
+        alternatives = grip.alternatives()
+        # The terms that matter least are decided first, each for the cheapest candidate within the tolerance.
+        for i in sorted(range(len(kinds)), key=lambda i: min(error for _, error in alternatives[i])):
+            for name, error_alone in alternatives[i]:
+                if error_alone > max_error:
+                    continue
+                other = named(name, without_term(model, kinds, i, point))
+                error = grip.error_of(other, max_error)
+                if error <= max_error:
+                    treatment[i], errors[i], model, spent = name, error_alone, other, error
+                    break
+        for name, other in simpler_pads(model):
+            error = grip.error_of(other, max_error)
+            if error <= max_error:
+                treatment[-1], model = name, other
+                decisions.append(_pads_decision(grip, name, abs(error - spent)))
+                spent = error
+                break
+    decisions += _term_decisions(grip, treatment, errors)
+    return tuple(treatment), tuple(decisions), spent, model
+
+
+def _pads_decision(grip: Grip, name: str, error: float) -> Decision:
+    share = grip.forces[0][-1] / grip.model.skins_n_m / max(grip.point.compression_m, 1e-9)
+    what = "their compression over the total compression"
+    return Decision(term="pads", decision=name, what=what, number=share, error=error)
+
+
+def _term_decisions(grip: Grip, treatment: Sequence[str], errors: Sequence[float]) -> list[Decision]:
+    decisions = []
+    for i, kind in enumerate(grip.kinds):
+        what, number = _deciding(kind, grip.model.terms[i + 1].params, grip.point)
+        decision = treatment[i] if treatment[i] in (KEPT, DROPPED) else f"limit: {treatment[i]}"
+        decisions.append(Decision(term=kind, decision=decision, what=what, number=number, error=errors[i]))
+    return decisions
+
+
+def _deciding(kind: str, params: TermParams, point: WorkingPoint) -> tuple[str, float]:
+    """Return the number that says most about a term: its fastest rate times the grasp, or its share of the force."""
+    term = find_term(kind)[1]
+    rates = term.rates(params, point)
+    if rates:
+        fastest = max(rates, key=lambda rate: rate.per_s)
+        return f"{fastest.what}, times seconds of grasp", fastest.per_s * point.seconds
+    return "force over gripping force", term.importance(params, point) / point.force_n

@@ -1,0 +1,186 @@
+"""Selecting the reduced model of an object: the first level whose trial grasp is accurate enough.
+
+A proposed model is simulated in a trial grasp, and compared with one in the full model with finer steps. The very first
+trial grasp, in the full model, also gives the speed at the first contact and the gripping force, from which proposals
+are made. Levels are tried from the largest tolerances to the smallest.
+
+An accepted model is tried twice more, with a controller that reads slightly larger and slightly smaller values of force
+and travel. Where a threshold is met so closely at a tick that the grasp then continues a tick earlier or later, both
+grasps may be on the wrong side of it, and a level with smaller steps is tried. Where even the last level fails, no
+model of this scene has that accuracy, and ConfigError says so.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from typing import Final
+
+from attrs import evolve
+
+from graspsense.plugin_api import ConfigError
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.plant import Steps
+from graspsense_sim_gripper.problem import GraspController, Problem
+from graspsense_sim_gripper.reduction.cache import ReductionCache
+from graspsense_sim_gripper.reduction.error import deviation
+from graspsense_sim_gripper.reduction.levels import FULL_SCALES, REFERENCE_SCALES, LevelScale, scales_for
+from graspsense_sim_gripper.reduction.model import DROPPED, Reduction, Verification
+from graspsense_sim_gripper.reduction.probe import Grip
+from graspsense_sim_gripper.reduction.propose import grip_of, has_forced_steps, propose
+from graspsense_sim_gripper.reduction.verify import Sensitivity, TrialGrasps, trial_grasps
+
+ACCEPTED_WITH_SPREAD: Final = 0.5
+ACCEPTED: Final = 0.8
+"""A model is accepted where the trial grasps differ by less than this part of the accuracy. With spread, the rest is
+for the instances of the object; without, only pads and the errors of the trial grasps themselves remain."""
+COARSE: Final = 0.03
+"""From this accuracy on, a threshold met too closely is examined again with a tenth of the accuracy."""
+FINE: Final = 0.003
+"""Up to this accuracy, the grasps to compare with have twice as many steps a tick: a contact that one step sees and
+another does not."""
+CULPRIT: Final = 0.2
+"""A term without which no more than this part of an error remains is its cause."""
+
+_SELECTED: Final = ReductionCache()
+
+
+def select(
+    problem: Problem,
+    controller: GraspController,
+    *,
+    compiled: bool = False,
+    padding: tuple[str, ...] | None = None,
+) -> Reduction:
+    """Return the reduced model of a problem's object, verified by trial grasps under the controller.
+
+    Models are cached by their content, in memory and on disk. With forced steps, as a reference, and where the peak
+    force cannot be resolved (which the reduction says), there is no trial grasp, and `verification` is None.
+
+    `compiled`: run the trial grasps compiled, where the controller can be compiled; `padding`: the kinds of terms with
+    which that code is padded, by default as in a batch. Both change times only.
+
+    Raises ConfigError where no model has the accuracy asked for, TypeError where there is no object.
+    """
+    key = _SELECTED.key(problem, controller)
+    reduction = _SELECTED.get(key)
+    if reduction is None:
+        reduction = _select(problem, trial_grasps(problem, controller, compiled=compiled, padding=padding))
+        _SELECTED.put(key, reduction)
+    return reduction
+
+
+def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
+    config, grip = problem.model_config, grip_of(problem)
+    reference = propose(problem, grip, _reference_scale(config, FULL_SCALES[0]))
+    not_verified = has_forced_steps(config) or config.fidelity == "reference"
+    if not_verified or math.isinf(reference.contact.error):
+        return propose(problem, grip)
+    try:
+        first = trial.record(reference)
+    except Exception:
+        # A controller may fail. In the grasp itself that is an outcome, and is reported.
+        return propose(problem, grip)
+    grip = grip_of(problem, _two_digits(first.peak_n), _two_digits(first.contact_speed_m_s()))
+    reference = propose(problem, grip, _reference_scale(config, FULL_SCALES[0]))
+    if math.isinf(reference.contact.error):
+        return propose(problem, grip)
+    return _first_accepted(problem, grip, trial)
+
+
+def _first_accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reduction:
+    config = problem.model_config
+    least, quantity, grasps = math.inf, "", 1
+    near_threshold: Sensitivity | None = None
+    tried: set[tuple[tuple[str, ...], Steps]] = set()
+    for scale in scales_for(config.fidelity, config.spread):
+        if near_threshold and scale.at(config.accuracy).step_tol >= near_threshold.step_tol:
+            continue
+        reduction = propose(problem, grip, scale)
+        model = reduction.treatment, reduction.steps
+        if model in tried:
+            continue
+        tried.add(model)
+        expected = trial.record(propose(problem, grip, _reference_scale(config, scale)))
+        error, of = deviation(trial.record(reduction), expected)
+        grasps += 1
+        if error <= _accepted(config) * config.accuracy:
+            grasps += 2
+            near_threshold = trial.sensitivity(reduction, expected)
+            if error + near_threshold.change <= config.accuracy:
+                return evolve(reduction, verification=Verification(error=error, quantity=of, grasps=grasps))
+        elif error < least:
+            least, quantity = error, of
+    if near_threshold is None:
+        term = _culprit(problem, grip, trial)
+        raise ConfigError(_refusal(problem, least, quantity, term))
+    if config.accuracy >= COARSE:
+        # Steps this coarse are too inaccurate to tell which side of the threshold is right.
+        finer = evolve(problem, model_config=evolve(config, accuracy=0.1 * config.accuracy))
+        with suppress(ConfigError):
+            return evolve(_select(finer, evolve(trial)), accuracy=config.accuracy)
+    raise ConfigError(_undecided(problem, near_threshold))
+
+
+def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:
+    """Return the scale of the grasp that a trial grasp of this scale is compared with."""
+    reference = REFERENCE_SCALES[scale.steps]
+    factor = 2 if config.accuracy <= FINE else 1
+    return reference._replace(min_steps=factor * reference.min_steps)
+
+
+def _accepted(config: SimConfig) -> float:
+    return ACCEPTED_WITH_SPREAD if config.spread else ACCEPTED
+
+
+def _two_digits(value: float) -> float:
+    """Return the value to two digits: no decision needs more, and similar grasps then share their proposals."""
+    return float(f"{value:.1e}")
+
+
+def _culprit(problem: Problem, grip: Grip, trial: TrialGrasps) -> str:
+    """Return the term without which the grasp depends least on its steps; empty where no single one stands out."""
+    scale = FULL_SCALES[1]
+    pair = [propose(problem, grip, s) for s in (scale, _reference_scale(problem.model_config, scale))]
+    fine, finer = pair
+    errors = {}
+    for i, kind in enumerate(grip.kinds):
+        treatment = (*fine.treatment[:i], DROPPED, *fine.treatment[i + 1 :])
+        errors[kind] = deviation(*(trial.record(evolve(r, treatment=treatment)) for r in pair))[0]
+    with_all, _ = deviation(trial.record(fine), trial.record(finer))
+    term = min(errors, key=errors.__getitem__, default="")
+    return term if term and errors[term] < CULPRIT * with_all else ""
+
+
+def _undecided(problem: Problem, found: Sensitivity) -> str:
+    changes = f"{found.quantity} by {found.change:.2g}" if math.isfinite(found.change) else "the outcome"
+    return (
+        f"{_inaccurate(problem)}: the controller compares with a threshold that is met at a tick within "
+        f"{found.force_n:.1g} N, or {found.travel:.1g} of the travel, so that the grasp may continue a tick earlier or "
+        f"later, which changes {changes}. Change where the ticks fall (gripper.open_gap_m, or the controller's speed "
+        f"or threshold), or {_advice(2.0 * found.change)}"
+    )
+
+
+def _refusal(problem: Problem, error: float, quantity: str, term: str) -> str:
+    found = f"{quantity} differs by {error:.2g}" if math.isfinite(error) else "even the outcome differs"
+    cause = (
+        f"the steps because of the term {term!r}" if term else "the steps, and not because of a single term"
+    )
+    return (
+        f"{_inaccurate(problem)}: with every term and the smallest steps, {found} between two step lengths. The grasp "
+        f"depends on {cause}; {_advice(2.0 * error / _accepted(problem.model_config))}"
+    )
+
+
+def _inaccurate(problem: Problem) -> str:
+    spec: ObjectSpec | None = problem.spec
+    where = "the scene" if spec is None else spec.file or f"object {spec.name!r}"
+    return f"{where}: no model of it reaches gripper.accuracy = {problem.model_config.accuracy:g}"
+
+
+def _advice(reachable: float) -> str:
+    """Return what to do, where an accuracy may be reachable."""
+    advice = f"ask for {reachable:.1g} (gripper.accuracy), or " if reachable <= 0.5 else ""
+    return f'{advice}accept an unverified result with gripper.fidelity = "reference"'

@@ -1,0 +1,278 @@
+"""Trial grasps of the nominal object, in one reduced model after another.
+
+A trial grasp has ideal sensors, and goes from the open fingers to the release under the controller that is to grasp the
+object. The approach is the same for every model and is simulated once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from attrs import define, evolve, field
+
+from graspsense.plugin_api import (
+    CELLS,
+    CONTACT_FORCE_N,
+    HOLD,
+    NotCompilable,
+    TickParams,
+    first_state,
+    gap_and_rate,
+    revolutions_at,
+    seconds_at_most,
+    tick_params,
+)
+from graspsense_sim_gripper.compiled.compose import Composition, grasp_loop
+from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
+from graspsense_sim_gripper.compiled.padding import padded
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.state import Motion
+from graspsense_sim_gripper.exact.discretise import discretise
+from graspsense_sim_gripper.loop import (
+    COLUMNS,
+    NOT_STARTED,
+    Buffers,
+    GraspParams,
+    PlantModel,
+    Progress,
+    has_ended,
+)
+from graspsense_sim_gripper.plant import EXPLICIT, Steps
+from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
+from graspsense_sim_gripper.reduction.candidates import reduced
+from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
+from graspsense_sim_gripper.reduction.model import Reduction
+from graspsense_sim_gripper.sensing import Bias, PadBuffers
+
+MAX_SECONDS: Final = 40.0
+"""The longest trial grasp, and the longest approach in it."""
+NEAR_M: Final = 3e-3
+"""An approach that takes longer is repeated from this distance to the object."""
+MIN_CLOSING_M_S: Final = 0.01
+MAX_HOLD_S: Final = 0.3
+TICKS_AT_ONCE: Final = 50
+"""Ticks of the approach between two looks at the distance."""
+CAPACITY: Final = 4096
+"""Ticks that a buffer holds."""
+SENSITIVITY: Final = 10.0
+MIN_FORCE_ERROR_N: Final = 0.01
+MAX_FORCE_ERROR_N: Final = 0.25
+"""The forces that the controller reads may be wrong by this multiple of the difference of two models at the contact, at
+least and at most by these times the step tolerance."""
+TRAVEL_ERROR: Final = 0.025
+"""The distance since the contact, from which rest is detected, may be wrong by this share times the step tolerance."""
+
+
+class Sensitivity(NamedTuple):
+    """What changes in a grasp whose controller reads slightly wrong values."""
+
+    force_n: float
+    travel: float
+    """The errors of the readings, in newtons and as a share."""
+    change: float
+    quantity: str
+    """The largest change, and the quantity that changes."""
+    step_tol: float
+    """That of the level."""
+
+
+class _Stage(NamedTuple):
+    """A trial grasp under way: its state, and what was recorded."""
+
+    progress: Progress
+    rows: tuple[Any, ...]
+    """The columns of `COLUMNS` and the phases below them, piece by piece."""
+    from_open: bool
+    """Whether it began with the fingers open."""
+
+
+@define(eq=False)
+class TrialGrasps:
+    """Grasps of one object under one controller."""
+
+    config: SimConfig
+    setup: GraspSetup
+    """The nominal object with all its terms and ideal sensors."""
+    controller: GraspController
+    params: TickParams
+    """Parameters of the controller, from the open fingers to the release."""
+    params_near: TickParams
+    """The same without opening and release, for a grasp that begins near the object."""
+    compiled: bool
+    padding: tuple[str, ...] | None
+    """The kinds with which compiled code is padded; None: as in a batch."""
+    _records: dict[Any, GraspRecord] = field(factory=dict, init=False)
+    _start: _Stage | None = field(default=None, init=False)
+    """Shortly before the first contact."""
+
+    def record(self, reduction: Reduction, force_n: float = 0.0, travel: float = 0.0) -> GraspRecord:
+        """Return the grasp in this model, with these errors of what the controller reads (see `Sensitivity`)."""
+        key = (reduction.treatment, reduction.steps, force_n, travel)
+        if key not in self._records:
+            try:
+                self._records[key] = self._grasp(reduction, force_n, travel)
+            except NotCompilable:
+                self.compiled = False
+                self._records[key] = self._grasp(reduction, force_n, travel)
+        return self._records[key]
+
+    def sensitivity(self, reduction: Reduction, expected: GraspRecord) -> Sensitivity:
+        """Return what becomes of the grasp where the controller's readings are as wrong as the model may be."""
+        exact, scale = self.record(reduction), reduction.level.step_tol
+        force_n = max(SENSITIVITY * _force_difference_n(exact, expected), MIN_FORCE_ERROR_N * scale)
+        force_n, travel = min(force_n, MAX_FORCE_ERROR_N * scale), TRAVEL_ERROR * scale
+        others = [self.record(reduction, sign * force_n, sign * travel) for sign in (-1.0, 1.0)]
+        change, quantity = max(deviation(other, exact) for other in others)
+        return Sensitivity(force_n, travel, change, quantity, scale)
+
+    def _grasp(self, reduction: Reduction, force_n: float, travel: float) -> GraspRecord:
+        setup = reduced(self.setup, reduction)
+        if self._start is None:
+            self._start = self._approach(setup)
+        start = self._start
+        bias = Bias(force_n, travel, setup.plant.thing.width_m)
+        setup = evolve(setup, sensor=setup.sensor._replace(bias=bias))
+        until = start.progress.loop.ticks + self._max_ticks()
+        end = self._runner(setup, start.from_open)(setup.plant.steps, start, until)
+        return _record(end, bias, setup.dt_s)
+
+    def _max_ticks(self) -> int:
+        return math.ceil(min(MAX_SECONDS, seconds_at_most(self.controller.run)) / self.setup.dt_s)
+
+    def _approach(self, setup: GraspSetup) -> _Stage:
+        """Return the grasp shortly before the first contact, begun near the object where it takes too long."""
+        stage, came_near = self._closed_in(setup, from_open=True)
+        if not came_near and not has_ended(stage.progress.controller):
+            stage, _ = self._closed_in(setup, from_open=False)
+        return stage
+
+    def _closed_in(self, setup: GraspSetup, from_open: bool) -> tuple[_Stage, bool]:
+        """Return the grasp shortly before the first contact, or where it ended, and whether it came to the contact."""
+        # No short steps, as nothing happens.
+        steps = setup.plant.steps._replace(scheme=EXPLICIT, longest_s=math.inf)
+        reach = setup.plant.thing.width_m + 2.0 * abs(setup.state.contact.offset_m)
+        state, link = setup.state, setup.plant.drive.link
+        if not from_open:
+            near = revolutions_at(link, min(state.motion.gap_m, reach + NEAR_M))
+            state = state._replace(motion=Motion(near, state.motion.speed_rev_s, *gap_and_rate(link, near)))
+        run = self._runner(setup, from_open)
+        controller = first_state(self.controller.controller.init())
+        stage = _Stage(Progress(NOT_STARTED, state, setup.sensor_state, controller), (), from_open)
+        while not has_ended(stage.progress.controller) and stage.progress.loop.ticks < self._max_ticks():
+            motion = stage.progress.plant.motion
+            closing = max(-motion.speed_rev_s * motion.jacobian_m_rev, MIN_CLOSING_M_S)
+            ticks_left = 0.5 * (motion.gap_m - reach) / (closing * setup.dt_s)
+            if ticks_left < 2.0:
+                return stage, True
+            after = run(steps, stage, stage.progress.loop.ticks + min(int(ticks_left), TICKS_AT_ONCE))
+            if after.progress.plant.contact.touched == 1:
+                return stage, True
+            stage = after
+        return stage, False
+
+    def _runner(self, setup: GraspSetup, from_open: bool) -> Callable[[Steps, _Stage, int], _Stage]:
+        """Return what continues a grasp of this model with given steps, until a tick."""
+        on_arrays, loop, made, exact = self._loop(setup)
+        buffers = _ideal_buffers(on_arrays)
+        params = self.params if from_open else self.params_near
+
+        def run(steps: Steps, stage: _Stage, until: int) -> _Stage:
+            progress, rows, _ = stage
+            if progress.plant.contact.touched == 0:
+                # The untouched object as this composition describes it.
+                fresh = made.state.contact
+                contact = progress.plant.contact._replace(left=fresh.left, right=fresh.right)
+                progress = progress._replace(plant=progress.plant._replace(contact=contact))
+            plant = made.plant._replace(steps=steps) if exact is None else exact
+            grasp_params = GraspParams(plant, made.sensor, params, setup.dt_s, until)
+            while not has_ended(progress.controller) and progress.loop.ticks < until:
+                table = np.zeros((len(COLUMNS), min(until - progress.loop.ticks, CAPACITY)))
+                phases = np.zeros(table.shape[1], np.int64)
+                recorded = (table, phases) if on_arrays else (table.tolist(), phases.tolist())
+                progress = progress._replace(loop=progress.loop._replace(recorded=0))
+                progress = loop(grasp_params, progress, Buffers(*buffers, *recorded))
+                rows = (*rows, np.vstack(recorded)[:, : progress.loop.recorded])
+            return _Stage(progress, rows, from_open)
+
+        return run
+
+    def _loop(self, setup: GraspSetup) -> tuple[bool, Callable[..., Progress], GraspSetup, PlantModel | None]:
+        """Return whether the loop is compiled, the loop, the setup that it takes, and the exact model if there is one.
+
+        Raises NotCompilable.
+        """
+        on_arrays = self.compiled
+        made = padded(setup, self.padding) if on_arrays else setup
+        exact = discretise(self.config, made, on_arrays=on_arrays)
+        composition = Composition(
+            made.kinds, None if exact is None else exact[1], made.plant.steps.settle > 0.0
+        )
+        model = None if exact is None else exact[0]
+        if not on_arrays:
+            return False, grasp_loop(composition, self.controller.step), made, model
+        machine_code = compiled_loop(composition, self.controller.step)
+
+        def loop(*args: Any) -> Progress:
+            with compiling(composition):
+                progress: Progress = machine_code(*args)
+                return progress
+
+        return True, loop, made, model
+
+
+def trial_grasps(
+    problem: Problem, controller: GraspController, *, compiled: bool, padding: tuple[str, ...] | None
+) -> TrialGrasps:
+    """Return the trial grasps of a problem. Raises TypeError where there is no object."""
+    if problem.nominal is None:
+        raise TypeError("where there is no object there is nothing to grasp")
+    law, run = controller.controller, evolve(controller.run, hold_s=min(controller.run.hold_s, MAX_HOLD_S))
+    near = evolve(problem.device, opening=None)
+    return TrialGrasps(
+        config=evolve(problem.model_config, spread=False),
+        setup=problem.nominal,
+        controller=controller,
+        params=tick_params(problem.device, law, run),
+        params_near=tick_params(near, law, run),
+        compiled=compiled,
+        padding=padding,
+    )
+
+
+def _ideal_buffers(on_arrays: bool) -> tuple[PadBuffers, Any]:
+    """Return the buffers of cell images and their times, which an ideal sensor does not use."""
+    zero, noise, images = np.zeros((2, CELLS)), np.zeros((1, 2 * CELLS)), np.full((1, 2, CELLS), math.nan)
+    if on_arrays:
+        return PadBuffers(zero[0], zero[1], noise, images), np.zeros(1)
+    left, right = zero.tolist()
+    return PadBuffers(left, right, noise.tolist(), images.tolist()), [0.0]
+
+
+def _record(end: _Stage, bias: Bias, dt_s: float) -> GraspRecord:
+    """Return what a grasp is compared by, without the errors of the readings."""
+    columns, progress = np.concatenate(end.rows, axis=1), end.progress
+    gap_m, left_n, right_n = (
+        columns[COLUMNS.index(name)] for name in ("gap_m", "force_left_n", "force_right_n")
+    )
+    share = bias.travel_share
+    return GraspRecord(
+        outcome=int(progress.controller.law.outcome) if progress.controller.guard.stopped == 0 else -1,
+        dt_s=dt_s,
+        gap_m=gap_m + (bias.from_m - np.minimum(gap_m, bias.from_m)) * share / (1.0 + share),
+        speed_m_s=columns[COLUMNS.index("velocity_m_s")],
+        left_n=np.where(left_n != 0.0, left_n - bias.force_n, 0.0),
+        right_n=np.where(right_n != 0.0, right_n - bias.force_n, 0.0),
+        n_rows=int(np.sum(columns[-1] <= HOLD)),
+        peak_n=progress.plant.peak_n,
+    )
+
+
+def _force_difference_n(grasp: GraspRecord, expected: GraspRecord) -> float:
+    """Return the difference of the forces of two grasps where both pads come to feel the contact force."""
+    forces, others = (np.minimum(record.left_n, record.right_n) for record in (grasp, expected))
+    i = min(int(np.argmax(force >= CONTACT_FORCE_N)) for force in (forces, others))
+    there = slice(max(i - 1, 0), i + 1)
+    return float(np.max(np.abs(forces[there] - others[there])))
