@@ -1,4 +1,4 @@
-"""The parts that come with graspsense itself, registered through the same hooks as anybody's."""
+"""The components of graspsense itself, registered by the same hooks as those of any plugin."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _PAD_FORCES: Final = (Channel("force_left", "N"), Channel("force_right", "N"))
 
 @hookimpl
 def graspsense_controllers() -> Iterable[ControllerEntry]:
-    """Return the paper's controller and the two that it is made of."""
+    """Return the controller of the paper, and the two that it consists of."""
     for name, summary in (
         ("velocity", "PI control of the gap's rate, whatever is in the way"),
         ("force", "constant effort, or closed loop on the pad force, from the start"),
@@ -44,7 +44,7 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:
 
 @hookimpl
 def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
-    """Return the six features of the paper's Table I."""
+    """Return the six features of Table I of the paper."""
     yield FeatureSetEntry(
         name="chitta",
         target="graspsense.plugins.features.chitta:ChittaFeatures",
@@ -64,7 +64,7 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
 
 @hookimpl
 def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
-    """Return the gripper that is a recording."""
+    """Return the backend that replays a recording."""
     yield SensorBackendEntry(
         name="replay",
         target="graspsense.sources.replay:ReplayBackend",
@@ -77,7 +77,7 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
 
 @hookimpl
 def graspsense_classifiers() -> Iterable[ClassifierEntry]:
-    """Return scikit-learn's classifiers; the paper's own, C4.5, is a distribution of its own."""
+    """Return classifiers of scikit-learn. C4.5, which the paper uses, is in another distribution."""
     for name, config, summary in (
         ("svm", "Svm", "support vector machine with a radial kernel (scikit-learn)"),
         ("mlp", "Mlp", "neural network with one hidden layer (scikit-learn)"),
@@ -95,7 +95,7 @@ def graspsense_classifiers() -> Iterable[ClassifierEntry]:
 
 @hookimpl
 def graspsense_datasets() -> Iterable[DatasetEntry]:
-    """Return the readers of other people's recordings."""
+    """Return the readers of recorded data."""
     yield DatasetEntry(
         name="icub",
         target="graspsense.sources.icub_dataset:read_dataset",
@@ -110,7 +110,7 @@ def graspsense_datasets() -> Iterable[DatasetEntry]:
 
 @hookimpl
 def graspsense_pipelines() -> Iterable[PipelineEntry]:
-    """Return the pipeline that runs where none is named."""
+    """Return the default pipeline."""
     yield PipelineEntry(
         name="default",
         resource="graspsense:plugins/pipelines/default.toml",

@@ -1,4 +1,4 @@
-"""The package of a new plugin, made from the templates beside this file."""
+"""Writes the package of a new plugin from the templates in this folder."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from graspsense.core.plugins import canonical, installed, installed_sources
 
 @frozen
 class ScaffoldKind:
-    """What is made for one role: the module that holds the part, and what to try first."""
+    """The package for one role: the module of the component, and the first command to try."""
 
     role: Role | None
     module: str
     does: str
     suffix: str
-    """What the name of the class ends with."""
+    """Ending of the name of the class."""
     needs: tuple[str, ...]
     first: str
 
@@ -79,16 +79,16 @@ KINDS: Final[Mapping[str, ScaffoldKind]] = {
         None, "observer", "an observer that logs how each grasp ended", "", (), "graspsense run"
     ),
 }
-"""What `plugins new` can make, by the name of `--role`."""
+"""The packages that `plugins new` can make, by the value of `--role`."""
 
 COMMON: Final = ("pyproject.toml", "README.md", ".gitignore", "tests/test_conformance.py")
 NAME: Final = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 
 def make(name: str, role: str, folder: Path) -> list[str]:
-    """Make the package `name` in `folder` and return what to do next, a line each.
+    """Write the package `name` to `folder` and return the next steps, one in each line.
 
-    Raises ConfigError where the role or the name will not do, or where the folder is in use.
+    Raises ConfigError for an unknown role, an invalid name, or a folder that is not empty.
     """
     kind = KINDS.get(role)
     if kind is None:
@@ -152,7 +152,7 @@ def _files(kind: ScaffoldKind, role: str, words: Mapping[str, str]) -> dict[str,
 
 
 def _check_importable(name: str) -> None:
-    """Refuse a name whose package another distribution or Python itself has. Raises ConfigError."""
+    """Refuse a name whose package exists in another distribution or in Python. Raises ConfigError."""
     package = name.replace("-", "_")
     if keyword.iskeyword(package):
         raise ConfigError(f"the name {name!r} will not do: {package} is a keyword of Python")

@@ -40,18 +40,18 @@ from graspsense_pr2_gripper.protocol import (
 )
 
 OPENING_N: Final = -20.0
-"""The authors' recordings show +17 and +20 N, opening, between squeezes."""
+"""Effort that opens the fingers. The authors' recordings show 17 and 20 N, opening, between squeezes."""
 TARE_IMAGES: Final = 6
 RELEASE_REPORT: Final = OutputReport(0, RELEASE_KIND, 0, 0, 0)
 UNHEARD_S: Final = 0.1
-"""A command that is not echoed for this long does not arrive: the device counts as lost."""
+"""Time without the echo of a command after which the device counts as lost."""
 UNCALIBRATED: Final = "none"
 TEST_NUMBER: Final = (0x1209, 0x0001)
 
 
 @final
 class Pr2Backend(SensorBackend[Pr2Config]):
-    """Reads and commands one gripper over the transport that the settings name."""
+    """Reads and commands one gripper over the transport in the settings."""
 
     _opened: Opened | None = None
     _report: dict[str, float | int | str | bool] | None = None
@@ -60,7 +60,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
     _sent = _echo = _heard_us = 0
 
     def objects(self) -> Sequence[ObjectKind]:
-        """Return what the emulated gripper's body can simulate; a real gripper simulates nothing."""
+        """Return the objects of the backend behind an emulated gripper; a real gripper has none."""
         return emulated_body(self.config).objects() if self.config.transport == "emulated" else ()
 
     def with_object(self, name: str) -> SensorBackend[Pr2Config]:
@@ -70,10 +70,10 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         return Pr2Backend(evolve(self.config, object=name))
 
     def open(self, seed: int) -> DeviceInfo:
-        """Open the gripper; a seed matters to an emulated one alone.
+        """Open the gripper; only an emulated one uses the seed.
 
-        After a loss the gripper of the same serial is waited for. Raises NoDevice, ConfigError where a stored
-        calibration is of another device, DataDamaged.
+        After a loss, this waits for the gripper with the same serial number. Raises NoDevice, DataDamaged, and
+        ConfigError if a stored calibration is of another device.
         """
         self.close()
         config = self.config
@@ -90,7 +90,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         return info
 
     def read(self, timeout_s: float) -> Reading | None:
-        """Return the newest frame with the last whole cell image. Raises DeviceLost."""
+        """Return the newest frame with the last complete cell image. Raises DeviceLost."""
         link = self._open().link
         arrival = link.next(timeout_s)
         if arrival is None:
@@ -111,9 +111,9 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         return self._measure.reading(report, arrival.image)
 
     def apply(self, command: Command) -> None:
-        """Send an effort, within the device's own limits. Raises DeviceLost.
+        """Send an effort within the limits of the device. Raises DeviceLost.
 
-        Anything but an effort that is a number lets go.
+        Any other command, and an effort of NaN, relaxes the gripper.
         """
         numbers = RELEASE_REPORT
         if command.kind == EFFORT:
@@ -134,7 +134,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         self._measure.tare(images)
 
     def close(self) -> None:
-        """Tell the gripper to let go, as far as it can still be told, and close it within two seconds."""
+        """Relax the gripper if it still responds, and close it within two seconds."""
         opened, self._opened = self._opened, None
         if opened is None:
             return
@@ -149,13 +149,13 @@ class Pr2Backend(SensorBackend[Pr2Config]):
             self._report["let_go_after_s"] = opened.emulation.wire.firmware.run_on()
 
     def report(self) -> Mapping[str, float | int | str | bool]:
-        """Return what was counted on the wire; once closed also whether that went cleanly."""
+        """Return the counters of the connection; once closed, also whether it closed cleanly."""
         if self._opened is not None:
             return self._counted(self._opened)
         return self._report or {}
 
     def dry_run_backend(self) -> Pr2Backend:
-        """Return an emulated gripper with the limits that hold for a real one at its first use."""
+        """Return an emulated gripper with the limits of a real one at its first use."""
         emulated = evolve(self.config, transport="emulated", pace="lock-step", calibration=UNCALIBRATED)
         backend = Pr2Backend(emulated)
         backend._stands_in = self.config.transport != "emulated" or self.config.pace == "device"
@@ -223,7 +223,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
 
 
 def device_numbers(identity: Identity) -> dict[str, float | str]:
-    """Return what a calibration of this device depends on, besides its serial."""
+    """Return the numbers that a calibration of this device depends on, besides the serial number."""
     return {
         "transmission": identity.transmission,
         "pad_counts_per_n": identity.pad_counts_per_n,

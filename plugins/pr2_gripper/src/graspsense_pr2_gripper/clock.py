@@ -1,4 +1,4 @@
-"""Host time from device time: what is the age of a report that has just been read?"""
+"""Estimates the offset between the clocks of host and device, and from it the age of a report."""
 
 from __future__ import annotations
 

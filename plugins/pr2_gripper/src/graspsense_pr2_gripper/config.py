@@ -1,4 +1,4 @@
-"""Settings of the PR2 gripper: which device, how its numbers are read, and the emulated one."""
+"""Settings of the PR2 gripper: the device, the interpretation of its numbers, and the emulation."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ _PROBABILITY = and_(ge(0.0), le(1.0))
 
 @frozen(kw_only=True)
 class FaultConfig:
-    """How the emulated device misbehaves; nothing of it by default. Probabilities are for each report or command."""
+    """Faults of the emulated device, by default none. Probabilities are for each report or command."""
 
     drop: float = field(default=0.0, validator=_PROBABILITY)
     """A report is lost."""
     corrupt: float = field(default=0.0, validator=_PROBABILITY)
     """A bit of a report is flipped."""
     repeat: float = field(default=0.0, validator=_PROBABILITY)
-    """A report comes twice."""
+    """A report is repeated."""
     reorder: float = field(default=0.0, validator=_PROBABILITY)
     """A report comes after the next one."""
     delay: float = field(default=0.0, validator=_PROBABILITY)
@@ -34,7 +34,7 @@ class FaultConfig:
     corrupt_command: float = field(default=0.0, validator=_PROBABILITY)
     """A bit of a command is flipped."""
     stall_at_s: float = field(default=inf, validator=ge(0.0))
-    """Device time at which nothing passes in either direction any more, for `stall_s`."""
+    """Device time from which on nothing passes in either direction, for `stall_s`."""
     stall_s: float = field(default=0.05, validator=gt(0.0))
     unplug_at_s: float = field(default=inf, validator=ge(0.0))
     """Device time at which the cable is pulled."""
@@ -47,7 +47,7 @@ class FaultConfig:
 
 @frozen(kw_only=True)
 class Pr2Config:
-    """A PR2 gripper: which device over which wire, how its fingertips are mounted, and what is emulated.
+    """A PR2 gripper: the device and its transport, the mounting of its fingertips, and the emulation.
 
     1209:0001 is the number that pid.codes reserves for private tests. The keys from `pace` on are for
     `transport = "emulated"` only.
@@ -56,29 +56,29 @@ class Pr2Config:
     transport: Literal["hidraw", "pyusb", "emulated"] = field(
         default="hidraw", validator=in_(("hidraw", "pyusb", "emulated"))
     )
-    """`hidraw`: through hidapi. `pyusb`: through libusb. `emulated`: a software gripper in this process."""
+    """`hidraw`: by hidapi. `pyusb`: by libusb. `emulated`: a gripper in software, in this process."""
     vendor_id: int = field(default=0x1209, validator=_USB_ID)
     product_id: int = field(default=0x0001, validator=_USB_ID)
     serial: str = field(default="", validator=max_len(16))
-    """Which one where there are several; empty: the only one."""
+    """Serial number, if there are several devices; empty: the only one."""
     reconnect_s: float = field(default=5.0, validator=ge(0.0))
-    """After a loss, how long opening the same gripper again waits for it to come back."""
+    """Time for which opening the gripper again after a loss waits for it."""
     calibration: str = ""
-    """Folder of calibrations; empty: the user's own; `none`: run without."""
+    """Folder of calibrations; empty: that of the user; `none`: run without."""
     swap_fingers: bool = False
-    """Take the board's left fingertip for the right one."""
+    """Exchange the left and the right fingertip of the board."""
     mirror_left: bool = False
     """Swap the left tip's -z and +z sides: sources disagree on where side cell 1 lies."""
     mirror_right: bool = False
 
     pace: Literal["lock-step", "device"] = field(default="lock-step", validator=in_(("lock-step", "device")))
-    """`lock-step`: a millisecond passes with each read. `device`: it runs by the clock, in a thread."""
+    """`lock-step`: each read advances the time by a millisecond. `device`: real time, in a thread."""
     body: str = "sim"
-    """What the emulated board drives: any gripper backend with a virtual clock."""
+    """The backend that the emulated board drives: any one with a virtual clock."""
     body_config: dict[str, Any] = field(factory=dict)
-    """Keys of that backend, as under its own [gripper]."""
+    """Settings of that backend, as in its table [gripper]."""
     object: str | None = field(default=None, metadata=NAMES_INPUT)
-    """What stands between the emulated gripper's fingers; None leaves it to the body."""
+    """The object between the fingers of the emulated gripper; None: the default of `body`."""
     transmission: Literal["pr2", "pr2_2009", "pr2_paper"] = field(
         default="pr2", validator=in_(("pr2", "pr2_2009", "pr2_paper"))
     )

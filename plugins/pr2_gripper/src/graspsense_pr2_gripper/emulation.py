@@ -1,4 +1,4 @@
-"""The software board: firmware over a body, behind a wire that may misbehave, as the settings ask for it."""
+"""The emulated board: firmware over a backend, behind a connection with faults, as in the settings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WATCHDOG_MS: Final = 100
 
 
 class Emulation(NamedTuple):
-    """The software board behind an emulated transport: its wire, its body and what the body says of itself."""
+    """The board behind an emulated transport: its connection, its backend, and the description of the backend."""
 
     wire: Wire
     body: SensorBackend[Any]
@@ -42,7 +42,7 @@ def emulated_body(config: Pr2Config) -> SensorBackend[Any]:
 
 
 def emulated_board(config: Pr2Config, seed: int) -> Emulation:
-    """Return a board over the body that the settings name, which is opened. Raises ConfigError."""
+    """Return a board over the backend that the settings name, which is opened. Raises ConfigError."""
     body = emulated_body(config)
     info = body.open(seed)
     if info.clock != "virtual":

@@ -1,4 +1,4 @@
-"""An emulated board that misbehaves: what is lost, damaged, late or frozen between it and the host."""
+"""Faults of an emulated board: reports and commands that are lost, damaged or late, and frozen cells."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from graspsense_pr2_gripper.protocol import SLICE_CELLS, decode_input, encode_in
 
 
 class Wire:
-    """Carries reports and commands of one firmware, as badly as the config says. `seed` decides by chance."""
+    """Transmits reports and commands of one firmware with the faults of the config, at random from `seed`."""
 
     def __init__(self, firmware: Firmware, faults: FaultConfig, seed: int) -> None:
         self.firmware = firmware
@@ -26,7 +26,7 @@ class Wire:
         self._frozen: int | None = None
 
     def step(self) -> list[bytes]:
-        """Let a period pass; return the reports that reach the host in it."""
+        """Advance by one period; return the reports that reach the host in it."""
         faults, chance = self._faults, self._chance
         report = self.firmware.step()
         if self._behaves:
@@ -60,7 +60,7 @@ class Wire:
         return arriving
 
     def output(self, data: bytes) -> None:
-        """Carry a command to the firmware."""
+        """Transmit a command to the firmware."""
         faults, chance = self._faults, self._chance
         if self.unplugged or self._stalled(self.firmware.time_us) or chance.random() < faults.drop_command:
             return

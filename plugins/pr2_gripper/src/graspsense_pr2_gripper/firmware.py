@@ -1,7 +1,7 @@
-"""The board's firmware in software: commands in, a report a millisecond out, and a watchdog between.
+"""The firmware of the board in software: it takes commands, sends a report every millisecond, and has a watchdog.
 
-It drives a body, any gripper backend with a virtual clock, and knows no host: what carries its reports is a
-transport's matter. One call of `step` is one period of the device's own clock.
+It drives a backend with a virtual clock, the body. Transports carry its reports. One call of `step` is one period of
+the clock of the device.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Firmware:
     def __init__(self, body: SensorBackend[Any], identity: Identity) -> None:
         self.identity = identity
         self.effort_un = 0
-        """What the motor is given now, before the limits of speed; 0 is let go."""
+        """The effort of the motor before the limit of speed; 0 when relaxed."""
         self._body = body
         self._link = LINKAGES[identity.transmission]
         self._period_us = round(1e6 / identity.report_rate_hz)
@@ -77,9 +77,9 @@ class Firmware:
         self._cells = [0] * IMAGE_CELLS
 
     def run_on(self) -> float:
-        """Let time pass without a host until the motor is let go; return how long that took in seconds.
+        """Advance the time without a host until the motor is relaxed; return the time (s) that this took.
 
-        The watchdog makes that short. Raises RuntimeError where it did not.
+        The watchdog limits this time. Raises RuntimeError if it does not act.
         """
         began = self.time_us
         while self.effort_un:
@@ -98,7 +98,7 @@ class Firmware:
         return encode_identity(self.identity)
 
     def output(self, data: bytes) -> None:
-        """Take a command; one that did not arrive whole changes nothing but the result."""
+        """Receive a command; a damaged one changes only the result field."""
         try:
             command = decode_output(data)
         except ProtocolError:
@@ -119,7 +119,7 @@ class Firmware:
         self._commanded_us = self.time_us
 
     def step(self) -> bytes:
-        """Let a period pass and return the report that ends it."""
+        """Advance by one period and return the report at its end."""
         now_us = self._step * self._period_us
         if self._result != NO_COMMAND and now_us - self._commanded_us >= self._watchdog_us:
             self.effort_un = 0
@@ -189,7 +189,7 @@ class Firmware:
 
 
 def _raw(cells: Sequence[float]) -> list[int]:
-    """Return cells as the board reads them: 16 bits, and 0 for one that does not answer."""
+    """Return cells as the board reads them: 16 bits, and 0 for a dead cell."""
     return [0 if cell != cell else min(max(round(cell), 0), 0xFFFF) for cell in cells]
 
 

@@ -1,4 +1,4 @@
-"""Between a transport and the driver: the newest report, fresh, or word that the device is gone.
+"""The link between a transport and the driver: it gives the newest report, or reports that the device is gone.
 
 `ThreadedLink` reads in a thread of its own, one report after another without pause, and hands on none that waited too
 long in some buffer: behind a Linux hidraw node the oldest 64 are kept and the newer lost. `LockStepLink` reads when
@@ -20,15 +20,15 @@ from graspsense_pr2_gripper.stream import Image, Restarted, Stream
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
 
 READ_S: Final = 0.05
-"""A read waits at most this long, so that the reader hears of a stop."""
+"""Longest wait of a read, so that the reader notices a stop."""
 OLDEST_S: Final = 0.05
-"""A report older than this is not handed on."""
+"""Age above which a report is discarded."""
 JOIN_S: Final = 1.0
-"""Closing waits this long for the reader, then for the device."""
+"""Time for which closing waits for the reader, and then for the device."""
 
 
 class Arrival(NamedTuple):
-    """A report, the last whole cell image there was with it, and when the host read it (monotonic seconds)."""
+    """A report, the last complete cell image, and the time at which the host read it (monotonic, s)."""
 
     report: InputReport
     image: Image | None
@@ -36,18 +36,18 @@ class Arrival(NamedTuple):
 
 
 class Link(ABC):
-    """An open device from the driver's side."""
+    """An open device as the driver sees it."""
 
     def __init__(self, transport: Transport) -> None:
         self.transport = transport
         self.stream = Stream()
         self.clock = DeviceClock()
         self.discarded = 0
-        """Reports that were too old to be acted on."""
+        """Number of reports that were too old."""
         self.skipped = 0
-        """Reports that a newer one replaced before the driver asked."""
+        """Number of reports that a newer one replaced before the driver read them."""
         self.gone = ""
-        """Why the device is gone; empty while it is there."""
+        """The reason why the device is gone; empty while it is connected."""
 
     @abstractmethod
     def next(self, timeout_s: float) -> Arrival | None:
@@ -55,12 +55,12 @@ class Link(ABC):
 
     @abstractmethod
     def close(self) -> bool:
-        """Let go of the device, bounded in time; return whether it was let go of cleanly."""
+        """Close the device in a bounded time; return whether it closed cleanly."""
 
     def send(self, report: bytes) -> None:
-        """Send a command. Raises DeviceLost, at once where the device is known to be gone."""
+        """Send a command. Raises DeviceLost, at once if the device is known to be gone."""
         if self.gone:
-            # A write to a device that answers nothing may block for seconds, each time.
+            # Each write to a device that does not respond may block for seconds.
             raise DeviceLost(self.gone)
         try:
             self.transport.write(report)
@@ -71,14 +71,14 @@ class Link(ABC):
 
 @final
 class LockStepLink(Link):
-    """Reads when asked; `period_s` of device time pass with each read that finds nothing waiting."""
+    """Reads on demand; each read without a waiting report advances the device time by `period_s`."""
 
     def __init__(self, transport: Transport, period_s: float) -> None:
         super().__init__(transport)
         self._period_s = period_s
 
     def next(self, timeout_s: float) -> Arrival | None:
-        """Let device time pass until a report is good, at most `timeout_s`."""
+        """Advance the device time until a report is valid, at most by `timeout_s`."""
         take, read = self.stream.take, self.transport.read
         try:
             for _ in range(math.ceil(timeout_s / self._period_s - 1e-9)):
@@ -102,7 +102,7 @@ class LockStepLink(Link):
 
 @final
 class ThreadedLink(Link):
-    """Reads in a daemon thread from the moment it is made."""
+    """Reads in a daemon thread that starts at construction."""
 
     def __init__(self, transport: Transport) -> None:
         super().__init__(transport)
@@ -128,7 +128,7 @@ class ThreadedLink(Link):
             return newest
 
     def close(self) -> bool:
-        """Stop the reader, then close the device: never under a read, and in a thread that may be left behind."""
+        """Stop the reader, then close the device, never during a read; a thread that hangs is abandoned."""
         if self._closed:
             return True
         self._closed = True
@@ -165,7 +165,7 @@ class ThreadedLink(Link):
 
 
 def close_within(transport: Transport, time_s: float) -> bool:
-    """Close a device in a thread that is left behind where it hangs; return whether it closed in time."""
+    """Close a device in a thread, which is abandoned if it hangs; return whether it closed in time."""
     closer = threading.Thread(target=transport.close, name="PR2 closer", daemon=True)
     closer.start()
     closer.join(time_s)

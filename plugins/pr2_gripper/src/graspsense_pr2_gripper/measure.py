@@ -1,4 +1,4 @@
-"""From the board's counts to metres and newtons: transmission, tare, counts per newton, load tables, bad cells."""
+"""Conversion of the counts of the board to metres and newtons: linkage, tare, scales, load tables, dead cells."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from graspsense_pr2_gripper.protocol import LEFT_ABSENT, RIGHT_ABSENT, Identity,
 from graspsense_pr2_gripper.stream import Image
 
 BAD_CELL: Final = 1 << 16
-"""Status: a cell of the last image does not answer and is left out of the forces."""
+"""Status: a cell of the last image is dead and left out of the forces."""
 BEYOND_TABLE: Final = 1 << 17
-"""Status: a pad force lies beyond its load table."""
+"""Status: a pad force is outside its load table."""
 UNLOADED_COUNTS: Final = 4500.0
 """Without a stored tare, a pad whose cells read more than this in the mean is taken to be loaded: users report
 2900 to 3800 without a load (public PressureListener scripts for the PR2, differing by finger and run)."""
@@ -47,7 +47,7 @@ _MIRRORED: Final = (
     1,
     *(FIRST_PAD_CELL + 3 * row + c for row in range(5) for c in (2, 1, 0)),
 )
-"""A tip's cells with its -z and +z sides swapped: sides, corners and tip cells, and the pad's columns."""
+"""The cells of a fingertip with the -z and +z sides swapped: sides, corners, tip cells, and the columns of the pad."""
 
 
 class _Felt(NamedTuple):
@@ -62,9 +62,9 @@ _NOTHING: Final = _Felt(math.nan, math.nan, math.nan, math.nan, 0)
 
 
 class Measure:
-    """Makes readings of the reports of one device, in order.
+    """Converts the reports of one device, in order, to readings.
 
-    `stored` is the zero of a stored tare, `tables` are the load tables of left and right, where there are any.
+    `stored` is the zero of a stored tare, `tables` are the load tables of left and right; None if there are none.
     """
 
     def __init__(
@@ -88,10 +88,10 @@ class Measure:
         self._first_us: int | None = None
         self._last_us = 0
         self.bad_cells = 0
-        """Most cells of one image that did not answer."""
+        """Largest number of dead cells in one image."""
 
     def reading(self, report: InputReport, image: Image | None) -> Reading:
-        """Return the reading of this report, with the last whole cell image."""
+        """Return the reading of this report, with the last complete cell image."""
         if self._first_us is None:
             self._first_us = report.time_us
             self._last_us = report.time_us - self._period_us
@@ -152,7 +152,7 @@ class Measure:
     def _feel(self) -> None:
         zero = self._zero
         if zero is None:
-            # Untared there is no force: the offsets alone are some thousand counts a cell.
+            # Without a tare there is no force: the offsets alone are some thousand counts for each cell.
             self._felt = _Felt(0.0, 0.0, 0.0, 0.0, 0)
             return
         left, left_bad = masked(self._pads.left, zero[0])

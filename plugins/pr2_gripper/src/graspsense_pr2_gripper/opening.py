@@ -1,4 +1,4 @@
-"""Opening the board that the settings ask for: over a real wire by serial, or one in software."""
+"""Opens the board in the settings: a real one by its serial number, or an emulated one."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from graspsense_pr2_gripper.transports.emulated import LockStepTransport, PacedT
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
 
 POLL_S: Final = 0.25
-"""A device that went away is looked for this often."""
+"""Time between two searches for a lost device."""
 
 
 class Opened(NamedTuple):
-    """An open board: the link to it, who it is, and the software behind it where it is emulated."""
+    """An open board: its link, its identity, and the emulation behind it if there is one."""
 
     link: Link
     identity: Identity
@@ -29,16 +29,16 @@ class Opened(NamedTuple):
 
 
 def open_board(config: Pr2Config, seed: int, wait_s: float) -> Opened:
-    """Open the board and check that it is one.
+    """Open the board and check its identity.
 
-    `wait_s` is how long to wait for a device that is not there. Raises NoDevice, ConfigError, PluginUnavailable.
+    `wait_s` is the time to wait for a device that is not connected. Raises NoDevice, ConfigError, PluginUnavailable.
     """
     if config.transport == "emulated":
         return _emulated(config, seed)
     transport = _open_transport(config, wait_s)
     try:
         identity = decode_identity(transport.feature(FEATURE_ID))
-        # One report may have waited in the device since long before: it would count all after it as lost.
+        # An old report may have waited in the device; with it, all reports in between would count as lost.
         transport.read(READ_S)
         if config.serial and identity.serial != config.serial:
             raise ProtocolError(
@@ -74,7 +74,7 @@ def _open_transport(config: Pr2Config, wait_s: float) -> Transport:
             try:
                 return openers[0]()
             except OSError as error:
-                # Just plugged in, a node may not be ours yet: udev is still at it.
+                # Right after plugging in, udev may not yet have set the permissions of the node.
                 missing = NoDevice(
                     f"the PR2 gripper is there but cannot be opened: {error}\n"
                     "  try: the udev rule that `graspsense doctor` prints, then plug it in again;\n"

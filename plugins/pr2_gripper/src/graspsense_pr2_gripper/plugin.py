@@ -1,4 +1,4 @@
-"""What this distribution brings to graspsense; imports no driver."""
+"""The components of this distribution. No driver is imported here."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
 
 @hookimpl
 def graspsense_emulators() -> Iterable[EmulatorEntry]:
-    """Return the software board as a device of this machine."""
+    """Return the emulated board as a device of this machine."""
     yield EmulatorEntry(
         name="pr2",
         target="graspsense_pr2_gripper.emulator.board:emulate",
@@ -50,7 +50,7 @@ def graspsense_emulators() -> Iterable[EmulatorEntry]:
 
 @hookimpl
 def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:
-    """Look for the gripper under its default numbers; a listing of HID devices needs no time limit."""
+    """Search for the gripper under its default USB numbers; a list of HID devices needs no time limit."""
     from graspsense_pr2_gripper.discovery import found_devices
 
     return found_devices()
@@ -58,7 +58,7 @@ def graspsense_probe_devices(timeout_s: float) -> Iterable[FoundDevice]:
 
 @hookimpl
 def graspsense_diagnose(config: object, timeout_s: float) -> Iterable[Finding]:
-    """Look into the gripper of these settings, or the one under the default numbers."""
+    """Examine the gripper of these settings, or the one under the default USB numbers."""
     from graspsense_pr2_gripper.diagnosis import diagnose
 
     return diagnose(config, timeout_s)

@@ -1,7 +1,7 @@
-"""The board's reports, bytes to numbers and back, as `specs/pr2_hid.md` defines them.
+"""Conversion of the reports of the board to numbers and back, as `specs/pr2_hid.md` defines them.
 
-Pure: no device, no state, no clock. Every report is 64 bytes with its id and ends with a CRC-32; what is not as
-the document says raises `ProtocolError` and nothing else.
+All functions are pure. Every report has 64 bytes, begins with its id and ends with a CRC-32. Anything that the document
+does not allow raises `ProtocolError`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ IMAGE_CELLS: Final = SLICES * SLICE_CELLS
 MAX_SAMPLES: Final = 4
 LAST_IMAGE: Final = 0xFFFF
 OWN_LIMIT: Final = 0xFFFFFFFF
-"""A limit in a command that leaves it to the device."""
+"""The value of a limit in a command that stands for the limit of the device."""
 
 LET_GO: Final = 1
 LIMITED: Final = 2
@@ -55,7 +55,7 @@ REPORT_DESCRIPTOR: Final = bytes.fromhex(
 
 
 class ProtocolError(ValueError):
-    """Bytes that are no report of this protocol, or numbers that no report can hold."""
+    """Bytes that are not a report of this protocol, or numbers that a report cannot represent."""
 
 
 class InputReport(NamedTuple):
@@ -87,7 +87,7 @@ class OutputReport(NamedTuple):
 
 
 class Identity(NamedTuple):
-    """Report 3: who the device is and what its numbers mean. `transmission` is the linkage's name."""
+    """Report 3: the identity of the device and the meaning of its numbers. `transmission` names the linkage."""
 
     firmware: tuple[int, int, int]
     serial: str

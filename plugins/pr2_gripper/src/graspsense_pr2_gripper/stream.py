@@ -1,4 +1,4 @@
-"""From reports as they come to reports in order and whole cell images; what is lost, late or damaged is counted."""
+"""Puts reports in order and assembles cell images; counts lost, late and damaged reports."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from graspsense_pr2_gripper.protocol import (
 _ALL_SLICES: Final = (1 << SLICES) - 1
 _HALF: Final = 1 << 31
 REMEMBERED: Final = 256
-"""Sequence numbers of lost reports that may still come late."""
+"""Number of lost reports that may still arrive late."""
 RESTARTED: Final = 32
-"""So many reports in a row from the past: the device has begun anew."""
+"""Number of consecutive reports with old sequence numbers after which the device counts as restarted."""
 
 
 class Image(NamedTuple):
-    """A whole cell image: `counter` rises by one with each, `cells` are the board's 44 in its own order."""
+    """A complete cell image: `counter` increases by one with each, `cells` are the 44 of the board in its order."""
 
     counter: int
     time_us: int
@@ -34,12 +34,12 @@ class Image(NamedTuple):
 
 
 class Restarted(Exception):
-    """The device's sequence began anew without the device having gone."""
+    """The sequence of the device restarted although the device was connected."""
 
 
 @define
 class Counts:
-    """What came over the wire since the device was opened."""
+    """Counters of the reports since the device was opened."""
 
     reports: int = 0
     lost: int = 0
@@ -53,12 +53,12 @@ class Counts:
 
 
 class Stream:
-    """Takes report after report of one device."""
+    """Processes the reports of one device in turn."""
 
     def __init__(self) -> None:
         self.counts = Counts()
         self.image: Image | None = None
-        """The last whole image."""
+        """The last complete image."""
         self._last = -1
         self._missing: dict[int, None] = {}
         self._from_the_past = 0
@@ -68,7 +68,7 @@ class Stream:
         self._cells = [0] * IMAGE_CELLS
 
     def take(self, data: bytes) -> InputReport | None:
-        """Return the report where it is newer than all before, else None. Raises Restarted."""
+        """Return the report if it is newer than all before, else None. Raises Restarted."""
         counts = self.counts
         try:
             report = decode_input(data)

@@ -1,4 +1,4 @@
-"""The udev rules to copy: `uaccess` opens a device to whoever sits at the machine, and to nobody else."""
+"""The udev rules for the user to copy: `uaccess` gives access to the user who is logged in at the machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a link does, measured without moving anything: rate, loss, delay, and the way there and back."""
+"""Measurements of a link without motion: rate, loss, delay, and round trip."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from graspsense_pr2_gripper.protocol import RELEASE_KIND, OutputReport, encode_o
 
 TRIPS: Final = 50
 TRIP_S: Final = 0.5
-"""An echo that takes longer than this does not come."""
+"""Time after which an echo counts as missing."""
 MISSES: Final = 3
-"""After so many that did not come no further one is waited for."""
+"""Number of missing echoes after which no further one is awaited."""
 FIRST_COUNTER: Final = 0x8000
-"""Far from the counters that a driver begins with."""
+"""First counter of the commands, far from those that a driver starts with."""
 
 
 class Watched(NamedTuple):

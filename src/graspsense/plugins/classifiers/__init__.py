@@ -1,1 +1,1 @@
-"""Classifiers that come with graspsense: scikit-learn's, behind the common role."""
+"""The classifiers of graspsense, from scikit-learn."""

@@ -21,11 +21,11 @@ class ForestConfig(KeptConfig):
 
     trees: int = field(default=100, validator=[instance_of(int), ge(1)])
     min_leaf: int = field(default=1, validator=[instance_of(int), ge(1)])
-    """Least number of training trials at a leaf."""
+    """Smallest number of training trials at a leaf."""
 
 
 class Forest(ScikitClassifier[ForestConfig]):
-    """Trees on samples of the trials; the probabilities are the mean of the trees'."""
+    """Decision trees on samples of the trials; the probabilities are means over the trees."""
 
     def estimator(self, seed: int, trials: int) -> Any:
         """Return the forest."""
@@ -36,6 +36,6 @@ class Forest(ScikitClassifier[ForestConfig]):
         )
 
     def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
-        """Return how the trees voted."""
+        """Return the votes of the trees."""
         what = f"mean of {self.config.trees} trees"
         return (most_likely(self.shares(fitted, row)[0].tolist(), self.classes(), what),)

@@ -21,11 +21,11 @@ class KnnConfig(ClassifierConfig):
     """Settings of the vote."""
 
     neighbours: int = field(default=5, validator=[instance_of(int), ge(1)])
-    """Training trials that vote; fewer where there are fewer."""
+    """Number of training trials that vote; fewer if there are fewer."""
 
 
 class Knn(ScikitClassifier[KnnConfig]):
-    """The nearest training trials vote, distance measured in standard deviations of the training trials."""
+    """A vote of the nearest training trials, with distances in standard deviations of the training trials."""
 
     def estimator(self, seed: int, trials: int) -> Any:
         """Return the vote."""
@@ -34,7 +34,7 @@ class Knn(ScikitClassifier[KnnConfig]):
         return KNeighborsClassifier(n_neighbors=min(self.config.neighbours, trials))
 
     def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
-        """Return the votes and how near the nearest was."""
+        """Return the votes, and the distance of the nearest trial."""
         distances, rows = fitted.estimator.kneighbors(row)
         votes = [fitted.labels[i] for i in rows[0].tolist()]
         return (

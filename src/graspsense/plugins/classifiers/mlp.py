@@ -26,7 +26,7 @@ class MlpConfig(KeptConfig):
 
 
 class Mlp(ScikitClassifier[MlpConfig]):
-    """One hidden layer, trained by L-BFGS, which suits sets of hundreds of trials."""
+    """A network with one hidden layer, trained by L-BFGS, which suits hundreds of trials."""
 
     def estimator(self, seed: int, trials: int) -> Any:
         """Return the network."""
@@ -41,5 +41,5 @@ class Mlp(ScikitClassifier[MlpConfig]):
         )
 
     def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
-        """Return the likeliest labels."""
+        """Return the most probable labels."""
         return (most_likely(self.shares(fitted, row)[0].tolist(), self.classes(), "outputs of the network"),)

@@ -1,4 +1,4 @@
-"""What scikit-learn's classifiers have in common here; scikit-learn is imported when one is fitted or loaded.
+"""The common part of the classifiers of scikit-learn, which is imported when one is fitted or loaded.
 
 Missing features are filled with the median of the training trials (0 where no training trial had the feature),
 then every feature is brought to mean 0 and standard deviation 1 over the training trials. A model is kept as its
@@ -27,15 +27,15 @@ ScikitConfigT = TypeVar("ScikitConfigT", bound=ClassifierConfig)
 
 @frozen(kw_only=True)
 class KeptConfig(ClassifierConfig):
-    """What the classifiers whose model can be kept in two ways have in common."""
+    """Settings of classifiers whose model can be stored in two ways."""
 
     kept_as: Literal["trials", "skops"] = field(default="trials", validator=in_(("trials", "skops")))
-    """How a model is kept: its training trials, or the fitted estimator (needs the extra skops)."""
+    """What a model file holds: the training trials, or the fitted estimator (needs the extra skops)."""
 
 
 @frozen(kw_only=True, eq=False)
 class FittedEstimator:
-    """A fitted estimator, what it was fitted on, and how a trial is made ready for it."""
+    """A fitted estimator, its training data, and the preprocessing of a trial."""
 
     estimator: Any
     table: FeatureTable
@@ -54,27 +54,27 @@ class FittedEstimator:
 
 
 class ScikitClassifier(Classifier[ScikitConfigT]):
-    """A classifier of scikit-learn; its subclasses say which."""
+    """A classifier of scikit-learn, which subclasses specify."""
 
     _fitted: FittedEstimator | None = None
     _made_with = ""
 
     @abstractmethod
     def estimator(self, seed: int, trials: int) -> Any:
-        """Return scikit-learn's estimator, unfitted, for this number of training trials."""
+        """Return the unfitted estimator for this number of training trials."""
 
     @abstractmethod
     def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
-        """Return why this label, for one trial made ready, of shape (1, features)."""
+        """Return the reasons for this label of one preprocessed trial, of shape (1, features)."""
 
     def shares(self, fitted: FittedEstimator, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the probabilities of trials made ready, columns in the order of the estimator's classes."""
+        """Return the probabilities of preprocessed trials, in the order of the classes of the estimator."""
         import numpy as np
 
         return np.asarray(fitted.estimator.predict_proba(rows), dtype=np.float64)
 
     def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
-        """Fill, scale, fit. Raises ValueError where there are fewer than two labels."""
+        """Fill missing values, scale, and fit. Raises ValueError for fewer than two labels."""
         import warnings
 
         import numpy as np
@@ -84,11 +84,11 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         if len(set(labels)) < 2:
             raise ValueError(f"all {len(labels)} trials have one label: there is nothing to tell apart")
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # numpy's, of a column without any value
+            warnings.simplefilter("ignore", RuntimeWarning)  # by numpy, for a column without values
             fill = np.nan_to_num(np.nanmedian(table.values, axis=0), nan=0.0)
         filled = np.where(np.isnan(table.values), fill, table.values)
         scale = filled.std(axis=0)
-        # What hardly differs from rounding is constant, and would be blown up to noise.
+        # A feature that varies only by rounding is constant; scaling would amplify it to noise.
         constant = scale <= 1e-12 * np.maximum(np.abs(filled).max(axis=0), np.finfo(np.float64).tiny)
         fitted = FittedEstimator(
             estimator=self.estimator(seed, len(labels)),
@@ -99,9 +99,9 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             mean=filled.mean(axis=0),
             scale=np.where(constant, 1.0, scale),
         )
-        # One thread: on tables this small more of them cost time, and sum in another order on another machine.
+        # One thread: on small tables more threads cost time, and the order of sums would depend on the machine.
         with warnings.catch_warnings(), threadpool_limits(1):
-            # A network that could still improve is what it is; its rate says how good that is.
+            # A network that has not converged is accepted; its recognition rate shows how good it is.
             warnings.simplefilter("ignore", ConvergenceWarning)
             fitted.estimator.fit(fitted.ready(table.values), np.array(labels))
         self._fitted = fitted
@@ -111,12 +111,12 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         return tuple(str(label) for label in self._model().estimator.classes_)
 
     def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
-        """Return shape (trials, classes)."""
+        """Return the probabilities, shape (trials, classes)."""
         fitted = self._model()
         return self.shares(fitted, fitted.ready(table.columns(fitted.table.names).values))
 
     def explain(self, features: Features) -> Prediction:
-        """Return the prediction, which missing feature was filled with what, and why this label."""
+        """Return the prediction with its reasons, and the values that replaced missing features."""
         import numpy as np
 
         fitted = self._model()
@@ -140,7 +140,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         )
 
     def to_json(self) -> dict[str, Any]:
-        """Return the training trials with the seed, or the estimator: what it takes to make the model again."""
+        """Return the training trials with the seed, or the estimator, from which the model can be restored."""
         import sklearn
 
         fitted = self._model()
@@ -164,7 +164,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         }
 
     def from_json(self, model: Mapping[str, Any]) -> None:
-        """Make the model again from its training trials. Raises KeyError, TypeError or ValueError."""
+        """Restore the model. Raises KeyError, TypeError or ValueError."""
         import numpy as np
 
         names, units = zip(*((str(name), str(unit)) for name, unit in model["features"]), strict=True)

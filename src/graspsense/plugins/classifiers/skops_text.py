@@ -1,4 +1,4 @@
-"""A fitted estimator of scikit-learn as text, through skops: no pickle, and of no type that is not listed here.
+"""A fitted estimator of scikit-learn as text, by skops: without pickle, and with listed types only.
 
 skops is the extra `skops`. What its own list of safe types lacks is `TRUSTED`; a file that holds any other type is
 refused before anything of it is made.
@@ -13,7 +13,7 @@ from typing import Any, Final
 from graspsense.plugin_api import PluginUnavailable
 
 TRUSTED: Final = ("sklearn.tree._tree.Tree",)
-"""Types that estimators of ours need beyond those that skops takes for safe: the arrays of a decision tree."""
+"""Types that the estimators need beyond those that skops regards as safe: the arrays of a decision tree."""
 HINT: Final = (
     'a model kept as skops needs skops.\n  in a clone: pip install -e ".[skops]"     published: '
     'pip install "graspsense[skops]"'
@@ -26,9 +26,9 @@ def as_text(estimator: Any) -> str:
 
 
 def from_text(text: str, kind: type, features: int) -> Any:
-    """Return the fitted estimator, which must be of this kind and take so many features.
+    """Return the fitted estimator, which must be of this class and have this number of features.
 
-    Raises PluginUnavailable without skops, ValueError where it is anything else, or of a type that is not listed.
+    Raises PluginUnavailable without skops, ValueError for any other object or a type that is not listed.
     """
     skops = _skops()
     try:
@@ -39,7 +39,7 @@ def from_text(text: str, kind: type, features: int) -> Any:
         estimator = skops.loads(data, trusted=list(TRUSTED))
     except (ValueError, binascii.Error):
         raise
-    except Exception as error:  # skops and what it calls raise whatever a broken archive makes them
+    except Exception as error:  # skops can raise anything on a broken archive
         raise ValueError(f"it is no estimator ({type(error).__name__}: {error})") from error
     if type(estimator) is not kind or getattr(estimator, "n_features_in_", None) != features:
         raise ValueError(f"it is no {kind.__name__} of {features} features")
@@ -50,7 +50,7 @@ def from_text(text: str, kind: type, features: int) -> Any:
 
 
 def _check_tree(tree: Any, features: int) -> None:
-    """Refuse a tree that leads out of its arrays: compiled code follows it without looking."""
+    """Refuse a tree with indices outside its arrays, which compiled code does not check. Raises ValueError."""
     n, left, right = tree.node_count, tree.children_left, tree.children_right
     inner = left >= 0
     for k, child in enumerate(zip(left.tolist(), right.tolist(), strict=True)):

@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 @frozen(kw_only=True)
 class SvmConfig(KeptConfig):
-    """Settings of the machine; the kernel's width is scikit-learn's `scale`."""
+    """Settings of the machine; the width of the kernel is `scale` of scikit-learn."""
 
     c: float = field(default=10.0, validator=gt(0.0))
-    """What a training trial on the wrong side costs; larger fits closer."""
+    """Penalty of a training trial on the wrong side; a larger one fits the data more closely."""
 
 
 class Svm(ScikitClassifier[SvmConfig]):
-    """Its probabilities are the softmax of its decision values, one against the rest: not calibrated."""
+    """The probabilities are the softmax of the one-against-rest decision values, and are not calibrated."""
 
     def estimator(self, seed: int, trials: int) -> Any:
         """Return the machine."""

@@ -1,4 +1,4 @@
-"""Scikit-learn's own decision tree (CART)."""
+"""The decision tree of scikit-learn (CART)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class CartConfig(KeptConfig):
 
     criterion: Literal["entropy", "gini"] = field(default="entropy", validator=in_(("entropy", "gini")))
     min_leaf: int = field(default=2, validator=[instance_of(int), ge(1)])
-    """Least number of training trials at a leaf."""
+    """Smallest number of training trials at a leaf."""
 
 
 class Cart(ScikitClassifier[CartConfig]):
@@ -37,7 +37,7 @@ class Cart(ScikitClassifier[CartConfig]):
         )
 
     def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
-        """Return the path through the tree, its thresholds in the features' own units."""
+        """Return the path through the tree, with thresholds in the units of the features."""
         inner = fitted.estimator.tree_
         nodes = fitted.estimator.decision_path(row).indices.tolist()
         sentences = []

@@ -1,4 +1,4 @@
-"""Force control: a constant effort as in the authors' code, or a closed loop on the force of the pads.
+"""Force control: a constant effort, as in the authors' code, or a closed loop on the force of the pads.
 
 Driven from an open gripper it arrives at full speed: the impact of Fig. 5.
 """
@@ -26,18 +26,18 @@ from graspsense.plugins.controllers.supervision import (
 
 @frozen(kw_only=True, slots=False)
 class ForceLoopConfig:
-    """What the squeeze is to reach, and how."""
+    """The target of the squeeze, and the control loop."""
 
     probing_force_n: float = field(default=20.0, validator=POSITIVE)
     """The effort of the squeeze; with `loop = "closed"`, the force on each pad."""
     loop: Literal["open", "closed"] = field(default="open", validator=in_(("open", "closed")))
     """`open`: a constant effort, as in the authors' code. `closed`: an integral loop on the pads' mean force."""
     force_gain_1_s: float = field(default=4.0, validator=NOT_NEGATIVE)
-    """Closed loop only: effort per second per newton of error; slow beside a cell image every 41 ms."""
+    """Closed loop only: rate of the effort per newton of error (1/s); slow compared with a cell image every 41 ms."""
     force_tolerance_n: float = field(default=0.3, validator=POSITIVE)
-    """Closed loop only: steady needs the mean force this near the one asked for (as in pr2_gripper_sensor)."""
+    """Closed loop only: largest error of the mean force at steady state (as in pr2_gripper_sensor)."""
     effort_limit_n: float = field(default=100.0, validator=POSITIVE)
-    """Closed loop only: the effort stays within 0 and this."""
+    """Closed loop only: upper limit of the effort; the lower limit is 0."""
 
 
 @frozen(kw_only=True, slots=False)
@@ -46,7 +46,7 @@ class ForceConfig(SupervisionConfig, ForceLoopConfig):
 
 
 class ForceLoop(NamedTuple):
-    """The numbers of `ForceLoopConfig`; `closed` is 0 or 1."""
+    """The parameters of `ForceLoopConfig`; `closed` is 0 or 1."""
 
     probing_force_n: float
     closed: int
@@ -55,7 +55,7 @@ class ForceLoop(NamedTuple):
 
 
 def force_loop(config: ForceLoopConfig) -> ForceLoop:
-    """Return the numbers of this config."""
+    """Return the parameters of this config."""
     return ForceLoop(
         probing_force_n=float(config.probing_force_n),
         closed=1 if config.loop == "closed" else 0,
@@ -74,14 +74,14 @@ def squeezing_effort(loop: ForceLoop, effort_n: float, frame: Frame) -> float:
 
 
 def settling(config: ForceLoopConfig) -> dict[str, float]:
-    """Return what `supervision` needs to know of the force: nothing where the loop is open."""
+    """Return the target of `supervision` for the force; empty for an open loop."""
     if config.loop == "open":
         return {}
     return {"target_force_n": config.probing_force_n, "force_tolerance_n": config.force_tolerance_n}
 
 
 class ForceParams(NamedTuple):
-    """Numbers of the law."""
+    """Parameters of the law."""
 
     loop: ForceLoop
     supervision: Supervision
@@ -97,7 +97,7 @@ class ForceState(NamedTuple):
 
 
 def step(params: ForceParams, state: ForceState, frame: Frame, pads: Pads) -> tuple[Command, ForceState]:
-    """Close with the probing effort; from contact on, closed loop if so set."""
+    """Close with the probing effort; from contact on, control the force if the loop is closed."""
     progress = supervise(params.supervision, state.progress, frame)
     effort = params.loop.probing_force_n
     if progress.phase != APPROACH:
@@ -106,12 +106,12 @@ def step(params: ForceParams, state: ForceState, frame: Frame, pads: Pads) -> tu
 
 
 class ForceController(Controller[ForceConfig]):
-    """Closes with a set effort, or squeezes to a set force."""
+    """Closes with a constant effort, or squeezes to a given force."""
 
     step = staticmethod(step)
 
     def params(self) -> ForceParams:
-        """Return the law's numbers."""
+        """Return the parameters of the law."""
         return ForceParams(
             loop=force_loop(self.config), supervision=supervision(self.config, **settling(self.config))
         )

@@ -42,7 +42,7 @@ class HybridConfig(SupervisionConfig, ForceLoopConfig, VelocityLoopConfig):
     """Settings of the hybrid controller."""
 
     ramp_s: float = field(default=0.0, validator=NOT_NEGATIVE)
-    """Time over which the effort goes from the velocity loop's last to the force law's (0: a hard switch)."""
+    """Time over which the effort changes from that of the velocity loop to that of the force law (0: at once)."""
 
 
 class HybridParams(NamedTuple):
@@ -56,7 +56,7 @@ class HybridParams(NamedTuple):
 
 
 class HybridState(NamedTuple):
-    """State of the law. `approach_effort_n` is the velocity loop's last effort, from which a ramp starts."""
+    """State of the law. `approach_effort_n` is the last effort of the velocity loop, at which a ramp starts."""
 
     phase: int
     outcome: int
@@ -65,11 +65,11 @@ class HybridState(NamedTuple):
     force_effort_n: float
     approach_effort_n: float
     approached_t_s: float
-    """When the velocity loop was last in charge; the ramp runs from there."""
+    """Time of the last tick of the velocity loop, at which the ramp starts."""
 
 
 def step(params: HybridParams, state: HybridState, frame: Frame, pads: Pads) -> tuple[Command, HybridState]:
-    """Velocity until both pads touch, then force."""
+    """Control the velocity until both pads touch, then the force."""
     progress = supervise(params.supervision, state.progress, frame)
     _, _, _, integral, force_effort, approach_effort, contact_t = state
     if progress.phase == APPROACH:
@@ -93,12 +93,12 @@ def step(params: HybridParams, state: HybridState, frame: Frame, pads: Pads) -> 
 
 
 class HybridController(Controller[HybridConfig]):
-    """The paper's controller, and the default."""
+    """The controller of the paper, and the default."""
 
     step = staticmethod(step)
 
     def params(self) -> HybridParams:
-        """Return the law's numbers."""
+        """Return the parameters of the law."""
         return HybridParams(
             velocity=velocity_loop(self.config),
             kind=kind_sent(self.config),

@@ -1,4 +1,4 @@
-"""When a closing gripper has touched, come to rest, or gone wrong: shared by the control laws.
+"""Supervision of a closing gripper: contact, rest, and failures. All control laws share it.
 
 The states and time-outs are those of the paper's own controller (personalrobots-pkg, September 2009,
 `experimental_controllers/src/pr2_gripper_controller.cpp`): 10 s to make contact, 3 s to come to rest, and the
@@ -38,35 +38,35 @@ from graspsense.plugin_api import (
 
 POSITIVE = and_(gt(0.0), lt(inf))
 NOT_NEGATIVE = and_(ge(0.0), lt(inf))
-"""What a law's settings may be: numbers that a gripper can be held to."""
+"""Validators of settings of control laws."""
 
 
 @frozen(kw_only=True, slots=False)
 class SupervisionConfig:
-    """Thresholds and time-outs that every control law of this package has."""
+    """Thresholds and time-outs of every control law of this package."""
 
     contact_force_n: float = field(default=CONTACT_FORCE_N, validator=POSITIVE)
-    """Contact is this much on both pads, over their tared zero."""
+    """Force on both pads, above their tared zero, from which on they touch the object."""
     rest_speed_m_s: float = field(default=REST_SPEED_M_S, validator=POSITIVE)
-    """At rest is slower than this throughout the window."""
+    """Speed below which the fingers are at rest, if throughout the window."""
     rest_window_s: float = field(default=REST_WINDOW_S, validator=POSITIVE)
     edge_force_n: float = field(default=0.25, validator=POSITIVE)
-    """More than this on one edge cell while closing is a side impact (100 counts of the softest cell)."""
+    """Force on a single edge cell above which closing ends as a side impact (100 counts of the most sensitive cell)."""
     move_timeout_s: float = field(default=10.0, validator=POSITIVE)
-    """Longest approach; longer by itself where the closing speed needs it."""
+    """Longest approach; extended if the closing speed requires it."""
     steady_timeout_s: float = field(default=3.0, validator=POSITIVE)
-    """Longest squeeze before the grasp counts as never steady."""
+    """Longest squeeze, after which the grasp ends as never steady."""
     closed_gap_m: float = field(default=0.003, validator=NOT_NEGATIVE)
-    """Fingers closed to this gap: nothing is there, or after contact nothing is left."""
+    """Gap at which the fingers count as closed: there is no object, or after contact none is left."""
     too_wide_m: float = field(default=0.001, validator=NOT_NEGATIVE)
-    """Contact within this much of closing: the thing is wider than the opening."""
+    """Travel within which a contact means that the object is wider than the opening."""
     crush_share: float = field(default=0.2, validator=POSITIVE)
-    """The force falling below this share of its peak while the gap falls by `crush_travel_m`: crushed."""
+    """The object is crushed if the force falls below this share of its peak as the gap closes by `crush_travel_m`."""
     crush_travel_m: float = field(default=0.002, validator=POSITIVE)
     slip_time_s: float = field(default=0.2, validator=POSITIVE)
     """Both pads below half the contact force for this long, closed further than at the peak: slipped out.
 
-    A finger that bounces off a rigid thing loses contact too, but opens.
+    A finger that bounces off a rigid object loses contact too, but opens.
     """
 
 
@@ -94,19 +94,19 @@ class Supervision(NamedTuple):
 
 
 class GraspProgress(NamedTuple):
-    """How far the grasp has come. The start is unknown until the first tick (`begun` 0)."""
+    """The progress of the grasp. The start is unknown until the first tick (`begun` is 0)."""
 
     phase: int
     outcome: int
     begun: int
     start_gap_m: float
     deadline_s: float
-    """When the approach, then the squeeze, has taken too long."""
+    """Time at which the approach, later the squeeze, has taken too long."""
     still: Stillness
     peak_force_n: float
     peak_gap_m: float
     felt_t_s: float
-    """When a pad was last felt after contact."""
+    """Time of the last force on a pad after contact."""
 
 
 def supervision(
@@ -116,7 +116,7 @@ def supervision(
     target_force_n: float = 0.0,
     force_tolerance_n: float = inf,
 ) -> Supervision:
-    """Return the numbers of this config, with what the law adds."""
+    """Return the parameters of this config, with those that the law adds."""
     return Supervision(
         contact_force_n=float(config.contact_force_n),
         rest_speed_m_s=float(config.rest_speed_m_s),
@@ -141,7 +141,7 @@ def not_begun() -> GraspProgress:
 
 
 def supervise(params: Supervision, now: GraspProgress, frame: Frame) -> GraspProgress:
-    """Return the progress after this frame; the same object where nothing has changed."""
+    """Return the progress after this frame; the same object if nothing has changed."""
     if now.outcome != RUNNING:
         return now
     if now.phase == APPROACH:

@@ -27,17 +27,17 @@ from graspsense.plugins.controllers.supervision import (
 
 @frozen(kw_only=True, slots=False)
 class VelocityLoopConfig:
-    """The loop's gains: those of the authors' code, 15000 and 25 with the integral held within 100 N."""
+    """Gains of the velocity loop: 15000 and 25, with the integral limited to 100 N, as in the authors' code."""
 
     closing_speed_m_s: float = field(default=0.010, validator=POSITIVE)
-    """Rate at which the gap is to close."""
+    """Closing speed of the gap."""
     velocity_gain_n_s_m: float = field(default=15000.0, validator=NOT_NEGATIVE)
-    """Effort per error of speed, N s/m."""
+    """Effort per error of the speed (N s/m)."""
     integral_gain_n_m: float = field(default=25.0, validator=NOT_NEGATIVE)
-    """Effort per error of gap, N/m."""
+    """Effort per error of the gap (N/m)."""
     integral_limit_n: float = field(default=100.0, validator=NOT_NEGATIVE)
     preload_n: float = field(default=7.0, validator=NOT_NEGATIVE)
-    """Where the integral starts: the gripper's Coulomb friction (7 N is fed forward in pr2_gripper_sensor)."""
+    """Initial value of the integral: the Coulomb friction of the gripper (7 N is fed forward in pr2_gripper_sensor)."""
     sends: Literal["effort", "velocity"] = field(default="effort", validator=in_(("effort", "velocity")))
     """What is commanded. `velocity` is for a gripper with a velocity loop of its own: this loop's gains then count for
     nothing, and the squeeze closes on with the effort as a limit."""
@@ -49,7 +49,7 @@ class VelocityConfig(SupervisionConfig, VelocityLoopConfig):
 
 
 class VelocityLoop(NamedTuple):
-    """The numbers of `VelocityLoopConfig`."""
+    """The parameters of `VelocityLoopConfig`."""
 
     closing_speed_m_s: float
     velocity_gain_n_s_m: float
@@ -59,7 +59,7 @@ class VelocityLoop(NamedTuple):
 
 
 def velocity_loop(config: VelocityLoopConfig) -> VelocityLoop:
-    """Return the numbers of this config."""
+    """Return the parameters of this config."""
     return VelocityLoop(
         closing_speed_m_s=float(config.closing_speed_m_s),
         velocity_gain_n_s_m=float(config.velocity_gain_n_s_m),
@@ -75,7 +75,7 @@ def kind_sent(config: VelocityLoopConfig) -> int:
 
 
 def closing_effort(loop: VelocityLoop, integral_n: float, frame: Frame) -> tuple[float, float]:
-    """Return the effort (N) that keeps the closing speed, and the integral (N) after this tick."""
+    """Return the effort (N) of the velocity loop, and its integral (N) after this tick."""
     speed, gain, integral_gain, limit, _ = loop
     error = speed + frame.velocity_m_s
     integral_n += integral_gain * error * frame.dt_s
@@ -106,7 +106,7 @@ class VelocityState(NamedTuple):
 def step(
     params: VelocityParams, state: VelocityState, frame: Frame, pads: Pads
 ) -> tuple[Command, VelocityState]:
-    """Close at the set speed, whatever resists."""
+    """Close at the given speed against any resistance."""
     progress = supervise(params.supervision, state.progress, frame)
     value, integral = closing_effort(params.loop, state.integral_n, frame)
     if params.kind == VELOCITY:
@@ -117,12 +117,12 @@ def step(
 
 
 class VelocityController(Controller[VelocityConfig]):
-    """Closes at a set speed."""
+    """Closes at a given speed."""
 
     step = staticmethod(step)
 
     def params(self) -> VelocityParams:
-        """Return the law's numbers."""
+        """Return the parameters of the law."""
         return VelocityParams(
             loop=velocity_loop(self.config),
             kind=kind_sent(self.config),

@@ -1,1 +1,1 @@
-"""The feature sets that come with graspsense."""
+"""The feature sets of graspsense."""

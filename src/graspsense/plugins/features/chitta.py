@@ -1,4 +1,4 @@
-"""The six features of Table I (Chitta, Piccoli and Sturm, ICRA 2010), with the paper's errata applied.
+"""The six features of Table I (Chitta, Piccoli and Sturm, ICRA 2010), with corrections of the equations.
 
 | feature | meaning | unit |
 |---|---|---|
@@ -43,29 +43,28 @@ RATES: Final = NAMES[4:]
 
 @frozen(kw_only=True)
 class ChittaConfig:
-    """Which force, and when contact and rest are."""
+    """The force to use, and the thresholds of contact and rest."""
 
     force: Literal["mean", "left", "right", "min", "sum"] = field(
         default="mean", validator=in_(("mean", "left", "right", "min", "sum"))
     )
-    """f of the two pad forces: their mean, one of them, the smaller, or their sum."""
+    """The force f from those of the two pads: their mean, one of them, the smaller, or their sum."""
     contact_force_n: float = field(default=CONTACT_FORCE_N, validator=gt(0.0))
-    """tau_1, on each pad."""
+    """tau_1, for each pad."""
     rest_speed_m_s: float = field(default=REST_SPEED_M_S, validator=gt(0.0))
-    """tau_2, throughout the window."""
+    """tau_2, below which the speed must stay throughout the window."""
     rest_window_s: float = field(default=REST_WINDOW_S, validator=gt(0.0))
 
 
 class ChittaFeatures(FeatureSet[ChittaConfig]):
-    """Draws the six features of Table I."""
+    """Extracts the six features of Table I."""
 
     def extract(self, trace: Trace) -> Features:
         """Return the six features.
 
-        Before contact all are missing; between contact and rest all but p_first are; where rest begins in the
-        very sample of the contact the two rates are missing, as they would divide by zero. The force is the
-        pads' at the end of the window that shows the rest: at its beginning the last cell image may still be
-        one from before.
+        Before contact, all are missing; between contact and rest, all but p_first. If rest begins in the sample of the
+        contact, the two rates are missing, because delta_t is zero. The force is taken at the end of the window that
+        shows the rest, because at its beginning the last cell image can be from before the rest.
         """
         units = self._units(trace)
         first = self._first(trace)
@@ -120,12 +119,12 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         return int(touch.argmax()) if touch.any() else None
 
     def _rest(self, trace: Trace, first: int) -> tuple[int, int] | None:
-        """Return the tick at which rest begins and the one at which its window is full, or None."""
+        """Return the tick at which rest begins and the one at which its window ends, or None."""
         config = self.config
         phase = trace.phase[first:]
         released = phase > HOLD
         end = first + (int(released.argmax()) if released.any() else len(phase))
-        # A controller may wait for more than rest (for its force); where it said steady, that is the rest meant.
+        # A controller can wait for more than rest, such as a force. The rest in its hold phase is then the one meant.
         held = phase == HOLD
         found = first_rest(
             trace.t_s[first:end],
@@ -153,5 +152,5 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
 
 
 def _closing(trace: Trace) -> NDArray[np.bool_]:
-    """Return which ticks belong to the grasp itself: from the approach to the end of the hold."""
+    """Return a mask of the ticks from the approach to the end of the hold."""
     return (trace.phase >= APPROACH) & (trace.phase <= HOLD)

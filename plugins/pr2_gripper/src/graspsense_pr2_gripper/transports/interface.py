@@ -1,4 +1,4 @@
-"""What the driver asks of a wire: whole reports in and out, and the feature report."""
+"""The interface of a transport: complete reports in both directions, and the feature report."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from abc import ABC, abstractmethod
 
 
 class TransportGone(Exception):
-    """The device is no longer there, or does not take what it is given; the text says which and how it showed."""
+    """The device is gone, or does not accept data; the text states which, and how this was detected."""
 
 
 class Transport(ABC):
-    """An open device. One thread reads, one writes; `close` is called when neither does any more."""
+    """An open device. One thread reads, one writes; `close` is called when both have ended."""
 
     @abstractmethod
     def read(self, timeout_s: float) -> bytes:
-        """Return the next input report with its id, or nothing where none came. Raises TransportGone."""
+        """Return the next input report with its id, or empty bytes if none came. Raises TransportGone."""
 
     @abstractmethod
     def write(self, report: bytes) -> None:
-        """Send an output report; that it arrives is not promised. Raises TransportGone."""
+        """Send an output report, without a guarantee that it arrives. Raises TransportGone."""
 
     @abstractmethod
     def feature(self, report_id: int) -> bytes:
@@ -26,4 +26,4 @@ class Transport(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Let go of the device; may block, does not raise where the device is gone."""
+        """Close the device; may block, and does not raise if the device is gone."""
