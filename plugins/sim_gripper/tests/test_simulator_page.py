@@ -6,6 +6,7 @@ from pathlib import Path
 import attrs
 import pytest
 
+from graspsense.plugin_api import create
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue, shipped_scenes
 from graspsense_sim_gripper.objects.spec import ObjectSpec, parse_scene
@@ -48,6 +49,17 @@ def test_the_table_of_a_scene_has_every_key():
 
 def test_the_table_of_terms_has_every_term():
     assert [row[0].strip("`") for row in rows("Terms")] == list(TERMS)
+
+
+def test_the_table_of_the_report_has_every_key():
+    gripper = create("sensor-backend", "sim", explain=True)
+    gripper.open(0)
+    gripper.read(0.1)
+    report = gripper.report()
+    nested = {f"selection.{key}" for key in report["selection"]}
+    named = {row[0].strip("`") for row in rows("What is reported")}
+    assert {name for name in named if "." not in name} == set(report)
+    assert {name for name in named if "." in name} <= nested
 
 
 @pytest.mark.parametrize("which", [0, 1])
