@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.evaluation.intervals import Rate, difference, wilson
+from graspsense.evaluation.intervals import RecognitionRate, difference, wilson
 
 
 @pytest.mark.parametrize(
@@ -40,7 +40,7 @@ def test_wilson_lies_in_the_unit_and_holds_the_rate(n, data):
 @pytest.mark.parametrize(("correct", "n"), [(1, 0), (-1, 3), (4, 3)])
 def test_what_is_no_rate_is_refused(correct, n):
     with pytest.raises(ValueError, match="is no rate"):
-        Rate(correct, n)
+        RecognitionRate(correct, n)
 
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), min_size=1, max_size=60))

@@ -10,8 +10,8 @@ from graspsense.core.errors import ConfigError
 from graspsense.report.simulation import (
     PEAK,
     TRACE,
-    Point,
     SimulationTrade,
+    VariantPoint,
     simulation_markdown,
     simulation_png,
     simulation_rows,
@@ -22,7 +22,7 @@ QUANTITIES = ("p_first", "delta_t", PEAK, TRACE)
 
 def point(method, step, seconds, error, role="curve", failure=""):
     errors = {} if math.isnan(error) else dict.fromkeys(QUANTITIES, error)
-    return Point(
+    return VariantPoint(
         method=method,
         fidelity="full",
         step=step,

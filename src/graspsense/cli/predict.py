@@ -39,7 +39,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     from graspsense.core.model import load_model
     from graspsense.core.plugins import installed
     from graspsense.evaluation.evaluate import rate_as_json
-    from graspsense.evaluation.intervals import Rate
+    from graspsense.evaluation.intervals import RecognitionRate
 
     asked = load_model(model, installed())
     labels: tuple[str, ...] | None = None
@@ -69,7 +69,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
         predictions = [asked.predict(table.row(i)) for i in range(len(table))]
     rate = None
     if labels is not None:
-        rate = Rate(
+        rate = RecognitionRate(
             sum(one.label == label for one, label in zip(predictions, labels, strict=True)), len(labels)
         )
     warnings = list(dict.fromkeys(warning for one in predictions for warning in one.warnings))

@@ -17,7 +17,7 @@ from graspsense.core.labelled import ControlFeatures, Labelled, Target, class_of
 from graspsense.evaluation.confusion import Confusion, confusion
 from graspsense.evaluation.crossval import FitRefused, Groups, Learner, Pooled, cross_validate
 from graspsense.evaluation.folds import commonest, in_order, instance_held_out, stratified
-from graspsense.evaluation.intervals import Difference, Rate, difference
+from graspsense.evaluation.intervals import Difference, RecognitionRate, difference
 
 if TYPE_CHECKING:
     from graspsense.core.features import FeatureTable
@@ -38,7 +38,7 @@ class Judged:
     """
 
     what: str
-    rate: Rate | None = None
+    rate: RecognitionRate | None = None
     reason: str = ""
     difference: Difference | None = None
     of: str = ""
@@ -61,7 +61,7 @@ class CurvePoint:
     """One point of the learning curve: the mean number of training trials, and the rate."""
 
     trained_on: float
-    rate: Rate
+    rate: RecognitionRate
 
 
 @frozen(kw_only=True)
@@ -73,13 +73,13 @@ class Evaluation:
     target: Target
     features: tuple[tuple[str, str], ...]
     protocol: str
-    headline: Rate
+    headline: RecognitionRate
     confusion: Confusion
     protocols: Mapping[str, Judged]
     controls: Mapping[str, Judged]
-    by_class: Mapping[str, Rate]
+    by_class: Mapping[str, RecognitionRate]
     """Rate of the headline among the trials of each class (`class` of `class:state`)."""
-    unlike: Rate
+    unlike: RecognitionRate
     """Held-out trials that the model of their fold would call unknown; here they are counted by their label."""
     learning_curve: tuple[CurvePoint, ...]
     warnings: tuple[str, ...]
@@ -118,7 +118,7 @@ class Evaluation:
         }
 
 
-def rate_as_json(rate: Rate) -> dict[str, Any]:
+def rate_as_json(rate: RecognitionRate) -> dict[str, Any]:
     """Return a rate with its counts and interval."""
     return {"n": rate.n, "correct": rate.correct, "rate": rate.rate, "interval": list(rate.interval)}
 
@@ -231,7 +231,7 @@ class _Judge:
             protocols=protocols,
             controls=controls,
             by_class=self._by_class(head),
-            unlike=Rate(int(head.unlike.sum()), len(self.labels)),
+            unlike=RecognitionRate(int(head.unlike.sum()), len(self.labels)),
             learning_curve=self._curve(head_folds, head) if with_curve else (),
             warnings=tuple(self.warnings),
             notes=tuple(self.notes),
@@ -309,8 +309,8 @@ class _Judge:
             self.learner, table, labels, self.groups, folds, seed=self.seed, share=share, progress=step
         )
 
-    def _rate(self, pooled: Pooled) -> Rate:
-        return Rate(sum(pooled.right(self.labels)), len(self.labels))
+    def _rate(self, pooled: Pooled) -> RecognitionRate:
+        return RecognitionRate(sum(pooled.right(self.labels)), len(self.labels))
 
     def _instance_held_out(
         self, plain: Pooled, plain_name: str
@@ -369,7 +369,7 @@ class _Judge:
         if len(self.groups) > 1:
             what += " (of each class, the commonest state)"
         against = difference(head.right(self.labels), right.tolist())
-        judged = Judged(what, Rate(int(right.sum()), len(right)), difference=against, of=protocol)
+        judged = Judged(what, RecognitionRate(int(right.sum()), len(right)), difference=against, of=protocol)
         return right.tolist(), judged
 
     def _shuffled(self) -> Judged:
@@ -385,13 +385,13 @@ class _Judge:
             found = self._pooled("shuffled_labels", self.labelled.table, folds, labels=shuffled)
         except FitRefused as refusal:
             return Judged(what, reason=str(refusal))
-        return Judged(what, Rate(sum(found.right(shuffled)), len(shuffled)))
+        return Judged(what, RecognitionRate(sum(found.right(shuffled)), len(shuffled)))
 
-    def _by_class(self, head: Pooled) -> dict[str, Rate]:
+    def _by_class(self, head: Pooled) -> dict[str, RecognitionRate]:
         right: dict[str, list[bool]] = {}
         for label, one in zip(self.labels, head.right(self.labels), strict=True):
             right.setdefault(class_of(label), []).append(one)
-        return {name: Rate(sum(of), len(of)) for name, of in sorted(right.items())}
+        return {name: RecognitionRate(sum(of), len(of)) for name, of in sorted(right.items())}
 
     def _curve(self, folds: Sequence[Folds], head: Pooled) -> tuple[CurvePoint, ...]:
         points: list[CurvePoint] = []

@@ -17,7 +17,7 @@ Z: Final = 1.959963984540054
 
 
 @frozen
-class Rate:
+class RecognitionRate:
     """Correct of all, with its 95 % Wilson interval."""
 
     correct: int

@@ -94,7 +94,7 @@ class Experiment:
 
 
 @frozen(kw_only=True, eq=False)
-class Learner:
+class LearnerSpec:
     """A classifier to be judged: how it is called, its qualified name, its keys."""
 
     name: str
@@ -112,7 +112,7 @@ class Case:
     settings: Settings
     data: Source
     test: Source | None
-    learners: tuple[Learner, ...]
+    learners: tuple[LearnerSpec, ...]
     judge: Any
     kind: str = "recognise"
     part: str = ""
@@ -360,7 +360,7 @@ class _Plan:
         pipeline: Settings,
         variant: Mapping[str, Any],
         sweep: Mapping[tuple[str, ...], Sequence[Any]],
-    ) -> Iterator[Learner]:
+    ) -> Iterator[LearnerSpec]:
         """Yield every classifier at every point of the sweep over its keys."""
         given = self.experiment.classifiers
         if not given:
@@ -404,7 +404,7 @@ class _Plan:
                     text = f"two classifiers are called {name!r}: give one a `name`"
                     self.complaints.append(self.layer.complain(InvalidValue(("classifiers", index), text)))
                 seen.add(name)
-                yield Learner(name=name, type=component.qualified, config=config)
+                yield LearnerSpec(name=name, type=component.qualified, config=config)
 
 
 def _number_of_trials(settings: Settings, data: Source) -> int | None:

@@ -17,7 +17,7 @@ from graspsense.core.plugins import installed
 from graspsense.core.strict import structured
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.evaluate import Evaluation, evaluate, rate_as_json
-from graspsense.evaluation.intervals import Rate
+from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.report.grasps import grasp_as_json
 from graspsense.sources.trial_source import Source, labelled_trials
 
@@ -153,7 +153,7 @@ def _on_other_trials(
     return {
         "classifier": f"{learner.component.qualified} {learner.component.version}",
         "protocol": OTHER_TRIALS,
-        **rate_as_json(Rate(matrix.correct, matrix.n)),
+        **rate_as_json(RecognitionRate(matrix.correct, matrix.n)),
         "labels": list(matrix.labels),
         "confusion": [list(row) for row in matrix.counts],
         "protocols": {},

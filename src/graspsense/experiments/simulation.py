@@ -18,7 +18,7 @@ from attrs import evolve, fields_dict, frozen
 from graspsense.core.errors import ConfigError
 from graspsense.core.roles import BatchBackend, Grasped, SimulationVariant
 from graspsense.experiments.versions import versions
-from graspsense.report.simulation import PEAK, TRACE, Point, SimulationTrade
+from graspsense.report.simulation import PEAK, TRACE, SimulationTrade, VariantPoint
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -63,7 +63,7 @@ def trade_simulation(
     all_seeds = [seed for _ in scenes for seed in seeds]
     reference: list[_Felt] | None = None
     quantities: tuple[str, ...] = ()
-    points: list[Point] = []
+    points: list[VariantPoint] = []
     in_turn = sorted(variants, key=lambda one: one.role != "reference")
     for k, variant in enumerate(in_turn):
         what = f"{variant.method}, {variant.fidelity}, {variant.step}"
@@ -157,7 +157,7 @@ def _point(
     reference: Sequence[_Felt],
     seconds: float,
     setup: float,
-) -> Point:
+) -> VariantPoint:
     worst: dict[str, float] = {}
     missing = ""
     for one, true in zip(felt, reference, strict=True):
@@ -177,7 +177,7 @@ def _point(
         worst[PEAK] = max(worst.get(PEAK, 0.0), abs(found - float(np.max(true.force, initial=0.0))) / peak)
         worst[TRACE] = max(worst.get(TRACE, 0.0), off / peak)
     failure = missing or ("" if all(map(math.isfinite, worst.values())) else "no number in the force trace")
-    return Point(
+    return VariantPoint(
         method=variant.method,
         fidelity=variant.fidelity,
         step=variant.step,
@@ -189,8 +189,8 @@ def _point(
     )
 
 
-def _failed(variant: SimulationVariant, why: str) -> Point:
-    return Point(
+def _failed(variant: SimulationVariant, why: str) -> VariantPoint:
+    return VariantPoint(
         method=variant.method,
         fidelity=variant.fidelity,
         step=variant.step,

@@ -20,7 +20,7 @@ NOUGHT: Final = 1e-9
 
 
 @frozen(kw_only=True)
-class Point:
+class VariantPoint:
     """One variant as measured: its errors and the processor time of one grasp, which are of the same runs.
 
     `errors` are the greatest of all grasps, by quantity; infinite where a feature is missing that should be there.
@@ -51,7 +51,7 @@ class SimulationTrade:
     scenes: tuple[str, ...]
     seeds: tuple[int, ...]
     quantities: tuple[str, ...]
-    points: tuple[Point, ...]
+    points: tuple[VariantPoint, ...]
     made: Mapping[str, str]
 
     def as_json(self) -> dict[str, Any]:

@@ -53,7 +53,7 @@ class LoopState(NamedTuple):
     effort_n: float
 
 
-class Progress(NamedTuple):
+class SimulationState(NamedTuple):
     """All state of a grasp between two ticks."""
 
     loop: LoopState
@@ -94,7 +94,7 @@ move: Callable[[PlantModel, PlantState, float, float], PlantState] = _move_unbou
 control: Callable[[TickParams, TickState, Frame, Pads], tuple[Command, TickState]] = _control_unbound
 
 
-def grasp(params: GraspParams, progress: Progress, buffers: Buffers) -> Progress:
+def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
     """Run a grasp to its end, for `max_ticks`, or until a buffer is full; return its state then.
 
     Recorded are the frames without `dt_s` and status, which a simulated gripper does not vary, and the command. Where
@@ -132,7 +132,7 @@ def grasp(params: GraspParams, progress: Progress, buffers: Buffers) -> Progress
         if state.done == 1 or state.guard.stopped == 1:
             break
         plant = move(params.plant, plant, effort, dt_s)
-    return Progress(LoopState(ticks, recorded, phase, tare_from, effort), plant, sensor, state)
+    return SimulationState(LoopState(ticks, recorded, phase, tare_from, effort), plant, sensor, state)
 
 
 def has_ended(state: TickState) -> bool:

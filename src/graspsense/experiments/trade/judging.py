@@ -14,7 +14,7 @@ from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import cross_validate
 from graspsense.evaluation.evaluate import rate_as_json
 from graspsense.evaluation.folds import stratified
-from graspsense.evaluation.intervals import Rate
+from graspsense.evaluation.intervals import RecognitionRate
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings
@@ -86,7 +86,7 @@ def entry(
         "learner": learner,
         "target": target,
         "protocol": protocol,
-        **rate_as_json(Rate(matrix.correct, matrix.n)),
+        **rate_as_json(RecognitionRate(matrix.correct, matrix.n)),
         "labels": list(matrix.labels),
         "confusion": [list(row) for row in matrix.counts],
         "controls": {},

@@ -31,7 +31,7 @@ from graspsense_sim_gripper.compiled.padding import composition_of, padded, unpa
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.exact.discretise import discretise
-from graspsense_sim_gripper.loop import COLUMNS, NOT_STARTED, Buffers, GraspParams, Progress, has_ended
+from graspsense_sim_gripper.loop import COLUMNS, NOT_STARTED, Buffers, GraspParams, SimulationState, has_ended
 from graspsense_sim_gripper.objects.library import split_number
 from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
 from graspsense_sim_gripper.reduction.model import Reduction
@@ -46,7 +46,7 @@ IMAGES: Final = 128
 
 Extracted = Any
 """What `Job.extract` returns, such as features."""
-GraspLoop = Callable[[GraspParams, Progress, Buffers], Progress]
+GraspLoop = Callable[[GraspParams, SimulationState, Buffers], SimulationState]
 
 
 @frozen(kw_only=True, eq=False)
@@ -207,7 +207,7 @@ def finished(
 
 def _run(
     job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage, on_arrays: bool
-) -> tuple[Progress, Buffers]:
+) -> tuple[SimulationState, Buffers]:
     """Run the loop to the end of the grasp, with longer buffers where those of the storage do not suffice."""
     blocks, ideal = setup.noise(), setup.sensor.ideal == 1
     buffers = storage.buffers
@@ -227,7 +227,7 @@ def _run(
         dt_s=setup.dt_s,
         max_ticks=math.ceil(seconds_at_most(job.run) / setup.dt_s),
     )
-    progress = Progress(NOT_STARTED, setup.state, setup.sensor_state, job.initial)
+    progress = SimulationState(NOT_STARTED, setup.state, setup.sensor_state, job.initial)
     while True:
         progress = loop(params, progress, buffers)
         if has_ended(progress.controller) or progress.loop.ticks >= params.max_ticks:

@@ -18,7 +18,7 @@ from graspsense_sim_gripper import plant
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
 from graspsense_sim_gripper.exact.propagate import bind_move
-from graspsense_sim_gripper.loop import Progress, grasp
+from graspsense_sim_gripper.loop import SimulationState, grasp
 from graspsense_sim_gripper.plant import PlantParams, Thing
 from graspsense_sim_gripper.problem import ControllerStep
 from graspsense_sim_gripper.sensing import Encoder, SensorState
@@ -205,7 +205,7 @@ def composed_move(composition: Composition, *, interpreted: bool = True) -> Plan
 @lru_cache(maxsize=64)
 def grasp_loop(
     composition: Composition, step: ControllerStep, *, interpreted: bool = True
-) -> Callable[..., Progress]:
+) -> Callable[..., SimulationState]:
     """Return the loop of a grasp under a controller with this step; not `interpreted`: to be compiled."""
     control = bind_reachable(tick, {"step": step})
     loop = bind_reachable(grasp, {"move": composed_move(composition, interpreted=False), "control": control})

@@ -38,7 +38,7 @@ class Filler(NamedTuple):
 NOTHING: Final = Filler(Kept(0, None), None)
 
 
-class Layout(NamedTuple):
+class PaddedLayout(NamedTuple):
     """The terms of a composition, and where those of an object are in it; the lumped spring and damper is first."""
 
     kinds: tuple[str, ...]
@@ -48,7 +48,7 @@ class Layout(NamedTuple):
     """For each of the object's own terms its place (-1: none), and its state then."""
 
 
-def layout_of(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> Layout:
+def layout_of(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> PaddedLayout:
     """Return the layout in which a grasp is compiled: with these kinds, or by default as in a batch."""
     if kinds is not None:
         return _with_kinds(setup.kinds, kinds)
@@ -112,25 +112,25 @@ def unpadded(state: PlantState, setup: GraspSetup) -> PlantState:
     return state._replace(contact=contact._replace(left=left, right=right))
 
 
-def _padded_state(contact: ContactState, layout: Layout) -> ContactState:
+def _padded_state(contact: ContactState, layout: PaddedLayout) -> ContactState:
     own = contact.states
     return contact._replace(states=tuple([own[i] if i >= 0 else f.state for i, f in layout.sources]))
 
 
-def _unpadded_state(contact: ContactState, layout: Layout) -> ContactState:
+def _unpadded_state(contact: ContactState, layout: PaddedLayout) -> ContactState:
     states = contact.states
     return contact._replace(states=tuple([states[i] if i >= 0 else rest for i, rest in layout.places]))
 
 
 @lru_cache(maxsize=256)
-def _with_kinds(own: tuple[str, ...], kinds: tuple[str, ...]) -> Layout:
+def _with_kinds(own: tuple[str, ...], kinds: tuple[str, ...]) -> PaddedLayout:
     sources = tuple((own.index(kind) + 1 if kind in own else -1, _filler(kind)) for kind in kinds)
     places = tuple((kinds.index(kind) + 1, find_term(kind)[1].at_rest) for kind in own)
-    return Layout(kinds, ((0, NOTHING), *sources), ((0, None), *places))
+    return PaddedLayout(kinds, ((0, NOTHING), *sources), ((0, None), *places))
 
 
 @lru_cache(maxsize=256)
-def _with_kept(own: tuple[str, ...], kept: tuple[int, ...]) -> Layout:
+def _with_kept(own: tuple[str, ...], kept: tuple[int, ...]) -> PaddedLayout:
     """Return the layout with the terms that a model keeps, each kind once or more."""
     indices = [i for i, keeps in enumerate(kept) if keeps == 1]
     sources = tuple((i + 1, NOTHING) for i in indices)
@@ -138,7 +138,7 @@ def _with_kept(own: tuple[str, ...], kept: tuple[int, ...]) -> Layout:
         (indices.index(i) + 1 if i in indices else -1, find_term(kind)[1].at_rest)
         for i, kind in enumerate(own)
     )
-    return Layout(tuple(own[i] for i in indices), ((0, NOTHING), *sources), ((0, None), *places))
+    return PaddedLayout(tuple(own[i] for i in indices), ((0, NOTHING), *sources), ((0, None), *places))
 
 
 @lru_cache(maxsize=256)

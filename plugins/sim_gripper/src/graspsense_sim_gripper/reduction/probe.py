@@ -35,7 +35,7 @@ MIN_FORCE_N: Final = 1.0
 
 
 @frozen(kw_only=True)
-class Path:
+class ProbePath:
     """Closures with their times and speeds, from the contact on."""
 
     closures: tuple[float, ...]
@@ -82,7 +82,7 @@ class Grip:
         return worst
 
 
-def forces_along(model: Thing, kinds: Sequence[str], path: Path) -> Iterator[float]:
+def forces_along(model: Thing, kinds: Sequence[str], path: ProbePath) -> Iterator[float]:
     """Yield the force at each point of the path."""
     press = contact_solver(tuple(kinds))
     contact, before = uncompressed(kinds), 0.0
@@ -109,7 +109,7 @@ def stiffness(grip: Grip, dt_s: float) -> tuple[float, float]:
         largest = max(largest, (further - rests) / further_m)
     # A surface that is struck responds before the parts behind it give way.
     touch = path.closures[0]
-    at_once = next(forces_along(model, grip.kinds, Path(closures=(touch,), times=(0.0,), speeds=(0.0,))))
+    at_once = next(forces_along(model, grip.kinds, ProbePath(closures=(touch,), times=(0.0,), speeds=(0.0,))))
     return largest, at_once / touch
 
 
@@ -135,7 +135,7 @@ def damping(grip: Grip, model: Thing, dt_s: float) -> float:
 
 def _paths(
     model: Thing, kinds: Sequence[str], force_n: float, speed_m_s: float, mass_kg: float
-) -> tuple[list[Path], WorkingPoint]:
+) -> tuple[list[ProbePath], WorkingPoint]:
     """Return the paths up to the expected force, and the working point that they reach."""
     depth = _depth(model, kinds, force_n, speed_m_s)
     # The contact itself: a spring stops the moving mass.
@@ -170,7 +170,7 @@ def _depth(model: Thing, kinds: Sequence[str], force_n: float, speed_m_s: float)
     return upper
 
 
-def _path(depth_m: float, duration_s: float, hold_s: float) -> Path:
+def _path(depth_m: float, duration_s: float, hold_s: float) -> ProbePath:
     """Return a closure at constant speed followed by rest, with points that become rarer while it rests."""
     speed = depth_m / duration_s
     early = (4.0**-k / POINTS for k in range(EARLY_POINTS, 0, -1))
@@ -184,4 +184,4 @@ def _path(depth_m: float, duration_s: float, hold_s: float) -> Path:
         closures.append(depth_m)
         speeds.append(0.0)
         wait *= 10.0**0.5
-    return Path(closures=tuple(closures), times=tuple(times), speeds=tuple(speeds))
+    return ProbePath(closures=tuple(closures), times=tuple(times), speeds=tuple(speeds))

@@ -37,7 +37,7 @@ from graspsense_sim_gripper.loop import (
     Buffers,
     GraspParams,
     PlantModel,
-    Progress,
+    SimulationState,
     has_ended,
 )
 from graspsense_sim_gripper.plant import EXPLICIT, Steps
@@ -82,7 +82,7 @@ class Sensitivity(NamedTuple):
 class _Stage(NamedTuple):
     """A trial grasp under way: its state, and what was recorded."""
 
-    progress: Progress
+    progress: SimulationState
     rows: tuple[Any, ...]
     """The columns of `COLUMNS` and the phases below them, piece by piece."""
     from_open: bool
@@ -160,7 +160,7 @@ class TrialGrasps:
             state = state._replace(motion=Motion(near, state.motion.speed_rev_s, *gap_and_rate(link, near)))
         run = self._runner(setup, from_open)
         controller = first_state(self.controller.controller.init())
-        stage = _Stage(Progress(NOT_STARTED, state, setup.sensor_state, controller), (), from_open)
+        stage = _Stage(SimulationState(NOT_STARTED, state, setup.sensor_state, controller), (), from_open)
         while not has_ended(stage.progress.controller) and stage.progress.loop.ticks < self._max_ticks():
             motion = stage.progress.plant.motion
             closing = max(-motion.speed_rev_s * motion.jacobian_m_rev, MIN_CLOSING_M_S)
@@ -199,7 +199,9 @@ class TrialGrasps:
 
         return run
 
-    def _loop(self, setup: GraspSetup) -> tuple[bool, Callable[..., Progress], GraspSetup, PlantModel | None]:
+    def _loop(
+        self, setup: GraspSetup
+    ) -> tuple[bool, Callable[..., SimulationState], GraspSetup, PlantModel | None]:
         """Return whether the loop is compiled, the loop, the setup that it takes, and the exact model if there is one.
 
         Raises NotCompilable.
@@ -215,9 +217,9 @@ class TrialGrasps:
             return False, grasp_loop(composition, self.controller.step), made, model
         machine_code = compiled_loop(composition, self.controller.step)
 
-        def loop(*args: Any) -> Progress:
+        def loop(*args: Any) -> SimulationState:
             with compiling(composition):
-                progress: Progress = machine_code(*args)
+                progress: SimulationState = machine_code(*args)
                 return progress
 
         return True, loop, made, model
