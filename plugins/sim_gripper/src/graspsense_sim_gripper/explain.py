@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from graspsense_sim_gripper.objects.spec import TermParams
 from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import WorkingPoint
-
-TermParams = Any
-"""The parameters of a term: a named tuple of the term's own type."""
 
 
 def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from graspsense.plugin_api import CELLS, Controller, DeviceInfo, RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
-from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.objects.spec import ObjectSpec, TermParams
 from graspsense_sim_gripper.plant import PlantParams
 from graspsense_sim_gripper.sensing import SensorParams, SensorState
 
@@ -21,8 +21,6 @@ IMAGES_PER_BLOCK: Final = 64
 
 ControllerStep = Callable[..., Any]
 """The step of a controller, with parameters and state of its own types."""
-TermParams = Any
-"""The parameters of a term: a named tuple of the term's own type."""
 
 
 @frozen(eq=False)

@@ -1,4 +1,4 @@
-"""The ways in which the simulator trades accuracy for time, as `graspsense tradeoff simulation` measures them."""
+"""The settings with which `graspsense tradeoff simulation` measures accuracy against time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from graspsense.plugin_api import SimulationVariant
 ACCURACIES: Final = (0.3, 0.1, 0.03, 0.01, 0.001, 1e-4)
 STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)
 FINE_S: Final = 2e-5
-"""Steps so short that what is left is the model's own error."""
+"""Steps so short that only the error of the model remains."""
 
 _FORMS: Final = (
     SimulationVariant(
@@ -64,4 +64,4 @@ _FORMS: Final = (
 def variants() -> tuple[SimulationVariant, ...]:
     """Return each scheme at each fidelity, from coarse to fine; compiled where that can be done."""
     compiled = "always" if find_spec("numba") is not None else "never"
-    return tuple(evolve(one, settings={"compile": compiled, **one.settings}) for one in _FORMS)
+    return tuple(evolve(variant, settings={"compile": compiled, **variant.settings}) for variant in _FORMS)

@@ -20,11 +20,15 @@ from typing import IO, Any, Final
 import numpy as np
 from attrs import asdict, fields
 
-from graspsense.plugin_api import Outcome, RunConfig, Trace, create, recipe_of
+from graspsense.plugin_api import Controller, Outcome, RunConfig, Trace, create, recipe_of
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, finished, grasp_plain
 from graspsense_sim_gripper.config import SimConfig
 
 _ARRAYS: Final = tuple(column.name for column in fields(Trace) if column.name != "units")
+
+
+Json = Any
+"""A value that JSON can represent."""
 
 
 class NotHandedOver(Exception):
@@ -129,7 +133,7 @@ def main() -> None:
         answers.flush()
 
 
-def _job(greeting: dict[str, Any]) -> Job:
+def _job(greeting: dict[str, Json]) -> Job:
     name, values = greeting["controller"]
     return Job(
         config=SimConfig(**greeting["config"]),
@@ -140,7 +144,7 @@ def _job(greeting: dict[str, Any]) -> Job:
     )
 
 
-def _named(controller: Any) -> tuple[str, dict[str, Any]]:
+def _named(controller: Controller[Any]) -> tuple[str, dict[str, Json]]:
     """Return the controller's name and settings. Raises ValueError where it does not follow from these alone."""
     name, values = recipe_of("controller", controller)
     twin = create("controller", name, **values)
@@ -150,11 +154,11 @@ def _named(controller: Any) -> tuple[str, dict[str, Any]]:
     return name, values
 
 
-def _line(value: Any) -> bytes:
+def _line(value: Json) -> bytes:
     return json.dumps(value).encode() + b"\n"
 
 
-def _read_line(stream: IO[bytes]) -> Any:
+def _read_line(stream: IO[bytes]) -> Json:
     line = stream.readline()
     if not line.endswith(b"\n"):
         raise EOFError("it gave no answer")
@@ -178,7 +182,7 @@ def _read_trace(of: IO[bytes]) -> Trace:
     return Trace(**parts)
 
 
-def _like(pattern: Any, values: Any) -> Any:
+def _like(pattern: Json, values: Json) -> Json:
     """Return these values, lists in lists, as tuples of the types in `pattern`."""
     if not isinstance(pattern, tuple):
         return values

@@ -26,6 +26,10 @@ from graspsense_sim_gripper.terms.registry import find_term, laws_of
 from graspsense_sim_gripper.terms.remainder import Kept, Remainder
 from graspsense_sim_gripper.terms.term import NO_STATE, Law
 
+Part = Any
+"""A function, constant or class that a composed function reads as a global."""
+Constructors = Mapping[Any, Part]
+"""Classes of named tuples, each with the function that creates them."""
 FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 TermStates = Any
 """A tuple with a state of its own type for each term."""
@@ -35,7 +39,7 @@ PlantMove = Callable[[Any, PlantState, float, float], PlantState]
 """Takes the plant's model, its state, the effort and the length of the tick."""
 ContactSolver = Callable[[Thing, ContactState, float, float, float], ContactState]
 
-INTERPRETED: Final[Mapping[Any, Any]] = {
+INTERPRETED: Final[Constructors] = {
     kind: maker(kind)
     for kind in (PlantState, Motion, Contact, ContactState, StepState, SensorState, Encoder, Frame)
 }
@@ -43,7 +47,7 @@ INTERPRETED: Final[Mapping[Any, Any]] = {
 
 
 def bind_reachable(
-    function: FunctionT, parts: Mapping[str, Any], constructors: Mapping[Any, Any] | None = None
+    function: FunctionT, parts: Mapping[str, Part], constructors: Constructors | None = None
 ) -> FunctionT:
     """Return a copy of `function` in which it, and every function that it calls, sees these parts as its globals.
 
@@ -59,12 +63,12 @@ def bind_reachable(
 
 
 def _bound(
-    function: Any,
-    parts: Mapping[str, Any],
-    constructors: Mapping[Any, Any],
+    function: Part,
+    parts: Mapping[str, Part],
+    constructors: Constructors,
     unread: set[str],
-    done: dict[int, Any],
-) -> Any:
+    done: dict[int, Part],
+) -> Part:
     if id(function) in done:
         return done[id(function)]
     replaced = {}

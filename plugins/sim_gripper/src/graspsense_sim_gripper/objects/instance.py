@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from attrs import frozen
 
-from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.objects.spec import ObjectSpec, TermParams
 
 GRAVITY_M_S2: Final = 9.80665
 PAD_CELLS: Final = 15
@@ -30,7 +30,7 @@ class Instance:
     table_n: float
     """Friction of the table that a finger has to overcome to push it."""
     kinds: tuple[str, ...]
-    terms: tuple[Any, ...]
+    terms: tuple[TermParams, ...]
     """The parameters of its terms."""
     patch_row: float
     """Position of the contact on the pad, in rows from its middle."""

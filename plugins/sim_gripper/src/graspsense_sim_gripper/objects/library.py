@@ -11,12 +11,19 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from attrs import fields_dict
 
 from graspsense.plugin_api import ConfigError, ObjectKind, UnknownName, suggestion
-from graspsense_sim_gripper.objects.spec import ObjectSpec, parse_scene, parse_term, spec_with_sorted_terms
+from graspsense_sim_gripper.objects.spec import (
+    ObjectSpec,
+    TomlTable,
+    TomlValue,
+    parse_scene,
+    parse_term,
+    spec_with_sorted_terms,
+)
 
 CONTAINERS: Final = ("odwalla", "naked", "can", "water")
 """The containers of Chitta, Piccoli and Sturm (ICRA 2010), section III.E: trials are simulated with them by default."""
@@ -123,17 +130,17 @@ def _read_scene(path: Path) -> ObjectSpec:
     return parse_scene(text, path.stem, str(path))
 
 
-def parse_entry(name: str, table: Mapping[str, Any]) -> ObjectSpec:
+def parse_entry(name: str, table: TomlTable) -> ObjectSpec:
     """Return an entry of the catalogue, in which every figure has its reason and no key is left out.
 
     Raises ConfigError with the object's name and the key.
     """
     reasons: dict[str, str] = {}
 
-    def figure(where: str, entry: Any) -> float:
+    def figure(where: str, entry: TomlValue) -> float:
         return _figure(where, entry, reasons)
 
-    values: dict[str, Any] = {"name": name}
+    values: dict[str, TomlValue] = {"name": name}
     for key, entry in table.items():
         if key != "terms":
             values[key] = entry if key in ("summary", "patch") else figure(f"{name}.{key}", entry)
@@ -157,7 +164,7 @@ def parse_entry(name: str, table: Mapping[str, Any]) -> ObjectSpec:
         raise ConfigError(f"object {name!r}: {error}") from error
 
 
-def _figure(where: str, entry: Any, reasons: dict[str, str]) -> float:
+def _figure(where: str, entry: TomlValue, reasons: dict[str, str]) -> float:
     if not isinstance(entry, Mapping) or set(entry) != {"value", "reason"} or not entry["reason"]:
         raise ConfigError(f"{where}: write {{ value = NUMBER, reason = TEXT }}, not {entry!r}")
     value = entry["value"]

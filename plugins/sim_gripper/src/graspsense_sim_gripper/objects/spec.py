@@ -19,6 +19,11 @@ from graspsense_sim_gripper.terms.registry import find_term, in_order
 
 PATCHES: Final = ("line", "face", "point")
 
+TomlValue = Any
+"""A value of a TOML file, of a type that is still to be checked."""
+TomlTable = Mapping[str, TomlValue]
+TermParams = Any
+"""The parameters of a term: a named tuple of the term's own type."""
 TermEntry = tuple[str, Mapping[str, float]]
 """The kind of a term, and its parameters by name."""
 
@@ -34,7 +39,7 @@ def _not_negative(default: float) -> float:
 class NominalTerm(NamedTuple):
     """The nominal parameters of a term, and which of them are stiffnesses, which vary between instances."""
 
-    params: Any
+    params: TermParams
     is_stiffness: tuple[bool, ...]
 
 
@@ -88,7 +93,7 @@ class ObjectSpec:
         return repr(self)
 
 
-def spec_with_sorted_terms(values: Mapping[str, Any], terms: list[TermEntry]) -> ObjectSpec:
+def spec_with_sorted_terms(values: TomlTable, terms: list[TermEntry]) -> ObjectSpec:
     """Return the spec with these values, its terms in the canonical order. Raises ValueError as its fields do."""
     order = in_order([kind for kind, _ in terms])
     return ObjectSpec(**values, terms=tuple(terms[i] for i in order))
@@ -115,10 +120,10 @@ def parse_scene(text: str, name: str, where: str) -> ObjectSpec:
     raise ConfigError("\n".join(f"{where}: {problem}" for problem in problems))
 
 
-def _scene_values(table: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
+def _scene_values(table: TomlTable, problems: list[str]) -> dict[str, TomlValue]:
     """Return the values of a scene's own keys, all but its terms."""
     known = fields_dict(ObjectSpec).keys() - {"name", "reasons", "file"}
-    values: dict[str, Any] = {}
+    values: dict[str, TomlValue] = {}
     for key, entry in table.items():
         if key not in known:
             problems.append(f"{key}: no such key. Known: {', '.join(sorted(known))}.{suggestion(key, known)}")
@@ -134,12 +139,12 @@ def _scene_values(table: Mapping[str, Any], problems: list[str]) -> dict[str, An
     return values
 
 
-def _scene_terms(tables: Any, problems: list[str]) -> list[TermEntry]:
+def _scene_terms(tables: TomlValue, problems: list[str]) -> list[TermEntry]:
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         problems.append("terms: write a table [[terms]] for each")
         return []
 
-    def number(where: str, entry: Any) -> float:
+    def number(where: str, entry: TomlValue) -> float:
         return _number(entry, where, problems)
 
     terms = []
@@ -151,7 +156,7 @@ def _scene_terms(tables: Any, problems: list[str]) -> list[TermEntry]:
     return terms
 
 
-def _number(entry: Any, label: str, problems: list[str], negative: bool = False) -> float:
+def _number(entry: TomlValue, label: str, problems: list[str], negative: bool = False) -> float:
     """Return the entry as a number; what is wrong with it is added to `problems`."""
     if isinstance(entry, bool) or not isinstance(entry, int | float):
         problems.append(f"{label}: {entry!r} is not a number")
@@ -165,11 +170,11 @@ def _number(entry: Any, label: str, problems: list[str], negative: bool = False)
 
 
 def parse_term(
-    table: Mapping[str, Any],
+    table: TomlTable,
     label: str,
     prefix: str,
     problems: list[str],
-    number: Callable[[str, Any], float],
+    number: Callable[[str, TomlValue], float],
 ) -> TermEntry | None:
     """Return the qualified kind of a term and its parameters, or None where it cannot be read at all.
 

@@ -37,6 +37,10 @@ MAX_FILES: Final = 4000
 """Files on disk, of some 2 kB each; at that number the older half is deleted."""
 
 
+Json = Any
+"""A value that JSON can represent."""
+
+
 class Key(NamedTuple):
     """Everything that a model follows from, but for the code."""
 
@@ -168,7 +172,7 @@ def _delete_old_files(folder: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def _as_values(model: Reduction) -> dict[str, Any]:
+def _as_values(model: Reduction) -> dict[str, Json]:
     values = asdict(model, recurse=True)
     tuples = {
         "point": model.point._asdict(),
@@ -178,7 +182,7 @@ def _as_values(model: Reduction) -> dict[str, Any]:
     return {**values, **tuples}
 
 
-def _from_values(values: dict[str, Any]) -> Reduction:
+def _from_values(values: dict[str, Json]) -> Reduction:
     verification = values["verification"]
     return Reduction(
         **{

@@ -1,16 +1,20 @@
-"""How far one simulated grasp is from another: the error that an accuracy is asked of.
+"""The error of one simulated grasp compared with another, which is what an accuracy limits.
 
-Of the six features, the peak force and the force's trace. The error of a quantity is its difference over the larger
-of its size and a scale; that of the trace is the root of the mean square of the difference, over that of the trace or
-a newton. Instants are located inside the tick, so that a grasp is not as good as its clock is fine. The features are
-those of Chitta, Piccoli and Sturm (ICRA 2010) with the mean of both forces, from ideal sensors.
+It is the largest error of the six features, of the peak force and of the force over time. The error of a quantity is
+the difference divided by the larger of its size and a scale; that of the force over time is the root mean square of the
+difference, divided by that of the force or by 1 N.
+
+The features are those of Chitta, Piccoli and Sturm (ICRA 2010) with the mean of both forces, from ideal sensors. The
+feature set `chitta` (graspsense.plugins.features) extracts them at ticks; here instants lie between ticks, so that an
+error does not depend on the clock, and that code cannot be shared. `test_they_are_the_feature_sets_own_to_a_tick` holds
+the two equal to a tick.
 """
 
 from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from attrs import frozen
@@ -27,13 +31,13 @@ SCALES: Final = {
     "df_dt": 1.0,
     "peak": 1.0,
 }
-"""Below these (m, m, N, s, m/s, N/s, N) an error counts as if the quantity were this."""
+"""Quantities smaller than these (m, m, N, s, m/s, N/s, N) count as if they had this size."""
 TRACE_SCALE_N: Final = 1.0
 
 
 @frozen(kw_only=True, eq=False)
 class GraspRecord:
-    """What a grasp is compared by: a row a tick from the approach on, how it ended, and the true peak force."""
+    """What of a grasp is compared: a row for each tick from the approach on, its outcome and the true peak force."""
 
     outcome: int
     dt_s: float
@@ -42,37 +46,37 @@ class GraspRecord:
     left_n: NDArray[np.float64]
     right_n: NDArray[np.float64]
     n_rows: int
-    """How many rows there are until the fingers open."""
+    """Number of rows until the fingers open."""
     peak_n: float
 
     def quantities(self) -> dict[str, float]:
-        """Return the features and the peak force; NaN for what this grasp does not have."""
-        found = dict.fromkeys(SCALES, math.nan)
-        found["peak"] = self.peak_n
-        first = self._touch()
+        """Return the features and the peak force; NaN for a feature that this grasp does not have."""
+        values = dict.fromkeys(SCALES, math.nan)
+        values["peak"] = self.peak_n
+        first = self._contact()
         if first is None:
-            return found
-        found["p_first"] = _at(self.gap_m, first)
+            return values
+        values["p_first"] = _at(self.gap_m, first)
         rest = self._rest(first)
         if rest is None:
-            return found
+            return values
         steady, moved = rest
-        found["p_steady"] = _at(self.gap_m, steady)
+        values["p_steady"] = _at(self.gap_m, steady)
         force = 0.5 * (self.left_n + self.right_n)
-        found["f_steady"] = _at(force, steady + REST_WINDOW_S / self.dt_s)
-        found["delta_t"] = (steady - first) * self.dt_s
+        values["f_steady"] = _at(force, steady + REST_WINDOW_S / self.dt_s)
+        values["delta_t"] = (steady - first) * self.dt_s
         if moved:
-            found["dp_dt"] = (found["p_steady"] - found["p_first"]) / found["delta_t"]
-            found["df_dt"] = (found["f_steady"] - _at(force, first)) / found["delta_t"]
-        return found
+            values["dp_dt"] = (values["p_steady"] - values["p_first"]) / values["delta_t"]
+            values["df_dt"] = (values["f_steady"] - _at(force, first)) / values["delta_t"]
+        return values
 
     def contact_speed_m_s(self) -> float:
-        """Return how fast the gap closed when a pad first felt anything; 0 where none did."""
+        """Return the closing speed when a pad first felt a force; 0 where none did."""
         felt = np.flatnonzero(np.maximum(self.left_n, self.right_n) > 0.0)
         return float(-self.speed_m_s[max(int(felt[0]) - 1, 0)]) if len(felt) else 0.0
 
-    def _touch(self) -> float | None:
-        """Return the row, and the part of one, at which both pads feel the contact force."""
+    def _contact(self) -> float | None:
+        """Return the row, with its fraction, at which both pads feel the contact force."""
         felt = np.minimum(self.left_n, self.right_n)[: self.n_rows] - CONTACT_FORCE_N
         over = np.flatnonzero(felt >= 0.0)
         if not len(over):
@@ -81,9 +85,9 @@ class GraspRecord:
         return float(i) if i == 0 else i - float(felt[i] / (felt[i] - felt[i - 1]))
 
     def _rest(self, first: float) -> tuple[float, bool] | None:
-        """Return from where on the speed stays below that of rest, and whether there was motion in between.
+        """Return the row, with its fraction, from which on the fingers rest, and whether they moved since the contact.
 
-        In the very row of the contact there is no rate, as the feature set has it.
+        The row of the contact itself does not count as motion, as in the feature set.
         """
         speed = np.abs(self.speed_m_s[: self.n_rows]) - REST_SPEED_M_S
         window = round(REST_WINDOW_S / self.dt_s)
@@ -96,27 +100,30 @@ class GraspRecord:
         return None
 
 
-def _at(column: Any, place: float) -> float:
+def _at(column: NDArray[np.float64], place: float) -> float:
     return float(np.interp(place, np.arange(len(column)), column))
 
 
-def deviation(one: GraspRecord, expected: GraspRecord) -> tuple[float, str]:
-    """Return the largest error of all, and which quantity it is of; infinite where they are not of one kind."""
-    if one.outcome != expected.outcome:
+def deviation(grasp: GraspRecord, expected: GraspRecord) -> tuple[float, str]:
+    """Return the largest error of all quantities, and the quantity; infinite where the outcomes differ.
+
+    It is also infinite where only one of the grasps has a feature.
+    """
+    if grasp.outcome != expected.outcome:
         return math.inf, "outcome"
-    worst, whose = 0.0, "nothing"
+    errors = {}
     wanted = expected.quantities()
-    for name, value in one.quantities().items():
-        if math.isnan(wanted[name]) and math.isnan(value):
-            continue
-        error = abs(value - wanted[name]) / max(abs(wanted[name]), SCALES[name])
+    for name, value in grasp.quantities().items():
+        if not (math.isnan(wanted[name]) and math.isnan(value)):
+            errors[name] = abs(value - wanted[name]) / max(abs(wanted[name]), SCALES[name])
+    n = min(len(grasp.gap_m), len(expected.gap_m))
+    if n > 0:
+        forces, others = (0.5 * (record.left_n[:n] + record.right_n[:n]) for record in (grasp, expected))
+        rms = float(np.sqrt(np.mean((forces - others) ** 2)))
+        errors["trace"] = rms / max(float(np.sqrt(np.mean(others**2))), TRACE_SCALE_N)
+    worst, quantity = 0.0, "nothing"
+    for name, error in errors.items():
+        # Written so that NaN counts as the largest.
         if not error <= worst:
-            worst, whose = (math.inf if math.isnan(error) else error), name
-    n = min(len(one.gap_m), len(expected.gap_m))
-    if n == 0:
-        return worst, whose
-    mine, other = (0.5 * (record.left_n[:n] + record.right_n[:n]) for record in (one, expected))
-    trace = float(np.sqrt(np.mean((mine - other) ** 2)) / max(np.sqrt(np.mean(other**2)), TRACE_SCALE_N))
-    if not trace <= worst:
-        worst, whose = (math.inf if math.isnan(trace) else trace), "trace"
-    return worst, whose
+            worst, quantity = (math.inf if math.isnan(error) else error), name
+    return worst, quantity

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
 from graspsense.plugin_api import gap_and_rate, revolutions_at
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.spec import TermParams
 from graspsense_sim_gripper.plant import EXPLICIT, MEAN_FORCE, STIFF, Drive, Steps, Thing
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.reduction.candidates import named, simpler_pads, without_term
@@ -39,8 +40,6 @@ CONVERGED: Final = 1e-7
 STIFFEST_N_M: Final = 1e6
 """Peak forces on contacts up to this stiff agree with their reference."""
 SCHEMES: Final = {EXPLICIT: "Verlet", STIFF: "TR-BDF2", MEAN_FORCE: "mean force"}
-
-TermParams = Any
 
 
 def has_forced_steps(config: SimConfig) -> bool:
