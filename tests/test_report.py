@@ -27,7 +27,7 @@ from graspsense.experiments.summary import summarise
 from graspsense.report.html import Page
 from graspsense.report.matrix import confusion_table
 from graspsense.report.store_page import store_page
-from graspsense.report.svg import INKS, QUIET, Scale
+from graspsense.report.svg import INKS, QUIET, AxisScale
 from graspsense.store.store import Store
 
 SIZES = {"desk": 1280, "phone": 390}
@@ -190,7 +190,7 @@ def test_every_count_of_a_confusion_matrix_is_in_its_table():
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-3.0, 2000.0), (1e-6, 3e-6), (57.1, 57.2)])
 def test_ticks_are_round_and_within(low, high):
-    ticks = Scale(low, high, 0.0, 100.0).ticks()
+    ticks = AxisScale(low, high, 0.0, 100.0).ticks()
 
     assert 2 <= len(ticks) <= 7
     assert low - 1e-9 <= ticks[0] <= ticks[-1] <= high + 1e-9 * max(1.0, abs(high))

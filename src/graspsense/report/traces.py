@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from graspsense.report.html import figure, folded, panels, table
-from graspsense.report.svg import DASHES, GRID, INKS, QUIET, Picture, Scale, number, reaching
+from graspsense.report.svg import DASHES, GRID, INKS, QUIET, AxisScale, Picture, number, reaching
 from graspsense.report.units import for_people, in_a_line
 
 MEANING: Final = {
@@ -82,7 +82,7 @@ def _traces(
     states = list(dict.fromkeys(grasp["label"] for grasp in grasps))[:STATES]
     legend = 348.0
     picture = Picture(legend + 15 * len(states) - 8)
-    x_scale = Scale(times[0], times[1], 36, picture.width - 10)
+    x_scale = AxisScale(times[0], times[1], 36, picture.width - 10)
     picture.text(2, 14, name, bold=True, size=13)
     force = reaching(forces, 172, 40, zero=True)
     gap = reaching(gaps, 300, 210)
@@ -124,7 +124,7 @@ def one_grasp(grasp: Mapping[str, Any], caption: str) -> str:
         return ""
     named = list(dict.fromkeys(grasp["phase"]))
     picture = Picture(334)
-    x_scale = Scale(t[0], t[-1], 36, picture.width - 10)
+    x_scale = AxisScale(t[0], t[-1], 36, picture.width - 10)
     gap = reaching([v for v in grasp["gap_mm"] if v is not None], 140, 44)
     force = reaching([v for v in grasp["force_n"] if v is not None], 280, 176, zero=True)
     begun, told = 0, []

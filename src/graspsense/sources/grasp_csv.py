@@ -21,7 +21,7 @@ from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.roles import Reading
 from graspsense.core.signals import NO_PADS, Frame
 from graspsense.recording.replayable import Recording
-from graspsense.sources.features_csv import Columns
+from graspsense.sources.features_csv import CsvColumns
 
 NEEDED: Final = ("time", "gap", "force")
 KNOWN: Final = (*NEEDED, "effort", "velocity")
@@ -57,12 +57,12 @@ def read_squeeze(name: str) -> Recording:
         most = 2 if what == "force" else 1
         if len(names) > most:
             raise ConfigError(f"{len(names)} columns are given for {what}: {most} at most")
-    columns = Columns(Path(file).expanduser())
+    columns = CsvColumns(Path(file).expanduser())
     found = {what: [_column(columns, what, one) for one in names] for what, names in given.items()}
     return _recording(columns, found)
 
 
-def _column(columns: Columns, what: str, text: str) -> list[float]:
+def _column(columns: CsvColumns, what: str, text: str) -> list[float]:
     name, star, factor_text = text.rpartition("*")
     factor = 1.0
     if star and text not in columns.cells:
@@ -84,7 +84,7 @@ def _column(columns: Columns, what: str, text: str) -> list[float]:
     return values
 
 
-def _recording(columns: Columns, found: Mapping[str, list[list[float]]]) -> Recording:
+def _recording(columns: CsvColumns, found: Mapping[str, list[list[float]]]) -> Recording:
     (times,), (gaps,), forces = found["time"], found["gap"], found["force"]
     if len(times) < 2:
         raise DataDamaged(f"{columns.path} has one line only: a squeeze needs more")

@@ -16,7 +16,7 @@ from graspsense.experiments.trade.compare import WITHOUT
 from graspsense.experiments.trade.front import front
 from graspsense.experiments.trade.paired import corrected_t, mcnemar
 from graspsense.report.html import figure
-from graspsense.report.svg import DASHES, INKS, QUIET, Picture, Scale, reaching
+from graspsense.report.svg import DASHES, INKS, QUIET, AxisScale, Picture, reaching
 
 NOTES: Final = {
     "trade_noise": "Noise: beyond about 25 counts a cell at the edge passes the threshold of a side impact (100 "
@@ -144,7 +144,7 @@ def _picture(found: Mapping[str, Sequence[Point]], axis: str, title: str) -> str
     every = [one for points_ in found.values() for one in points_]
     picture = Picture(262 + 15 * (len(found) + 1))
     x = reaching([one.cost for one in every], LEFT, picture.width - 14)
-    y = Scale(0.0, 100.0, 215, 24)
+    y = AxisScale(0.0, 100.0, 215, 24)
     picture.y_axis(y, LEFT - 4, picture.width - 8, "recognised, in %")
     picture.x_axis(x, 24, 215, axis)
     told = []
