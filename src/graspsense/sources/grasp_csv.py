@@ -26,7 +26,7 @@ from graspsense.sources.features_csv import CsvColumns
 NEEDED: Final = ("time", "gap", "force")
 KNOWN: Final = (*NEEDED, "effort", "velocity")
 FARTHEST_M: Final = 1.0
-"""A gap that is wider is likely not in metres."""
+"""A gap that is wider is not in metres."""
 
 
 def named(path: str, columns: Mapping[str, Sequence[str]]) -> str:
@@ -95,6 +95,11 @@ def _recording(columns: CsvColumns, found: Mapping[str, list[list[float]]]) -> R
             )
     steps = [now - before for before, now in pairwise(times)]
     steps.insert(0, steps[0])
+    if max(gaps) > FARTHEST_M:
+        raise DataDamaged(
+            f"{columns.path}: the gap goes up to {max(gaps):g} m, which no gripper has: where the column is in "
+            "mm, write COLUMN*0.001 for it"
+        )
     if "velocity" in found:
         (speeds,) = found["velocity"]
     else:
@@ -111,10 +116,6 @@ def _recording(columns: CsvColumns, found: Mapping[str, list[list[float]]]) -> R
     notes = [f"{len(times)} lines of {columns.path.name}: taken to be in s, m and N"]
     if len(forces) == 1:
         notes.append("one force was recorded: it is taken for that of both pads")
-    if max(gaps) > FARTHEST_M:
-        notes.append(
-            f"the gap goes up to {max(gaps):g} m: where the column is in mm, write COLUMN*0.001 for it"
-        )
     return Recording(
         name=f"CSV {columns.path.name}", readings=readings, rate_hz=1.0 / median(steps), notes=tuple(notes)
     )
