@@ -65,7 +65,7 @@ def contender(name: str) -> Any:
 def n_nodes(estimator: Any) -> float:
     """The size of its tree; NaN where it does not tell (imodels keeps XML)."""
     tree = getattr(estimator, "tree_", None)
-    return float(getattr(tree, "node_count", getattr(tree, "n_nodes", float("nan"))))
+    return float(getattr(tree, "node_count", float("nan")))
 
 
 def seconds(work: Callable[[], Any]) -> float:

@@ -174,7 +174,7 @@ def test_pruning_against_held_out_trials_makes_a_smaller_tree():
     pruned = fitted("c45", table, noisy, pruning="reduced_error", mdl_correction=False)
 
     def nodes(tree):
-        return len(tree.to_json()["nodes"]["attribute"])
+        return len(tree.to_json()["nodes"]["feature"])
 
     assert nodes(pruned) < nodes(whole)
 

@@ -39,8 +39,8 @@ def test_rows_without_a_class_are_not_learned_from_but_seen() -> None:
     # The midpoint is 2.5; the largest value below it is that of the row without a class.
     rows = "0,x,no\n1,x,no\n4,x,yes\n5,x,yes\n2.25,x,?\n"
     tree = fit(parse_arff(HEAD + rows))
-    assert tree.to_dict()["thr"] == 2.25
-    assert tree.weight[0] == 4.0
+    assert tree.to_dict()["threshold"] == 2.25
+    assert tree.weighted_n_node_samples[0] == 4.0
 
 
 @pytest.mark.parametrize(

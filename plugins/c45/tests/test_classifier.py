@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from attrs import fields
 from sklearn.datasets import load_iris
 from sklearn.model_selection import GridSearchCV, cross_val_predict
 from sklearn.pipeline import make_pipeline
@@ -42,7 +43,7 @@ def test_defaults_are_j48s_and_presets_are_named() -> None:
     assert C45Classifier().get_params() == C45Classifier.j48().get_params()
     options = Options()
     assert all(
-        getattr(C45Classifier(), name) == getattr(options, name) for name in Options.__dataclass_fields__
+        getattr(C45Classifier(), field.name) == getattr(options, field.name) for field in fields(Options)
     )
     paper = C45Classifier.paper(rep_folds=5)
     assert (paper.criterion, paper.pruning, paper.mdl_correction, paper.rep_folds) == (
@@ -154,7 +155,7 @@ def test_mixed_columns() -> None:
 def test_weights_and_missing_values() -> None:
     x = np.array([[0.0], [0.0], [1.0], [1.0], [np.nan]])
     classifier = C45Classifier(min_objects=1).fit(x, [0, 0, 1, 1, 1], sample_weight=[1, 1, 1, 1, 0.5])
-    assert classifier.tree_.weight[0] == 4.5
+    assert classifier.tree_.weighted_n_node_samples[0] == 4.5
     assert classifier.predict_proba([[np.nan]])[0].sum() == pytest.approx(1.0)
     assert (classifier.predict_proba([[np.nan]])[0] > 0).all()
 

@@ -57,7 +57,7 @@ def test_same_tree_and_predictions(weights: str, decimals: int | None) -> None:
         assert numpy_tree == fast_tree, options
         predicted = [class_indices(numpy_tree, table.values, engine) for engine in ("numpy", "fast")]
         assert predicted[0].tolist() == predicted[1].tolist()
-        sizes.append(numpy_tree.n_nodes)
+        sizes.append(numpy_tree.node_count)
     assert max(sizes) > 50
 
 

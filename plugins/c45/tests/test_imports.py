@@ -39,6 +39,25 @@ def test_a_stored_tree_predicts_with_numpy_alone() -> None:
     assert not loaded & {"sklearn", "scipy", "numba", "pandas", "matplotlib", "graspsense"}
 
 
+@pytest.mark.parametrize("missing", ["numba", "graspsense"])
+def test_where_the_compiled_engine_is_not_installed_numpy_answers(missing: str) -> None:
+    code = (
+        "import sys, importlib.util\n"
+        "found = importlib.util.find_spec\n"
+        "importlib.util.find_spec = lambda name: None if name == sys.argv[1] else found(name)\n"
+        "from graspsense_c45.engines import choose_fast, missing_for_fast\n"
+        "assert missing_for_fast() == (sys.argv[1],)\n"
+        "assert not choose_fast('auto', 10**9)\n"
+        "try:\n"
+        "    choose_fast('fast', 1)\n"
+        "except ModuleNotFoundError as error:\n"
+        "    assert sys.argv[1] in str(error) and 'graspsense-c45[fast]' in str(error)\n"
+        "else:\n"
+        "    raise AssertionError\n"
+    )
+    assert not modules_after(code, missing) & {"numba", "graspsense"}
+
+
 def test_every_public_name_loads_and_others_do_not() -> None:
     import graspsense_c45
 

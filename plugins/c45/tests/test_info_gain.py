@@ -57,7 +57,7 @@ def grow(
 ) -> dict[str, Any]:
     labels = [k for _, k in rows]
     counts = count(labels, n_classes)
-    node: dict[str, Any] = {"dist": counts}
+    node: dict[str, Any] = {"class_weights": counts}
     if len(rows) < 2 * options.min_objects or max(counts) == len(rows):
         return node
     best, chosen = 0.0, None
@@ -73,34 +73,38 @@ def grow(
     threshold = max(x[a] for x in every if x[a] <= middle)
     sides = [[r for r in rows if (r[0][a] <= threshold) == left] for left in (True, False)]
     return node | {
-        "att": a,
-        "thr": threshold,
-        "sons": [grow(side, every, options, n_classes) for side in sides],
+        "feature": a,
+        "threshold": threshold,
+        "children": [grow(side, every, options, n_classes) for side in sides],
     }
 
 
 def prune(node: dict[str, Any], held: list[tuple[list[float], int]]) -> int:
     """Reduced-error pruning in place; returns the held-out errors of what is left."""
-    label = node["dist"].index(max(node["dist"]))
+    label = node["class_weights"].index(max(node["class_weights"]))
     as_leaf = sum(k != label for _, k in held)
-    if "att" not in node:
+    if "feature" not in node:
         return as_leaf
-    a, threshold = node["att"], node["thr"]
+    a, threshold = node["feature"], node["threshold"]
     as_tree = sum(
-        prune(son, [r for r in held if (r[0][a] <= threshold) == left])
-        for son, left in zip(node["sons"], (True, False), strict=True)
+        prune(child, [r for r in held if (r[0][a] <= threshold) == left])
+        for child, left in zip(node["children"], (True, False), strict=True)
     )
     if as_leaf <= as_tree:
-        for key in ("att", "thr", "sons"):
+        for key in ("feature", "threshold", "children"):
             del node[key]
         return as_leaf
     return as_tree
 
 
 def shape(node: dict[str, Any]) -> dict[str, Any]:
-    kept = {"dist": [int(c) for c in node["dist"]]}
-    if "att" in node:
-        kept |= {"att": node["att"], "thr": node["thr"], "sons": [shape(son) for son in node["sons"]]}
+    kept = {"class_weights": [int(c) for c in node["class_weights"]]}
+    if "feature" in node:
+        kept |= {
+            "feature": node["feature"],
+            "threshold": node["threshold"],
+            "children": [shape(child) for child in node["children"]],
+        }
     return kept
 
 
@@ -149,4 +153,4 @@ def test_gain_and_ratio_differ_where_c45_says_so() -> None:
     x1 = [0.0] * 9 + [1.0] + [0.0] * 2 + [1.0] * 8
     given = make_table(Schema((Attribute("x0"), Attribute("x1")), (0, 1)), np.column_stack((x0, x1)), labels)
     by_gain = fit(given, Options(criterion="info_gain", pruning="none", mdl_correction=False))
-    assert by_gain.to_dict()["att"] == 1
+    assert by_gain.to_dict()["feature"] == 1

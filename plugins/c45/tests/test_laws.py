@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from graspsense_c45 import JavaRandom, criteria
-from graspsense_c45.arithmetic import ln, one_minus_exp, x_ln_x_array
-from graspsense_c45.cuts import NOT_ADMISSIBLE, best_cuts
+from graspsense_c45.arithmetic import ln, one_minus_exp, x_ln_x
 from graspsense_c45.estimates import estimated_errors, prepare_confidence
+from graspsense_c45.levelwise.best_cuts import NOT_ADMISSIBLE, best_cuts
 
 
 def test_logarithm_is_right_to_the_last_bits() -> None:
@@ -18,7 +18,7 @@ def test_logarithm_is_right_to_the_last_bits() -> None:
     for x in (rng.random(2_000) * 10.0 ** rng.uniform(-300, 300, 2_000)).tolist():
         assert ln(x) == pytest.approx(math.log(x), rel=4e-16, abs=2e-16)
     assert ln(1.0) == 0.0
-    assert x_ln_x_array(np.array([0.0, 5e-7, 1.0])).tolist() == [0.0, 0.0, 0.0]
+    assert x_ln_x(np.array([0.0, 5e-7, 1.0])).tolist() == [0.0, 0.0, 0.0]
 
 
 def test_one_minus_exp_keeps_small_arguments() -> None:
@@ -32,17 +32,17 @@ def test_estimates_are_quinlans() -> None:
     confidence = prepare_confidence(0.25)
     for errors, weight, rate in ((0, 6, 0.206), (0, 9, 0.143), (0, 1, 0.750), (1, 16, 0.157)):
         # The last one is interpolated in a table of z there, and exact here.
-        expected = float(estimated_errors(float(weight), float(errors), *confidence)) / weight
+        expected = float(estimated_errors(float(weight), float(errors), confidence)) / weight
         assert expected == pytest.approx(rate, abs=6e-4 if errors == 0 else 4e-3)
 
 
 def test_estimates_at_the_ends() -> None:
     confidence = prepare_confidence(0.25)
-    assert estimated_errors(0.0, 0.0, *confidence) == 0.0
-    assert estimated_errors(3.0, 3.0, *confidence) == 3.0
-    assert estimated_errors(3.0, 1.0, *prepare_confidence(0.6)) == 1.0
+    assert estimated_errors(0.0, 0.0, confidence) == 0.0
+    assert estimated_errors(3.0, 3.0, confidence) == 3.0
+    assert estimated_errors(3.0, 1.0, prepare_confidence(0.6)) == 1.0
     weights = np.linspace(1.0, 50.0, 500)
-    shares = estimated_errors(weights, weights * 0.3, *confidence)
+    shares = estimated_errors(weights, weights * 0.3, confidence)
     assert ((shares >= weights * 0.3) & (shares <= weights + 1e-12)).all()
 
 

@@ -113,16 +113,16 @@ def assert_same_nodes(ours: dict[str, Any], theirs: dict[str, Any], where: str) 
     pairs = [(ours, theirs, where)]
     while pairs:
         mine, given, place = pairs.pop()
-        assert mine.get("att") == given.get("att"), place
-        assert mine.get("thr") == given.get("thr"), place
+        assert mine.get("feature") == given.get("att"), place
+        assert mine.get("threshold") == given.get("thr"), place
         assert mine["class"] == given["class"], place
-        assert mine["n"] == pytest.approx(given["n"], abs=1e-6), place
-        assert mine["dist"] == pytest.approx(given["dist"], abs=1e-6), place
+        assert mine["weighted_n_node_samples"] == pytest.approx(given["n"], abs=1e-6), place
+        assert mine["class_weights"] == pytest.approx(given["dist"], abs=1e-6), place
         if "att" in given:
-            assert mine["bags"] == pytest.approx(given["bags"], abs=1e-6), place
-            assert len(mine["sons"]) == len(given["sons"]), place
-            sons = zip(mine["sons"], given["sons"], strict=True)
-            pairs += [(m, g, f"{place}.{i}") for i, (m, g) in enumerate(sons)]
+            assert mine["child_weights"] == pytest.approx(given["bags"], abs=1e-6), place
+            assert len(mine["children"]) == len(given["children"]), place
+            children = zip(mine["children"], given["children"], strict=True)
+            pairs += [(m, g, f"{place}.{i}") for i, (m, g) in enumerate(children)]
 
 
 def assert_same_answers(tree: Tree, question: Asked, variant: str) -> int:
@@ -147,7 +147,7 @@ def test_trees_and_answers(name: str) -> None:
         tree = fitted(name, variant)
         assert_same_nodes(tree.to_dict(), question.answer(variant, "tree"), f"{name} {variant}")
         assert assert_same_answers(tree, question, variant) >= 1
-        assert tree.n_nodes == question.answer(variant, "size")
+        assert tree.node_count == question.answer(variant, "size")
         assert tree.n_leaves == question.answer(variant, "leaves")
 
 
@@ -184,7 +184,7 @@ def check_cross_validation(name: str, variants: list[str]) -> int:
                 Options(**VARIANTS[variant]),
             )
             predicted[test] = distributions(tree, table.values[test]).argmax(axis=1)
-            sizes.append(tree.n_nodes)
+            sizes.append(tree.node_count)
         np.add.at(confusion, (table.labels, predicted), 1)
         assert confusion.tolist() == theirs["confusion"], (name, variant)
         assert predicted.tolist() == theirs["pred"], (name, variant)
@@ -217,10 +217,10 @@ def test_where_j48_never_ends_ours_does() -> None:
     # (lo + hi) / 2 overflows there; J48 then sends every row left, again and again.
     table, probe = read_csv("mag_overflow", range(2 + int(read_labels("mag_overflow").max())))
     tree = fit(table, Options(pruning="none"))
-    inner = tree.tests.attribute >= 0
-    assert np.isfinite(tree.tests.threshold[inner]).all()
+    inner = tree.splits.feature >= 0
+    assert np.isfinite(tree.splits.threshold[inner]).all()
     for node in np.flatnonzero(inner).tolist():
-        assert all(tree.weight[son] > 0 for son in tree.sons(node))
+        assert all(tree.weighted_n_node_samples[child] > 0 for child in tree.children(node))
     assert len(class_indices(tree, probe)) == len(probe)
     assert np.abs(table.values).max() > 8e307
 

@@ -93,8 +93,8 @@ def test_rules_keep_the_tightest_bounds_only() -> None:
 def test_dot_has_every_node_and_edge_and_quotes() -> None:
     tree = grasp_tree()
     dot = to_dot(tree)
-    assert len(re.findall(r"^  n\d+ \[", dot, re.MULTILINE)) == tree.n_nodes
-    assert len(re.findall(r"->", dot)) == tree.n_nodes - 1
+    assert len(re.findall(r"^  n\d+ \[", dot, re.MULTILINE)) == tree.node_count
+    assert len(re.findall(r"->", dot)) == tree.node_count - 1
     assert '[label="<= 0.542 s"]' in dot
     quoted = fit(
         make_table(Schema((Attribute('a "b"'),), ('"', "\\")), [[0.0]] * 3 + [[1.0]] * 3, [0] * 3 + [1] * 3)
@@ -106,7 +106,7 @@ def test_drawing_names_every_node() -> None:
     tree = grasp_tree()
     axes = draw(tree)
     words = [text.get_text() for text in axes.texts]
-    assert len(words) == tree.n_nodes + tree.n_nodes - 1
+    assert len(words) == tree.node_count + tree.node_count - 1
     assert "delta_t" in words
     assert "empty\n12" in words
     mpl.pyplot.close("all")
@@ -145,7 +145,7 @@ def test_damaged_json_is_refused(change: dict[str, object], words: str) -> None:
         from_json(json.dumps(to_document(grasp_tree()) | change))
 
 
-@pytest.mark.parametrize("key", ["attribute", "n_sons", "value", "threshold", "weights"])
+@pytest.mark.parametrize("key", ["feature", "n_children", "category", "threshold", "class_weights"])
 def test_damaged_nodes_are_refused(key: str) -> None:
     # Another number is a threshold too.
     for wrong in ("x", None) if key == "threshold" else (99, "x", -5, None):
@@ -157,10 +157,10 @@ def test_damaged_nodes_are_refused(key: str) -> None:
         from_json(to_json(grasp_tree())[:-3])
 
 
-def test_sons_that_point_upwards_are_refused() -> None:
+def test_children_that_point_upwards_are_refused() -> None:
     document = to_document(grasp_tree())
-    document["nodes"]["n_sons"] = [0, 2, 0, 3, 0, 0]
-    with pytest.raises(StoredTreeError, match="do not make up a tree"):
+    document["nodes"]["n_children"] = [0, 2, 0, 3, 0, 0]
+    with pytest.raises(StoredTreeError, match="do not form a tree"):
         from_json(json.dumps(document))
 
 

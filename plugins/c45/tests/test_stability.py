@@ -38,47 +38,47 @@ def test_huge_values_split_cleanly(scale: float) -> None:
     values = [[-scale], [-scale / 2], [scale / 2], [scale]] * 3
     tree = fit(table(values, [0, 0, 1, 1] * 3))
     # The midpoint of the inner pair is 0; the largest value of the data below it is the threshold.
-    assert tree.to_dict()["thr"] == -scale / 2
+    assert tree.to_dict()["threshold"] == -scale / 2
     assert class_indices(tree, values).tolist() == [0, 0, 1, 1] * 3
 
 
 def test_midpoint_of_two_huge_values_does_not_overflow() -> None:
     tree = fit(table([[1.6e308]] * 4 + [[1.7e308]] * 4, [0] * 4 + [1] * 4), Options(actual_split_value=False))
-    assert 1.6e308 <= tree.to_dict()["thr"] < 1.7e308
-    assert tree.n_nodes == 3
+    assert 1.6e308 <= tree.to_dict()["threshold"] < 1.7e308
+    assert tree.node_count == 3
 
 
 def test_a_column_below_the_gap_never_splits() -> None:
     # J48's rule: neighbours must differ by more than 1e-5, whatever the scale.
     for tiny in (1e-300, 1e-9, 0.99e-5):
-        assert fit(table([[0.0]] * 5 + [[tiny]] * 5, [0] * 5 + [1] * 5), GROWN).n_nodes == 1
-    assert fit(table([[0.0]] * 5 + [[1.1e-5]] * 5, [0] * 5 + [1] * 5), GROWN).n_nodes == 3
+        assert fit(table([[0.0]] * 5 + [[tiny]] * 5, [0] * 5 + [1] * 5), GROWN).node_count == 1
+    assert fit(table([[0.0]] * 5 + [[1.1e-5]] * 5, [0] * 5 + [1] * 5), GROWN).node_count == 3
 
 
 def test_neighbours_one_ulp_apart() -> None:
     # Near 1 an ulp is below the gap; near 1e12 it is above, and the midpoint rounds to one of the two.
-    assert fit(table([[1.0]] * 5 + [[np.nextafter(1.0, 2)]] * 5, [0] * 5 + [1] * 5), GROWN).n_nodes == 1
+    assert fit(table([[1.0]] * 5 + [[np.nextafter(1.0, 2)]] * 5, [0] * 5 + [1] * 5), GROWN).node_count == 1
     for low in (1e12, 1e12 + 2**-13):
         high = float(np.nextafter(low, 2e12))
         tree = fit(table([[low]] * 5 + [[high]] * 5, [0] * 5 + [1] * 5), Options(actual_split_value=False))
-        assert tree.to_dict()["thr"] == low
+        assert tree.to_dict()["threshold"] == low
         assert class_indices(tree, [[low], [high]]).tolist() == [0, 1]
 
 
 def test_ties_go_to_the_first_column_and_the_first_cut() -> None:
     column = [0.0] * 4 + [1.0] * 4
     tree = fit(table(np.column_stack((column, column)), [0] * 4 + [1] * 4))
-    assert tree.to_dict()["att"] == 0
+    assert tree.to_dict()["feature"] == 0
     # Cutting two rows off either end is equally good.
     tree = fit(table([[0.0], [0.0], [1.0], [1.0], [2.0], [2.0]], [0, 0, 1, 1, 0, 0]), GROWN)
-    assert tree.to_dict()["thr"] == 0.0
+    assert tree.to_dict()["threshold"] == 0.0
 
 
 def test_of_two_zeros_the_first_in_the_rows_is_the_threshold() -> None:
     # As J48; it is the one thing about a threshold that the order of the rows decides.
     for first, second in ((0.0, -0.0), (-0.0, 0.0)):
         tree = fit(table([[first], [second]] * 3 + [[1.0]] * 6, [0] * 6 + [1] * 6))
-        assert np.signbit(tree.to_dict()["thr"]) == np.signbit(first)
+        assert np.signbit(tree.to_dict()["threshold"]) == np.signbit(first)
 
 
 def test_majority_ties_go_to_the_first_class() -> None:
@@ -89,8 +89,8 @@ def test_majority_ties_go_to_the_first_class() -> None:
 
 def test_constant_columns_and_duplicates_give_a_leaf() -> None:
     tree = fit(table([[3.0, 4.0]] * 10, [0, 1] * 5), GROWN)
-    assert tree.n_nodes == 1
-    assert tree.weights.tolist() == [[5.0, 5.0]]
+    assert tree.node_count == 1
+    assert tree.class_weights.tolist() == [[5.0, 5.0]]
 
 
 def test_one_row_and_one_class() -> None:
@@ -113,7 +113,7 @@ def test_rows_of_weight_zero_do_not_vote() -> None:
     values = [[0.0]] * 4 + [[1.0]] * 4 + [[0.0]] * 3
     weights = [1.0] * 8 + [0.0] * 3
     tree = fit(table(values, [0] * 4 + [1] * 4 + [1] * 3, weights))
-    assert tree.weights.tolist() == [[4.0, 4.0], [4.0, 0.0], [0.0, 4.0]]
+    assert tree.class_weights.tolist() == [[4.0, 4.0], [4.0, 0.0], [0.0, 4.0]]
 
 
 def test_whole_weights_are_repeated_rows() -> None:
@@ -126,7 +126,7 @@ def test_whole_weights_are_repeated_rows() -> None:
     weighted = fit(table(values, labels, weights), options)
     repeated = fit(table(np.repeat(values, weights, axis=0), np.repeat(labels, weights)), options)
     assert weighted == repeated
-    assert weighted.n_nodes > 1
+    assert weighted.node_count > 1
 
 
 @pytest.mark.parametrize("value", [np.inf, -np.inf])
@@ -141,15 +141,15 @@ def test_infinite_values_are_refused(value: float) -> None:
 def test_a_column_that_is_all_missing_is_left_alone() -> None:
     values = np.column_stack((np.full(8, np.nan), [0.0] * 4 + [1.0] * 4))
     tree = fit(table(values, [0] * 4 + [1] * 4))
-    assert tree.to_dict()["att"] == 1
-    assert fit(table(np.full((6, 1), np.nan), [0, 1] * 3)).n_nodes == 1
+    assert tree.to_dict()["feature"] == 1
+    assert fit(table(np.full((6, 1), np.nan), [0, 1] * 3)).node_count == 1
 
 
 def test_missing_values_are_shared_out_by_weight() -> None:
     # 6 known rows go left, 3 right; the 10th row, which knows nothing, goes 2/3 left and 1/3 right.
     values = [[0.0]] * 6 + [[1.0]] * 3 + [[np.nan]]
     tree = fit(table(values, [0] * 6 + [1] * 3 + [0]), GROWN)
-    assert tree.weights[1:].ravel().tolist() == pytest.approx([6 + 2 / 3, 0.0, 1 / 3, 3.0], abs=1e-9)
+    assert tree.class_weights[1:].ravel().tolist() == pytest.approx([6 + 2 / 3, 0.0, 1 / 3, 3.0], abs=1e-9)
     # Predicting shares by the training weight of the branches.
     left, right = 20 / 3, 10 / 3
     expected = [left / 10 + right / 10 * (1 / 3) / right, 3.0 / 10]
@@ -159,7 +159,7 @@ def test_missing_values_are_shared_out_by_weight() -> None:
 def test_a_value_no_row_took_answers_with_the_parents_distribution() -> None:
     schema = Schema((Attribute("colour", values=("red", "green", "blue")),), (0, 1))
     tree = fit(make_table(schema, [[0.0]] * 4 + [[1.0]] * 3, [0] * 4 + [1] * 3), GROWN)
-    assert tree.n_nodes == 4
+    assert tree.node_count == 4
     assert distributions(tree, [[2.0]])[0].tolist() == pytest.approx([4 / 7, 3 / 7])
 
 
@@ -168,7 +168,7 @@ def test_many_values_stay_out_of_the_average_but_may_be_chosen() -> None:
     values = np.column_stack((np.repeat(np.arange(10.0), 2), [0.0] * 9 + [1.0] * 11))
     schema = Schema((Attribute("id", values=tuple("abcdefghij")), Attribute("x")), (0, 1))
     tree = fit(make_table(schema, values, [0] * 10 + [1] * 10), GROWN)
-    assert tree.to_dict()["att"] == 1
+    assert tree.to_dict()["feature"] == 1
 
 
 def test_a_nominal_column_must_hold_indices() -> None:
@@ -208,11 +208,13 @@ def test_the_order_of_the_rows_does_not_matter(given_table: Table, random: Any) 
 @given(tables())
 def test_weights_add_up_and_json_is_exact(given_table: Table) -> None:
     tree = fit(given_table, Options(min_objects=1))
-    assert tree.weight[0] == pytest.approx(given_table.weights.sum(), rel=1e-12)
-    for node in range(tree.n_nodes):
-        sons = list(tree.sons(node))
-        if sons:
-            np.testing.assert_allclose(tree.weights[sons].sum(axis=0), tree.weights[node], atol=1e-6)
+    assert tree.weighted_n_node_samples[0] == pytest.approx(given_table.weights.sum(), rel=1e-12)
+    for node in range(tree.node_count):
+        children = list(tree.children(node))
+        if children:
+            np.testing.assert_allclose(
+                tree.class_weights[children].sum(axis=0), tree.class_weights[node], atol=1e-6
+            )
     assert from_json(to_json(tree)) == tree
     np.testing.assert_allclose(distributions(tree, given_table.values).sum(axis=1), 1.0, atol=1e-6)
 
@@ -228,10 +230,10 @@ def test_the_order_of_the_columns_matters_in_ties_only() -> None:
     compared = 0
     while pairs:
         one, other = pairs.pop()
-        assert one["dist"] == other["dist"]
-        if "att" in one:
-            assert (one["att"], one["thr"]) == (2 - other["att"], other["thr"])
-            pairs += list(zip(one["sons"], other["sons"], strict=True))
+        assert one["class_weights"] == other["class_weights"]
+        if "feature" in one:
+            assert (one["feature"], one["threshold"]) == (2 - other["feature"], other["threshold"])
+            pairs += list(zip(one["children"], other["children"], strict=True))
             compared += 1
     assert compared >= 3
 
@@ -246,7 +248,7 @@ def test_the_order_of_the_rows_decides_what_is_held_out() -> None:
         for order in (np.arange(90), rng.permutation(90))
     ]
     assert trees[0] != trees[1]
-    assert trees[0].weight[0] == 60.0
+    assert trees[0].weighted_n_node_samples[0] == 60.0
 
 
 def test_held_out_rows_need_reduced_error_pruning() -> None:
@@ -280,5 +282,5 @@ def test_a_deep_tree_is_no_trouble() -> None:
     options = Options(pruning="none", collapse=False, mdl_correction=False, min_objects=1)
     values = np.arange(n, dtype=float)[:, None] ** 1.0
     tree = fit(table(values, labels), options)
-    assert tree.n_nodes > 100
+    assert tree.node_count > 100
     assert from_json(to_json(tree)) == tree

@@ -1,7 +1,7 @@
 """J48 itself beside ours, on random tables: nominal columns, missing values, weights, missing classes.
 
 Runs where the environment variable WEKA_JAR names Weka's jar (3.9.6) and Java is there; the committed answers in
-test_oracle.py are the tests of record.
+test_oracle.py are the splits of record.
 """
 
 from __future__ import annotations
@@ -63,13 +63,13 @@ def assert_same(ours: dict[str, Any], theirs: dict[str, Any]) -> None:
     pairs = [(ours, theirs)]
     while pairs:
         mine, given = pairs.pop()
-        assert (mine.get("att"), mine.get("thr"), mine["class"]) == (
+        assert (mine.get("feature"), mine.get("threshold"), mine["class"]) == (
             given.get("att"),
             given.get("thr"),
             given["class"],
         )
-        assert mine["dist"] == pytest.approx(given["dist"], abs=1e-6)
-        pairs += list(zip(mine.get("sons", []), given.get("sons", []), strict=True))
+        assert mine["class_weights"] == pytest.approx(given["dist"], abs=1e-6)
+        pairs += list(zip(mine.get("children", []), given.get("children", []), strict=True))
 
 
 @pytest.mark.slow

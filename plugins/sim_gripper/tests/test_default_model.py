@@ -86,7 +86,7 @@ def test_its_command_makes_it_again(tmp_path: Path) -> None:
     for key in ("classifier", "settings", "target", "features"):
         assert made[key] == KEPT[key]
     nodes, kept = made["model"]["nodes"], KEPT["model"]["nodes"]
-    for column in ("attribute", "value", "n_sons", "weights"):
+    for column in ("feature", "category", "n_children", "class_weights"):
         assert nodes[column] == kept[column]
     for threshold, before in zip(nodes["threshold"], kept["threshold"], strict=True):
         assert threshold == before or threshold == pytest.approx(before, rel=0.0, abs=1e-9)

@@ -16,7 +16,7 @@ AGAIN_IN_A_LOG_S: Final = 10.0
 BAR: Final = 24
 
 
-class ProgressLine:
+class Progress:
     """Reports what is being done and how much of it; leaves nothing behind on a terminal."""
 
     def __init__(self) -> None:
@@ -37,7 +37,7 @@ class ProgressLine:
         else:
             click.echo(f"{what}: {done} of {total}", err=True)
 
-    def __enter__(self) -> ProgressLine:
+    def __enter__(self) -> Progress:
         return self
 
     def __exit__(

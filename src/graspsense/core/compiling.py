@@ -26,7 +26,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from attrs import field, frozen
+from attrs import frozen
 
 from graspsense.core.binding import bind
 from graspsense.core.call_graph import (
@@ -71,11 +71,13 @@ class CompileOptions:
 
     counts_references: bool = True
     """Whether arrays are reference counted. False is faster, and only for code that creates no array or list."""
+    uncounted: frozenset[types.CodeType] = frozenset()
+    """Code of called functions that create no array or list: they do not count references in any case."""
     error_model: Literal["python", "numpy"] = "python"
     """Division by zero raises ZeroDivisionError ("python") or gives infinity or NaN ("numpy")."""
     inlining: Inlining | None = None
     """Which calls are inlined; by default the compiler decides."""
-    replacements: Replacements = field(default=NO_REPLACEMENTS, converter=types.MappingProxyType)
+    replacements: Replacements = NO_REPLACEMENTS
     """Python functions, each with the function that is compiled in its place."""
     install: str = "numba"
     """The requirement that brings numba, named to a user who does not have it."""
@@ -164,7 +166,7 @@ class _Compilation:
             # Only the outermost function is kept on disk, since the others are inside it, and only it needs the
             # wrapper for calls from the interpreter, which takes longer to compile than most functions.
             with _cache_folder(self.numba, function) as cache:
-                _COMPILED[key] = self.numba.njit(named, cache=cache, **self._flags())
+                _COMPILED[key] = self.numba.njit(named, cache=cache, **self._flags(function))
         return _COMPILED[key]
 
     def _inner(self, function: types.FunctionType, n_places: int) -> Callable[..., Any]:
@@ -173,7 +175,9 @@ class _Compilation:
         if key not in _COMPILED:
             named = self._named(function, key)
             inline = self._inline(function.__code__, n_places)
-            _COMPILED[key] = self.numba.njit(named, no_cpython_wrapper=True, **inline, **self._flags())
+            _COMPILED[key] = self.numba.njit(
+                named, no_cpython_wrapper=True, **inline, **self._flags(function)
+            )
         return _COMPILED[key]
 
     def _named(self, function: types.FunctionType, key: str) -> Callable[..., Any]:
@@ -194,12 +198,14 @@ class _Compilation:
         inlining = self.options.inlining
         hints = () if inlining is None else (inlining.short_code, inlining.long_code)
         versions = [version(name) for name in ("numba", "llvmlite", "numpy")]
-        digest.update(f"{self._flags()} {hints} {versions}".encode())
+        uncounted = sorted(code.co_qualname for code in self.options.uncounted)
+        digest.update(f"{self._flags(function)} {hints} {uncounted} {versions}".encode())
         return f"{digest.hexdigest()[:16]} {role}"
 
-    def _flags(self) -> dict[str, Any]:
+    def _flags(self, function: types.FunctionType) -> dict[str, Any]:
         flags = {"nogil": True, "no_cfunc_wrapper": True, "error_model": self.options.error_model}
-        return flags if self.options.counts_references else {**flags, "_nrt": False}
+        counts = self.options.counts_references and function.__code__ not in self.options.uncounted
+        return flags if counts else {**flags, "_nrt": False}
 
     def _inline(self, code: types.CodeType, n_places: int) -> dict[str, Any]:
         inlining = self.options.inlining

@@ -1,7 +1,7 @@
-"""C4.5 decision trees, equal to Weka's J48 to the bit.
+"""C4.5 decision trees, equal to those of Weka's J48 to the bit.
 
-Importing this pulls in neither numpy nor scikit-learn; a name loads what it needs when it is first used.
-``C45Classifier`` is the scikit-learn face; everything else needs numpy only.
+A name is imported when it is first used; importing the package imports neither numpy nor scikit-learn.
+`C45Classifier` is a scikit-learn estimator; everything else needs numpy and attrs only.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""ARFF files in: Weka's text format for tables.
+"""Reading ARFF files, the text format of Weka for tables.
 
 Source: Weka manual, chapter "ARFF" (attribute declarations, sparse rows, instance weights, quoting).
 """
@@ -22,14 +22,16 @@ _MISSING = "?"
 
 
 class ArffError(ValueError):
-    """An ARFF file that cannot be read; the message names file, line, what was found and what is allowed."""
+    """An ARFF file that cannot be read; the message names the file, the line, what it holds and what is allowed."""
 
 
 def read_arff(path: str | Path, class_attribute: str | None = None) -> Table:
-    """The table in an ARFF file; the class is a nominal attribute, the last one unless named.
+    """Return the table in an ARFF file.
 
+    class_attribute: the name of the nominal attribute that is the class; by default the last attribute.
     Numeric and nominal attributes, dense and sparse rows, instance weights and missing values (``?``) are read.
-    Raises ArffError: anything else, each with its line.
+
+    Raises ArffError for anything else, with its line.
     """
     path = Path(path)
     try:
@@ -40,7 +42,7 @@ def read_arff(path: str | Path, class_attribute: str | None = None) -> Table:
 
 
 def parse_arff(text: str, class_attribute: str | None = None, source: str = "<text>") -> Table:
-    """The table in a text; see ``read_arff``."""
+    """Return the table in an ARFF text; see `read_arff`. `source` is named in errors."""
     reader = _Reader(source)
     for number, line in enumerate(text.splitlines(), start=1):
         reader.take(number, line)

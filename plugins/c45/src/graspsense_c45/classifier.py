@@ -1,6 +1,6 @@
-"""C4.5 with scikit-learn's face (needs the extra ``sklearn``)."""
+"""C4.5 as a scikit-learn estimator (needs the extra ``sklearn``)."""
 
-# ruff: noqa: N803 (X is what scikit-learn calls it)
+# ruff: noqa: N803 (the name X is scikit-learn's)
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from attrs import fields
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import _check_sample_weight, check_is_fitted, column_or_1d, validate_data
 
+from graspsense_c45.arrays import AnyArray, Indices, Reals
 from graspsense_c45.dot import to_dot
 from graspsense_c45.drawing import draw
 from graspsense_c45.fitting import fit
@@ -29,24 +31,26 @@ from graspsense_c45.text import to_text
 from graspsense_c45.tree import Tree
 from graspsense_c45.weka_folds import hold_out
 
-_OPTIONS = tuple(Options.__dataclass_fields__)
+_OPTIONS = tuple(field.name for field in fields(Options))
 
 
 class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
-    """A C4.5 decision tree, equal to J48's; the defaults are J48's.
+    """A C4.5 decision tree, equal to that of J48, whose defaults it has.
 
     criterion, pruning, confidence_factor, min_objects, collapse, subtree_raising, mdl_correction, actual_split_value,
     laplace, binary_splits, rep_folds: see ``Options``.
-    classes: the declared classes in order, absent ones included (their number enters J48's least branch weight); None
-        takes those that occur, sorted.
-    nominal: the nominal columns, as a boolean mask, indices or names; None takes a data frame's categorical columns.
-        A value that was not there when fitting is treated as missing.
+    classes: the declared classes in order; a class need not occur (the number of classes enters the least weight of a
+        branch). By default those that occur, sorted.
+    nominal: the nominal columns, as a boolean mask, indices or names; by default the categorical columns of a data
+    frame.
+        A value that did not occur in fitting is treated as missing.
     units: the units of the columns, as a mapping of names or a sequence, for paths and rules.
-    random_state: with ``reduced_error`` pruning, an integer or a RandomState shuffles the rows before holding some out;
-        None takes them in their order, as J48 does (whose seed does not decide which rows are held out).
-    engine: ``numpy``, ``fast`` (needs numba) or ``auto``; the tree is the same.
+    random_state: with ``reduced_error`` pruning, an integer or a RandomState shuffles the rows before some are held
+    out;
+        None keeps their order, as J48 does (whose seed does not decide which rows are held out).
+    engine: ``numpy``, ``fast`` (needs the extra ``fast``) or ``auto``; the tree is the same.
 
-    After fitting: ``tree_`` (a ``Tree``), ``classes_``, ``n_features_in_``, ``feature_names_in_`` where X has names.
+    After fitting: ``tree_`` (a `tree.Tree`), ``classes_``, ``n_features_in_``, ``feature_names_in_`` where X has names.
     NaN in X is missing; so are None and NA in a data frame.
     """
 
@@ -88,19 +92,19 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 
     @classmethod
     def j48(cls, **changes: Any) -> Self:
-        """J48's defaults, with these changes."""
+        """Return an estimator with J48's defaults and these changes."""
         return cls(**changes)
 
     @classmethod
     def paper(cls, **changes: Any) -> Self:
-        """The text of Chitta et al. (2010): highest information gain, pruned against a held-out set."""
+        """Return an estimator as Chitta et al. (2010) describe it, with these changes; see `options.PAPER`."""
         return cls(**({name: getattr(PAPER, name) for name in _OPTIONS} | changes))
 
     @classmethod
     def from_tree(cls, tree: Tree) -> Self:
-        """A fitted classifier that answers with this tree."""
+        """Return a fitted estimator that predicts with this tree."""
         classifier = cls(laplace=tree.laplace, classes=list(tree.schema.classes))
-        classifier._take(tree, np.array(tree.schema.classes))
+        classifier._adopt(tree, np.array(tree.schema.classes))
         classifier.n_features_in_ = len(tree.schema.attributes)
         classifier._categories = [
             None if attribute.values is None else list(attribute.values)
@@ -110,7 +114,7 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
 
     @classmethod
     def from_json(cls, text: str | bytes) -> Self:
-        """A fitted classifier that answers with the stored tree."""
+        """Return a fitted estimator that predicts with the stored tree. Raises StoredTreeError."""
         return cls.from_tree(from_json(text))
 
     def fit(
@@ -118,9 +122,10 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     ) -> Self:
         """Grow and prune the tree.
 
-        holdout: with ``reduced_error`` pruning, the rows of X to prune against (a boolean mask or indices), in place of
-        the last of ``rep_folds`` stratified folds.
-        Raises ValueError: what cannot be learned from, each with the reason.
+        holdout: with ``reduced_error`` pruning, the rows of X to prune on (a boolean mask or indices), instead of the
+        last of ``rep_folds`` stratified folds.
+
+        Raises ValueError for data that a tree cannot be fitted to; the message says why.
         """
         options = Options(**{name: getattr(self, name) for name in _OPTIONS})
         values = self._encode(X, fitting=True)
@@ -134,69 +139,69 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         if held_out is None and options.pruning == "reduced_error" and self.random_state is not None:
             order = check_random_state(self.random_state).permutation(len(values))
             held_out = order[hold_out(labels[order], options.rep_folds)]
-        self._take(fit(table, options, held_out, self.engine), classes)  # type: ignore[arg-type]
+        self._adopt(fit(table, options, held_out, self.engine), classes)  # type: ignore[arg-type]
         return self
 
-    def predict(self, X: Any) -> NDArray[Any]:
-        """The class of each row, as J48 classifies (laplace changes probabilities only)."""
+    def predict(self, X: Any) -> AnyArray:
+        """Return the class of each row, as J48 classifies; `laplace` changes probabilities only."""
         check_is_fitted(self)
         values = self._encode(X, fitting=False)
-        labels: NDArray[Any] = self.classes_[class_indices(self.tree_, values, self.engine)]  # type: ignore[arg-type]
+        labels: AnyArray = self.classes_[class_indices(self.tree_, values, self.engine)]  # type: ignore[arg-type]
         return labels
 
-    def predict_proba(self, X: Any) -> NDArray[np.float64]:
-        """The probability of each class for each row, in the order of ``classes_``."""
+    def predict_proba(self, X: Any) -> Reals:
+        """Return the probability of each class for each row, in the order of ``classes_``."""
         check_is_fitted(self)
         return distributions(self.tree_, self._encode(X, fitting=False), self.engine)  # type: ignore[arg-type]
 
     def explain(self, X: Any) -> list[Path]:
-        """The path of each row's prediction, in words and units."""
+        """Return the path of each row through the tree, in words and units."""
         check_is_fitted(self)
         return [explain(self.tree_, row) for row in self._encode(X, fitting=False)]
 
     @property
-    def feature_importances_(self) -> NDArray[np.float64]:
-        """The share of each column in the information gained; see ``feature_importances``."""
+    def feature_importances_(self) -> Reals:
+        """The fraction of each column in the information gain; see `importances.feature_importances`."""
         check_is_fitted(self)
         return feature_importances(self.tree_)
 
     def to_dict(self) -> dict[str, Any]:
-        """The tree as nested nodes; see ``Tree.to_dict``."""
+        """Return the tree as nested dictionaries; see `tree.Tree.to_dict`."""
         check_is_fitted(self)
         return self.tree_.to_dict()
 
     def to_json(self) -> str:
-        """The tree as JSON."""
+        """Return the tree as JSON."""
         check_is_fitted(self)
         return to_json(self.tree_)
 
     def to_text(self) -> str:
-        """The tree as J48 dumps it."""
+        """Return the tree as J48 prints it."""
         check_is_fitted(self)
         return to_text(self.tree_)
 
     def to_rules(self) -> tuple[Rule, ...]:
-        """The tree as rules, one a leaf."""
+        """Return the tree as rules, one a leaf."""
         check_is_fitted(self)
         return to_rules(self.tree_)
 
     def to_dot(self) -> str:
-        """The tree for Graphviz."""
+        """Return the tree in the DOT language."""
         check_is_fitted(self)
         return to_dot(self.tree_)
 
     def draw(self, axes: Any = None) -> Any:
-        """The tree drawn with matplotlib."""
+        """Draw the tree with matplotlib; return the axes."""
         check_is_fitted(self)
         return draw(self.tree_, axes)
 
     def __sklearn_tags__(self) -> Any:
-        """NaN is missing, and missing is welcome."""
+        """Return the tags: NaN is allowed, and means missing."""
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
 
-    def _take(self, tree: Tree, classes: NDArray[Any]) -> None:
+    def _adopt(self, tree: Tree, classes: AnyArray) -> None:
         self.tree_ = tree
         self.classes_ = classes
 
@@ -218,10 +223,10 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             for name, unit, categories in zip(names, units, self._categories, strict=True)
         ]
 
-    def _encode_labels(self, y: ArrayLike, n_rows: int) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    def _encode_labels(self, y: ArrayLike, n_rows: int) -> tuple[Indices, AnyArray]:
         labels = column_or_1d(y, warn=True)
         if labels.dtype.kind not in "biu":
-            # Whole numbers are classes; the check is slow for what it could find in them, which is nothing.
+            # Integers are classes; the check could find nothing in them, and is slow.
             check_classification_targets(y)
         if len(labels) != n_rows:
             raise ValueError(f"{len(labels)} labels for {n_rows} rows; there must be one a row")
@@ -229,7 +234,7 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             present, codes = np.unique(labels, return_inverse=True)
         except TypeError:
             raise ValueError(
-                "labels of different types cannot be told apart; use strings only, or integers only"
+                "labels of different types cannot be sorted; use strings only, or integers only"
             ) from None
         if self.classes is None:
             return codes, present
@@ -240,13 +245,13 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             raise ValueError(f"classes must be distinct and hold every label; not among them: {unknown}")
         return np.array([place[label] for label in present.tolist()])[codes], declared
 
-    def _encode(self, X: Any, fitting: bool) -> NDArray[np.float64]:
-        """The values as numbers, nominal ones as the index of their category."""
+    def _encode(self, X: Any, fitting: bool) -> Reals:
+        """Return the values as numbers, nominal ones as the index of their category."""
         if fitting:
             self._nominal_columns = _nominal_columns(X, self.nominal)
             self._categories: list[list[Any] | None] = []
         if not (self._nominal_columns if fitting else any(c is not None for c in self._categories)):
-            numbers: NDArray[np.float64] = validate_data(
+            numbers: Reals = validate_data(
                 self, X, reset=fitting, dtype=np.float64, order="C", ensure_all_finite="allow-nan"
             )
             if fitting:
@@ -266,7 +271,7 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         return np.column_stack(encoded)
 
 
-def _row_indices(rows: ArrayLike, n_rows: int) -> NDArray[np.int64]:
+def _row_indices(rows: ArrayLike, n_rows: int) -> Indices:
     chosen = np.asarray(rows)
     if chosen.dtype == bool:
         chosen = np.flatnonzero(chosen) if chosen.shape == (n_rows,) else np.array([n_rows])
@@ -306,12 +311,12 @@ def _columns(X: Any) -> list[Any]:
 
 
 def _is_missing(value: Any) -> bool:
-    # NaN and pandas' NaT are not equal to themselves; the comparison of pandas' NA is no boolean at all.
+    # NaN and NaT of pandas are not equal to themselves; a comparison with NA of pandas is not a boolean.
     return value is None or type(value).__name__ == "NAType" or bool(value != value)
 
 
 def _categories(column: Any) -> list[Any]:
-    """The declared categories of a categorical column, else the values that occur, sorted."""
+    """Return the declared categories of a categorical column, else the values that occur, sorted."""
     if hasattr(column, "cat"):
         return list(column.cat.categories)
     present = {value for value in column.tolist() if not _is_missing(value)}
@@ -323,7 +328,7 @@ def _categories(column: Any) -> list[Any]:
         ) from None
 
 
-def _codes(column: Any, categories: list[Any]) -> NDArray[np.float64]:
+def _codes(column: Any, categories: list[Any]) -> Reals:
     place = {value: float(code) for code, value in enumerate(categories)}
     missing = float("nan")
     return np.array(
@@ -331,7 +336,7 @@ def _codes(column: Any, categories: list[Any]) -> NDArray[np.float64]:
     )
 
 
-def _numbers(column: Any, index: int) -> NDArray[np.float64]:
+def _numbers(column: Any, index: int) -> Reals:
     try:
         return np.array([float("nan") if _is_missing(value) else float(value) for value in column.tolist()])
     except (TypeError, ValueError):

@@ -1,80 +1,203 @@
-"""What makes a split good: the laws of C4.5's gain, gain ratio and minimum weights, as J48 has them.
+"""The rules by which C4.5 splits and prunes: gain, gain ratio, least weights, tolerances.
 
-All functions are elementwise, on scalars and on arrays. Terms ``x ln x`` come in and natural logarithms are divided out
-here. W is the weight at a node, T the part of it whose value of the attribute is known.
-Source: Quinlan, C4.5 (1993), sections 2.2 to 2.4; weka.classifiers.trees.j48 3.9.6 for every tolerance.
+All functions are elementwise, on numbers and on arrays, and both engines call them. W is the weight at a node, T the
+weight of its rows that know the value of the attribute, L(x) = x ln x. Gains are in bits.
+
+Source: Quinlan, C4.5: Programs for Machine Learning (1993), sections 2.2 to 2.4 (gain, gain ratio, tests on numbers)
+and 4 (pruning); Quinlan, Improved use of continuous attributes in C4.5, JAIR 4 (1996) (the cost of a threshold). The
+tolerances are those of weka.classifiers.trees.j48 3.9.6, in the class that each docstring names.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from graspsense_c45.arithmetic import LN2, TOLERANCE, select
+from graspsense_c45.arithmetic import LN2, TOLERANCE, Scale, ln, real_term, real_weight, select, term
+from graspsense_c45.arrays import Elementwise, Mask, Real, Reals, Truth, Whole
 
 GAP = 1e-5
-"""A cut needs ``v[i] + GAP < v[i + 1]``: an absolute gap, whatever the column's scale."""
+"""Neighbouring values are apart where they differ by more than this, in the unit of the attribute (C45Split)."""
 
 AVERAGE_SLACK = 1e-3
-"""An attribute is eligible when its gain is at least the average gain less this."""
+"""An attribute is eligible where its gain is at least the average gain less this, in bits (C45ModelSelection)."""
 
 MANY_VALUES = 0.3
-"""A nominal attribute with this share of values to rows, or more, stays out of the average gain."""
+"""A nominal attribute with this ratio of values to rows, or a larger one, is left out of the average gain."""
 
 COLLAPSE_SLACK = 1e-3
+"""Training errors that a subtree may save without being kept (C45PruneableClassifierTree.collapse)."""
 PRUNING_SLACK = 0.1
+"""Estimated errors by which a smaller tree may be worse (C45PruneableClassifierTree.prune)."""
 
 
-def is_pure_or_small(weight: Any, majority_weight: Any, min_objects: Any) -> Any:
-    """Whether a node is a leaf at once: fewer than twice the minimum weight, or one class only."""
+# ---------------------------------------------------------------------------------------------- which nodes split
+
+
+def is_pure_or_small(weight: Real, majority_weight: Real, min_objects: float) -> Truth:
+    """Return whether a node is a leaf: below twice the least weight, or of one class (C45ModelSelection)."""
     return (2.0 * min_objects - weight > TOLERANCE) | (weight - majority_weight < TOLERANCE)
 
 
-def min_side_weight(known_weight: Any, n_classes: Any, min_objects: Any) -> Any:
-    """The least weight of each side of a numeric cut: a tenth of the mean class weight, within [M, 25]."""
+def min_side_weight(known_weight: Real, n_classes: int, min_objects: float) -> Real:
+    """Return the least weight of each side of a numeric test: a tenth of the mean weight of a class.
+
+    It is at least `min_objects`, and at most the larger of that and 25 (C45Split.handleNumericAttribute).
+    """
     tenth = 0.1 * known_weight / n_classes
     capped = select(tenth - 25.0 > TOLERANCE, 25.0, tenth)
     return select(tenth - min_objects < TOLERANCE, min_objects, capped)
 
 
-def has_enough_rows(known_rows: Any, min_side: Any) -> Any:
-    """Whether as many rows are known as two sides need; rows are counted here, not weighed."""
+def has_enough_rows(known_rows: Whole, min_side: Real) -> Truth:
+    """Return whether the known rows suffice for two sides. Rows are counted, not weighed (C45Split)."""
     return 2.0 * min_side - known_rows <= TOLERANCE
 
 
-def gain(numerator: Any, known_weight: Any, weight: Any) -> Any:
-    """Information gain in bits per unit weight, unknown values discounted.
+# --------------------------------------------------------------------------------------------- cuts of an attribute
 
-    ``numerator`` is L(T) - sum L(class) + sum over sides (sum L(class) - L(side)), with L(x) = x ln x.
+
+def are_apart(low: Real, high: Real) -> Truth:
+    """Return whether a cut between two neighbouring values is admissible."""
+    return low + GAP < high
+
+
+def is_better_cut(numerator: Whole, best: Whole, tolerance: Whole, least: Whole) -> Truth:
+    """Return whether a cut replaces the best one of a scan; `best` is 0 where there is none yet.
+
+    All are numerators of gains (see `gain`) in fixed point; `tolerance` is that of `gain_tolerance`, and a numerator
+    below `least` counts as no gain.
+    """
+    return (numerator - best > tolerance) & (numerator >= least)
+
+
+def gain_tolerance(weight: Real, term_bits: int) -> Real:
+    """Return the tolerance of a gain as a difference of fixed-point numerators; compared with > as an integer."""
+    return np.floor(np.ldexp(TOLERANCE * LN2 * weight, term_bits))
+
+
+def least_numerator(weight: Real, known_weight: Real, term_bits: int) -> Real:
+    """Return the fixed-point numerator below which a gain counts as 0."""
+    return np.ceil(np.ldexp(TOLERANCE * LN2 * weight / known_weight, term_bits))
+
+
+def least_units(weight: Real, weight_bits: int) -> Real:
+    """Return the least fixed-point weight that counts as `weight` or more."""
+    return np.floor(np.ldexp(weight - TOLERANCE, weight_bits)) + 1.0
+
+
+def midpoint(low: Real, high: Real) -> Real:
+    """Return the number halfway between two values, the lower value where rounding would give the higher.
+
+    Where the sum overflows the halves are added. J48 then sends every row left and never ends (C45Split).
+    """
+    middle = (low + high) / 2.0
+    middle = select(np.isfinite(middle), middle, low / 2.0 + high / 2.0)
+    return select(middle == high, low, middle)
+
+
+# ------------------------------------------------------------------------------------------------ gain and gain ratio
+
+
+def gain(numerator: Real, known_weight: Real, weight: Real) -> Real:
+    """Return the information gain per unit weight, in bits, discounted for rows that do not know the value.
+
+    `numerator` is L(T) - sum L(class) + sum over sides (sum L(class) - L(side)) (InfoGainSplitCrit).
     """
     unknown_rate = (weight - known_weight) / weight
     total = (1.0 - unknown_rate) * (numerator / LN2)
     return select(np.abs(total) < TOLERANCE, 0.0, total / known_weight)
 
 
-def gain_tolerance(weight: Any, term_bits: Any) -> Any:
-    """The tolerance of a gain, as a difference of numerators in units of ``2**-term_bits`` (whole units matter)."""
-    return np.floor(np.ldexp(TOLERANCE * LN2 * weight, term_bits))
+def gain_ratio(gain_value: Real, split_numerator: Real, weight: Real) -> Real:
+    """Return the gain over the split information, 0 where that is 0 (GainRatioSplitCrit).
 
-
-def least_numerator(weight: Any, known_weight: Any, term_bits: Any) -> Any:
-    """Below this numerator, in units of ``2**-term_bits``, a gain counts as none."""
-    return np.ceil(np.ldexp(TOLERANCE * LN2 * weight / known_weight, term_bits))
-
-
-def least_units(weight: Any, weight_bits: Any) -> Any:
-    """The least number of units of ``2**-weight_bits`` that counts as ``weight`` or more."""
-    return np.floor(np.ldexp(weight - TOLERANCE, weight_bits)) + 1.0
-
-
-def mdl_cost(ln_cuts: Any, weight: Any) -> Any:
-    """The price of naming one of so many cuts, in bits per unit weight (C4.5 release 8)."""
-    return ln_cuts / LN2 / weight
-
-
-def gain_ratio(gain_value: Any, split_numerator: Any, weight: Any) -> Any:
-    """Gain over split information; ``split_numerator`` is L(W) - sum L(side) - L(W - T)."""
+    `split_numerator` is L(W) - sum L(side) - L(W - T).
+    """
     split_information = split_numerator / LN2
     trivial = np.abs(split_information) < TOLERANCE
     return select(trivial, 0.0, gain_value / (select(trivial, 1.0, split_information) / weight))
+
+
+def threshold_cost(n_cuts: Whole, weight: Real) -> Elementwise:
+    """Return the cost, in bits per unit weight, of naming one of `n_cuts` thresholds (C4.5 release 8)."""
+    return ln(real_weight(n_cuts, 0)) / LN2 / weight
+
+
+def gain_of_cut(
+    numerator: Whole, n_cuts: Whole, known: Whole, weight: Whole, scale: Scale, mdl_correction: bool
+) -> Real:
+    """Return the gain of a numeric test, in bits.
+
+    numerator: of the gain, in fixed point. n_cuts: the number of admissible cuts. known, weight: T and W in fixed
+    point.
+    mdl_correction: whether the cost of the threshold is subtracted.
+    """
+    real = real_weight(weight, scale.weight_bits)
+    value = gain(real_term(numerator, scale.term_bits), real_weight(known, scale.weight_bits), real)
+    if mdl_correction:
+        value = value - threshold_cost(n_cuts, real)
+    return value
+
+
+def ratio_of_cut(gain_value: Real, left: Whole, known: Whole, weight: Whole, scale: Scale) -> Real:
+    """Return the gain ratio of a numeric test; `left`, `known` and `weight` are fixed-point weights."""
+    split = term(weight, scale) - term(left, scale) - term(known - left, scale) - term(weight - known, scale)
+    return gain_ratio(gain_value, real_term(split, scale.term_bits), real_weight(weight, scale.weight_bits))
+
+
+def choose_attribute(
+    usable: Mask, gains: Reals, ratios: Reals, averaged: Mask, by_ratio: bool
+) -> Elementwise:
+    """Return the attribute to split on, -1 where none is eligible (C45ModelSelection).
+
+    The first axis of `usable`, `gains` and `ratios` is the attribute. The chosen attribute is the first one whose
+    score is not exceeded by more than the tolerance. The score is the gain, or with `by_ratio` the gain ratio of the
+    attributes that have at least the average gain of the `averaged` ones.
+    """
+    average: Real = -np.inf
+    if by_ratio:
+        total: Real = 0.0
+        number: Real = 0.0
+        for a in range(len(gains)):
+            counted = usable[a] & averaged[a]
+            total = total + select(counted, gains[a], 0.0)
+            number = number + counted
+        average = select(number > 0.0, total / np.maximum(number, 1.0), np.inf)
+    scores = ratios if by_ratio else gains
+    best: Real = 0.0
+    chosen: Whole = -1
+    for a in range(len(gains)):
+        eligible = usable[a] & (gains[a] >= average - AVERAGE_SLACK)
+        better = eligible & (scores[a] - best > TOLERANCE)
+        best = select(better, scores[a], best)
+        chosen = select(better, a, chosen)
+    return chosen
+
+
+# ---------------------------------------------------------------------------------------------------------- pruning
+
+
+def collapses(errors_below: Whole, errors_as_leaf: Whole, slack: float) -> Truth:
+    """Return whether a subtree saves too few training errors to be kept; all in fixed-point weight."""
+    return errors_below >= errors_as_leaf - slack
+
+
+def is_no_worse(errors: Whole, other: Whole, limit: int) -> Truth:
+    """Return whether a smaller tree is no worse than another one, from the estimated errors of both in fixed point.
+
+    `limit` is the least excess that counts; see `estimates.Estimation`.
+    """
+    return errors - other < limit
+
+
+def leaf_is_best(as_leaf: Whole, as_tree: Whole, as_branch: Whole, limit: int) -> Truth:
+    """Return whether a node becomes a leaf, from the estimated errors as leaf, as tree and as its heaviest branch.
+
+    A node that does not is replaced by its heaviest branch where that is no worse than the tree.
+    """
+    return is_no_worse(as_leaf, as_tree, limit) & is_no_worse(as_leaf, as_branch, limit)
+
+
+def is_not_lighter(weight: Real, other: Real) -> Truth:
+    """Return whether a branch replaces another one as the heaviest (Distribution.maxBag: the last one of equals)."""
+    return other - weight < TOLERANCE

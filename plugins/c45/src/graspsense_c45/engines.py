@@ -1,4 +1,4 @@
-"""Which engine does the work; the results are the same."""
+"""Which engine grows a tree and predicts; the results are the same."""
 
 from __future__ import annotations
 
@@ -9,23 +9,30 @@ from typing import get_args
 from graspsense_c45.options import Engine
 
 WORTH_COMPILING = 1_000_000
-"""From so many values on, ``auto`` takes the compiled engine where it is installed: importing it has paid by then."""
+"""Values (rows x attributes) from which "auto" chooses the compiled engine: importing it pays from there on."""
+
+_NEEDED = ("numba", "graspsense")
+"""numba compiles; graspsense keeps the compiled code on disk, under a fingerprint of the code."""
 
 
 def choose_fast(engine: Engine, n_values: int) -> bool:
-    """Whether to use the compiled engine.
+    """Return whether to use the compiled engine for so many values.
 
-    Raises ModuleNotFoundError: it is asked for by name and numba is not installed; ValueError: there is no such engine.
+    "auto" chooses the numpy engine where the compiled one is not installed; see `missing_for_fast`.
+
+    Raises ValueError for an unknown engine, and ModuleNotFoundError where "fast" is not installed.
     """
     if engine not in get_args(Engine):
         raise ValueError(f"engine is {engine!r}; allowed: {', '.join(get_args(Engine))}")
-    if engine == "fast" and not _is_installed():
+    if engine == "fast" and missing_for_fast():
         raise ModuleNotFoundError(
-            "engine='fast' needs numba, which is not installed; install graspsense-c45[fast] or use engine='numpy'"
+            f"engine='fast' needs {' and '.join(missing_for_fast())}, which is not installed; "
+            "install graspsense-c45[fast] or use engine='numpy'"
         )
-    return engine == "fast" or (engine == "auto" and n_values >= WORTH_COMPILING and _is_installed())
+    return engine == "fast" or (engine == "auto" and n_values >= WORTH_COMPILING and not missing_for_fast())
 
 
 @cache
-def _is_installed() -> bool:
-    return find_spec("numba") is not None
+def missing_for_fast() -> tuple[str, ...]:
+    """Return the packages that the compiled engine needs and that are not installed; then the numpy engine answers."""
+    return tuple(name for name in _NEEDED if find_spec(name) is None)

@@ -1,24 +1,25 @@
-"""How much each attribute tells."""
+"""How much each attribute contributes to a tree."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from graspsense_c45.arithmetic import LN2, x_ln_x_array
+from graspsense_c45.arithmetic import LN2, x_ln_x
+from graspsense_c45.arrays import Reals
 from graspsense_c45.tree import Tree
 
 
-def feature_importances(tree: Tree) -> NDArray[np.float64]:
-    """The share of each attribute in the information the tree gains on its training weight; they add up to 1.
+def feature_importances(tree: Tree) -> Reals:
+    """Return the fraction of each attribute in the information gain of the tree on its training weight.
 
-    All are 0 where the tree gains nothing.
+    The fractions add up to 1; all are 0 where the tree gains no information. The impurity of a node is its entropy.
     """
-    uncertainty = (x_ln_x_array(tree.weight) - x_ln_x_array(tree.weights).sum(axis=1)) / LN2
+    classes = np.asarray(x_ln_x(tree.class_weights)).sum(axis=1)
+    weighted_impurity = (x_ln_x(tree.weighted_n_node_samples) - classes) / LN2
     gained = np.zeros(len(tree.schema.attributes))
-    for node in range(tree.n_nodes):
+    for node in range(tree.node_count):
         if not tree.is_leaf(node):
-            sons = list(tree.sons(node))
-            gained[tree.tests.attribute[node]] += uncertainty[node] - uncertainty[sons].sum()
+            children = list(tree.children(node))
+            gained[tree.splits.feature[node]] += weighted_impurity[node] - weighted_impurity[children].sum()
     gained = np.maximum(gained, 0.0)
     return np.asarray(gained / gained.sum() if gained.any() else gained)

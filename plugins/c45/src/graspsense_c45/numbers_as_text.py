@@ -1,4 +1,4 @@
-"""Numbers for people, and numbers as Weka prints them."""
+"""Numbers as short text, and as Weka prints them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from decimal import ROUND_HALF_EVEN, Decimal
 
 
 def short(value: float, other: float | None = None) -> str:
-    """Three significant digits, or as many as it takes to tell the value from another one."""
+    """Return three significant digits, or as many as distinguish the value from another one."""
     for digits in range(3, 17):
         text = f"{value:.{digits}g}"
         if other is None or value == other or text != f"{other:.{digits}g}":
@@ -16,7 +16,7 @@ def short(value: float, other: float | None = None) -> str:
 
 
 def weka_number(value: float) -> str:
-    """As weka.core.Utils.doubleToString with 6 decimals (java.text.DecimalFormat): plain digits, no trailing zeros."""
+    """Return a number as weka.core.Utils.doubleToString with 6 decimals: plain digits, no trailing zeros."""
     exact = Decimal(repr(value))
     if exact.as_tuple().exponent < -6:  # type: ignore[operator]
         exact = exact.quantize(Decimal("0.000001"), ROUND_HALF_EVEN)
@@ -25,7 +25,7 @@ def weka_number(value: float) -> str:
 
 
 def weka_weight(weight: float) -> str:
-    """As weka.core.Utils.roundDouble with 2 decimals, printed by Double.toString: one decimal at least."""
+    """Return a weight as weka.core.Utils.roundDouble with 2 decimals and Double.toString: one decimal at least."""
     rounded = math.floor(weight * 100.0 + 0.5) / 100.0
     if rounded < 1e7:
         return repr(rounded)

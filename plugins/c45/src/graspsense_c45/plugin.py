@@ -1,7 +1,4 @@
-"""The classifier `c45` of graspsense: the only module here that knows graspsense.
-
-Light to import: the tree itself is imported when one is grown or asked.
-"""
+"""The classifier `c45` of graspsense. Importing it imports no numpy; the modules of the tree are imported on use."""
 
 from __future__ import annotations
 
@@ -46,7 +43,7 @@ def graspsense_classifiers() -> Iterable[ClassifierEntry]:
 
 @frozen(kw_only=True)
 class C45Config(ClassifierConfig):
-    """How the tree is grown and pruned; the defaults are J48's."""
+    """How the tree is grown and pruned. The defaults are those of J48."""
 
     criterion: Literal["gain_ratio", "info_gain"] = field(
         default="gain_ratio", validator=in_(("gain_ratio", "info_gain"))
@@ -56,23 +53,23 @@ class C45Config(ClassifierConfig):
     )
     """`pessimistic`: by error estimates; `reduced_error`: by errors on held-out trials."""
     confidence_factor: float = field(default=0.25, validator=and_(gt(0.0), lt(1.0)))
-    """Of the pessimistic estimate; smaller prunes more."""
+    """Of the pessimistic estimate; a smaller one prunes more."""
     min_objects: float = field(default=2.0, validator=ge(1.0))
     """Least number of trials in at least two branches."""
     mdl_correction: bool = True
-    """Whether a split on a number pays for the choice of its threshold."""
+    """Whether the gain of a numeric test is reduced by the cost of its threshold."""
     subtree_raising: bool = True
     rep_folds: int = field(default=3, validator=ge(2))
-    """`reduced_error` holds out one part in so many."""
+    """`reduced_error` holds out one of this number of parts."""
 
 
 class C45(Classifier[C45Config]):
-    """A C4.5 tree. A missing feature goes down all branches, in proportion to their training trials."""
+    """A C4.5 tree. Where a feature is missing the prediction is a mean over all branches, by their training trials."""
 
     _tree: Tree | None = None
 
     def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
-        """Grow and prune a tree; nothing in it is drawn at random. Raises ValueError."""
+        """Grow and prune a tree; the seed does not enter. Raises ValueError for data without a label."""
         from graspsense_c45.fitting import fit
         from graspsense_c45.options import Options
         from graspsense_c45.schema import Attribute, Schema
@@ -103,7 +100,7 @@ class C45(Classifier[C45Config]):
         return tuple(str(label) for label in self._fitted().schema.classes)
 
     def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
-        """Return the distribution at the leaf, or over the leaves where something is missing."""
+        """Return the distribution at the leaf; where a feature is missing, the mean over the leaves."""
         from graspsense_c45.prediction import distributions
 
         tree = self._fitted()
@@ -139,19 +136,23 @@ class C45(Classifier[C45Config]):
             attribute = tree.attribute(node)
             if attribute.is_nominal:
                 return branch(tree, node, slot)
-            threshold = in_words(float(tree.tests.threshold[node]), attribute.unit)
+            threshold = in_words(float(tree.splits.threshold[node]), attribute.unit)
             return f"{attribute.name} {'≤' if slot == 0 else '>'} {threshold}"
 
-        led = {son: (node, slot) for node in range(tree.n_nodes) for slot, son in enumerate(tree.sons(node))}
+        branch_to = {
+            child: (node, slot)
+            for node in range(tree.node_count)
+            for slot, child in enumerate(tree.children(node))
+        }
         return [
             TreeNode(
-                label=self.classes()[int(tree.majority[node])],
-                trials=float(tree.weight[node]),
-                wrong=float(tree.weight[node] - tree.weights[node].max()),
-                parent=led[node][0] if node in led else None,
-                branch=words(*led[node]) if node in led else "",
+                label=self.classes()[int(tree.majority_class[node])],
+                trials=float(tree.weighted_n_node_samples[node]),
+                wrong=float(tree.weighted_n_node_samples[node] - tree.class_weights[node].max()),
+                parent=branch_to[node][0] if node in branch_to else None,
+                branch=words(*branch_to[node]) if node in branch_to else "",
             )
-            for node in range(tree.n_nodes)
+            for node in range(tree.node_count)
         ]
 
     def to_json(self) -> dict[str, Any]:
@@ -161,7 +162,7 @@ class C45(Classifier[C45Config]):
         return to_document(self._fitted())
 
     def from_json(self, model: Mapping[str, Any]) -> None:
-        """Become the tree that `to_json` gave. Raises ValueError where it is none."""
+        """Load the tree that `to_json` returned. Raises ValueError where `model` is not a stored tree."""
         from graspsense_c45.stored import from_document
 
         self._tree = from_document(dict(model))

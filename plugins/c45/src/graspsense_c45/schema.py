@@ -1,13 +1,18 @@
-"""What the columns and the classes of a tree are called."""
+"""The names of the attributes and classes of a tree."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from attrs import frozen
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Attribute:
-    """One column: numeric (``values`` is None; ``unit`` may be empty) or nominal with its declared values in order."""
+    """A column of the table.
+
+    name: its name.
+    unit: the unit of a numeric attribute; may be empty.
+    values: the declared values of a nominal attribute, in order; None for a numeric one.
+    """
 
     name: str
     unit: str = ""
@@ -15,13 +20,13 @@ class Attribute:
 
     @property
     def is_nominal(self) -> bool:
-        """Whether the column holds one of a few declared values."""
+        """Whether the attribute has a few declared values instead of numbers."""
         return self.values is not None
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Schema:
-    """The columns in order, and the declared classes in order, absent ones included.
+    """The attributes and the declared classes, both in order; a declared class need not occur.
 
     A class label is a string, an integer, a float or a boolean, and keeps its type through JSON.
     """

@@ -1,40 +1,42 @@
-"""The rows a tree is grown from, checked."""
+"""The rows that a tree is grown on, checked."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from attrs import frozen
+from numpy.typing import ArrayLike
 
+from graspsense_c45.arrays import Indices, Reals
 from graspsense_c45.schema import Schema
 
 MISSING_CLASS = -1
+"""The label of a row without a class."""
 
 
-@dataclass(frozen=True, slots=True)
+@frozen(eq=False)
 class Table:
-    """Rows of attribute values, class indices and weights.
+    """Rows of attribute values, class indices and weights. Made by `make_table`, which checks them.
 
-    values: float64, rows x attributes; NaN is missing; a nominal column holds the index of its value.
-    labels: int64 class indices; -1 is a missing class (the row is not learned from, but its values are seen).
-    weights: float64, finite, not negative.
+    values: rows x attributes, in the unit of the attribute; NaN is missing; a nominal column holds indices of values.
+    labels: class indices; -1 is a missing class. The tree does not learn from such a row, but its values are candidates
+        for thresholds.
+    weights: one a row, finite and not negative.
     """
 
     schema: Schema
-    values: NDArray[np.float64]
-    labels: NDArray[np.int64]
-    weights: NDArray[np.float64]
+    values: Reals
+    labels: Indices
+    weights: Reals
 
 
 def make_table(
     schema: Schema, values: ArrayLike, labels: ArrayLike, weights: ArrayLike | None = None
 ) -> Table:
-    """A checked table.
+    """Return a table; every row has weight 1 by default.
 
-    Raises ValueError: shapes that do not fit, infinite values, a nominal column holding anything but indices of its
-    declared values, labels outside the declared classes, weights that are negative, not finite or all zero, no row.
+    Raises ValueError for shapes that do not fit, infinite values, nominal columns that hold anything but indices of
+    declared values, labels outside the declared classes, weights that are negative, not finite or all 0, and where no
+    row has a class.
     """
     x = np.asarray(values, dtype=np.float64)
     y = np.asarray(labels, dtype=np.int64)
@@ -58,9 +60,9 @@ def make_table(
     return Table(schema, x, y, w)
 
 
-def check_values(schema: Schema, x: NDArray[Any]) -> None:
-    """Raise ValueError where a value is infinite or a nominal column holds no index of a declared value."""
-    # One pass for the usual case: a sum is finite unless something in it is not (or it overflows).
+def check_values(schema: Schema, x: Reals) -> None:
+    """Raise ValueError where a value is infinite or not an index of a declared value in a nominal column."""
+    # A sum is finite unless one of its terms is not, or it overflows: the usual case takes one pass.
     with np.errstate(over="ignore", invalid="ignore"):
         suspicious = not np.isfinite(x.sum())
     if suspicious and np.isinf(x).any():

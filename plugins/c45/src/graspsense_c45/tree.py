@@ -1,43 +1,46 @@
-"""A finished tree: a value."""
+"""A fitted tree, as a value."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from attrs import frozen
 
-from graspsense_c45.arithmetic import TOLERANCE, Array
-from graspsense_c45.branches import LEAF, Branches, Tests
+from graspsense_c45.arithmetic import TOLERANCE, first_maximum
+from graspsense_c45.arrays import AnyArray, Indices, Reals
 from graspsense_c45.schema import Attribute, Schema
+from graspsense_c45.splits import LEAF, ROOT, GrowingTree, Splits
 
 
-@dataclass(frozen=True, eq=False)
+@frozen(eq=False, repr=False, slots=False)
 class Tree:
-    """A tree that predicts; it does not change, and equal trees compare equal.
+    """A tree that predicts. It does not change, and trees that are equal to the bit compare equal.
 
-    schema: columns and classes. tests: the nodes, numbered breadth first, the sons of a node one after the other.
-    weights: float64, nodes x classes, the training weight that came to each node.
-    laplace: whether distributions are smoothed at the leaves.
+    schema: attributes and classes.
+    splits: how the nodes split. Nodes are numbered breadth first.
+    class_weights: nodes x classes, the training weight of each class at each node.
+    laplace: whether probabilities are smoothed at the leaves.
     """
 
     schema: Schema
-    tests: Tests
-    weights: NDArray[np.float64]
+    splits: Splits
+    class_weights: Reals
     laplace: bool = False
 
-    def __post_init__(self) -> None:
+    def __attrs_post_init__(self) -> None:
         """Make the arrays read-only."""
-        for array in (*self._columns(), self.weights):
+        for array in (*self._columns(), self.class_weights):
             array.flags.writeable = False
 
     def __eq__(self, other: object) -> bool:
-        """Equal to the bit."""
+        """Return whether the other tree is the same to the bit."""
         if not isinstance(other, Tree):
             return NotImplemented
-        pairs = zip((*self._columns(), self.weights), (*other._columns(), other.weights), strict=True)
+        pairs = zip(
+            (*self._columns(), self.class_weights), (*other._columns(), other.class_weights), strict=True
+        )
         return (
             self.schema == other.schema
             and self.laplace == other.laplace
@@ -47,107 +50,115 @@ class Tree:
         )
 
     def __hash__(self) -> int:
-        """Equal trees have equal hashes."""
-        return hash((self.schema, self.laplace, self.tests.attribute.tobytes(), self.weights.tobytes()))
+        """Return the same number for equal trees."""
+        return hash((self.schema, self.laplace, self.splits.feature.tobytes(), self.class_weights.tobytes()))
 
     def __repr__(self) -> str:
-        """Size and classes in one line."""
-        return f"<Tree: {self.n_leaves} leaves, {self.n_nodes} nodes, {len(self.schema.classes)} classes>"
+        """Return the size and the number of classes."""
+        return f"<Tree: {self.n_leaves} leaves, {self.node_count} nodes, {len(self.schema.classes)} classes>"
 
     @property
-    def n_nodes(self) -> int:
-        """Number of nodes, leaves included (J48's size of the tree)."""
-        return len(self.tests.attribute)
+    def node_count(self) -> int:
+        """Number of nodes, leaves included: the size of the tree in J48's report."""
+        return len(self.splits.feature)
 
     @property
     def n_leaves(self) -> int:
         """Number of leaves."""
-        return int(np.count_nonzero(self.tests.attribute == LEAF))
+        return int(np.count_nonzero(self.splits.feature == LEAF))
 
     @cached_property
-    def depth(self) -> int:
-        """Tests on the longest path."""
-        return len(self.tests.levels(np.zeros(1, dtype=np.int64))) - 1
+    def max_depth(self) -> int:
+        """Number of tests on the longest path."""
+        return len(self.splits.levels(ROOT)) - 1
 
     @cached_property
-    def weight(self) -> NDArray[np.float64]:
+    def weighted_n_node_samples(self) -> Reals:
         """Training weight at each node."""
-        return np.asarray(self.weights.sum(axis=1))
+        return np.asarray(self.class_weights.sum(axis=1))
 
     @cached_property
-    def majority(self) -> NDArray[np.int64]:
-        """The class of each node: the first one not beaten by more than the tolerance."""
-        return first_maximum(self.weights)
+    def majority_class(self) -> Indices:
+        """The class of each node: the first one that no other exceeds by more than the tolerance."""
+        return largest_class(self.class_weights)
 
     @cached_property
-    def parent(self) -> NDArray[np.int64]:
+    def parent(self) -> Indices:
         """The parent of each node, -1 at the root."""
-        inner = np.flatnonzero(self.tests.attribute != LEAF)
-        parent = np.full(self.n_nodes, -1)
-        parent[self.tests.sons(inner)] = np.repeat(inner, self.tests.n_sons[inner])
+        inner = np.flatnonzero(self.splits.feature != LEAF)
+        parent = np.full(self.node_count, -1)
+        parent[self.splits.children(inner)] = np.repeat(inner, self.splits.n_children[inner])
         return parent
 
     def attribute(self, node: int) -> Attribute:
-        """The attribute an inner node tests."""
-        return self.schema.attributes[int(self.tests.attribute[node])]
+        """Return the attribute that an inner node tests."""
+        return self.schema.attributes[int(self.splits.feature[node])]
 
-    def sons(self, node: int) -> range:
-        """The sons of a node; none at a leaf."""
-        first = int(self.tests.first_son[node])
-        return range(first, first + int(self.tests.n_sons[node]))
+    def children(self, node: int) -> range:
+        """Return the children of a node; a leaf has none."""
+        first = int(self.splits.first_child[node])
+        return range(first, first + int(self.splits.n_children[node]))
 
     def is_leaf(self, node: int) -> bool:
-        """Whether the node tests nothing."""
-        return bool(self.tests.attribute[node] == LEAF)
+        """Return whether the node is a leaf."""
+        return bool(self.splits.feature[node] == LEAF)
 
     def to_dict(self) -> dict[str, Any]:
-        """Nested nodes: n, dist, class, and att, thr, bags, sons at inner ones.
+        """Return the nodes as nested dictionaries.
 
-        thr is the threshold of a numeric test; at a nominal one it is None (one son a value) or the index of the value
-        that goes to the first son. class is the index of the majority class, bags the weight of each son.
+        Every node has ``weighted_n_node_samples``, ``class_weights`` and ``class`` (the index of its majority class).
+        An inner node also has ``feature``, ``threshold``, ``child_weights`` and ``children``. ``threshold`` is a number
+        in the unit of the attribute; at a nominal test it is None where each value has a child, else the index of the
+        value that goes to the first child.
         """
         nodes: list[dict[str, Any]] = [
-            {"n": n, "dist": dist, "class": majority}
-            for n, dist, majority in zip(
-                self.weight.tolist(), self.weights.tolist(), self.majority.tolist(), strict=True
+            {"weighted_n_node_samples": weight, "class_weights": weights, "class": majority}
+            for weight, weights, majority in zip(
+                self.weighted_n_node_samples.tolist(),
+                self.class_weights.tolist(),
+                self.majority_class.tolist(),
+                strict=True,
             )
         ]
-        for i in np.flatnonzero(self.tests.attribute != LEAF).tolist():
-            threshold: float | int | None = float(self.tests.threshold[i])
-            if self.attribute(i).is_nominal:
-                value = int(self.tests.value[i])
-                threshold = None if value < 0 else value
-            sons = [nodes[son] for son in self.sons(i)]
-            nodes[i] |= {
-                "att": int(self.tests.attribute[i]),
-                "thr": threshold,
-                "bags": [son["n"] for son in sons],
-                "sons": sons,
+        for node in np.flatnonzero(self.splits.feature != LEAF).tolist():
+            threshold: float | int | None = float(self.splits.threshold[node])
+            if self.attribute(node).is_nominal:
+                category = int(self.splits.category[node])
+                threshold = None if category < 0 else category
+            children = [nodes[child] for child in self.children(node)]
+            nodes[node] |= {
+                "feature": int(self.splits.feature[node]),
+                "threshold": threshold,
+                "child_weights": [child["weighted_n_node_samples"] for child in children],
+                "children": children,
             }
         return nodes[0]
 
-    def _columns(self) -> tuple[NDArray[Any], ...]:
-        tests = self.tests
-        return tests.attribute, tests.threshold, tests.value, tests.first_son, tests.n_sons
+    def _columns(self) -> tuple[AnyArray, ...]:
+        splits = self.splits
+        return splits.feature, splits.threshold, splits.category, splits.first_child, splits.n_children
 
 
-def first_maximum(rows: Array) -> NDArray[np.int64]:
-    """The first column of each row that no later one beats by more than the tolerance (scanning as J48 does)."""
-    best = np.full(len(rows), -1.0)
-    chosen = np.zeros(len(rows), dtype=np.int64)
-    for k in range(rows.shape[1]):
-        better = rows[:, k] - best > TOLERANCE
-        best = np.where(better, rows[:, k], best)
-        chosen = np.where(better, k, chosen)
-    return chosen
+def largest_class(rows: Reals) -> Indices:
+    """Return the first class of each row that no other exceeds by more than the tolerance, scanning as J48 does."""
+    return np.asarray(first_maximum(rows.T, -1.0, TOLERANCE), dtype=np.int64)
 
 
-def finish(branches: Branches, weight_bits: int, schema: Schema, laplace: bool) -> Tree:
-    """The tree value of what was grown and pruned; nodes that are no longer reached are gone."""
-    order = np.concatenate(branches.levels(np.zeros(1, dtype=np.int64)))
-    n_sons = branches.n_sons[order]
-    first_son = np.where(n_sons > 0, 1 + np.cumsum(n_sons) - n_sons, 0).astype(np.int32)
-    tests = Tests(
-        branches.attribute[order], branches.threshold[order], branches.value[order], first_son, n_sons
+def finish(grown: GrowingTree, weight_bits: int, schema: Schema, laplace: bool) -> Tree:
+    """Return the tree that was grown and pruned, without the nodes that are no longer reached."""
+    order = np.concatenate(grown.levels(ROOT))
+    n_children = grown.n_children[order]
+    splits = Splits(
+        grown.feature[order],
+        grown.threshold[order],
+        grown.category[order],
+        first_children(n_children),
+        n_children,
     )
-    return Tree(schema, tests, np.ldexp(branches.counts[order].astype(np.float64), -weight_bits), laplace)
+    return Tree(schema, splits, np.ldexp(grown.counts[order].astype(np.float64), -weight_bits), laplace)
+
+
+def first_children(n_children: AnyArray) -> AnyArray:
+    """Return the first child of each node of a tree that is numbered breadth first; 0 at leaves."""
+    first = 1 + np.cumsum(n_children) - n_children
+    return np.where(n_children > 0, first, 0).astype(np.int32)

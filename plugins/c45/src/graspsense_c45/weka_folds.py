@@ -1,4 +1,4 @@
-"""Weka's own folds and orders, so that a cross validation can be compared row by row.
+"""The folds and orders of Weka, so that a cross validation can be compared row by row.
 
 Source: java.util.Random (Java SE API documentation: a 48-bit linear congruential generator);
 weka.core.Instances 3.9.6: randomize, stratify, trainCV, testCV.
@@ -10,7 +10,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from graspsense_c45.arrays import Indices
 
 _MULTIPLIER = 0x5DEECE66D
 _MASK = (1 << 48) - 1
@@ -23,7 +25,7 @@ class JavaRandom:
         self._state = (seed ^ _MULTIPLIER) & _MASK
 
     def next_int(self, bound: int) -> int:
-        """A number in 0..bound-1, as nextInt(bound) gives it."""
+        """Return an integer in 0..bound-1, as nextInt(bound). Raises ValueError for a bound outside 1..2147483647."""
         if not 0 < bound <= 2**31 - 1:
             raise ValueError(f"bound is {bound}; it must be in 1..2147483647")
         if bound & (bound - 1) == 0:
@@ -35,7 +37,7 @@ class JavaRandom:
                 return value
 
     def shuffle(self, order: list[int]) -> None:
-        """Weka's randomize: exchange from the end with a place not behind it."""
+        """Shuffle in place, as Weka's randomize: from the end, each place is exchanged with one at or before it."""
         for last in range(len(order) - 1, 0, -1):
             other = self.next_int(last + 1)
             order[last], order[other] = order[other], order[last]
@@ -46,14 +48,14 @@ class JavaRandom:
 
 
 class Fold(NamedTuple):
-    """One fold: the training rows in the order Weka trains on them, and the test rows in order."""
+    """A fold: the training rows in the order in which Weka trains on them, and the test rows in order."""
 
-    train: NDArray[np.int64]
-    test: NDArray[np.int64]
+    train: Indices
+    test: Indices
 
 
 def stratify(labels: Sequence[int], n_folds: int) -> list[int]:
-    """Weka's stratify: an order of the rows whose contiguous blocks have the classes in proportion."""
+    """Return an order of the rows whose contiguous blocks hold the classes in proportion (Weka's stratify)."""
     order = list(range(len(labels)))
     begin = 1
     while begin < len(order):
@@ -67,14 +69,15 @@ def stratify(labels: Sequence[int], n_folds: int) -> list[int]:
 
 
 def test_block(n_rows: int, n_folds: int, fold: int) -> range:
-    """The places of a fold's test rows: contiguous, the first folds one longer where it does not divide."""
+    """Return the places of the test rows of a fold: contiguous; the first folds are longer by one where needed."""
     size, rest = divmod(n_rows, n_folds)
     start = fold * size + min(fold, rest)
     return range(start, start + size + (1 if fold < rest else 0))
 
 
-def hold_out(labels: ArrayLike, n_folds: int) -> NDArray[np.int64]:
-    """The rows that J48 -R -N n_folds holds out: the last stratified fold; the order of the rows decides, no seed.
+def hold_out(labels: ArrayLike, n_folds: int) -> Indices:
+    """Return the rows that J48 -R -N n_folds holds out: the last stratified fold. No seed enters, only the order of
+    rows.
 
     Raises ValueError where there are fewer rows than folds.
     """
@@ -85,9 +88,11 @@ def hold_out(labels: ArrayLike, n_folds: int) -> NDArray[np.int64]:
 
 
 def stratified_folds(labels: ArrayLike, n_folds: int = 10, seed: int = 1) -> list[Fold]:
-    """The folds of Weka's Evaluation.crossValidateModel: shuffle, stratify, and shuffle each training set once more.
+    """Return the folds of Weka's Evaluation.crossValidateModel: shuffle, stratify, shuffle each training set.
 
-    labels: one hashable label a row. Raises ValueError where there are fewer rows than folds.
+    labels: a hashable label for each row.
+
+    Raises ValueError where there are fewer rows than folds.
     """
     given = _cuttable(labels, n_folds)
     random = JavaRandom(seed)

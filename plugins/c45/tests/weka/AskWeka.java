@@ -1,6 +1,6 @@
 // Answers of Weka's J48 as JSON lines. Run: java -cp weka.jar AskWeka.java REQUESTS
 // REQUESTS: one request a line, tab separated: an ARFF file, then J48 options separated by spaces.
-// Each answer: the tree (n, dist, class, att, thr, bags, sons), and class and distribution for every row of the file.
+// Each answer: the tree (n, dist, class, att, thr, bags, children), and class and distribution for every row of the file.
 
 import java.io.BufferedReader;
 import java.io.FileReader;
@@ -42,7 +42,7 @@ public class AskWeka {
       for (int i = 0; i < distribution.numBags(); i++) {
         out.append(i > 0 ? "," : "").append(number(distribution.perBag(i)));
       }
-      out.append("],\"sons\":[");
+      out.append("],\"children\":[");
       for (int i = 0; i < tree.getSons().length; i++) {
         out.append(i > 0 ? "," : "");
         node(tree.getSons()[i], data, out);

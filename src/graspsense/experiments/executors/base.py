@@ -1,30 +1,30 @@
-"""The interface of executors."""
+"""What an executor is."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from graspsense.experiments.task import Task, TaskResult
+from graspsense.experiments.task import Done, Task
 
 
 class ExecutorLost(Exception):
-    """Nothing is left that could run tasks: the scheduler was stopped, or no worker starts."""
+    """All that could do tasks is gone: a scheduler that was stopped, workers that do not start."""
 
 
 class Executor(Protocol):
-    """Runs tasks and yields the result of each as soon as it is available, in any order.
+    """Does tasks and yields what came of each as soon as it is there, in any order.
 
-    A task that fails yields a `TaskResult` with the reason. Tasks without a result when the iterator ends were not run.
-    Raises ExecutorLost if the run cannot continue.
+    A task that cannot be done is a `Done` with its reason; only what ends the whole run is raised. Whatever was not
+    yielded when the iterator ends or is closed was not done. Raises ExecutorLost.
     """
 
     @property
     def workers(self) -> int:
-        """Number of tasks that run at the same time."""
+        """How many tasks it does at once."""
 
-    def run(self, tasks: Sequence[Task]) -> Iterator[TaskResult]:
-        """Run the tasks."""
+    def run(self, tasks: Sequence[Task]) -> Iterator[Done]:
+        """Do them."""
 
     def close(self) -> None:
-        """Stop the workers, whatever they are doing."""
+        """Let go of the workers, whatever they are doing."""

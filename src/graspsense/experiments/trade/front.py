@@ -1,4 +1,4 @@
-"""The Pareto front of cost and rate."""
+"""Which of several cases nothing beats: none is both cheaper and better."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Sequence
 
 
 def front(costs: Sequence[float], rates: Sequence[float], *, cheap_is_low: bool = True) -> list[bool]:
-    """Return whether each case is on the Pareto front.
+    """Return for each case whether it lies on the Pareto front.
 
-    A case is not on the front if another one is at least as cheap and at least as good, and better in one of the two.
+    A case is off it where another one is at least as cheap and at least as good, and better in one of the two.
     """
     if not cheap_is_low:
-        costs = [-cost for cost in costs]
-    on_front = []
+        costs = [-one for one in costs]
+    found = []
     for cost, rate in zip(costs, rates, strict=True):
         beaten = any(
             other <= cost and better >= rate and (other < cost or better > rate)
             for other, better in zip(costs, rates, strict=True)
         )
-        on_front.append(not beaten)
-    return on_front
+        found.append(not beaten)
+    return found

@@ -1,0 +1,88 @@
+"""The compiled engine as a builder of trees."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from graspsense_c45.criteria import COLLAPSE_SLACK
+from graspsense_c45.depthfirst import compiled
+from graspsense_c45.depthfirst.growing import Columns, Rules
+from graspsense_c45.depthfirst.nodes import Nodes, Rows
+from graspsense_c45.depthfirst.pruning import Pruning
+from graspsense_c45.estimates import prepare_estimation
+from graspsense_c45.splits import ALL_VALUES, LEAF, GrowingTree
+from graspsense_c45.training_set import TrainingSet
+
+
+class DepthFirstTreeBuilder:
+    """Grows a tree when it is made; see `fitting.TreeBuilder`. It builds the trees that `can_build` accepts."""
+
+    def __init__(self, training: TrainingSet) -> None:
+        self._training = training
+        columns = _columns(training)
+        self._nodes = compiled.grow(columns, training.averaged, _rules(training))
+        self._order = columns.rows[0].copy()
+        self.tree = _as_tree(self._nodes)
+
+    @staticmethod
+    def can_build(training: TrainingSet) -> bool:
+        """Return whether all attributes are numeric and no value is missing."""
+        return training.complete and not training.value_counts.any()
+
+    def collapse(self) -> None:
+        """Make leaves of subtrees that hardly save training errors."""
+        slack = float(np.ldexp(COLLAPSE_SLACK, self._training.scale.weight_bits))
+        compiled.collapse(self._nodes, self._training.weight_margin, slack)
+        self._mark_leaves()
+
+    def prune_pessimistic(self) -> None:
+        """Prune by estimated errors."""
+        training, options = self._training, self._training.options
+        weight_bits = training.scale.weight_bits
+        estimation = prepare_estimation(options.confidence_factor, training.total_weight, weight_bits)
+        rows = Rows(
+            self._order, np.ascontiguousarray(training.values), training.small_labels(), training.weights
+        )
+        constants = Pruning(estimation, training.weight_margin, options.subtree_raising)
+        compiled.prune(self._nodes, rows, constants)
+        self._mark_leaves()
+
+    def _mark_leaves(self) -> None:
+        self.tree.n_children[self.tree.feature == LEAF] = 0
+
+
+def _columns(training: TrainingSet) -> Columns:
+    n_rows, n_attributes = training.values.shape
+    rows = np.empty((n_attributes, n_rows), dtype=np.uint32)
+    values = np.empty((n_attributes, n_rows))
+    for a in range(n_attributes):
+        column = np.ascontiguousarray(training.values[:, a])
+        rows[a] = np.argsort(column)
+        values[a] = column[rows[a]]
+    terms = training.terms(np.arange(n_rows + 1)) if training.unit else np.zeros(1, dtype=np.int64)
+    return Columns(rows, values, training.small_labels(), training.weights, terms, np.diff(terms))
+
+
+def _rules(training: TrainingSet) -> Rules:
+    options = training.options
+    return Rules(
+        n_classes=training.n_classes,
+        min_objects=float(options.min_objects),
+        scale=training.scale,
+        weight_margin=training.weight_margin,
+        mdl_correction=options.mdl_correction,
+        by_ratio=options.criterion == "gain_ratio",
+        unit=training.unit,
+    )
+
+
+def _as_tree(nodes: Nodes) -> GrowingTree:
+    """Return the nodes as a tree that shares their arrays."""
+    return GrowingTree(
+        feature=nodes.feature,
+        threshold=nodes.threshold,
+        category=np.full(len(nodes.feature), ALL_VALUES, dtype=np.int32),
+        first_child=nodes.first_child,
+        n_children=np.where(nodes.feature == LEAF, 0, 2).astype(np.int32),
+        counts=nodes.counts,
+    )

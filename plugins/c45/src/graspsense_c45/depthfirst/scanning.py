@@ -1,0 +1,114 @@
+"""The best cut of one attribute at one node, by a scan over its sorted rows.
+
+`levelwise.best_cuts` finds the same cut for many nodes without scanning; `tests/test_engines.py` holds the two equal.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from graspsense_c45.arithmetic import Scale, term
+from graspsense_c45.arrays import FixedPoint, Integer, Reals, SmallLabels
+from graspsense_c45.criteria import are_apart, is_better_cut
+from graspsense_c45.depthfirst.nodes import RowIndices
+
+
+class Run(NamedTuple):
+    """The rows of a node, sorted by the values of an attribute: entries `begin` to `stop` (excluded) of the arrays."""
+
+    rows: RowIndices
+    values: Reals
+    labels: SmallLabels
+    begin: Integer
+    stop: Integer
+
+
+class Limits(NamedTuple):
+    """What a cut must reach at a node, in fixed point; see `criteria`.
+
+    least_weight: on each side. tolerance, least_numerator: of the numerator of the gain.
+    """
+
+    least_weight: Integer
+    tolerance: Integer
+    least_numerator: Integer
+
+
+class Cut(NamedTuple):
+    """The best cut of a run.
+
+    numerator: of the gain, in fixed point. place: the cut is behind this entry; -1 where there is no admissible cut.
+    left: the fixed-point weight up to the cut. n_cuts: the number of admissible cuts.
+    """
+
+    numerator: Integer
+    place: Integer
+    left: Integer
+    n_cuts: Integer
+
+
+def scan_unit(
+    run: Run, counts: FixedPoint, passed: FixedPoint, terms: FixedPoint, steps: FixedPoint, limits: Limits
+) -> Cut:
+    """Return the best cut of a node whose rows all weigh 1.
+
+    counts: rows of each class at the node. passed: zeros, one a class. terms: ``x ln x`` of 0, 1, ... rows, in fixed
+    point; steps: their differences.
+    """
+    rows, values, labels, begin, stop = run
+    total = stop - begin
+    # The numerator without the terms of the sides: L(T), and what the rows that were passed changed.
+    inside = terms[total]
+    best: Integer = np.int64(0)
+    cut_left: Integer = np.int64(0)
+    place: Integer = np.int64(-1)
+    n_cuts = 0
+    # No cut is admissible in the last rows, which one side needs.
+    for i in range(begin, stop - limits.least_weight):
+        k = labels[rows[i]]
+        before = passed[k]
+        passed[k] = before + 1
+        inside += steps[before] - steps[counts[k] - before - 1]
+        left = i + 1 - begin
+        if left < limits.least_weight or not are_apart(values[i], values[i + 1]):
+            continue
+        n_cuts += 1
+        numerator = inside - terms[left] - terms[total - left]
+        if is_better_cut(numerator, best, limits.tolerance, limits.least_numerator):
+            best, place, cut_left = numerator, i, left
+    return Cut(best, place, cut_left, n_cuts)
+
+
+def scan_weighted(
+    run: Run, counts: FixedPoint, passed: FixedPoint, weights: FixedPoint, scale: Scale, limits: Limits
+) -> Cut:
+    """Return the best cut of a node whose rows have any fixed-point weights; otherwise as `scan_unit`."""
+    rows, values, labels, begin, stop = run
+    total = counts.sum()
+    inside = term(total, scale)
+    best: Integer = np.int64(0)
+    cut_left: Integer = np.int64(0)
+    place: Integer = np.int64(-1)
+    n_cuts = 0
+    left = np.int64(0)
+    for i in range(begin, stop - 1):
+        row = rows[i]
+        k, weight = labels[row], weights[row]
+        before = passed[k]
+        rest = counts[k] - before
+        passed[k] = before + weight
+        left += weight
+        right = total - left
+        inside += term(before + weight, scale) - term(before, scale)
+        inside += term(rest - weight, scale) - term(rest, scale)
+        if left < limits.least_weight or right < limits.least_weight:
+            continue
+        if not are_apart(values[i], values[i + 1]):
+            continue
+        n_cuts += 1
+        numerator = inside - term(left, scale) - term(right, scale)
+        if is_better_cut(numerator, best, limits.tolerance, limits.least_numerator):
+            best, place, cut_left = numerator, i, left
+    return Cut(best, place, cut_left, n_cuts)

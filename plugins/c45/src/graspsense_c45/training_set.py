@@ -1,0 +1,142 @@
+"""The rows that a tree is grown on, in fixed point."""
+
+from __future__ import annotations
+
+import numpy as np
+from attrs import frozen
+
+from graspsense_c45 import criteria
+from graspsense_c45.arithmetic import (
+    TERM_BITS,
+    TOLERANCE,
+    WEIGHT_BITS,
+    Scale,
+    bits_below,
+    first_maximum,
+    real_term,
+    real_weight,
+    term,
+    x_ln_x,
+)
+from graspsense_c45.arrays import AnyArray, FixedPoint, Indices, Mask, Real, Reals, SmallLabels
+from graspsense_c45.options import Options
+from graspsense_c45.table import MISSING_CLASS, Table
+
+
+@frozen(eq=False)
+class TrainingSet:
+    """The rows with a class, and the constants that follow from them.
+
+    values: rows x attributes; NaN is missing. labels: the class of each row. weights: in units of ``2**-weight_bits``.
+    n_classes: declared classes. value_counts: declared values of a nominal attribute, 0 for a numeric one.
+    averaged: whether an attribute enters the average gain.
+    scale: the units of weights and terms. unit: whether every row weighs 1 and no value is missing.
+    complete: whether no value is missing.
+    """
+
+    values: Reals
+    labels: Indices
+    weights: FixedPoint
+    n_classes: int
+    value_counts: Indices
+    averaged: Mask
+    scale: Scale
+    unit: bool
+    complete: bool
+    options: Options
+
+    def terms(self, weights: AnyArray) -> FixedPoint:
+        """Return ``x ln x`` of fixed-point weights, as fixed-point terms."""
+        return np.asarray(term(weights, self.scale))
+
+    def real_weights(self, weights: AnyArray) -> Reals:
+        """Return fixed-point weights as numbers of rows (exact)."""
+        return np.asarray(real_weight(weights, self.scale.weight_bits))
+
+    def real_terms(self, terms: AnyArray) -> Reals:
+        """Return fixed-point terms as numbers."""
+        return np.asarray(real_term(terms, self.scale.term_bits))
+
+    @property
+    def total_weight(self) -> float:
+        """The weight of all rows, in rows."""
+        return float(self.real_weights(self.weights.sum()))
+
+    @property
+    def weight_margin(self) -> int:
+        """The largest difference of two fixed-point weights that are equal within the tolerance."""
+        return int(np.floor(np.ldexp(TOLERANCE, self.scale.weight_bits)))
+
+    def gain_tolerance(self, weight: Real) -> FixedPoint:
+        """Return the tolerance of a gain, as a difference of numerators at nodes of this weight (in rows)."""
+        return np.asarray(criteria.gain_tolerance(weight, self.scale.term_bits), dtype=np.int64)
+
+    def least_numerator(self, weight: Real, known_weight: Real) -> FixedPoint:
+        """Return the numerator below which a gain counts as 0; both weights in rows."""
+        return np.asarray(
+            criteria.least_numerator(weight, known_weight, self.scale.term_bits), dtype=np.int64
+        )
+
+    def least_units(self, weight: Real) -> FixedPoint:
+        """Return the least fixed-point weight that counts as `weight` rows or more."""
+        return np.asarray(criteria.least_units(weight, self.scale.weight_bits), dtype=np.int64)
+
+    def small_labels(self) -> SmallLabels:
+        """Return the labels in the smallest type that holds them."""
+        return self.labels.astype(np.min_scalar_type(self.n_classes))
+
+    def majority_class(self, counts: FixedPoint) -> Indices:
+        """Return the first class that no other exceeds by more than the margin, for each row of counts."""
+        if self.scale.weight_bits == 0:
+            # The margin is 0, and this is several times faster than the scan.
+            return np.asarray(np.argmax(counts, axis=1))
+        return np.asarray(first_maximum(counts.T, 0, self.weight_margin), dtype=np.int64)
+
+    def training_errors(self, counts: FixedPoint) -> FixedPoint:
+        """Return the fixed-point weight outside the majority class, for each row of counts."""
+        majority = self.majority_class(counts)
+        errors: FixedPoint = counts.sum(axis=1) - counts[np.arange(len(counts)), majority]
+        return errors
+
+
+def make_training_set(table: Table, rows: Indices | None, options: Options) -> TrainingSet:
+    """Return these rows of a table (all by default) for growing a tree; rows without a class are left out."""
+    chosen = table.labels != MISSING_CLASS
+    if rows is not None:
+        mask = np.zeros(chosen.shape, dtype=bool)
+        mask[rows] = True
+        chosen &= mask
+    whole = bool(chosen.all())
+    values = table.values if whole else table.values[chosen]
+    labels = table.labels if whole else table.labels[chosen]
+    weights = table.weights if whole else table.weights[chosen]
+    unit_weights = bool(np.all(weights == 1.0))
+    complete = not bool(np.isnan(values).any())
+    total = float(weights.sum())
+    whole_numbers = total < 2.0**WEIGHT_BITS and (unit_weights or bool(np.all(weights == np.floor(weights))))
+    weight_bits = 0 if complete and whole_numbers else bits_below(total, WEIGHT_BITS)
+    value_counts = np.array(
+        [0 if attribute.values is None else len(attribute.values) for attribute in table.schema.attributes],
+        dtype=np.int64,
+    )
+    return TrainingSet(
+        values=values,
+        labels=labels,
+        weights=np.rint(np.ldexp(weights, weight_bits)).astype(np.int64),
+        n_classes=len(table.schema.classes),
+        value_counts=value_counts,
+        averaged=_averaged(value_counts, len(table.labels)),
+        scale=Scale(weight_bits, bits_below(float(x_ln_x(total)) + 1.0, TERM_BITS)),
+        unit=unit_weights and complete,
+        complete=complete,
+        options=options,
+    )
+
+
+def _averaged(value_counts: Indices, n_rows: int) -> Mask:
+    """Return which attributes enter the average gain: all but nominal ones of many values, if any is left."""
+    few = value_counts - criteria.MANY_VALUES * n_rows < -TOLERANCE
+    averaged: Mask = (value_counts == 0) | few
+    if not averaged.any():
+        averaged[:] = True
+    return averaged
