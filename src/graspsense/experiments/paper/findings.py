@@ -192,7 +192,7 @@ def _failing(held: Sequence[Row], checked: Sequence[Claim]) -> list[tuple[str, s
 def _notes(paper: Published, held: Sequence[Row]) -> tuple[str, ...]:
     fitted = paper.fitted
     return (
-        f"Fitted to Tables II and III at 20 N and to the authors' tree were {fitted.count} numbers: "
+        f"{fitted.count} numbers were fitted to Tables II and III at 20 N and to the authors' tree: "
         f"{'; '.join(fitted.parameters)}. {fitted.rests}",
         *(f"{row.published.where}: {row.published.note}" for row in held if row.published.note),
         *(f"{one.where}: {one.note}" for one in paper.matrices if one.note),
