@@ -1,24 +1,25 @@
-"""Fits the twelve free figures of the simulator's containers again, from values that nothing was fitted to. Simulated.
+"""Fits the twelve free figures of the simulator's containers again, from values that were not fitted. Simulated.
 
     python benchmarks/fit.py [--list] [--quick] [--seeds 4] [--rounds 2] [--json]
 
-Fitted may be, of each container: the share of the force that lands on the cells, the loss in the full, open one, and a
-scale on the spread of stiffness. Targets may be Tables II and III of the paper, at 20 N, and the tree that the authors
-learned on the robot; nothing else goes in.
+For each container three figures may be fitted: the share of the force that lands on the cells, the loss in its full,
+open state, and a scale on the spread of stiffness. The targets are Tables II and III of the paper, at 20 N, and the
+tree that the authors learned on the robot. Nothing else is used.
 
-Start: the share of the block, whose flat face loads the whole pad; no loss; the spread of stiffness that the catalogue
-gives a reason for, times 1. Then coordinate descent: one figure after the other takes the value of its grid that gives
-the least objective, round after round, and in the end the middles to its neighbours. Every try grasps the same things
-with the same seeds, in the numbers of section III.E, and a C4.5 tree is judged in the folds of `graspsense experiment
-table_2` and `table_3`. The objective is the sum over the targets of the squared misfit, in standard deviations of what
-is printed: five rates, and how well each of the four splits of the authors' tree, taken as it is, sorts simulated
-Odwalla bottles at 23 N in the states it is there to part, each side counted alike. That should be 1, and is given the
-deviation of Table III for Odwalla. Nine targets that are missed as chance has it come to 9; a split that the model
-cannot make at all adds 118, whatever the figures. How often the tree as a whole is right is printed, and is no target.
+The search starts with the share of the block, whose flat face loads the whole pad, with no loss, and with the spread of
+stiffness for which the catalogue gives a reason. It is a coordinate descent: one figure after the other is set to the
+value of its grid with the least objective, in several rounds, and at the end to a midpoint between neighbours where
+that is better. Every trial grasps the same objects with the same seeds, in the numbers of section III.E, and a C4.5
+tree is evaluated in the folds of `graspsense experiment table_2` and `table_3`. The objective is the sum over the
+targets of the squared difference in standard deviations of the published value. The targets are five rates, and for
+each of the four splits of the authors' tree, unchanged, the rate at which it separates simulated Odwalla bottles at 23
+N in the states that it is meant to separate, with equal weight for both sides. That rate should be 1, with the
+deviation of Table III for Odwalla. Nine targets that differ as by chance give 9; a split that the model cannot
+reproduce adds 118 for any figures. The rate of the whole tree is printed and is not a target.
 
-Printed: start, end and catalogue with their objectives, also on seeds that nothing was fitted on; and for each figure
-which values of its grid do about as well. `--list` prints the catalogue's alone. Takes ten to fifteen minutes on two
-cores; `--quick` takes coarse grids, one seed and one round, and shows that it runs.
+Printed are the start, the end and the catalogue with their objectives, also on seeds that were not used for fitting,
+and for each figure the values of its grid that are about as good. `--list` prints only those of the catalogue. The fit
+takes ten to fifteen minutes on two cores; `--quick` uses coarse grids, one seed and one round, to show that it runs.
 """
 
 from __future__ import annotations

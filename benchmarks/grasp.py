@@ -1,10 +1,10 @@
-"""How much faster than real time one plain grasp runs in a warm process: plant, sensing, law, guard, trace, features.
+"""How much faster than real time a grasp runs in the interpreter: plant, sensors, controller, guard, trace, features.
 
     python benchmarks/grasp.py [--json]
 
-The grasp is that of `graspsense run --object block` (about 7 s on the gripper's clock). Processor time of this
-process, the fastest of several grasps (the others were held up by other work on the machine; their median stands
-beside it); the compiled loop of the same grasp stands beside it where numba is there.
+The grasp is that of `graspsense run --object block` (about 7 s on the gripper's clock). Given are the smallest
+processor time of several grasps in a process that has run one before, the median and the largest (other work on the
+machine delays some grasps), and the same for the compiled loop where numba is installed.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def main() -> None:
 
 
 def compiled_factor(simulated: float) -> float | None:
-    """Return the same for the compiled loop, trace included; None without numba."""
+    """Return the factor of the compiled loop with its trace; None without numba."""
     if find_spec("numba") is None:
         return None
     gripper = create("sensor-backend", "sim", object="block")

@@ -1,9 +1,10 @@
-"""How hard each controller hits: the block over all phases of the pads' clock, and two hundred eggs. Simulated.
+"""The peak force of each controller, on the block at all phases of the pads' clock and on two hundred eggs. Simulated.
 
     python benchmarks/impact.py [--json]
 
-True peak force on a pad, which only the simulator knows. The block is grasped at 23 N from 41 openings, 10 um apart,
-which moves the contact through the 41 ms of the pads' clock; the eggs at 20 N, a seed each.
+The peak is the true force on a pad, which only the simulator knows. The block is grasped at 23 N from 41 opening gaps
+that are 10 um apart, so that the contact falls on every phase of the pads' clock of 41 ms. The eggs are grasped at 20
+N, each with a seed of its own.
 """
 
 from __future__ import annotations
@@ -47,11 +48,11 @@ def main() -> None:
 
 def block() -> dict[str, float]:
     peak: dict[str, list[float]] = {"hybrid": [], "force": []}
-    for name, found in peak.items():
+    for name, peaks_n in peak.items():
         controller = create("controller", name, probing_force_n=23.0)
         for k in range(PHASES):
             config = SimConfig(spread=False, open_gap_m=0.086 + k * 1e-5)
-            found.append(run_many(config, controller, ["block"], [0], compiled=True)[0].state.peak_n)
+            peaks_n.append(run_many(config, controller, ["block"], [0], compiled=True)[0].state.peak_n)
     return {
         "block_hybrid_least_n": min(peak["hybrid"]),
         "block_hybrid_most_n": max(peak["hybrid"]),

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import click
 import pytest
+from test_imports import MAY_KNOW
 
 from graspsense.cli.main import cli
 from graspsense.experiments.experiment import read_experiment
@@ -51,6 +52,29 @@ def test_the_drawing_of_the_rooms_is_that_of_the_imports():
 def test_no_room_imports_in_a_circle():
     for graph in (ROOMS.host_rooms(), ROOMS.simulator_rooms()):
         assert not ROOMS.panel(graph).against
+
+
+def architecture_rows(title):
+    """The cells of the table in a section of docs/architecture.md."""
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    section = page.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+    return [line.strip("| ").split(" | ") for line in section.splitlines() if line.startswith("| `")]
+
+
+def test_the_table_of_packages_is_the_rule_that_is_enforced():
+    rooms = {name: used for name, used in MAY_KNOW.items() if not name.startswith("__")}
+    table = {row[0].strip("`"): set(re.findall(r"`(\w+)`", row[2])) for row in architecture_rows("Packages")}
+    assert table.pop("cli") == {"plugins", "plugin_api"}, "the cli may use all rooms but these"
+    rooms["cli"] |= {"plugins", "plugin_api"}
+    assert rooms.pop("cli") == rooms.keys() | {"cli"}
+    assert table == {name: used - {name} for name, used in rooms.items()}
+
+
+def test_the_table_of_the_simulator_has_every_folder():
+    package = ROOT / "plugins" / "sim_gripper" / "src" / "graspsense_sim_gripper"
+    folders = {path.parent.name for path in package.glob("*/__init__.py")}
+    named = {row[0].strip("`") for row in architecture_rows("The simulator")}
+    assert named == folders - {"models"}, "the table of docs/architecture.md has one row for each folder"
 
 
 def test_an_arrow_that_follows_from_others_is_left_out_and_a_circle_shows():

@@ -21,7 +21,7 @@ from graspsense.experiments.experiment import read_experiment, shipped
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
-from graspsense.experiments.task import Done, Task
+from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.timing import TimeLeft
 
 EXPERIMENT = """
@@ -77,7 +77,7 @@ def test_an_experiment_is_a_file_and_ends_in_a_page(run, file, tmp_path):
     assert code == 0
     assert found["complete"]
     assert found["tasks"] == 4
-    assert {(one["case"], one["classifier"]) for one in found["arms"]} == {
+    assert {(one["case"], one["classifier"]) for one in found["conditions"]} == {
         (case, learner) for case in ("folds 2", "folds 4") for learner in ("c45", "near")
     }
     page = (tmp_path / "out" / "report.html").read_text()
@@ -189,7 +189,7 @@ def test_a_task_that_fails_is_a_result_with_a_reason(run, file, tmp_path):
     assert code == 1
     assert "4 tasks: 2 done now, 2 failed" in out
     assert "failed 2 times: label 'a' in" in out
-    assert "2 tasks failed and are not in these figures" in (tmp_path / "out" / "report.html").read_text()
+    assert "2 tasks failed and are not included" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_one_run_at_a_time_writes_to_a_folder(file, tmp_path):
@@ -261,11 +261,11 @@ def test_a_key_is_the_hash_of_what_the_result_follows_from():
 
 @given(st.integers(0, 400))
 def test_no_part_of_a_result_is_taken_for_one(end):
-    text = Done(key="k", name="n", state="done", result={"rate": 0.5}, made={"seconds": 1.5}).to_text()
+    text = TaskResult(key="k", name="n", state="done", result={"rate": 0.5}, made={"seconds": 1.5}).to_text()
 
-    assert Done.from_text(text).seconds == 1.5
+    assert TaskResult.from_text(text).seconds == 1.5
     with pytest.raises((ValueError, KeyError, TypeError)):
-        Done.from_text(text[: end % len(text)])
+        TaskResult.from_text(text[: end % len(text)])
 
 
 def test_rates_over_seeds():
@@ -274,7 +274,7 @@ def test_rates_over_seeds():
 
     assert rate.mean == pytest.approx(0.875)
     assert rate.interval == pytest.approx((0.772287, 0.977713), abs=1e-5)
-    assert rate.further == pytest.approx((0.645328, 1.0), abs=1e-5)
+    assert rate.prediction == pytest.approx((0.645328, 1.0), abs=1e-5)
 
 
 def test_seeds_that_agree_are_no_certainty():
@@ -294,7 +294,7 @@ def test_one_seed_has_the_interval_of_its_trials():
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8), st.integers(1, 500))
 def test_intervals_hold_the_mean_and_a_further_seed_is_less_sure(rates, n):
     rate = OverSeeds(tuple(rates), n)
-    (low, high), (below, above) = rate.interval, rate.further
+    (low, high), (below, above) = rate.interval, rate.prediction
 
     assert 0.0 <= below <= low + 1e-12 <= high + 2e-12 <= above + 3e-12 <= 1.0 + 4e-12
     if len(rates) > 1:
@@ -326,14 +326,14 @@ def test_train_here_test_there(file, tmp_path):
     )
     planned, results = read_experiment(str(file), ["seeds=1"]), Results(tmp_path / "out")
     run_experiment(planned, results, Serial)
-    arm = summarise(planned, results).arm(learner="c45")
+    condition = summarise(planned, results).condition(classifier="c45")
 
-    assert arm.protocol == "other_trials"
-    assert arm.confusion.n == 40
-    assert sum(arm.confusion.counts[0]) == 15  # five labels were changed from a to b
+    assert condition.protocol == "other_trials"
+    assert condition.confusion.n == 40
+    assert sum(condition.confusion.counts[0]) == 15  # five labels were changed from a to b
 
 
-def test_an_experiment_on_simulated_grasps_keeps_what_was_felt(tmp_path):
+def test_an_experiment_on_simulated_grasps_keeps_trials_curves_and_trees(tmp_path):
     path = tmp_path / "small.toml"
     path.write_text(
         'title = "x"\n[data]\nobjects = ["can:full_open", "can:empty_open"]\ntotal = 7\ninstances = 2\n'
@@ -343,15 +343,15 @@ def test_an_experiment_on_simulated_grasps_keeps_what_was_felt(tmp_path):
     run_experiment(planned, results, Serial)
     result = summarise(planned, results).results["", 0]
 
-    assert result["labels"] == ["can:full_open"] * 4 + ["can:empty_open"] * 3
-    assert sorted(set(result["instances"])) == ["can#0", "can#1"]
-    assert [one["label"] for one in result["grasps"]] == ["can:full_open", "can:empty_open"]
-    grasp = result["grasps"][0]
-    at_contact = grasp["t_s"].index(0.0)
-    assert grasp["phase"][at_contact - 1 : at_contact + 1] == ["approach", "squeeze"]
-    tree = result["judged"][0]["tree"]
-    assert tree[0]["parent"] is None
-    assert sum(node["trials"] for node in tree if node["parent"] == 0) == 7
+    assert list(result.trials.labels) == ["can:full_open"] * 4 + ["can:empty_open"] * 3
+    assert sorted(set(result.trials.instances)) == ["can#0", "can#1"]
+    assert [curve.label for curve in result.grasps] == ["can:full_open", "can:empty_open"]
+    grasp = result.grasps[0]
+    at_contact = grasp.t_s.index(0.0)
+    assert grasp.phase[at_contact - 1 : at_contact + 1] == ("approach", "squeeze")
+    tree = result.classifiers[0].tree
+    assert tree[0].parent is None
+    assert sum(node.trials for node in tree if node.parent == 0) == 7
 
 
 def test_an_experiment_never_opens_a_real_gripper(tmp_path):

@@ -120,18 +120,18 @@ def test_features_relative_to_it_are_a_tenth_below_the_absolute_ones(found):
 
 @real_data
 def test_blocks_of_recording_order_are_reported_with_their_interval(found):
-    blocks = found.as_json()["controls"]["recording_order"]
+    blocks = found.controls["recording_order"]
 
-    assert blocks["n"] == 203
-    assert blocks["difference"] == pytest.approx(found.headline.rate - blocks["rate"])
-    low, high = blocks["difference_interval"]
-    assert low < blocks["difference"] < high
-    assert blocks["difference_of"] == "stratified_10_fold less this"
+    assert blocks.rate.n == 203
+    assert blocks.difference.value == pytest.approx(found.headline.rate - blocks.rate.rate)
+    low, high = blocks.difference.interval
+    assert low < blocks.difference.value < high
+    assert blocks.difference_of == "stratified_10_fold"
 
 
 @real_data
 def test_no_instance_can_be_held_out_there(found):
-    held = found.as_json()["controls"]["instance_held_out"]
+    held = found.controls["instance_held_out"]
 
-    assert held["rate"] is None
-    assert held["reason"] == "every class of this set is one object, so that none can be held out"
+    assert held.rate is None
+    assert held.reason == "every class of this set is one object, so that none can be held out"

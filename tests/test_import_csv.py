@@ -8,6 +8,7 @@ from grippers import bottle, squeezing
 
 from graspsense.cli.main import main
 from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.signals import Phase
 from graspsense.recording.reader import read_recorded
 from graspsense.sources.grasp_csv import named, read_squeeze
 from graspsense.store.store import Store
@@ -50,9 +51,11 @@ def test_one_force_is_that_of_both_pads_and_said_so(squeeze):
     assert any("one force was recorded" in note for note in recording.notes)
 
 
-def test_a_gap_that_is_likely_in_millimetres_is_told(squeeze):
-    (note,) = [one for one in read_squeeze(name_of(squeeze, gap="opening")).notes if "gap" in one]
-    assert note.endswith("m: where the column is in mm, write COLUMN*0.001 for it")
+def test_a_gap_in_millimetres_is_refused(squeeze):
+    with pytest.raises(
+        DataDamaged, match=r"goes up to 74 m, which no gripper has.* write COLUMN\*0\.001 for it"
+    ):
+        read_squeeze(name_of(squeeze, gap="opening"))
     assert not [one for one in read_squeeze(name_of(squeeze)).notes if "gap" in one]
 
 
@@ -131,6 +134,9 @@ def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squ
     recorded = read_recorded(kept.recording)
     assert len(recorded) == TICKS
     assert recorded.readings()[-1].frame.t_s == pytest.approx(7.199)
+    # Its phases are those of the controller, so that a page draws it from the contact on, as any other trial.
+    first_squeeze = recorded.trace().phase.tolist().index(Phase.SQUEEZE)
+    assert recorded.trace().t_s[first_squeeze] == pytest.approx(6.0, abs=0.1)
     code, out, err = run(capsys, "replay", f"{store}#1", "--json")
     assert code == 0, err
     assert json.loads(out)["features"] == features

@@ -39,7 +39,7 @@ def test_wilson_lies_in_the_unit_and_holds_the_rate(n, data):
 
 @pytest.mark.parametrize(("correct", "n"), [(1, 0), (-1, 3), (4, 3)])
 def test_what_is_no_rate_is_refused(correct, n):
-    with pytest.raises(ValueError, match="is no rate"):
+    with pytest.raises(ValueError, match="is not a rate"):
         RecognitionRate(correct, n)
 
 
@@ -76,5 +76,5 @@ def test_the_interval_of_a_difference_covers_the_true_one_nineteen_times_in_twen
 
 
 def test_of_two_lengths_there_is_no_difference():
-    with pytest.raises(ValueError, match="must judge the same ones"):
+    with pytest.raises(ValueError, match="must be of the same trials"):
         difference([True], [True, False])

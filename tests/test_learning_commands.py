@@ -63,15 +63,15 @@ def test_its_json(run, csv):
     assert found["classifier"].startswith("graspsense/knn ")
     assert found["settings"] == {"neighbours": 3}
     assert found["protocol"] == "stratified_10_fold"
-    assert found["n"] == 120
-    assert found["labels"] == ["can:empty", "can:full", "jar:empty", "jar:full"]
-    assert found["controls"]["width_only"]["rate"] < 0.8 < found["rate"]
+    assert found["headline"]["n"] == 120
+    assert found["confusion"]["labels"] == ["can:empty", "can:full", "jar:empty", "jar:full"]
+    assert found["controls"]["width_only"]["rate"]["rate"] < 0.8 < found["headline"]["rate"]
 
 
 def test_states_of_one_class(run, csv):
     _, out, _ = run("evaluate", csv, "--label", "what", "--json", "--target", "state", "--only", "can")
 
-    assert json.loads(out)["labels"] == ["can:empty", "can:full"]
+    assert json.loads(out)["confusion"]["labels"] == ["can:empty", "can:full"]
 
 
 def test_train_then_predict(run, csv, tmp_path):
@@ -211,9 +211,9 @@ def test_simulated_trials_small_and_whole(run):
     found = json.loads(out)
 
     assert code == 0
-    assert found["n"] == 12
+    assert found["headline"]["n"] == 12
     assert found["protocol"] == "instance_held_out"
-    assert found["controls"]["before_contact"]["n"] == 12
+    assert found["controls"]["before_contact"]["rate"]["n"] == 12
     assert any("simulated" in note for note in found["notes"])
 
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from graspsense.cli.main import main
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import read_experiment, shipped
-from graspsense.experiments.page import experiment_page, found_in
+from graspsense.experiments.page import experiment_page, findings_of
 from graspsense.experiments.paper.claims import split_by
 from graspsense.experiments.paper.published import published
-from graspsense.experiments.paper.rows import Row, rows
+from graspsense.experiments.paper.rows import RateComparison, rows
 from graspsense.experiments.results import EXPERIMENT, Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
@@ -131,9 +131,9 @@ def test_parts_are_done_as_if_alone_and_the_resolved_file_means_the_same_tasks(t
     assert {task.key for task in again.tasks()} == {task.key for task in planned.tasks()}
 
     summary = summarise(planned, results)
-    found = found_in(summary)
+    found = findings_of(summary)
     row = next(one for one in rows(summary, published()) if one.published.id == "table_3_can")
-    assert isinstance(row, Row)
+    assert isinstance(row, RateComparison)
     assert row.ours.n == 6
     claims = {one["id"]: one for one in found.values["claims"]}
     assert claims["fig_6_force"]["holds"]
@@ -153,10 +153,10 @@ def test_a_force_controller_hits_harder_than_the_hybrid_one_and_neither_counts_a
     planned = read_experiment(str(tmp_path / "impacts.toml"), ["seeds=1"])
     results = Results(tmp_path / "out")
     assert run_experiment(planned, results, Serial).complete
-    row = {name: result["rows"][0] for (name, _), result in summarise(planned, results).results.items()}
-    assert row["force"]["true_peak_force_n"] > 2 * row["hybrid"]["true_peak_force_n"]
-    assert row["force"]["speed_m_s"] > 0.05 > row["hybrid"]["speed_m_s"] == pytest.approx(0.01, rel=0.1)
-    assert row["hybrid"]["closed_m"] == pytest.approx(0.086 - row["hybrid"]["p_steady"], abs=2e-4)
+    row = {name: result.rows[0] for name, _, result in summarise(planned, results).grasp_results()}
+    assert row["force"].true_peak_force_n > 2 * row["hybrid"].true_peak_force_n
+    assert row["force"].speed_m_s > 0.05 > row["hybrid"].speed_m_s == pytest.approx(0.01, rel=0.1)
+    assert row["hybrid"].closed_m == pytest.approx(0.086 - row["hybrid"].features["p_steady"], abs=2e-4)
 
 
 def test_every_shipped_experiment_can_be_planned():

@@ -17,11 +17,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from graspsense.core.config import Flag, resolve
 from graspsense.core.errors import ConfigError, DataDamaged, DeviceLost, RecordingEnded
+from graspsense.core.pipeline import grasp_with
+from graspsense.core.plugins import installed
 from graspsense.core.roles import DeviceInfo
-from graspsense.core.signals import EFFORT, NO_PADS, VELOCITY, Command, Frame
+from graspsense.core.signals import EFFORT, NO_PADS, VELOCITY, Command, Frame, Phase
+from graspsense.core.trace import PAD_COLUMNS, TICK_COLUMNS
 from graspsense.sources.icub import IcubGrasp, read_grasp, read_recording, relative_readings
 from graspsense.sources.replay import ReplayBackend, ReplayConfig
+from graspsense.store.record_grasp import record_grasp
+from graspsense.store.store import Store
+from graspsense.store.trial_ref import recorded_settings
 
 REST_DEG = (20.0, 80.0, 10.0, 40.0, 30.0, 50.0, 32.0, 45.0, 5.0)
 """Joints 7 to 15."""
@@ -354,3 +361,35 @@ def test_run_on_a_real_grasp_ends_steady_with_all_features() -> None:
     grasp = json.loads(done.stdout)
     assert grasp["outcome"] == "steady"
     assert None not in grasp["features"].values()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        (),
+        ("controller.type=velocity",),  # ends otherwise than steady
+        ("gripper.type=pr2", "gripper.transport=emulated", "gripper.object=can:full_open"),
+    ],
+)
+def test_a_replayed_trial_has_the_trace_of_the_grasp_to_the_last_bit(
+    tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    settings = resolve(options=[*options, "classifier.type=none"])
+    with Store.open(tmp_path) as store:
+        grasp = record_grasp(store, settings, installed(), labels={}, origin="run")
+    again = resolve(
+        experiment=recorded_settings("store", f"{tmp_path}#1"),
+        options=["classifier.type=none"],
+        flags=[
+            Flag("--gripper", "gripper.type", "replay"),
+            Flag("RECORDING", "gripper.recording", f"store:{tmp_path}#1"),
+        ],
+    )
+    replayed = grasp_with(again, installed())
+
+    assert Phase.RELEASE in grasp.trial.trace.phase
+    for name in (*TICK_COLUMNS, *PAD_COLUMNS):
+        before, now = getattr(grasp.trial.trace, name), getattr(replayed.trace, name)
+        assert before.tobytes() == now.tobytes(), name
+    assert replayed.features.values == grasp.trial.features.values
+    assert replayed.outcome == grasp.trial.outcome

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import read_experiment
-from graspsense.experiments.page import found_in
+from graspsense.experiments.page import findings_of
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
 from graspsense.experiments.trade.front import front
-from graspsense.experiments.trade.next_squeeze import Promise, Squeezed, decide
+from graspsense.experiments.trade.next_squeeze import Decision, Forces, Promise, SqueezeAnswers, decide
 from graspsense.experiments.trade.paired import corrected_t, mcnemar
 
 CASES = st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=1, max_size=12)
@@ -57,7 +57,7 @@ GUESSES = np.full((2, 2), 0.5)
 
 
 def squeezed(answer, seconds=1.0):
-    return Squeezed(answer=np.array([answer]), seconds=np.array([seconds]))
+    return SqueezeAnswers(answer=np.array([answer]), seconds=np.array([seconds]))
 
 
 def promise(confusion, seconds=1.0):
@@ -66,26 +66,32 @@ def promise(confusion, seconds=1.0):
 
 def test_who_is_sure_at_the_contact_does_not_squeeze():
     known = (squeezed(1), promise(KNOWS))
-    assert decide(0, known, {17.0: squeezed(0)}, {17.0: promise(KNOWS)}, 0.9, 3, 1.0) == (1, 0.0, 0)
+    forces = Forces(answers={17.0: squeezed(0)}, promises={17.0: promise(KNOWS)})
+    decision = decide(0, known, forces, sure=0.9, most=3, again_s=1.0)
+    assert decision == Decision(answer=1, seconds=0.0, squeezes=0)
 
 
 def test_who_is_not_takes_the_force_that_tells_most_per_second():
     nothing = (squeezed(0), promise(GUESSES))
-    forces = {17.0: squeezed(0, 0.3), 20.0: squeezed(1, 0.4)}
-    informative = {17.0: promise(GUESSES, 0.3), 20.0: promise(KNOWS, 0.4)}
-    assert decide(0, nothing, forces, informative, 0.9, 3, 1.0) == (1, 0.4, 1)
-    # Both know as much, one in less time.
-    slow_and_fast = {17.0: promise(KNOWS, 0.3), 20.0: promise(KNOWS, 0.4)}
-    assert decide(0, nothing, forces, slow_and_fast, 0.9, 3, 1.0) == (0, 0.3, 1)
+    answers = {17.0: squeezed(0, 0.3), 20.0: squeezed(1, 0.4)}
+    informative = Forces(answers=answers, promises={17.0: promise(GUESSES, 0.3), 20.0: promise(KNOWS, 0.4)})
+    decision = decide(0, nothing, informative, sure=0.9, most=3, again_s=1.0)
+    assert decision == Decision(answer=1, seconds=0.4, squeezes=1)
+    # Both are equally informative; one takes less time.
+    equal = Forces(answers=answers, promises={17.0: promise(KNOWS, 0.3), 20.0: promise(KNOWS, 0.4)})
+    decision = decide(0, nothing, equal, sure=0.9, most=3, again_s=1.0)
+    assert decision == Decision(answer=0, seconds=0.3, squeezes=1)
 
 
 def test_a_second_squeeze_costs_its_opening_and_never_more_than_allowed():
     nothing = (squeezed(0), promise(GUESSES))
-    forces = {17.0: squeezed(0, 0.3), 20.0: squeezed(1, 0.4)}
-    promises = {17.0: promise(KNOWS, 0.3), 20.0: promise(KNOWS, 0.4)}
-    _, seconds, used = decide(0, nothing, forces, promises, 0.999, 3, 1.0)
-    assert (seconds, used) == (pytest.approx(0.3 + 1.0 + 0.4), 2)
-    assert decide(0, nothing, forces, promises, 0.999, 1, 1.0)[2] == 1
+    forces = Forces(
+        answers={17.0: squeezed(0, 0.3), 20.0: squeezed(1, 0.4)},
+        promises={17.0: promise(KNOWS, 0.3), 20.0: promise(KNOWS, 0.4)},
+    )
+    decision = decide(0, nothing, forces, sure=0.999, most=3, again_s=1.0)
+    assert (decision.seconds, decision.squeezes) == (pytest.approx(0.3 + 1.0 + 0.4), 2)
+    assert decide(0, nothing, forces, sure=0.999, most=1, again_s=1.0).squeezes == 1
 
 
 COMMON = """
@@ -119,7 +125,7 @@ def test_each_trade_runs_and_gives_advice(tmp_path, kind, more, trials):
     results = Results(tmp_path / "out")
     account = run_experiment(planned, results, Serial)
     assert account.complete, account.failed
-    found = found_in(summarise(planned, results))
+    found = findings_of(summarise(planned, results))
     assert found.answer
     assert found.tables[0].rows
     if kind == "early":

@@ -11,7 +11,7 @@ from graspsense.cli.output import echo_json, echo_table, file_to_write, talk
 from graspsense.cli.sources import SOURCES, classifier_option, learner_of, source_options, trials_of
 
 if TYPE_CHECKING:
-    from graspsense.evaluation.evaluate import Evaluation, Judged
+    from graspsense.evaluation.results import Evaluation, Measurement
 
 
 @click.command(
@@ -50,18 +50,18 @@ def evaluate(
     **given: Any,
 ) -> None:
     """Measure and print."""
-    from graspsense.cli.progress import Progress
+    from graspsense.cli.progress import ProgressLine
     from graspsense.core.strict import plain
-    from graspsense.evaluation.evaluate import evaluate as judge
+    from graspsense.evaluation.evaluate import evaluate as measure
 
     learner = learner_of(source, classifier, given)
-    with Progress() as progress:
+    with ProgressLine() as progress:
         labelled = trials_of(source, progress, given)
         if keep:
             from graspsense.sources.features_csv import write_labelled
 
             write_labelled(Path(keep), labelled)
-        found = judge(
+        evaluation = measure(
             learner,
             labelled,
             classifier=f"{learner.component.qualified} {learner.component.version}",
@@ -74,12 +74,15 @@ def evaluate(
     if png:
         from graspsense.report.confusion import confusion_png
 
-        confusion_png(found.confusion, f"{found.source}\n{found.protocol}: {found.headline.words}", Path(png))
+        title = f"{evaluation.source}\n{evaluation.protocol}: {evaluation.headline.words}"
+        confusion_png(evaluation.confusion, title, Path(png))
         talk(f"drawn in {png}")
     if as_json:
-        echo_json(found.as_json())
+        from graspsense.evaluation.json_codec import to_json
+
+        echo_json(to_json(evaluation))
     else:
-        _print(found)
+        _print(evaluation)
 
 
 def _print(found: Evaluation) -> None:
@@ -98,7 +101,7 @@ def _print(found: Evaluation) -> None:
     click.echo()
     rows = [_row(name, one) for name, one in found.protocols.items()]
     rows += [_row(name, one) for name, one in found.controls.items() if name not in found.protocols]
-    echo_table(("PROTOCOL OR CONTROL", "RATE", "95 %", "DIFFERENCE", "WHAT"), rows)
+    echo_table(("PROTOCOL OR CONTROL", "RATE", "95 %", "LOWER BY", "THAN", "WHAT"), rows)
     click.echo("\nconfusion (rows are the truth)")
     for line in confusion_text(found.confusion):
         click.echo(f"  {line}")
@@ -109,14 +112,21 @@ def _print(found: Evaluation) -> None:
     click.echo("\nlearning curve")
     for point in found.learning_curve:
         click.echo(f"  {point.trained_on:8.1f} trials  {point.rate.words}")
-    click.echo(f"\nwould be called unknown: {found.unlike.words}")
+    click.echo(f"\nwould be called unknown: {found.unknown.words}")
     for note in found.notes:
         click.echo(f"note: {note}")
 
 
-def _row(name: str, one: Judged) -> tuple[str, str, str, str, str]:
-    if one.rate is None:
-        return name, "-", "", "", f"{one.what}: {one.reason}"
-    low, high = one.rate.interval
-    against = f"{one.of} less this: {one.difference.words}" if one.difference else ""
-    return name, f"{one.rate.rate:.3f}", f"{low:.3f} to {high:.3f}", against, one.what
+def _row(name: str, measured: Measurement) -> tuple[str, ...]:
+    if measured.rate is None:
+        return name, "-", "", "", "", f"{measured.what}: not measured ({measured.reason})"
+    low, high = measured.rate.interval
+    difference = measured.difference.words if measured.difference else ""
+    return (
+        name,
+        f"{measured.rate.rate:.3f}",
+        f"{low:.3f} to {high:.3f}",
+        difference,
+        measured.difference_of,
+        measured.what,
+    )

@@ -59,9 +59,9 @@ def experiment(
     if experiment is None:
         _list(shipped(), as_json)
         return
-    from graspsense.cli.progress import Progress
+    from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.executors.choose import chosen
-    from graspsense.experiments.page import found_in, write_page
+    from graspsense.experiments.page import findings_of, write_page
     from graspsense.experiments.results import Results
     from graspsense.experiments.run import run_experiment
     from graspsense.experiments.summary import summarise
@@ -73,7 +73,7 @@ def experiment(
     if dry_run:
         _plan([task.name for task in planned.tasks()], as_json)
         return
-    with Progress() as progress:
+    with ProgressLine() as progress:
         account = run_experiment(
             planned,
             results,
@@ -90,7 +90,7 @@ def experiment(
         page = write_page(found, results)
     except SaveFailed as error:
         problem = str(error)
-    more = found_in(found)
+    more = findings_of(found)
     if as_json:
         told = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
         where = None if page is None else str(page)
@@ -160,7 +160,7 @@ def _print(found: Summary, more: Findings | None, account: Account, page: str) -
 
 def _print_rates(found: Summary) -> None:
     rows = []
-    for one in found.arms:
+    for one in found.conditions:
         low, high = one.rate.interval
         rows.append(
             (one.name or "-", one.target, f"{one.rate.mean:.3f}", f"{low:.3f} to {high:.3f}", one.protocol)

@@ -176,7 +176,7 @@ def _report(error: Exception, as_json: bool) -> int:
     else:
         message, code = f"{type(error).__name__}: {error}", EXIT_BUG
     talk = "\n  ".join([message, *getattr(error, "__notes__", ())])
-    if code == EXIT_BUG:
+    if code == EXIT_BUG and not isinstance(error, GraspsenseError):
         talk = f"internal error: {talk}\n  This is a bug, ours or a plugin's."
         if os.environ.get(TRACEBACK_VARIABLE) != "1":
             talk += f" Run it again with {TRACEBACK_VARIABLE}=1 to see where it happened."

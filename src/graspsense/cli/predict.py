@@ -34,12 +34,12 @@ MOST_WITH_REASONS: Final = 1000
 @click.option("--json", "as_json", is_flag=True, help="Print every prediction with its reasons as JSON.")
 def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     """Predict and print."""
-    from graspsense.cli.progress import Progress
+    from graspsense.cli.progress import ProgressLine
     from graspsense.core.errors import ConfigError
     from graspsense.core.model import load_model
     from graspsense.core.plugins import installed
-    from graspsense.evaluation.evaluate import rate_as_json
     from graspsense.evaluation.intervals import RecognitionRate
+    from graspsense.evaluation.json_codec import to_json
 
     asked = load_model(model, installed())
     labels: tuple[str, ...] | None = None
@@ -50,7 +50,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
 
         table = read_table(Path(source), asked.names)
     else:
-        with Progress() as progress:
+        with ProgressLine() as progress:
             labelled = trials_of(
                 source, progress, {**given, "features": given["features"] or ",".join(asked.names)}
             )
@@ -81,7 +81,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
                 "predictions": [
                     _as_json(one, None if labels is None else labels[i]) for i, one in enumerate(predictions)
                 ],
-                "rate": None if rate is None else rate_as_json(rate),
+                "rate": None if rate is None else to_json(rate),
                 "unknown": sum(not _known(one) for one in predictions),
                 "warnings": warnings,
                 "notes": list(notes),

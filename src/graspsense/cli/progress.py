@@ -16,7 +16,7 @@ AGAIN_IN_A_LOG_S: Final = 10.0
 BAR: Final = 24
 
 
-class Progress:
+class ProgressLine:
     """Reports what is being done and how much of it; leaves nothing behind on a terminal."""
 
     def __init__(self) -> None:
@@ -37,7 +37,7 @@ class Progress:
         else:
             click.echo(f"{what}: {done} of {total}", err=True)
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> ProgressLine:
         return self
 
     def __exit__(

@@ -42,7 +42,7 @@ def report(
 
     The page is one file without external resources.
     """
-    from graspsense.cli.progress import Progress
+    from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.page import NAME, experiment_page
     from graspsense.experiments.results import EXPERIMENT, Results
     from graspsense.report.store_page import store_page
@@ -56,7 +56,7 @@ def report(
         results = Results(Path(folder))
         page = experiment_page(summarise(read_experiment(str(results.folder / EXPERIMENT)), results), results)
     else:
-        with Progress() as progress:
+        with ProgressLine() as progress:
             page = store_page(
                 folder,
                 classifier=classifier,

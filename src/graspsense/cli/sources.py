@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from graspsense.cli.progress import Progress
+    from graspsense.cli.progress import ProgressLine
     from graspsense.core.config import SelectedComponent, Settings
     from graspsense.core.labelled import Labelled
 
@@ -102,7 +102,7 @@ def is_csv(source: str) -> bool:
     return kind_of(source) == "CSV"
 
 
-def trials_of(source: str, progress: Progress, given: Mapping[str, Any]) -> Labelled:
+def trials_of(source: str, progress: ProgressLine, given: Mapping[str, Any]) -> Labelled:
     """Return the trials of a source, or of one class of it; `given` holds the options of `source_options`.
 
     Raises ConfigError, DataDamaged.
@@ -110,7 +110,7 @@ def trials_of(source: str, progress: Progress, given: Mapping[str, Any]) -> Labe
     from graspsense.cli.output import talk
     from graspsense.core.errors import ConfigError
     from graspsense.core.strict import ValidationFailed, structured
-    from graspsense.sources.trial_source import Source, kind_of, labelled_trials
+    from graspsense.sources.trial_source import TrialSource, kind_of, labelled_trials
 
     kind = kind_of(source)
     _refuse_misplaced(kind)
@@ -128,7 +128,7 @@ def trials_of(source: str, progress: Progress, given: Mapping[str, Any]) -> Labe
         "trials": given["trials"],
     }
     try:
-        described = structured(values, Source, source)
+        described = structured(values, TrialSource, source)
     except ValidationFailed as misfit:
         raise ConfigError("\n".join(f"--{one.path[0]}: {one.text}" for one in misfit.problems)) from None
     if kind == SIMULATED:

@@ -62,7 +62,7 @@ def simulation(
     Errors of features, peak force and force trace are relative to a reference that keeps every term and halves its
     steps until nothing changes. Times are measured on the same grasps.
     """
-    from graspsense.cli.progress import Progress
+    from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.simulation import SCENES, trade_simulation
     from graspsense.report.simulation import simulation_markdown, simulation_png, simulation_rows
 
@@ -70,7 +70,7 @@ def simulation(
     settings = settings_of(pipeline, gripper, object_name, options, seed)
     wanted = scenes or ((object_name,) if object_name else SCENES)
     first = settings.run.seed
-    with Progress() as progress:
+    with ProgressLine() as progress:
         found = trade_simulation(
             settings, scenes=wanted, seeds=range(first, first + seeds), progress=progress
         )

@@ -54,7 +54,7 @@ def train(
     **given: Any,
 ) -> None:
     """Train, write, and say what was made of what."""
-    from graspsense.cli.progress import Progress
+    from graspsense.cli.progress import ProgressLine
     from graspsense.core.errors import ConfigError
     from graspsense.core.labelled import class_of
     from graspsense.core.model import train as trained
@@ -64,7 +64,7 @@ def train(
     if path.suffix != ".json":
         raise ConfigError(f"--out {out}: a model's file ends in .json")
     learner = learner_of(source, classifier, given)
-    with Progress() as progress:
+    with ProgressLine() as progress:
         labelled = trials_of(source, progress, given)
     if target == "state" and len({class_of(label) for label in labelled.labels}) > 1:
         raise ConfigError(

@@ -16,11 +16,11 @@ EXIT_DAMAGED = 5
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def verify(source: str, as_json: bool) -> None:
     """Check the store DIR with all its recordings, or one recording FILE. Exit code 5 means damage."""
-    from graspsense.cli.progress import Progress
+    from graspsense.cli.progress import ProgressLine
     from graspsense.store.verify import verify_file, verify_store
 
     if Path(source).is_dir():
-        with Progress() as progress:
+        with ProgressLine() as progress:
             found = verify_store(source, lambda done, total: progress("checking", done, total))
     else:
         found = verify_file(source)

@@ -58,12 +58,13 @@ class DeviceInfo:
     """A gripper as it was opened.
 
     `simulated` is True where forces and motion come from a model, False where a physical gripper measures them.
-    With a `virtual` clock, apply and read advance the time by one tick without waiting; with a `device` clock, a read
-    waits for the next frame. `opening` is the command that opens the fingers, None for a recording, and `relaxed` the
-    command that exerts no force. `tare_images` is the number of unloaded cell images that a tare needs, 0 if the
-    gripper is not tared. `calibration` maps each stored calibration in use to the hash of its content. `numbers` state
-    what the raw numbers of the device mean (counts per newton, transmission); a stored calibration is valid for these
-    only. `units` names the units that are not SI, as in a recording: `{"t": "frame"}`. `notes` are sentences that a
+    With a `virtual` clock, apply and read advance the time by one tick without waiting; with a `device` clock, a
+    read waits for the next frame. `opening` is the command that opens the fingers, None for a recording, and
+    `relaxed` the command that exerts no force. `has_release` is True for a recording that goes on until the fingers
+    are open again. `tare_images` is the number of unloaded cell images that a tare needs, 0 if the gripper is not
+    tared. `calibration` maps each stored calibration in use to the hash of its content. `numbers` state what the
+    raw numbers of the device mean (counts per newton, transmission); a stored calibration is valid for these only.
+    `units` names the units that are not SI, as in a recording: `{"t": "frame"}`. `notes` are sentences that a
     reader of the result must know.
     """
 
@@ -77,6 +78,7 @@ class DeviceInfo:
     speed_limit_m_s: float = field(converter=float)
     opening: Command | None
     relaxed: Command
+    has_release: bool = False
     tare_images: int = 0
     calibration: Mapping[str, str] = field(factory=dict)
     numbers: Mapping[str, float | str] = field(factory=dict)
@@ -146,6 +148,13 @@ class SensorBackend(ABC, Generic[ConfigT]):
     def report(self) -> Mapping[str, float | int | str | bool]:
         """Return counters, and values that the frames do not contain (a simulator knows the true force)."""
         return {}
+
+    def recorded_commands(self) -> Sequence[float] | None:
+        """Return the value that was commanded after each frame, for a recording that knows them; otherwise None.
+
+        A trace then holds these values, since what a controller commands has no effect on a recording.
+        """
+        return None
 
     def dry_run_backend(self) -> SensorBackend[Any] | None:
         """Return an emulated gripper that takes the same commands, for a dry run; None if there is none.

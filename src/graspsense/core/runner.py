@@ -68,7 +68,7 @@ def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -
     infinite = float("inf")
     return TickParams(
         schedule=Schedule(
-            opens=1 if info.opening is not None else 0,
+            opens=1 if info.opening is not None else 2 * info.has_release,
             opening=info.opening if info.opening is not None else info.relaxed,
             relaxed=info.relaxed,
             tare_images=info.tare_images,
@@ -163,6 +163,9 @@ def run_grasp(
         except Exception as error:
             report = {"report_failed": named(error)}
     frames = grasp.recorder.frames
+    commands = backend.recorded_commands()
+    if commands is not None:
+        grasp.recorder.commands[:] = commands[: len(frames)]
     return Grasp(
         trace=grasp.recorder.trace(),
         outcome=outcome,

@@ -26,7 +26,8 @@ OPEN_WINDOW_S = 0.1
 class Schedule(NamedTuple):
     """The phases around a grasp: the commands that open and relax, the images for the tare, the time to hold.
 
-    `opens` is 0 for a recording, which has no opening, taring or release.
+    `opens` is 1 for a gripper. For a recording, which begins at the approach, it is 2 if the release is in it, and 0
+    if it is not.
     """
 
     opens: int
@@ -75,7 +76,7 @@ def tick(params: TickParams, state: TickState, frame: Frame, pads: Pads) -> tupl
     phase, since, still, first_image, law, watcher, done = state
     if phase == -1:
         phase, since, still = OPENING, frame.t_s, Stillness(frame.t_s, frame.gap_m)
-        if schedule.opens == 0:
+        if schedule.opens != 1:
             phase = APPROACH
 
     if phase >= APPROACH and phase != RELEASE:
@@ -85,7 +86,7 @@ def tick(params: TickParams, state: TickState, frame: Frame, pads: Pads) -> tupl
             since = frame.t_s
         elif law.outcome != STEADY or frame.t_s - since >= schedule.hold_s:
             since, still = frame.t_s, Stillness(frame.t_s, frame.gap_m)
-            if schedule.opens == 1:
+            if schedule.opens != 0:
                 phase = RELEASE
             else:
                 done = 1

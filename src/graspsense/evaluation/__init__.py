@@ -1,1 +1,1 @@
-"""How good a classifier is on labelled trials, and how much of that is the recording's rather than the object's."""
+"""Evaluating classifiers on labelled trials, with controls that show how far a rate is due to the recording itself."""

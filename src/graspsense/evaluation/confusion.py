@@ -1,4 +1,4 @@
-"""Which label was taken for which."""
+"""Confusion matrices."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from attrs import frozen
 
 @frozen
 class Confusion:
-    """Counts of trials; a row is the true label, a column the predicted one."""
+    """Counts of trials: rows are true labels, columns predicted labels."""
 
     labels: tuple[str, ...]
     counts: tuple[tuple[int, ...], ...]
 
     @property
     def correct(self) -> int:
-        """The sum of the diagonal."""
+        """The number of correct predictions."""
         return sum(self.counts[i][i] for i in range(len(self.labels)))
 
     @property
@@ -26,10 +26,10 @@ class Confusion:
 
 
 def confusion(true: Sequence[str], predicted: Sequence[str]) -> Confusion:
-    """Return the counts over every label that occurs on either side, sorted."""
+    """Return the confusion matrix over all labels that occur on either side, sorted."""
     labels = tuple(sorted({*true, *predicted}))
     numbers = {label: i for i, label in enumerate(labels)}
     counts = [[0] * len(labels) for _ in labels]
-    for one, other in zip(true, predicted, strict=True):
-        counts[numbers[one]][numbers[other]] += 1
+    for actual, answer in zip(true, predicted, strict=True):
+        counts[numbers[actual]][numbers[answer]] += 1
     return Confusion(labels, tuple(map(tuple, counts)))

@@ -1,4 +1,4 @@
-"""Cross validation: each trial is predicted once, by a model that was trained on other folds."""
+"""Cross validation: each trial is predicted once, by a model that was trained on the other folds."""
 
 from __future__ import annotations
 
@@ -23,33 +23,33 @@ class FitRefused(ConfigError):
     """A classifier refused the training trials of a fold: its `fit` raised ValueError."""
 
 
-class Learner(Protocol):
-    """Something that makes a fresh, untrained classifier: a component with its config."""
+class ClassifierFactory(Protocol):
+    """Makes untrained classifiers: a component with its config."""
 
     def create(self) -> Classifier[Any]:
-        """Return it."""
+        """Return a new, untrained classifier."""
 
 
 Groups = Sequence["NDArray[np.int64]"]
-"""Trials that are cross-validated apart from each other: all of them, or those of one class."""
+"""Trials that are cross-validated separately: all of them, or those of each class."""
 
 
 @frozen(eq=False)
 class Pooled:
-    """The predictions of all folds, one a trial; `unlike` says which the model of its fold would call unknown."""
+    """The predictions of all folds, one per trial; `unlike` marks those that the model of their fold calls unknown."""
 
     predicted: tuple[str, ...]
     unlike: NDArray[np.bool_]
     trained_on: float
-    """Mean number of training trials of a fold."""
+    """Mean number of training trials per fold."""
 
     def right(self, labels: Sequence[str]) -> list[bool]:
-        """Return for each trial whether its prediction is its label."""
-        return [one == label for one, label in zip(self.predicted, labels, strict=True)]
+        """Return whether each trial is predicted correctly."""
+        return [answer == label for answer, label in zip(self.predicted, labels, strict=True)]
 
 
 def cross_validate(
-    learner: Learner,
+    learner: ClassifierFactory,
     table: FeatureTable,
     labels: Sequence[str],
     groups: Groups,
@@ -59,12 +59,12 @@ def cross_validate(
     share: float = 1.0,
     progress: Callable[[], None] | None = None,
 ) -> Pooled:
-    """Predict every trial of every group by the folds of that group.
+    """Predict every trial of every group, with the folds of that group.
 
-    `folds` holds one array a group, of that group's length. The prediction is the label of the largest
-    probability, the first of equals. Where the training trials of a fold have one label, that is the prediction.
-    `share` trains on that part of each fold's training trials, of each label about the same part, at least one
-    of each. Raises FitRefused where the classifier cannot learn from the training trials of a fold.
+    `folds` has one array per group, of the length of the group. The prediction is the label with the largest
+    probability, the first of several. If the training trials of a fold have a single label, that label is predicted.
+    With `share`, training uses about that share of the training trials of each label, at least one. Raises FitRefused
+    if the classifier cannot learn from the training trials of a fold.
     """
     predicted = [""] * len(labels)
     unlike = np.zeros(len(labels), dtype=np.bool_)
@@ -88,7 +88,7 @@ def cross_validate(
 
 
 def thinned(rows: NDArray[np.int64], labels: Sequence[str], share: float, seed: int) -> NDArray[np.int64]:
-    """Return about this share of the trials of each label, at least one; a larger share holds a smaller one."""
+    """Return about this share of the trials of each label, at least one; a larger share contains a smaller one."""
     rng = np.random.default_rng(seed)
     of = np.array([labels[i] for i in rows])
     kept = []
@@ -99,7 +99,7 @@ def thinned(rows: NDArray[np.int64], labels: Sequence[str], share: float, seed: 
 
 
 def _predict(
-    learner: Learner,
+    learner: ClassifierFactory,
     table: FeatureTable,
     training: NDArray[np.int64],
     known: Sequence[str],

@@ -1,6 +1,6 @@
-"""A recognition rate with everything that is needed to judge it: protocols, controls, learning curve.
+"""Evaluating a classifier on labelled trials: its rate, with protocols, controls and a learning curve.
 
-`docs/evaluation.md` says how each number is defined.
+`docs/evaluation.md` defines every number.
 """
 
 from __future__ import annotations
@@ -10,14 +10,15 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from attrs import field, frozen
+from attrs import frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.core.labelled import ControlFeatures, Labelled, Target, class_of
-from graspsense.evaluation.confusion import Confusion, confusion
-from graspsense.evaluation.crossval import FitRefused, Groups, Learner, Pooled, cross_validate
+from graspsense.evaluation.confusion import confusion
+from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.folds import commonest, in_order, instance_held_out, stratified
-from graspsense.evaluation.intervals import Difference, RecognitionRate, difference
+from graspsense.evaluation.intervals import RecognitionRate, difference
+from graspsense.evaluation.results import CurvePoint, Evaluation, Measurement
 
 if TYPE_CHECKING:
     from graspsense.core.features import FeatureTable
@@ -25,106 +26,13 @@ if TYPE_CHECKING:
 
 INSTANCE_HELD_OUT: Final = "instance_held_out"
 SHARES: Final = (0.1, 0.2, 0.4, 0.7, 1.0)
-"""Parts of the training trials on which the learning curve is measured."""
+"""Shares of the training trials at which the learning curve is measured."""
 
 Progress = Callable[[str, int, int], None]
 
 
-@frozen
-class Judged:
-    """A rate that could be measured, or the reason why not.
-
-    `what` defines it. `difference` is the rate that it is a control of, less this one.
-    """
-
-    what: str
-    rate: RecognitionRate | None = None
-    reason: str = ""
-    difference: Difference | None = None
-    of: str = ""
-    """What `difference` starts from: the name of a protocol."""
-
-    def as_json(self) -> dict[str, Any]:
-        """Return it as JSON; `rate` is None with a `reason` where it could not be measured."""
-        if self.rate is None:
-            return {"what": self.what, "rate": None, "reason": self.reason}
-        found: dict[str, Any] = {"what": self.what, **rate_as_json(self.rate)}
-        if self.difference is not None:
-            found["difference"] = self.difference.value
-            found["difference_interval"] = list(self.difference.interval)
-            found["difference_of"] = f"{self.of} less this"
-        return found
-
-
-@frozen
-class CurvePoint:
-    """One point of the learning curve: the mean number of training trials, and the rate."""
-
-    trained_on: float
-    rate: RecognitionRate
-
-
-@frozen(kw_only=True)
-class Evaluation:
-    """What `graspsense evaluate` found."""
-
-    source: str
-    classifier: str
-    target: Target
-    features: tuple[tuple[str, str], ...]
-    protocol: str
-    headline: RecognitionRate
-    confusion: Confusion
-    protocols: Mapping[str, Judged]
-    controls: Mapping[str, Judged]
-    by_class: Mapping[str, RecognitionRate]
-    """Rate of the headline among the trials of each class (`class` of `class:state`)."""
-    unlike: RecognitionRate
-    """Held-out trials that the model of their fold would call unknown; here they are counted by their label."""
-    learning_curve: tuple[CurvePoint, ...]
-    warnings: tuple[str, ...]
-    """What in the controls speaks against taking the headline for the object's."""
-    notes: tuple[str, ...]
-    folds: int
-    seed: int
-    settings: Mapping[str, Any] = field(factory=dict)
-    confusions: Mapping[str, Confusion] = field(factory=dict)
-    """The confusion matrix of each protocol that could be followed; `confusion` is that of the headline."""
-
-    def as_json(self) -> dict[str, Any]:
-        """Return what `graspsense evaluate --json` prints."""
-        return {
-            "source": self.source,
-            "classifier": self.classifier,
-            "settings": dict(self.settings),
-            "target": self.target,
-            "features": [name for name, _ in self.features],
-            "units": dict(self.features),
-            "folds": self.folds,
-            "seed": self.seed,
-            "protocol": self.protocol,
-            **rate_as_json(self.headline),
-            "labels": list(self.confusion.labels),
-            "confusion": [list(row) for row in self.confusion.counts],
-            "protocols": {name: one.as_json() for name, one in self.protocols.items()},
-            "controls": {name: one.as_json() for name, one in self.controls.items()},
-            "by_class": {name: rate_as_json(one) for name, one in self.by_class.items()},
-            "unknown": rate_as_json(self.unlike),
-            "learning_curve": [
-                {"trained_on": one.trained_on, **rate_as_json(one.rate)} for one in self.learning_curve
-            ],
-            "warnings": list(self.warnings),
-            "notes": list(self.notes),
-        }
-
-
-def rate_as_json(rate: RecognitionRate) -> dict[str, Any]:
-    """Return a rate with its counts and interval."""
-    return {"n": rate.n, "correct": rate.correct, "rate": rate.rate, "interval": list(rate.interval)}
-
-
 def evaluate(
-    learner: Learner,
+    learner: ClassifierFactory,
     labelled: Labelled,
     *,
     classifier: str,
@@ -136,156 +44,152 @@ def evaluate(
     learning_curve: bool = True,
     progress: Progress | None = None,
 ) -> Evaluation:
-    """Judge a classifier on labelled trials, with the controls and the learning curve unless these are left out.
+    """Cross-validate a classifier on labelled trials, with controls and learning curve unless these are switched off.
 
-    `target` is what is recognised: the label as it is (`both`), the class, or the state among trials of one
-    class, each class apart from the others. Raises ConfigError where there is nothing to tell apart, or too
-    few trials.
+    `target` selects what is recognised: the label as it is (`both`), the class, or the state within each class.
+    Raises ConfigError if there is only one label, or if there are too few trials.
     """
-    judge = _Judge(learner, labelled, classifier, target, folds, seed, settings or {}, progress)
-    return judge.judge(controls, learning_curve)
+    notes = list(labelled.notes)
+    trials = _trials_for(labelled, target, notes)
+    evaluator = _Evaluator(learner, trials, target, folds, seed, progress, notes)
+    headline, protocols = evaluator.measure_protocols()
+    measured = evaluator.measure_controls(headline, protocols) if controls else {}
+    curve = evaluator.learning_curve(headline) if learning_curve else ()
+    labels, table = trials.labels, trials.table
+    return Evaluation(
+        source=labelled.source,
+        classifier=classifier,
+        settings=settings or {},
+        target=target,
+        features=tuple(zip(table.names, table.units, strict=True)),
+        folds=folds,
+        seed=seed,
+        protocol=headline.protocol,
+        headline=evaluator.rate(headline.pooled),
+        confusion=confusion(labels, headline.pooled.predicted),
+        protocols=protocols,
+        controls=measured,
+        by_class=_by_class(labels, headline.pooled),
+        unknown=RecognitionRate(int(headline.pooled.unlike.sum()), len(labels)),
+        learning_curve=curve,
+        warnings=tuple(evaluator.warnings),
+        notes=tuple(notes),
+        confusions={
+            name: confusion(labels, pooled.predicted) for name, pooled in evaluator.pooled_by_protocol.items()
+        },
+    )
 
 
-class _Judge:
-    """What the measurements of one evaluation share."""
+@frozen
+class _Headline:
+    """The predictions that the headline is about, with their protocol and folds."""
+
+    protocol: str
+    pooled: Pooled
+    folds: list[Folds]
+
+
+class _Evaluator:
+    """The measurements of one evaluation. `warnings` and `notes` collect what a reader must know."""
 
     def __init__(
         self,
-        learner: Learner,
-        labelled: Labelled,
-        classifier: str,
+        learner: ClassifierFactory,
+        trials: Labelled,
         target: Target,
-        folds: int,
+        k: int,
         seed: int,
-        settings: Mapping[str, Any],
         progress: Progress | None,
+        notes: list[str],
     ) -> None:
-        self.learner, self.classifier, self.target = learner, classifier, target
-        self.k, self.seed, self.settings, self.progress = folds, seed, settings, progress
-        self.notes = list(labelled.notes)
+        self.learner, self.trials, self.k, self.seed = learner, trials, k, seed
+        self.progress, self.notes = progress, notes
+        self.labels = trials.labels
+        self.groups = _groups(self.labels, target)
         self.warnings: list[str] = []
-        self.labelled = self._chosen(labelled)
-        self.labels = self.labelled.labels
-        self.groups: Groups = self._groups()
+        self.stratified_name = f"stratified_{k}_fold"
+        self.pooled_by_protocol: dict[str, Pooled] = {}
+        self.pooled_by_control: dict[str, Pooled] = {}
         self._note_small_labels()
 
-    def judge(self, with_controls: bool, with_curve: bool) -> Evaluation:
-        """Measure everything that is asked for."""
-        labelled, table = self.labelled, self.labelled.table
-        plain_name = f"stratified_{self.k}_fold"
-        plain_what = f"{self.k} folds, stratified by label; predictions of all folds pooled"
-        dealt = self._folds(lambda labels, rows: stratified(labels, self.k, self.seed))
-        plain = self._pooled(plain_name, table, dealt)
-        plain_judged = Judged(plain_what, self._rate(plain))
-        protocols = {}
-        held, held_folds, protocols[INSTANCE_HELD_OUT] = self._instance_held_out(plain, plain_name)
-        protocols[plain_name] = plain_judged
-        protocol = plain_name if held is None else INSTANCE_HELD_OUT
-        head = plain if held is None else held
-        head_folds = dealt if held_folds is None else held_folds
+    def measure_protocols(self) -> tuple[_Headline, dict[str, Measurement]]:
+        """Measure the rate under each protocol. The headline holds out whole instances if that is possible."""
+        folds = self._folds(lambda labels, rows: stratified(labels, self.k, self.seed))
+        plain = self._pooled(self.stratified_name, self.trials.table, folds)
+        headline = _Headline(self.stratified_name, plain, folds)
+        held, measured = self._instance_held_out(plain)
+        if held is not None:
+            self.pooled_by_protocol[INSTANCE_HELD_OUT] = held.pooled
+        self.pooled_by_protocol[self.stratified_name] = plain
+        what = f"{self.k} folds, stratified by label; predictions of all folds pooled"
+        protocols = {
+            INSTANCE_HELD_OUT: measured,
+            self.stratified_name: Measurement(what, self.rate(plain)),
+        }
+        return held or headline, protocols
 
-        majority_right, majority = self._majority(head, protocol)
+    def measure_controls(
+        self, headline: _Headline, protocols: Mapping[str, Measurement]
+    ) -> dict[str, Measurement]:
+        """Measure the controls, and warn if they show that the recording itself reveals the labels."""
+        trials = self.trials
+        majority_correct, majority = self._majority(headline)
+        controls = {
+            "before_contact": self._other_features(
+                "before_contact",
+                trials.before_contact,
+                headline,
+                "features from before contact only",
+                trials.no_before_contact,
+            ),
+            "width_only": self._other_features(
+                "width_only", trials.width, headline, "the width alone", trials.no_width
+            ),
+            INSTANCE_HELD_OUT: protocols[INSTANCE_HELD_OUT],
+            "recording_order": self._in_order(),
+            "majority_class": majority,
+            "shuffled_labels": self._shuffled(),
+        }
+        for name, control in trials.variants.items():
+            controls[name] = self._other_features(name, control, headline)
+        self._warn_of_early_recognition(controls["before_contact"], majority_correct)
+        self._warn_of_leaks(controls)
+        return controls
 
-        def beside(name: str, control: ControlFeatures | None, reason: str = "", default: str = "") -> Judged:
-            """Judge other features by the same folds."""
-            if control is None:
-                return Judged(default, reason=reason or "these trials have no such features")
-            try:
-                found = self._pooled(name, control.table, head_folds)
-            except FitRefused as refusal:
-                return Judged(control.what, reason=str(refusal))
-            right = found.right(self.labels)
-            against = difference(head.right(self.labels), right)
-            if name == "before_contact" and difference(right, majority_right).interval[0] > 0.0:
-                self.warnings.append(
-                    f"before any contact {self._rate(found).rate:.3f} are right already ({control.what}; the "
-                    f"commonest label alone: {np.mean(majority_right):.3f}): the recording tells the labels apart"
-                )
-            return Judged(control.what, self._rate(found), difference=against, of=protocol)
-
-        controls: dict[str, Judged] = {}
-        if with_controls:
-            controls = {
-                "before_contact": beside(
-                    "before_contact",
-                    labelled.before_contact,
-                    labelled.no_before_contact,
-                    "features from before the contact only",
-                ),
-                "width_only": beside("width_only", labelled.width, labelled.no_width, "p_first alone"),
-                INSTANCE_HELD_OUT: protocols[INSTANCE_HELD_OUT],
-                "recording_order": self._in_order(plain, plain_name),
-                "majority_class": majority,
-                "shuffled_labels": self._shuffled(),
-            }
-            controls.update((name, beside(name, one)) for name, one in labelled.variants.items())
-            self._warn_of_leaks(controls)
-        return Evaluation(
-            source=labelled.source,
-            classifier=self.classifier,
-            target=self.target,
-            features=tuple(zip(table.names, table.units, strict=True)),
-            protocol=protocol,
-            headline=self._rate(head),
-            confusion=confusion(self.labels, head.predicted),
-            protocols=protocols,
-            controls=controls,
-            by_class=self._by_class(head),
-            unlike=RecognitionRate(int(head.unlike.sum()), len(self.labels)),
-            learning_curve=self._curve(head_folds, head) if with_curve else (),
-            warnings=tuple(self.warnings),
-            notes=tuple(self.notes),
-            folds=self.k,
-            seed=self.seed,
-            settings=self.settings,
-            confusions={
-                name: confusion(self.labels, one.predicted)
-                for name, one in ((INSTANCE_HELD_OUT, held), (plain_name, plain))
-                if one is not None
-            },
-        )
-
-    def _chosen(self, labelled: Labelled) -> Labelled:
-        """Return the trials with the labels that are to be told apart."""
-        if self.target == "class":
-            labelled = labelled.aimed("class")
-        elif self.target == "state":
-            labelled.aimed("state")
-            states: dict[str, set[str]] = {}
-            for label in labelled.labels:
-                states.setdefault(class_of(label), set()).add(label)
-            single = sorted(name for name, of in states.items() if len(of) == 1)
-            if single:
-                self.notes.append(f"left out, as they have one state only: {', '.join(single)}")
-                kept = [i for i, label in enumerate(labelled.labels) if class_of(label) not in single]
-                if not kept:
-                    raise ConfigError(
-                        f"every class in {labelled.source} has one state: nothing to tell apart"
+    def learning_curve(self, headline: _Headline) -> tuple[CurvePoint, ...]:
+        """Measure the rate for growing shares of the training trials."""
+        points: list[CurvePoint] = []
+        for share in SHARES:
+            pooled = headline.pooled
+            if share < 1.0:
+                name = f"learning curve {share:.0%}"
+                try:
+                    pooled = self._pooled(name, self.trials.table, headline.folds, share)
+                except FitRefused as refusal:
+                    self.notes.append(
+                        f"the learning curve has no point at {share:.0%} of the trials: {refusal}"
                     )
-                labelled = labelled.rows(np.array(kept, dtype=np.int64))
-        if len(labelled.classes) < 2:
-            raise ConfigError(
-                f"every trial of {labelled.source} has the label {labelled.labels[0]!r}: there is nothing to tell apart"
-            )
-        return labelled
+                    continue
+            # At least one trial per label is used, so small shares of few trials may be the same trials.
+            if not points or pooled.trained_on > points[-1].trained_on:
+                points.append(CurvePoint(pooled.trained_on, self.rate(pooled)))
+        return tuple(points)
 
-    def _groups(self) -> Groups:
-        if self.target != "state":
-            return [np.arange(len(self.labels))]
-        of = np.array([class_of(label) for label in self.labels])
-        return [np.flatnonzero(of == name) for name in np.unique(of)]
+    def rate(self, pooled: Pooled) -> RecognitionRate:
+        """Return the rate of these predictions."""
+        return RecognitionRate(sum(pooled.right(self.labels)), len(self.labels))
 
     def _note_small_labels(self) -> None:
         counts = Counter(self.labels)
-        alone = sorted(label for label, n in counts.items() if n == 1)
+        single = sorted(label for label, n in counts.items() if n == 1)
         few = sorted(label for label, n in counts.items() if 1 < n < self.k)
-        if alone:
-            self.notes.append(f"one trial only, so that no fold can get it right: {', '.join(alone)}")
+        if single:
+            self.notes.append(f"labels with a single trial, which no fold can predict: {', '.join(single)}")
         if few:
-            self.notes.append(f"fewer trials than folds ({self.k}): {', '.join(few)}")
+            self.notes.append(f"labels with fewer trials than folds ({self.k}): {', '.join(few)}")
 
-    def _folds(self, deal: Callable[[Sequence[str], Any], Folds]) -> list[Folds]:
-        return [deal([self.labels[i] for i in rows], rows) for rows in self.groups]
+    def _folds(self, assign: Callable[[Sequence[str], Any], Folds]) -> list[Folds]:
+        return [assign([self.labels[i] for i in rows], rows) for rows in self.groups]
 
     def _pooled(
         self,
@@ -295,6 +199,7 @@ class _Judge:
         share: float = 1.0,
         labels: Sequence[str] | None = None,
     ) -> Pooled:
+        """Cross-validate and report progress under this name. Raises FitRefused."""
         labels = self.labels if labels is None else labels
         total = sum(int(of.max()) + 1 for of in folds)
         done = 0
@@ -309,103 +214,159 @@ class _Judge:
             self.learner, table, labels, self.groups, folds, seed=self.seed, share=share, progress=step
         )
 
-    def _rate(self, pooled: Pooled) -> RecognitionRate:
-        return RecognitionRate(sum(pooled.right(self.labels)), len(self.labels))
+    def _against(self, what: str, pooled: Pooled, other: Pooled, other_name: str) -> Measurement:
+        """Return the rate of `pooled` with its difference to another protocol."""
+        by = difference(other.right(self.labels), pooled.right(self.labels))
+        return Measurement(what, self.rate(pooled), difference=by, difference_of=other_name)
 
-    def _instance_held_out(
-        self, plain: Pooled, plain_name: str
-    ) -> tuple[Pooled | None, list[Folds] | None, Judged]:
-        what = f"at most {self.k} folds of whole instances: no model knew the very thing it is tested on"
-        instances = self.labelled.instances
+    def _instance_held_out(self, plain: Pooled) -> tuple[_Headline | None, Measurement]:
+        what = f"at most {self.k} folds of whole instances: no model was trained on the object that it is tested on"
+        instances = self.trials.instances
         if instances is None:
-            reason = self.labelled.no_instances or "no instances are named"
-            return None, None, Judged(what, reason=reason)
-        alone = sorted(
-            label
-            for label in self.labelled.classes
-            if len({one for one, of in zip(instances, self.labels, strict=True) if of == label}) == 1
-        )
-        if alone:
-            reason = f"one instance only, which cannot be held out and known: {', '.join(alone)}"
-            return None, None, Judged(what, reason=reason)
+            return None, Measurement(what, reason=self.trials.no_instances or "no instances are named")
+        of_label: dict[str, set[str]] = {}
+        for instance, label in zip(instances, self.labels, strict=True):
+            of_label.setdefault(label, set()).add(instance)
+        single = sorted(label for label, of in of_label.items() if len(of) == 1)
+        if single:
+            reason = f"labels with a single instance, which cannot be held out: {', '.join(single)}"
+            return None, Measurement(what, reason=reason)
         folds = self._folds(
             lambda labels, rows: instance_held_out(labels, [instances[i] for i in rows], self.k, self.seed)
         )
         try:
-            held = self._pooled(INSTANCE_HELD_OUT, self.labelled.table, folds)
+            held = self._pooled(INSTANCE_HELD_OUT, self.trials.table, folds)
         except FitRefused as refusal:
-            return None, None, Judged(what, reason=str(refusal))
-        against = difference(plain.right(self.labels), held.right(self.labels))
-        return held, folds, Judged(what, self._rate(held), difference=against, of=plain_name)
+            return None, Measurement(what, reason=str(refusal))
+        headline = _Headline(INSTANCE_HELD_OUT, held, folds)
+        return headline, self._against(what, held, plain, self.stratified_name)
 
-    def _in_order(self, plain: Pooled, plain_name: str) -> Judged:
-        what = f"{self.k} folds, each a block of every label's trials in the order of their recording"
-        order = self.labelled.order
+    def _in_order(self) -> Measurement:
+        what = f"{self.k} folds; each is a block of every label's trials in the order of recording"
+        order = self.trials.order
         if order is None:
-            return Judged(what, reason=self.labelled.no_order or "the order of recording is not known")
+            return Measurement(what, reason=self.trials.no_order or "the order of recording is not known")
         folds = self._folds(lambda labels, rows: in_order(labels, [order[i] for i in rows], self.k))
         try:
-            blocks = self._pooled("recording_order", self.labelled.table, folds)
+            blocks = self._pooled("recording_order", self.trials.table, folds)
         except FitRefused as refusal:
-            return Judged(what, reason=str(refusal))
-        against = difference(plain.right(self.labels), blocks.right(self.labels))
-        return Judged(what, self._rate(blocks), difference=against, of=plain_name)
+            return Measurement(what, reason=str(refusal))
+        plain = self.pooled_by_protocol[self.stratified_name]
+        return self._against(what, blocks, plain, self.stratified_name)
 
-    def _warn_of_leaks(self, controls: Mapping[str, Judged]) -> None:
-        for name, why in (
-            (INSTANCE_HELD_OUT, "part of the stratified rate is the very things' that were trained on"),
-            ("recording_order", "part of the stratified rate is the moment's of the recording"),
-        ):
-            one = controls[name].difference
-            if one is not None and one.interval[0] > 0.0:
-                self.warnings.append(f"{name} is lower by {one.words}: {why}")
+    def _other_features(
+        self,
+        name: str,
+        control: ControlFeatures | None,
+        headline: _Headline,
+        default: str = "",
+        reason: str = "",
+    ) -> Measurement:
+        """Measure the rate with other features on the folds of the headline."""
+        if control is None:
+            return Measurement(default, reason=reason or "these trials have no such features")
+        try:
+            pooled = self._pooled(name, control.table, headline.folds)
+        except FitRefused as refusal:
+            return Measurement(control.what, reason=str(refusal))
+        self.pooled_by_control[name] = pooled
+        return self._against(control.what, pooled, headline.pooled, headline.protocol)
 
-    def _majority(self, head: Pooled, protocol: str) -> tuple[list[bool], Judged]:
-        right = np.zeros(len(self.labels), dtype=np.bool_)
+    def _majority(self, headline: _Headline) -> tuple[list[bool], Measurement]:
+        """Return which trials have the most frequent label of their group, and the rate of predicting that label."""
+        correct = np.zeros(len(self.labels), dtype=np.bool_)
         for rows in self.groups:
             most = commonest([self.labels[i] for i in rows])
-            right[rows] = [self.labels[i] == most for i in rows]
-        what = "the commonest label, whatever is felt"
+            correct[rows] = [self.labels[i] == most for i in rows]
+        what = "always the most frequent label"
         if len(self.groups) > 1:
-            what += " (of each class, the commonest state)"
-        against = difference(head.right(self.labels), right.tolist())
-        judged = Judged(what, RecognitionRate(int(right.sum()), len(right)), difference=against, of=protocol)
-        return right.tolist(), judged
+            what += " (the most frequent state of each class)"
+        return correct.tolist(), Measurement(
+            what,
+            RecognitionRate(int(correct.sum()), len(correct)),
+            difference=difference(headline.pooled.right(self.labels), correct.tolist()),
+            difference_of=headline.protocol,
+        )
 
-    def _shuffled(self) -> Judged:
-        """Judge by labels that say nothing: dealt anew to the trials, within each class where it is known."""
+    def _shuffled(self) -> Measurement:
+        """Measure the rate on labels that carry no information: shuffled among the trials of each group."""
         rng = np.random.default_rng(self.seed)
         labels = np.array(self.labels)
         for rows in self.groups:
             labels[rows] = rng.permutation(labels[rows])
         shuffled = labels.tolist()
         folds = [stratified([shuffled[i] for i in rows], self.k, self.seed) for rows in self.groups]
-        what = "the same trials with their labels shuffled, in stratified folds"
+        what = "the same trials with shuffled labels, in stratified folds"
         try:
-            found = self._pooled("shuffled_labels", self.labelled.table, folds, labels=shuffled)
+            pooled = self._pooled("shuffled_labels", self.trials.table, folds, labels=shuffled)
         except FitRefused as refusal:
-            return Judged(what, reason=str(refusal))
-        return Judged(what, RecognitionRate(sum(found.right(shuffled)), len(shuffled)))
+            return Measurement(what, reason=str(refusal))
+        return Measurement(what, RecognitionRate(sum(pooled.right(shuffled)), len(shuffled)))
 
-    def _by_class(self, head: Pooled) -> dict[str, RecognitionRate]:
-        right: dict[str, list[bool]] = {}
-        for label, one in zip(self.labels, head.right(self.labels), strict=True):
-            right.setdefault(class_of(label), []).append(one)
-        return {name: RecognitionRate(sum(of), len(of)) for name, of in sorted(right.items())}
+    def _warn_of_early_recognition(self, control: Measurement, majority_correct: Sequence[bool]) -> None:
+        if control.rate is None:
+            return
+        correct = self.pooled_by_control["before_contact"].right(self.labels)
+        if difference(correct, majority_correct).interval[0] > 0.0:
+            self.warnings.append(
+                f"{control.rate.rate:.3f} are recognised from before contact ({control.what}); the most frequent label "
+                f"alone gives {np.mean(majority_correct):.3f}. The recording itself reveals the labels"
+            )
 
-    def _curve(self, folds: Sequence[Folds], head: Pooled) -> tuple[CurvePoint, ...]:
-        points: list[CurvePoint] = []
-        for share in SHARES:
-            one = head
-            if share < 1.0:
-                try:
-                    one = self._pooled(f"learning curve {share:.0%}", self.labelled.table, folds, share)
-                except FitRefused as refusal:
-                    self.notes.append(
-                        f"the learning curve has no point at {share:.0%} of the trials: {refusal}"
-                    )
-                    continue
-            # Of few trials of a label at least one is kept, so that small shares may come to the same trials.
-            if not points or one.trained_on > points[-1].trained_on:
-                points.append(CurvePoint(one.trained_on, self._rate(one)))
-        return tuple(points)
+    def _warn_of_leaks(self, controls: Mapping[str, Measurement]) -> None:
+        for name, why in (
+            (INSTANCE_HELD_OUT, "part of the stratified rate comes from having seen the same objects"),
+            ("recording_order", "part of the stratified rate comes from the time of recording"),
+        ):
+            by = controls[name].difference
+            if by is not None and by.interval[0] > 0.0:
+                self.warnings.append(f"{name} is lower by {by.words}: {why}")
+
+
+def _trials_for(labelled: Labelled, target: Target, notes: list[str]) -> Labelled:
+    """Return the trials with the labels that the target asks for.
+
+    Raises ConfigError if there are not at least two labels, or if a target `state` finds labels without a state.
+    """
+    if target == "class":
+        labelled = labelled.aimed("class")
+    elif target == "state":
+        labelled = _with_several_states(labelled, notes)
+    if len(labelled.classes) < 2:
+        raise ConfigError(
+            f"every trial of {labelled.source} has the label {labelled.labels[0]!r}: there is nothing to tell apart"
+        )
+    return labelled
+
+
+def _with_several_states(labelled: Labelled, notes: list[str]) -> Labelled:
+    """Return the trials of the classes that have more than one state."""
+    labelled.aimed("state")  # raises ConfigError if a label has no state
+    states: dict[str, set[str]] = {}
+    for label in labelled.labels:
+        states.setdefault(class_of(label), set()).add(label)
+    single = sorted(name for name, of in states.items() if len(of) == 1)
+    if not single:
+        return labelled
+    notes.append(f"classes left out because they have a single state: {', '.join(single)}")
+    rows = [i for i, label in enumerate(labelled.labels) if class_of(label) not in single]
+    if not rows:
+        raise ConfigError(
+            f"every class in {labelled.source} has a single state: there is nothing to tell apart"
+        )
+    return labelled.rows(np.array(rows, dtype=np.int64))
+
+
+def _groups(labels: Sequence[str], target: Target) -> Groups:
+    """Return the trials that are cross-validated separately: those of each class if the target is `state`."""
+    if target != "state":
+        return [np.arange(len(labels))]
+    classes = np.array([class_of(label) for label in labels])
+    return [np.flatnonzero(classes == name) for name in np.unique(classes)]
+
+
+def _by_class(labels: Sequence[str], pooled: Pooled) -> dict[str, RecognitionRate]:
+    correct: dict[str, list[bool]] = {}
+    for label, right in zip(labels, pooled.right(labels), strict=True):
+        correct.setdefault(class_of(label), []).append(right)
+    return {name: RecognitionRate(sum(of), len(of)) for name, of in sorted(correct.items())}

@@ -1,4 +1,4 @@
-"""How trials are dealt into folds: each function returns, for every trial, the number of the fold that tests it."""
+"""Assigning trials to folds: each function returns the number of the fold that tests each trial."""
 
 from __future__ import annotations
 
@@ -17,48 +17,48 @@ if TYPE_CHECKING:
 
 
 def stratified(labels: Sequence[str], k: int, seed: int) -> Folds:
-    """Deal the trials of each label, shuffled, round and round to the folds.
+    """Assign the shuffled trials of each label to the folds in turn.
 
-    Raises ConfigError where there are fewer than two folds, or fewer trials than folds.
+    Raises ConfigError for fewer than two folds, or fewer trials than folds.
     """
     _check(len(labels), k)
     rng = np.random.default_rng(seed)
     folds = np.zeros(len(labels), dtype=np.int64)
-    dealt = 0
+    assigned = 0
     for _, rows in _by_label(labels):
         shuffled = rng.permutation(rows)
-        # Going on where the label before ended keeps all folds of one size, within one trial.
-        folds[shuffled] = (dealt + np.arange(len(shuffled))) % k
-        dealt += len(shuffled)
+        # Continuing where the previous label ended keeps the sizes of all folds equal to within one trial.
+        folds[shuffled] = (assigned + np.arange(len(shuffled))) % k
+        assigned += len(shuffled)
     return folds
 
 
 def instance_held_out(labels: Sequence[str], instances: Sequence[str], k: int, seed: int) -> Folds:
-    """Deal whole instances, so that no trial is tested by a model that knew the very thing it is of.
+    """Assign whole instances, so that no model was trained on the object that it is tested on.
 
-    Instances are dealt by the label that most of their trials have, so that folds hold about as many of each.
-    With fewer instances than folds there are as many folds as instances.
+    Instances are stratified by the most frequent label of their trials. If there are fewer instances than folds,
+    there are as many folds as instances.
     """
     _check(len(labels), k)
     rng = np.random.default_rng(seed)
-    things = sorted(set(instances))
-    k = min(k, len(things))
+    objects = sorted(set(instances))
+    k = min(k, len(objects))
     _check(len(labels), k)
-    of = np.array(instances)
+    instance_of = np.array(instances)
     main = [
-        commonest([label for label, one in zip(labels, instances, strict=True) if one == thing])
-        for thing in things
+        commonest([label for label, instance in zip(labels, instances, strict=True) if instance == name])
+        for name in objects
     ]
-    fold_of = np.zeros(len(things), dtype=np.int64)
-    dealt = 0
+    fold_of = np.zeros(len(objects), dtype=np.int64)
+    assigned = 0
     for _, members in _by_label(main):
-        fold_of[rng.permutation(members)] = (dealt + np.arange(len(members))) % k
-        dealt += len(members)
-    return fold_of[np.searchsorted(np.array(things), of)]
+        fold_of[rng.permutation(members)] = (assigned + np.arange(len(members))) % k
+        assigned += len(members)
+    return fold_of[np.searchsorted(np.array(objects), instance_of)]
 
 
 def in_order(labels: Sequence[str], order: Sequence[int], k: int) -> Folds:
-    """Cut the trials of each label, in the order of their recording, into `k` blocks that follow one another."""
+    """Split the trials of each label into `k` consecutive blocks in the order of recording."""
     _check(len(labels), k)
     folds = np.zeros(len(labels), dtype=np.int64)
     when = np.array(order)
@@ -69,7 +69,7 @@ def in_order(labels: Sequence[str], order: Sequence[int], k: int) -> Folds:
 
 
 def commonest(labels: Sequence[str]) -> str:
-    """Return the label that occurs most often, of equals the first by name."""
+    """Return the most frequent label, the first by name of several."""
     counts = Counter(labels)
     most = max(counts.values())
     return min(label for label, n in counts.items() if n == most)
@@ -82,6 +82,6 @@ def _by_label(labels: Sequence[str]) -> list[tuple[str, NDArray[np.int64]]]:
 
 def _check(n: int, k: int) -> None:
     if k < 2:
-        raise ConfigError(f"{k} fold{'' if k == 1 else 's'}: a cross validation needs at least 2")
+        raise ConfigError(f"{k} fold{'' if k == 1 else 's'}: cross validation needs at least 2")
     if n < k:
-        raise ConfigError(f"{n} trials cannot be cut into {k} folds: give more trials, or fewer --folds")
+        raise ConfigError(f"{n} trials cannot be split into {k} folds: give more trials, or fewer --folds")

@@ -1,7 +1,7 @@
-"""Intervals of recognition rates, all at 95 %.
+"""Confidence intervals of recognition rates, all at 95 %.
 
-Wilson: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209. Difference of two rates on the same trials: method 10 of
-R. G. Newcombe, Statistics in Medicine 17 (1998) 2635, which is made of the two Wilson intervals.
+One rate: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209. Difference of two rates on the same trials: method 10 of
+R. G. Newcombe, Statistics in Medicine 17 (1998) 2635, which combines two Wilson intervals.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ Z: Final = 1.959963984540054
 
 @frozen
 class RecognitionRate:
-    """Correct of all, with its 95 % Wilson interval."""
+    """A number of correct trials out of `n`, with its 95 % Wilson interval."""
 
     correct: int
     n: int
 
     def __attrs_post_init__(self) -> None:
         if self.n < 1 or not 0 <= self.correct <= self.n:
-            raise ValueError(f"{self.correct} correct of {self.n} is no rate")
+            raise ValueError(f"{self.correct} correct of {self.n} is not a rate")
 
     @property
     def rate(self) -> float:
-        """Correct / all."""
+        """The share of correct trials."""
         return self.correct / self.n
 
     @property
@@ -39,43 +39,43 @@ class RecognitionRate:
 
     @property
     def words(self) -> str:
-        """Return it as a person reads it."""
+        """The rate as text: share, counts and interval."""
         low, high = self.interval
         return f"{self.rate:.3f} ({self.correct}/{self.n}, 95 % {low:.3f} to {high:.3f})"
 
 
 @frozen
 class Difference:
-    """A rate less another rate on the same trials, with its 95 % interval."""
+    """A rate minus another rate on the same trials, with its 95 % interval."""
 
     value: float
     interval: tuple[float, float]
 
     @property
     def words(self) -> str:
-        """Return it as a person reads it."""
+        """The rate as text: share, counts and interval."""
         return f"{self.value:+.3f} ({self.interval[0]:+.3f} to {self.interval[1]:+.3f})"
 
 
 def wilson(correct: float, n: int) -> tuple[float, float]:
-    """Return the 95 % Wilson interval of `correct` out of `n`; a mean of several counts need not be whole."""
+    """Return the 95 % Wilson interval of `correct` out of `n`; `correct` may be a mean of several counts."""
     p, zz = correct / n, Z * Z
     middle = (p + zz / (2 * n)) / (1 + zz / n)
     half = Z / (1 + zz / n) * math.sqrt(p * (1 - p) / n + zz / (4 * n * n))
-    # At the ends the interval reaches them exactly; rounding must not take it past.
+    # At 0 and 1 the interval ends exactly there; rounding must not exceed them.
     low = 0.0 if correct == 0 else max(middle - half, 0.0)
     high = 1.0 if correct == n else min(middle + half, 1.0)
     return low, high
 
 
 def difference(first: Sequence[bool], second: Sequence[bool]) -> Difference:
-    """Return the rate of `first` less that of `second`; both say of the same trials which were right.
+    """Return the rate of `first` minus that of `second`; both state which of the same trials are correct.
 
-    Raises ValueError where they are not of one length, or empty.
+    Raises ValueError if their lengths differ or are zero.
     """
     n = len(first)
     if n == 0 or len(second) != n:
-        raise ValueError(f"{n} and {len(second)} trials: both must judge the same ones")
+        raise ValueError(f"{n} and {len(second)} trials: both must be of the same trials")
     both = sum(1 for x, y in zip(first, second, strict=True) if x and y)
     only_first = sum(1 for x, y in zip(first, second, strict=True) if x and not y)
     only_second = sum(1 for x, y in zip(first, second, strict=True) if y and not x)
@@ -90,7 +90,7 @@ def difference(first: Sequence[bool], second: Sequence[bool]) -> Difference:
 
 
 def _correlation(both: int, only_first: int, only_second: int, neither: int) -> float:
-    """Return Newcombe's phi, with his correction for continuity where the two agree."""
+    """Return Newcombe's phi, with his continuity correction for a positive correlation."""
     n = both + only_first + only_second + neither
     margins = (both + only_first) * (only_second + neither) * (both + only_second) * (only_first + neither)
     if margins == 0:

@@ -1,4 +1,4 @@
-"""Rates of one experiment over several seeds: their mean, how sure it is, and where a further one would lie."""
+"""Rates of one experiment over several seeds: their mean, its interval, and a prediction interval."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from graspsense.evaluation.intervals import wilson
 
 @frozen
 class OverSeeds:
-    """Rates of seeds that are independent of each other: each with things, grasps and folds of its own.
+    """Rates of independent seeds, each with its own objects, grasps and folds.
 
-    `interval` is that of the mean, `further` where the rate of one further seed lies, both at 95 %, by Student's t
-    with one degree of freedom less than there are seeds, kept within 0 and 1. A published rate is one such run: it is
-    to be held against `further`. Neither is taken narrower than the Wilson interval of the trials, of all seeds or
-    of one, so that seeds which agree by chance are not taken for certainty; with one seed it stands for both.
+    `interval` is the confidence interval of the mean, `prediction` the interval for the rate of one more seed. Both
+    are at 95 %, from Student's t with one degree of freedom less than there are seeds, clipped to 0 and 1. A published
+    rate is one such run, so it is compared with `prediction`. Neither interval is narrower than the Wilson interval of
+    the trials (of all seeds, or of one), because a few seeds may agree by chance. With one seed, both are it.
     """
 
     rates: tuple[float, ...]
     n: int
-    """Trials of one seed."""
+    """Trials per seed."""
 
     def __attrs_post_init__(self) -> None:
         if not self.rates or self.n < 1:
@@ -39,8 +39,8 @@ class OverSeeds:
         return self._around(math.sqrt(1 / len(self.rates)), self.n * len(self.rates))
 
     @property
-    def further(self) -> tuple[float, float]:
-        """Where the rate of one further seed lies, at 95 %."""
+    def prediction(self) -> tuple[float, float]:
+        """The 95 % prediction interval for the rate of one more seed."""
         return self._around(math.sqrt(1 + 1 / len(self.rates)), self.n)
 
     def _around(self, factor: float, n: int) -> tuple[float, float]:
@@ -52,7 +52,7 @@ class OverSeeds:
 
     @property
     def words(self) -> str:
-        """Return it as a person reads it."""
+        """The mean as text, with its interval."""
         low, high = self.interval
         return f"{self.mean:.3f} (95 % {low:.3f} to {high:.3f})"
 
@@ -60,10 +60,10 @@ class OverSeeds:
 def mean_difference(
     first: Sequence[float], second: Sequence[float], n: int
 ) -> tuple[float, tuple[float, float]]:
-    """Return the mean of `first` less `second`, seed by seed, and its 95 % interval by Student's t.
+    """Return the mean of `first` minus `second`, paired by seed, and its 95 % interval from Student's t.
 
-    Rates of `n` trials come in steps of 1/n, so the deviation between seeds is taken for at least that. Raises
-    ValueError where there are not the same seeds, or fewer than two.
+    Rates of `n` trials have steps of 1/n, so the standard deviation between seeds is taken as at least 1/n. Raises
+    ValueError if the lengths differ or there are fewer than two seeds.
     """
     if len(first) != len(second) or len(first) < 2:
         raise ValueError(f"{len(first)} and {len(second)} rates: give two or more, of the same seeds")

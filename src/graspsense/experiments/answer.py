@@ -1,58 +1,66 @@
-"""The answer to an experiment's question in a sentence, with its interval."""
+"""The answer to the question of an experiment: one or two sentences, computed from the rates alone."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from graspsense.experiments.summary import Arm, Summary
+from graspsense.experiments.summary import ConditionResult, Summary
+from graspsense.report.wording import TARGETS
 
 
 def answer(summary: Summary) -> str:
-    """Return what came out in a sentence or two, which follow from the numbers alone."""
-    if not summary.arms:
-        return "No task has a result yet: there is no answer."
-    target = summary.arms[0].target
-    arms = [one for one in summary.arms if one.target == target]
-    told = {
-        "both": "what it is and in what state",
-        "class": "what it is",
-        "state": "the state of a known thing",
-    }[arms[0].tells]
-    seeds = len(arms[0].judged)
-    over = f", over {seeds} seeds" if seeds > 1 else ""
-    kind = "simulated grasps" if arms[0].simulated else "recorded grasps"
-    if len(arms) == 1:
-        only = arms[0]
-        return f"{_begun(only.name)} tells {told} in {_rate(only)} of {only.rate.n} {kind}{over}."
-    best = max(arms, key=lambda one: one.rate.mean)
-    text = f"{_begun(best.name)} does best: it tells {told} in {_rate(best)} of {best.rate.n} {kind}{over}."
-    ends = _ends(arms)
-    if ends is not None:
-        low, high = ends
-        change = high.less(low)
-        if change is not None:
-            return f"{text} From {low.name} to {high.name} the rate changes by {_points(*change)}."
-    if len({one.rate.mean for one in arms}) == 1:
+    """Return the answer in one or two sentences."""
+    if not summary.conditions:
+        return "There is no answer yet: no task has a result."
+    target = summary.conditions[0].target
+    conditions = [condition for condition in summary.conditions if condition.target == target]
+    best = max(conditions, key=lambda condition: condition.rate.mean)
+    sample = _sample(best)
+    recognises = TARGETS[conditions[0].recognised]
+    if len(conditions) == 1:
+        return f"{_capitalised(best.name)} recognises {recognises} in {_rate(best)} of {sample}."
+    if len({condition.rate.mean for condition in conditions}) == 1:
         return (
-            f"All {len(arms)} cases do alike: {told} is told in {_rate(best)} of {best.rate.n} {kind}{over}."
+            f"All {len(conditions)} cases recognise {recognises} equally well: in {_rate(best)} of {sample}."
         )
-    worst = min(arms, key=lambda one: one.rate.mean)
-    gap = best.less(worst)
-    if gap is None:
-        overlap = worst.rate.interval[1] >= best.rate.interval[0]
-        sure = ": the intervals overlap, so this may be chance" if overlap else ""
-        return f"{text} {_begun(worst.name)} does worst, {_rate(worst)}{sure}."
-    return f"{text} {_begun(worst.name)} does worst: {_rate(worst)}; the difference is {_points(*gap)}."
+    text = f"{_capitalised(best.name)} is best: it recognises {recognises} in {_rate(best)} of {sample}."
+    return f"{text} {_comparison(conditions, best)}"
 
 
-def _ends(arms: Sequence[Arm]) -> tuple[Arm, Arm] | None:
-    """Return the arms of the least and the largest of one swept number, where they differ in nothing else."""
-    if len({arm.learner for arm in arms}) > 1 or len(arms[0].case.at) != 1:
+def _comparison(conditions: Sequence[ConditionResult], best: ConditionResult) -> str:
+    """Return the sentence that compares the ends of a sweep, or else the best condition with the worst."""
+    ends = _ends_of_sweep(conditions)
+    change = None if ends is None else ends[1].minus(ends[0])
+    if ends is not None and change is not None:
+        return f"From {ends[0].name} to {ends[1].name} the rate changes by {_points(*change)}."
+    worst = min(conditions, key=lambda condition: condition.rate.mean)
+    gap = best.minus(worst)
+    name = _capitalised(worst.name)
+    if gap is not None:
+        return f"{name} is worst, with {_rate(worst)}; the difference is {_points(*gap)}."
+    if worst.rate.interval[1] >= best.rate.interval[0]:
+        return (
+            f"{name} is worst, with {_rate(worst)}; as the intervals overlap, the difference may be chance."
+        )
+    return f"{name} is worst, with {_rate(worst)}."
+
+
+def _sample(condition: ConditionResult) -> str:
+    kind = "simulated grasps" if condition.simulated else "recorded grasps"
+    seeds = len(condition.by_seed)
+    return f"{condition.rate.n} {kind}" + (f" per seed, over {seeds} seeds" if seeds > 1 else "")
+
+
+def _ends_of_sweep(
+    conditions: Sequence[ConditionResult],
+) -> tuple[ConditionResult, ConditionResult] | None:
+    """Return the conditions at the smallest and the largest value, if they differ in a single number only."""
+    if len({condition.classifier for condition in conditions}) > 1 or len(conditions[0].case.at) != 1:
         return None
-    key = next(iter(arms[0].case.at))
-    if not all(type(arm.case.at.get(key)) in (int, float) for arm in arms):
+    key = next(iter(conditions[0].case.at))
+    if not all(type(condition.case.at.get(key)) in (int, float) for condition in conditions):
         return None
-    ordered = sorted(arms, key=lambda arm: float(arm.case.at[key]))
+    ordered = sorted(conditions, key=lambda condition: float(condition.case.at[key]))
     return ordered[0], ordered[-1]
 
 
@@ -63,11 +71,11 @@ def _points(value: float, interval: tuple[float, float]) -> str:
     return text.replace("-", "−")
 
 
-def _begun(name: str) -> str:
-    """Return a name as a sentence begins with it."""
+def _capitalised(name: str) -> str:
+    """Return a name as the start of a sentence."""
     return name[:1].upper() + name[1:] if " " in name else name
 
 
-def _rate(arm: Arm) -> str:
-    low, high = arm.rate.interval
-    return f"{100 * arm.rate.mean:.1f} % (95 %: {100 * low:.1f} to {100 * high:.1f})"
+def _rate(condition: ConditionResult) -> str:
+    low, high = condition.rate.interval
+    return f"{100 * condition.rate.mean:.1f} % (95 %: {100 * low:.1f} to {100 * high:.1f})"

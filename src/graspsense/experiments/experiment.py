@@ -20,7 +20,7 @@ from graspsense.core.strict import InvalidValue, ValidationFailed, plain, struct
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.task import Task
 from graspsense.sources.simulated import plan_trials, simulated_objects
-from graspsense.sources.trial_source import SIMULATED, Source, groups_of, labelled_trials
+from graspsense.sources.trial_source import SIMULATED, TrialSource, groups_of, labelled_trials
 
 PIPELINE_TABLES: Final = (*(one for one in TABLE_OF_ROLE.values() if one != "classifier"), "run")
 SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
@@ -86,11 +86,11 @@ class Experiment:
     sweep: Mapping[str, Any] = field(factory=dict)
     """Keys, as `controller.probing_force_n`, each with a list of values: every combination is a case."""
     data: Mapping[str, Any] = field(factory=dict)
-    """Keys of `graspsense.sources.trial_source.Source`."""
+    """Keys of `graspsense.sources.trial_source.TrialSource`."""
     test: Mapping[str, Any] = field(factory=dict)
     """Other trials to judge on, in place of a cross validation."""
     judge: Mapping[str, Any] = field(factory=dict)
-    """Keys of the kind, as `graspsense.experiments.recognise.Judging`."""
+    """Keys of the kind, as `graspsense.experiments.recognise.EvaluationSettings`."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -103,15 +103,15 @@ class LearnerSpec:
 
 
 @frozen(kw_only=True, eq=False)
-class Case:
+class ExperimentCase:
     """One of the things compared: its name, what it differs in, and everything that its tasks follow from."""
 
     name: str
     at: Mapping[str, Any]
     """`pipeline`, `variant` and swept keys (but the classifier's) with the values of this case."""
     settings: Settings
-    data: Source
-    test: Source | None
+    data: TrialSource
+    test: TrialSource | None
     learners: tuple[LearnerSpec, ...]
     judge: Any
     kind: str = "recognise"
@@ -128,7 +128,7 @@ class Planned:
 
     name: str
     experiment: Experiment
-    cases: tuple[Case, ...]
+    cases: tuple[ExperimentCase, ...]
     seeds: tuple[int, ...]
     pipelines: Mapping[str, Settings]
     parts: tuple[Planned, ...] = ()
@@ -137,7 +137,7 @@ class Planned:
         """Return every task, the seeds of a case one after the other, all cases for one seed first."""
         return [self.task(case, seed) for seed in self.seeds for case in self.cases]
 
-    def task(self, case: Case, seed: int) -> Task:
+    def task(self, case: ExperimentCase, seed: int) -> Task:
         """Return the task of this case with this seed."""
         params = {
             "settings": {
@@ -203,7 +203,7 @@ def _of_parts(name: str, experiment: Experiment, layer: Layer, within: Sequence[
     seeds = _listed(experiment.seeds)
     parts = [read_experiment(part, [f"seeds={list(seeds)}"], within) for part in experiment.parts]
     pipelines: dict[str, Settings] = {}
-    cases: list[Case] = []
+    cases: list[ExperimentCase] = []
     for part in parts:
         for called, settings in part.pipelines.items():
             if called in pipelines and pipelines[called].values != settings.values:
@@ -302,7 +302,7 @@ class _Plan:
         point: Sequence[tuple[tuple[str, ...], Any]],
         sweep: Mapping[tuple[str, ...], Sequence[Any]],
         at: dict[str, Any],
-    ) -> Case:
+    ) -> ExperimentCase:
         one = self.experiment
         values = _laid(_tables(one), _tables(variant))
         for path, value in point:
@@ -316,14 +316,14 @@ class _Plan:
             str(value) if key in ("pipeline", "variant") else in_a_name(key, value)
             for key, value in at.items()
         )
-        data = self._keys(values.get("data", {}), Source, "data")
-        test = self._keys(values["test"], Source, "test") if values.get("test") else None
+        data = self._keys(values.get("data", {}), TrialSource, "data")
+        test = self._keys(values["test"], TrialSource, "test") if values.get("test") else None
         if any(source is not None and source.kind == SIMULATED for source in (data, test)):
             simulated_objects(settings)
         judge = self._keys(values.get("judge", {}), kind_of(one.kind).keys_class(), "judge")
         if test is None and data is not None and judge is not None:
             self._check_folds(settings, data, judge)
-        return Case(
+        return ExperimentCase(
             name=name,
             at=at,
             settings=settings,
@@ -334,7 +334,7 @@ class _Plan:
             kind=one.kind,
         )
 
-    def _check_folds(self, settings: Settings, data: Source, judge: Any) -> None:
+    def _check_folds(self, settings: Settings, data: TrialSource, judge: Any) -> None:
         """Complain of more folds than trials, which every task of the case would end with."""
         folds = getattr(judge, "folds", None)
         if folds is None:
@@ -407,7 +407,7 @@ class _Plan:
                 yield LearnerSpec(name=name, type=component.qualified, config=config)
 
 
-def _number_of_trials(settings: Settings, data: Source) -> int | None:
+def _number_of_trials(settings: Settings, data: TrialSource) -> int | None:
     """Return how many trials a source has, None where that is known only when a data set is read."""
     if data.kind == SIMULATED:
         return len(plan_trials(settings, groups_of(data), 0).labels)

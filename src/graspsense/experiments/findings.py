@@ -62,7 +62,7 @@ class Findings:
         """Return the tables with what is drawn of them, then the further parts."""
         found = [one.section(self.drawn.get(one.id, "")) for one in self.tables]
         if self.notes:
-            found.append(Section(id="notes", title="What has to be known", body=bullets(self.notes)))
+            found.append(Section(id="notes", title="Notes", body=bullets(self.notes)))
         return [*found, *self.sections]
 
     def markdown(self, title: str, made: Mapping[str, Any], cpu_seconds: float) -> str:
@@ -72,7 +72,7 @@ class Findings:
         lines = [
             f"# {title}",
             "",
-            "Simulated, every figure of ours: the things grasped are models.",
+            "All grasps are simulated, with models of the gripper and of the objects.",
             f"Made by `{made.get('command', '')}`, begun {made.get('begun_at', '?')}, written "
             f"{time.strftime('%Y-%m-%d', time.gmtime())}, on {made.get('system', '?')}, commit {commit}; "
             f"{cpu_seconds:.0f} s of processor time in all tasks together.",
@@ -83,7 +83,7 @@ class Findings:
         for one in self.tables:
             lines += one.markdown
         if self.notes:
-            lines += ["## What has to be known", "", *(f"- {_cell(one)}" for one in self.notes), ""]
+            lines += ["## Notes", "", *(f"- {_cell(one)}" for one in self.notes), ""]
         return "\n".join(lines)
 
 

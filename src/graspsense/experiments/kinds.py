@@ -1,4 +1,4 @@
-"""The kinds of tasks there are. A further kind is a module with a function and a class, and a line here."""
+"""The kinds of task. To add one, write a module with a function and a settings class, and add a line here."""
 
 from __future__ import annotations
 
@@ -10,38 +10,47 @@ from attrs import frozen
 
 from graspsense.core.errors import ConfigError, suggestion
 
-TaskFunction = Callable[[Mapping[str, Any], int], Mapping[str, Any]]
-"""Takes the params and the seed of a task and returns JSON values, which follow from these two alone."""
+TaskFunction = Callable[[Mapping[str, Any], int], Any]
+"""Takes the parameters and the seed of a task. Returns its result, which depends on these two alone."""
+
+_RECOGNITION: Final = "graspsense.experiments.task_results:RecognitionResult"
 
 
 @frozen
-class Kind:
-    """A kind of task: the import strings of its function, and of the attrs class of its keys under `[judge]`.
+class TaskKind:
+    """A kind of task, as import strings.
 
-    `tells` is that of a function from a `Summary` to `Findings`, where what came out is more than rates. A kind
+    `run` is its function, `keys` the attrs class of its keys under `[judge]`, and `result` the class of its result.
+    `report_with` is a function from a `Summary` to `Findings`, for kinds whose report is more than rates. A kind
     without a function is for experiments that consist of others.
     """
 
     name: str
     run: str = ""
     keys: str = ""
-    tells: str = ""
+    report_with: str = ""
+    result: str = _RECOGNITION
 
     def function(self) -> TaskFunction:
-        """Return what does such a task."""
+        """Return the function that runs such a task."""
         function: TaskFunction = _imported(self.run)
         return function
 
     def keys_class(self) -> type:
-        """Return the class of its keys."""
+        """Return the class of the keys under `[judge]`."""
         cls: type = _imported(self.keys)
         return cls
 
+    def result_class(self) -> type:
+        """Return the class of the result."""
+        cls: type = _imported(self.result)
+        return cls
+
     def findings(self) -> Callable[[Any], Any] | None:
-        """Return what tells what came out, None where rates are all."""
-        if not self.tells:
+        """Return the function that reports the findings, None if the rates are the whole report."""
+        if not self.report_with:
             return None
-        function: Callable[[Any], Any] = _imported(self.tells)
+        function: Callable[[Any], Any] = _imported(self.report_with)
         return function
 
 
@@ -50,51 +59,52 @@ _TRADES: Final = "graspsense.experiments.trade.findings:findings"
 KINDS: Final = {
     kind.name: kind
     for kind in (
-        Kind(
+        TaskKind(
             "recognise",
             "graspsense.experiments.recognise:recognise",
-            "graspsense.experiments.recognise:Judging",
+            "graspsense.experiments.recognise:EvaluationSettings",
         ),
-        Kind(
+        TaskKind(
             "grasp",
             "graspsense.experiments.grasping:grasp",
-            "graspsense.experiments.grasping:Grasping",
-            tells="graspsense.experiments.paper.findings:findings",
+            "graspsense.experiments.grasping:GraspSettings",
+            result="graspsense.experiments.task_results:GraspResult",
+            report_with="graspsense.experiments.paper.findings:findings",
         ),
-        Kind(
+        TaskKind(
             "table",
             "graspsense.experiments.recognise:recognise",
-            "graspsense.experiments.recognise:Judging",
-            tells="graspsense.experiments.paper.findings:findings",
+            "graspsense.experiments.recognise:EvaluationSettings",
+            report_with="graspsense.experiments.paper.findings:findings",
         ),
-        Kind("paper", tells="graspsense.experiments.paper.findings:findings"),
-        Kind(
+        TaskKind("paper", report_with="graspsense.experiments.paper.findings:findings"),
+        TaskKind(
             "trade",
             "graspsense.experiments.trade.costs:trade",
-            "graspsense.experiments.trade.costs:TradeJudging",
-            tells=_TRADES,
+            "graspsense.experiments.trade.costs:TradeSettings",
+            report_with=_TRADES,
         ),
         *(
-            Kind(
+            TaskKind(
                 name,
                 f"graspsense.experiments.trade.{name}:{name}",
                 f"graspsense.experiments.trade.{name}:{keys}",
-                tells=_TRADES,
+                report_with=_TRADES,
             )
             for name, keys in (
-                ("early", "Early"),
-                ("squeezes", "Squeezes"),
-                ("physics", "Physics"),
-                ("next_squeeze", "NextSqueeze"),
-                ("compare", "Comparing"),
+                ("early", "EarlySettings"),
+                ("squeezes", "RepeatSettings"),
+                ("physics", "ModelErrorSettings"),
+                ("next_squeeze", "NextSqueezeSettings"),
+                ("compare", "ComparisonSettings"),
             )
         ),
-        Kind("trades", tells=_TRADES),
+        TaskKind("trades", report_with=_TRADES),
     )
 }
 
 
-def kind_of(name: str) -> Kind:
+def kind_of(name: str) -> TaskKind:
     """Return a kind by its name. Raises ConfigError."""
     if name not in KINDS:
         raise ConfigError(

@@ -1,20 +1,20 @@
-"""The page of an experiment: question, answer, and everything that the answer rests on."""
+"""The page of an experiment: the question, the answer, and the evidence for it."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from graspsense.core.model import worded
-from graspsense.core.tree import TreeNode
 from graspsense.experiments.answer import answer
 from graspsense.experiments.findings import MARKDOWN, Findings, write_markdown
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.results import EXPERIMENT, Results
-from graspsense.experiments.summary import Arm, Summary
+from graspsense.experiments.summary import ConditionResult, Summary
+from graspsense.experiments.task_results import RecognitionResult
 from graspsense.report.evaluation_sections import code, confusion_section, controls_section, tree_section
 from graspsense.report.html import Page, Section, bullets, facts, folded, pair, paragraph, table
 from graspsense.report.rates import RateRow, rates_over, rates_picture, rates_table
@@ -24,35 +24,36 @@ from graspsense.report.write import write_html
 
 NAME: Final = "report.html"
 MATRICES: Final = 6
-"""Confusion matrices that are shown; those of further cases are in the results."""
+"""Confusion matrices on the page; those of further cases are in the results."""
 SIMULATED: Final = (
-    "every figure of ours comes from a model of gripper and objects; none was measured on real things"
+    "all figures of graspsense are simulated, with models of gripper and objects; none was measured "
+    "on real objects"
 )
 ROWS: Final = 40
-"""Cases in one picture."""
+"""Largest number of cases in one picture."""
 
 
 def write_page(summary: Summary, results: Results) -> Path:
     """Write `report.html` beside the results and return its path. Raises SaveFailed."""
     path = results.folder / NAME
     write_html(path, experiment_page(summary, results))
-    found = found_in(summary)
+    found = findings_of(summary)
     if found is not None:
         text = found.markdown(summary.planned.experiment.title, results.provenance(), summary.cpu_seconds)
         write_markdown(results.folder / MARKDOWN, text)
     return path
 
 
-def found_in(summary: Summary) -> Findings | None:
-    """Return what came out beyond rates, None for a kind of experiment that has nothing else."""
-    tells = kind_of(summary.planned.experiment.kind).findings()
-    return None if tells is None else tells(summary)
+def findings_of(summary: Summary) -> Findings | None:
+    """Return the findings beyond rates, None for a kind of experiment without any."""
+    report_with = kind_of(summary.planned.experiment.kind).findings()
+    return None if report_with is None else report_with(summary)
 
 
 def experiment_page(summary: Summary, results: Results) -> Page:
     """Return the page."""
     one = summary.planned.experiment
-    found = found_in(summary)
+    found = findings_of(summary)
     if found is not None:
         return Page(
             kind="Experiment",
@@ -62,10 +63,10 @@ def experiment_page(summary: Summary, results: Results) -> Page:
             beside=_failures(summary) + bullets([SIMULATED], "warning"),
             sections=(*found.page_sections(), _made_of(summary, results)),
         )
-    best = best_arm(summary)
-    sections = [_rates(summary)] if summary.arms else []
+    best = best_condition(summary)
+    sections = [_rates(summary)] if summary.conditions else []
     if best is not None:
-        sections += [*_judged(summary, best), *felt_sections(summary, best)]
+        sections += [*_evaluation_sections(summary, best), *measurement_sections(summary, best)]
     sections.append(_made_of(summary, results))
     return Page(
         kind="Experiment",
@@ -77,86 +78,96 @@ def experiment_page(summary: Summary, results: Results) -> Page:
     )
 
 
-def best_arm(summary: Summary) -> Arm | None:
-    """Return the arm with the highest rate for the first target, None where there is none."""
-    arms = [arm for arm in summary.arms if arm.target == summary.arms[0].target]
-    return max(arms, key=lambda arm: arm.rate.mean) if arms else None
+def best_condition(summary: Summary) -> ConditionResult | None:
+    """Return the condition with the highest rate for the first target, None if there is none."""
+    conditions = [
+        condition for condition in summary.conditions if condition.target == summary.conditions[0].target
+    ]
+    return max(conditions, key=lambda condition: condition.rate.mean) if conditions else None
 
 
-def rate_row(arm: Arm, *, strong: bool = False, name: str = "") -> RateRow:
-    """Return an arm as a row of a picture."""
+def rate_row(condition: ConditionResult, *, strong: bool = False, name: str = "") -> RateRow:
+    """Return a condition as a row of a picture."""
     return RateRow(
-        name=name or arm.name,
-        rate=arm.rate.mean,
-        interval=arm.rate.interval,
-        what=f"{TARGETS[arm.tells]}, {arm.protocol.replace('_', ' ')}",
+        name=name or condition.name,
+        rate=condition.rate.mean,
+        interval=condition.rate.interval,
+        what=f"{TARGETS[condition.recognised]}, {condition.protocol.replace('_', ' ')}",
         strong=strong,
     )
 
 
-def _beside(summary: Summary, best: Arm | None) -> str:
-    """Return what must be read with the answer: how it was measured, and what speaks against it."""
+def _beside(summary: Summary, best: ConditionResult | None) -> str:
+    """Return what must be read with the answer: how it was measured, and what casts doubt on it."""
     if best is None:
         return _failures(summary)
-    first = next(iter(best.judged.values()))
-    result = next(one for (case, _), one in summary.results.items() if case == best.case.name)
-    seeds = len(best.judged)
-    labels = len(first["labels"])
-    features = ", ".join(name for name, _ in result["features"])
-    made = "made by a simulator" if best.simulated else "recorded"
-    anew = f", anew for each of {seeds} seeds" if best.simulated and seeds > 1 else ""
-    guess = best.controls.get("majority_class", ("", None, ""))[1]
-    guessing = f" Guessing the commonest would be right in {100 * guess.mean:.0f} %." if guess else ""
-    text = (
-        "A gripper closes two fingers that feel force on a thing it cannot see into. From each grasp a few numbers are "
-        f"drawn ({features}); a classifier learns from them {TARGETS[best.tells]}: {labels} possible answers."
-        f"{guessing} Each case has {best.rate.n} grasps, {made}{anew}. Every grasp is judged by "
-        f"{protocol_words(best.protocol)}. An interval holds the true mean in 95 of 100 such experiments."
+    result = _first_result(summary, best)
+    seeds = len(best.by_seed)
+    features = ", ".join(name for name, _ in result.trials.features) if result and result.trials else ""
+    origin = "simulated" if best.simulated else "recorded"
+    if best.simulated and seeds > 1:
+        origin += f" anew for each of {seeds} seeds"
+    guess = best.majority
+    guessing = (
+        f" Always guessing the most frequent label is right in {100 * guess.mean:.0f} %." if guess else ""
     )
-    warnings = list(dict.fromkeys(str(line) for line in first.get("warnings", ())))
+    text = (
+        "A gripper closes two fingers with force sensors on an object that it cannot see into. Each grasp gives a few "
+        f"numbers ({features}), from which a classifier learns {TARGETS[best.recognised]}. There are "
+        f"{len(best.first.confusion.labels)} possible answers.{guessing} Each case has {best.rate.n} grasps, {origin}. "
+        f"Every grasp is classified by {protocol_words(best.protocol)}. A 95 % interval contains the true mean in "
+        "95 of 100 such experiments."
+    )
+    warnings = list(dict.fromkeys(best.first.warnings))
     if best.simulated:
-        warnings.append(
-            "every figure here comes from a model of gripper and objects; none was measured on real things"
-        )
+        warnings.append(SIMULATED)
     return paragraph(text) + _failures(summary) + bullets(warnings, "warning")
+
+
+def _first_result(summary: Summary, condition: ConditionResult) -> RecognitionResult | None:
+    """Return the result of the first seed of a condition."""
+    seed = next((seed for seed in summary.planned.seeds if seed in condition.by_seed), None)
+    return None if seed is None else summary.recognition(condition.case.name, seed)
 
 
 def _failures(summary: Summary) -> str:
     lines = []
     if summary.failed:
         reasons = list(dict.fromkeys(one.reason for one in summary.failed))
-        lines.append(
-            f"{len(summary.failed)} tasks failed and are not in these figures: {'; '.join(reasons[:5])}"
-        )
+        lines.append(f"{len(summary.failed)} tasks failed and are not included: {'; '.join(reasons[:5])}")
     if summary.missing:
-        lines.append(f"{summary.missing} tasks have no result yet: the figures are of those that have")
+        lines.append(f"{summary.missing} tasks have no result yet and are not included")
     return bullets(lines, "warning")
 
 
 def _rates(summary: Summary) -> Section:
     body = []
-    for target in dict.fromkeys(arm.target for arm in summary.arms):
-        arms = [arm for arm in summary.arms if arm.target == target]
-        best = max(arms, key=lambda arm: arm.rate.mean)
-        rows = [rate_row(arm, strong=arm is best and len(arms) > 1) for arm in arms]
-        title = f"How often {TARGETS[best.tells]} is told"
+    for target in dict.fromkeys(condition.target for condition in summary.conditions):
+        conditions = [condition for condition in summary.conditions if condition.target == target]
+        best = max(conditions, key=lambda condition: condition.rate.mean)
+        rows = [
+            rate_row(condition, strong=condition is best and len(conditions) > 1) for condition in conditions
+        ]
+        title = f"How often {TARGETS[best.recognised]} is recognised"
         body.append(f"<h3>{escape(title)}</h3>")
-        picture = _picture(arms, rows, f"{title}. Bars are 95 % intervals.")
-        body.append(pair(picture, rates_table("Case by case", rows)))
-    return Section(id="rates", title="How often it is right", body="".join(body))
+        picture = _picture(conditions, rows, f"{title}. Bars are 95 % intervals.")
+        body.append(pair(picture, rates_table("ExperimentCase by case", rows)))
+    return Section(id="rates", title="Recognition rates", body="".join(body))
 
 
-def _picture(arms: Sequence[Arm], rows: Sequence[RateRow], caption: str) -> str:
-    """Return the rates against the one number that was swept, or else a row for each."""
-    key = _swept_number(arms)
+def _picture(conditions: Sequence[ConditionResult], rows: Sequence[RateRow], caption: str) -> str:
+    """Return the rates against the number that was swept, or else one row per condition."""
+    key = _swept_number(conditions)
     if key is None:
-        cut = "" if len(rows) <= ROWS else f" The first {ROWS} of {len(rows)}; all are in the table."
+        cut = "" if len(rows) <= ROWS else f" The first {ROWS} of {len(rows)}; the table has all of them."
         return rates_picture(rows[:ROWS], caption + cut)
     series: dict[str, list[tuple[float, RateRow]]] = {}
-    for arm, row in zip(arms, rows, strict=True):
-        others = [str(value) for name, value in arm.case.at.items() if name != key]
-        series.setdefault(", ".join([*others, arm.learner]), []).append((float(arm.case.at[key]), row))
-    guess = arms[0].controls.get("majority_class", ("", None, ""))[1]
+    for condition, row in zip(conditions, rows, strict=True):
+        others = [str(value) for name, value in condition.case.at.items() if name != key]
+        series.setdefault(", ".join([*others, condition.classifier]), []).append(
+            (float(condition.case.at[key]), row)
+        )
+    guess = conditions[0].majority
     what, one = worded(key.rpartition(".")[2], 1.0)
     factor, _, unit = one.partition(" ")
     series = {name: [(x * float(factor), row) for x, row in points] for name, points in series.items()}
@@ -164,93 +175,85 @@ def _picture(arms: Sequence[Arm], rows: Sequence[RateRow], caption: str) -> str:
     return rates_over(series, axis, caption, None if guess is None else guess.mean)
 
 
-def _swept_number(arms: Sequence[Arm]) -> str | None:
-    """Return the key that takes the most different numbers, where it takes more than one."""
+def _swept_number(conditions: Sequence[ConditionResult]) -> str | None:
+    """Return the swept key with the most different numbers, None if no key has more than one."""
     numbers: dict[str, set[float]] = {}
-    for arm in arms:
-        for key, value in arm.case.at.items():
+    for condition in conditions:
+        for key, value in condition.case.at.items():
             if isinstance(value, int | float) and not isinstance(value, bool):
                 numbers.setdefault(key, set()).add(float(value))
     most = max(numbers, key=lambda key: len(numbers[key]), default=None)
-    everywhere = most is not None and all(most in arm.case.at for arm in arms)
+    everywhere = most is not None and all(most in condition.case.at for condition in conditions)
     return most if everywhere and most is not None and len(numbers[most]) > 1 else None
 
 
-def _judged(summary: Summary, best: Arm) -> list[Section]:
+def _evaluation_sections(summary: Summary, best: ConditionResult) -> list[Section]:
+    """Return the controls of the best condition, confusion matrices, and a tree if there is one."""
     sections = []
     if best.controls:
-        rows = [rate_row(best, strong=True)]
-        missing = []
-        for name, (what, rate, reason) in best.controls.items():
-            if name == best.protocol:
-                continue
-            called, good_for = control_words(name, what)
-            if rate is None:
-                missing.append(f"{called}: not measured ({reason})")
-            else:
-                rows.append(RateRow(name=called, rate=rate.mean, interval=rate.interval, what=good_for))
-        sections.append(controls_section(rows, missing, best.name))
-    arms = [arm for arm in summary.arms if arm.target == best.target]
-    arms = sorted(arms, key=lambda arm: -arm.rate.mean)
-    chosen = arms if len(arms) <= MATRICES else [*arms[: MATRICES - 1], arms[-1]]
+        rows, missing = _control_rows(best)
+        sections.append(controls_section([rate_row(best, strong=True), *rows], missing, best.name))
+    conditions = [condition for condition in summary.conditions if condition.target == best.target]
+    conditions = sorted(conditions, key=lambda condition: -condition.rate.mean)
+    chosen = conditions if len(conditions) <= MATRICES else [*conditions[: MATRICES - 1], conditions[-1]]
     first, *others = [
         (
-            f"{arm.name}: {arm.confusion.n} answers of {len(arm.judged)} seeds, {100 * arm.rate.mean:.1f} % right",
-            arm.confusion,
+            f"{condition.name}: {condition.confusion.n} predictions of {len(condition.by_seed)} seeds, "
+            f"{100 * condition.rate.mean:.1f} % correct",
+            condition.confusion,
         )
-        for arm in chosen
+        for condition in chosen
     ]
     sections.append(confusion_section(first, others))
-    tree = next((one["tree"] for one in best.judged.values() if one.get("tree")), None)
+    tree = next((result.tree for result in best.by_seed.values() if result.tree), None)
     if tree:
-        nodes = [TreeNode.from_json(node) for node in tree]
-        sections.append(tree_section(nodes, f"{best.learner} grows on all grasps of the first seed"))
+        sections.append(tree_section(tree, f"{best.classifier} grows on all grasps of the first seed"))
     return sections
 
 
-def felt_sections(summary: Summary, best: Arm) -> list[Section]:
-    """Return what was felt, of the first seed that has a result."""
-    seed = next((s for s in summary.planned.seeds if (best.case.name, s) in summary.results), None)
-    if seed is None:
+def _control_rows(best: ConditionResult) -> tuple[list[RateRow], list[str]]:
+    """Return a row for each control that was measured, and a sentence for each that was not."""
+    rows, missing = [], []
+    for name, control in best.controls.items():
+        if name == best.protocol:
+            continue
+        title, purpose = control_words(name, control.what)
+        if control.rate is None:
+            missing.append(f"{title}: not measured ({control.reason})")
+        else:
+            interval = control.rate.interval
+            rows.append(RateRow(name=title, rate=control.rate.mean, interval=interval, what=purpose))
+    return rows, missing
+
+
+def measurement_sections(summary: Summary, best: ConditionResult) -> list[Section]:
+    """Return the grasps and features of the first seed that has a result."""
+    result = _first_result(summary, best)
+    if result is None:
         return []
-    result = summary.results[best.case.name, seed]
+    seed = next(seed for seed in summary.planned.seeds if seed in best.by_seed)
     where = f" Case: {best.case.name}." if best.case.name else ""
     sections = []
-    grasps: Sequence[Mapping[str, Any]] = result.get("grasps") or ()
-    if grasps:
-        chosen = grasps[0]
-        sections.append(
-            Section(
-                id="grasp",
-                title="One grasp, from the approach to rest",
-                body=one_grasp(
-                    chosen,
-                    f"{chosen['label']}, seed {seed}.{where} The fingers close until both touch, squeeze with a set "
-                    "force, and hold until nothing moves.",
-                ),
-            )
+    if result.grasps:
+        chosen = result.grasps[0]
+        caption = (
+            f"{chosen.label}, seed {seed}.{where} The fingers close until both touch, squeeze with a set force, and "
+            "hold until nothing moves."
         )
         sections.append(
-            Section(
-                id="traces",
-                title="What the fingers felt",
-                body=paragraph(f"Some grasps of each kind from seed {seed}, laid over each other.{where}")
-                + traces_by_class(grasps),
-            )
+            Section(id="grasp", title="One grasp, from the approach to rest", body=one_grasp(chosen, caption))
         )
-    labels, values = result["labels"], result["values"]
-    features = [(str(name), str(unit)) for name, unit in result["features"]]
-    sections.append(
-        Section(
-            id="features",
-            title="What was drawn from it",
-            body=paragraph(
-                f"Each dot is one grasp of seed {seed}; the bar reaches from the first to the third quartile, with the "
-                f"median across it.{where} What lies apart here can be told apart."
-            )
-            + features_by_class(features, labels, values),
+        text = f"Some grasps of each label from seed {seed}, drawn over each other.{where}"
+        body = paragraph(text) + traces_by_class(result.grasps)
+        sections.append(Section(id="traces", title="Force and gap over time", body=body))
+    if result.trials is not None:
+        text = (
+            f"Each dot is one grasp of seed {seed}. The bar spans the first to the third quartile, with the median "
+            f"across it.{where} Labels that lie apart here can be distinguished."
         )
-    )
+        trials = result.trials
+        body = paragraph(text) + features_by_class(trials.features, trials.labels, trials.values)
+        sections.append(Section(id="features", title="Features", body=body))
     return sections
 
 
@@ -259,15 +262,15 @@ def _made_of(summary: Summary, results: Results) -> Section:
     one = summary.planned.experiment
     git = (made.get("git") or {}).get("graspsense") or {}
     commit = f"{git.get('commit')}{' (with changes)' if git.get('dirty') else ''}" if git else "unknown"
-    source = next(iter(summary.results.values()), {})
-    notes = [str(line) for line in source.get("notes", ())]
+    result = next(iter(summary.results.values()), None)
+    notes = result.notes if isinstance(result, RecognitionResult) else ()
     pairs = [
         ("experiment", f"{summary.planned.name} ({one.kind})"),
         ("command", str(made.get("command", ""))),
         ("begun", str(made.get("begun_at", ""))),
-        ("trials", str(source.get("source", "none yet"))),
+        ("trials", "none yet" if result is None else result.source),
         ("cases, seeds", f"{len(summary.planned.cases)} cases, seeds {_ranges(summary.planned.seeds)}"),
-        ("computing", f"{summary.seconds:.0f} s in all tasks together"),
+        ("computing time", f"{summary.seconds:.0f} s, all tasks together"),
         ("machine", f"{made.get('host', '?')}, {made.get('system', '?')}"),
         ("code", f"graspsense {made.get('graspsense', '?')}, commit {commit}"),
         *((f"hash of {name}", value) for name, value in (made.get("files") or {}).items()),
@@ -288,18 +291,18 @@ def _made_of(summary: Summary, results: Results) -> Section:
         facts(pairs)
         + bullets(notes)
         + folded("Versions", facts(versions))
-        + folded("The experiment, with everything filled in", code("experiment file", text))
+        + folded("The experiment with all its settings", code("experiment file", text))
         + folded("Settings of the first case", code("settings", json.dumps(settings, indent=1)))
         + paragraph(
-            "The idea is that of S. Chitta, M. Piccoli and J. Sturm, Tactile Object Class and Internal State "
-            "Recognition for Mobile Manipulation, ICRA 2010. Intervals over seeds are Student's, those of one "
-            "run Wilson's (J. Am. Stat. Assoc. 22, 1927, 209)."
+            "The method follows S. Chitta, M. Piccoli and J. Sturm, Tactile Object Class and Internal State "
+            "Recognition for Mobile Manipulation, ICRA 2010. Intervals over seeds are Student's; those of one run "
+            "are Wilson's (J. Am. Stat. Assoc. 22, 1927, 209)."
         )
     )
     if summary.failed:
         rows = [(failure.name, failure.reason) for failure in summary.failed]
         body += table("Tasks that failed", ("task", "reason"), rows)
-    return Section(id="made", title="What it was made from", body=body)
+    return Section(id="made", title="Provenance", body=body)
 
 
 def _ranges(seeds: Sequence[int]) -> str:

@@ -26,7 +26,7 @@ from graspsense.core.config import to_toml, toml_key, toml_value
 from graspsense.core.errors import ConfigError
 from graspsense.core.strict import plain
 from graspsense.experiments.experiment import PipelineOf, Planned
-from graspsense.experiments.task import Done
+from graspsense.experiments.task import TaskResult
 from graspsense.experiments.versions import versions
 from graspsense.recording.atomic_file import SaveFailed, write_or_replace
 from graspsense.recording.provenance import process_provenance
@@ -49,19 +49,19 @@ class Results:
         """Return where what came of a task lies."""
         return self.folder / RESULTS / f"{key}.json"
 
-    def add(self, done: Done) -> None:
+    def add(self, done: TaskResult) -> None:
         """Keep what came of a task; when this returns the disk has it. Raises SaveFailed."""
         _write(self.path(done.key), done.to_text() + "\n")
 
-    def get(self, key: str) -> Done | None:
+    def get(self, key: str) -> TaskResult | None:
         """Return what came of a task; None where nothing did, or where its file is not whole."""
         try:
-            done = Done.from_text(self.path(key).read_text(encoding="utf-8"))
+            done = TaskResult.from_text(self.path(key).read_text(encoding="utf-8"))
         except (OSError, ValueError, KeyError, TypeError):
             return None
         return done if done.key == key else None
 
-    def of(self, keys: Sequence[str]) -> dict[str, Done]:
+    def of(self, keys: Sequence[str]) -> dict[str, TaskResult]:
         """Return what came of these tasks, in their order, without those of which nothing did."""
         found = ((key, self.get(key)) for key in keys)
         return {key: done for key, done in found if done is not None}

@@ -11,7 +11,7 @@ from graspsense.core.interrupts import Interrupts
 from graspsense.experiments.executors.base import Executor, ExecutorLost
 from graspsense.experiments.experiment import Planned
 from graspsense.experiments.results import Results
-from graspsense.experiments.task import Done
+from graspsense.experiments.task import TaskResult
 from graspsense.experiments.timing import TimeLeft
 from graspsense.experiments.versions import differences, versions
 from graspsense.recording.atomic_file import SaveFailed
@@ -27,7 +27,7 @@ class Account:
     total: int
     kept: int
     done: int
-    failed: tuple[Done, ...] = ()
+    failed: tuple[TaskResult, ...] = ()
     stopped: str = ""
     notes: tuple[str, ...] = field(default=())
 
@@ -123,7 +123,7 @@ def run_experiment(
     )
 
 
-def _notes(known: Sequence[Done]) -> list[str]:
+def _notes(known: Sequence[TaskResult]) -> list[str]:
     """Return what differs between what made the results that are there and what runs now."""
     found: list[str] = []
     for one in known:

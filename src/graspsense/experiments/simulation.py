@@ -61,7 +61,7 @@ def trade_simulation(
         )
     names = [scene for scene in scenes for _ in seeds]
     all_seeds = [seed for _ in scenes for seed in seeds]
-    reference: list[_Felt] | None = None
+    reference: list[_Measured] | None = None
     quantities: tuple[str, ...] = ()
     points: list[VariantPoint] = []
     in_turn = sorted(variants, key=lambda one: one.role != "reference")
@@ -99,7 +99,7 @@ def trade_simulation(
 
 
 @frozen(kw_only=True, eq=False)
-class _Felt:
+class _Measured:
     features: Features
     force: NDArray[np.float64]
 
@@ -108,9 +108,9 @@ class _Felt:
 class _Extraction:
     feature_set: Any
 
-    def __call__(self, trace: Trace) -> _Felt:
+    def __call__(self, trace: Trace) -> _Measured:
         force = 0.5 * (trace.force_left_n + trace.force_right_n)
-        return _Felt(features=self.feature_set.extract(trace), force=force)
+        return _Measured(features=self.feature_set.extract(trace), force=force)
 
 
 def _measured(
@@ -119,7 +119,7 @@ def _measured(
     scenes: Sequence[str],
     seeds: Sequence[int],
     tick: Callable[[], None] | None,
-) -> tuple[list[_Felt], float, float]:
+) -> tuple[list[_Measured], float, float]:
     """Return what every grasp felt, the processor time of one, and what the first ones took beyond that."""
     ideal = {"sensor": "ideal"} if "sensor" in fields_dict(type(settings.gripper.config)) else {}
     config = evolve(settings.gripper.config, **{**ideal, **variant.settings})
@@ -153,8 +153,8 @@ def _measured(
 
 def _point(
     variant: SimulationVariant,
-    felt: Sequence[_Felt],
-    reference: Sequence[_Felt],
+    felt: Sequence[_Measured],
+    reference: Sequence[_Measured],
     seconds: float,
     setup: float,
 ) -> VariantPoint:

@@ -1,143 +1,185 @@
-"""What came out: the rate of each case, classifier and target over all seeds, and what it differs from."""
+"""The results of an experiment: the rate of each case, classifier and target over all seeds, and their differences."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 from attrs import frozen
 
+from graspsense.core.labelled import Target
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.over_seeds import OverSeeds, mean_difference
-from graspsense.experiments.experiment import Case, Planned
+from graspsense.experiments.experiment import ExperimentCase, Planned
 from graspsense.experiments.results import Results
-from graspsense.experiments.task import Done
+from graspsense.experiments.task import TaskResult
+from graspsense.experiments.task_results import (
+    AnyTaskResult,
+    ClassifierResult,
+    GraspResult,
+    RecognitionResult,
+)
 
 
-@frozen(kw_only=True, eq=False)
-class Arm:
-    """One case, judged by one classifier for one target, over the seeds of which there are results.
+@frozen(kw_only=True)
+class ControlOverSeeds:
+    """A control over the seeds of a condition: what it is, and its rate or the reason why there is none."""
 
-    `judged` holds what the task `recognise` found, by seed.
-    """
+    what: str
+    rate: OverSeeds | None
+    reason: str
 
-    case: Case
-    learner: str
-    target: str
-    judged: Mapping[int, Mapping[str, Any]]
+
+@frozen(kw_only=True, eq=False, slots=False)
+class ConditionResult:
+    """One case, evaluated with one classifier for one target, over the seeds that have results."""
+
+    case: ExperimentCase
+    classifier: str
+    target: Target
+    by_seed: Mapping[int, ClassifierResult]
+    """At least one seed."""
     simulated: bool
 
     @property
     def name(self) -> str:
-        """What tells it from the others that are judged for the same target."""
-        learner = self.learner if len(self.case.learners) > 1 or not self.case.name else ""
-        return ", ".join(part for part in (self.case.name, learner) if part)
+        """The name among the conditions of the same target: the case, and the classifier if there are several."""
+        classifier = self.classifier if len(self.case.learners) > 1 or not self.case.name else ""
+        return ", ".join(part for part in (self.case.name, classifier) if part)
+
+    @property
+    def first(self) -> ClassifierResult:
+        """The result of the first seed."""
+        return next(iter(self.by_seed.values()))
 
     @property
     def protocol(self) -> str:
-        """The folds by which it was judged."""
-        return str(next(iter(self.judged.values()))["protocol"])
+        """The protocol of the rates."""
+        return self.first.protocol
 
     @property
-    def tells(self) -> str:
-        """What is told by right answers: the target, or the class where labels have no state."""
-        labels = next(iter(self.judged.values()))["labels"]
-        return "class" if self.target == "both" and not any(":" in one for one in labels) else self.target
+    def recognised(self) -> Target:
+        """What a correct prediction recognises: the target, or the class if labels have no state."""
+        no_state = not any(":" in label for label in self.first.confusion.labels)
+        return "class" if self.target == "both" and no_state else self.target
 
     @property
     def rates(self) -> dict[int, float]:
         """The rate of each seed."""
-        return {seed: float(one["rate"]) for seed, one in self.judged.items()}
+        return {seed: result.rate.rate for seed, result in self.by_seed.items()}
 
-    @property
+    @cached_property
     def rate(self) -> OverSeeds:
-        """The rate over the seeds.
+        """The rate over the seeds. Recorded trials are the same for every seed, so their mean is a single rate."""
+        return self._over_seeds(list(self.rates.values()))
 
-        On recorded trials seeds only deal the same trials to other folds: they count as one run.
-        """
-        first = next(iter(self.judged.values()))
-        rates = tuple(self.rates.values())
-        if not self.simulated:
-            rates = (sum(rates) / len(rates),)
-        return OverSeeds(rates, int(first["n"]))
+    @cached_property
+    def controls(self) -> dict[str, ControlOverSeeds]:
+        """The controls over the seeds, by name."""
+        controls = {}
+        for name, control in self.first.controls.items():
+            measured = (result.controls[name].rate for result in self.by_seed.values())
+            rates = [rate.rate for rate in measured if rate is not None]
+            rate = self._over_seeds(rates) if rates else None
+            controls[name] = ControlOverSeeds(what=control.what, rate=rate, reason=control.reason)
+        return controls
 
     @property
-    def controls(self) -> dict[str, tuple[str, OverSeeds | None, str]]:
-        """Each control: what it is, its rate over the seeds, or the reason why there is none."""
-        found: dict[str, tuple[str, OverSeeds | None, str]] = {}
-        first = next(iter(self.judged.values()))
-        for name, one in first["controls"].items():
-            rates = [each["controls"][name]["rate"] for each in self.judged.values()]
-            known = [float(rate) for rate in rates if rate is not None]
-            if known and not self.simulated:
-                known = [sum(known) / len(known)]
-            rate = OverSeeds(tuple(known), int(first["n"])) if known else None
-            found[name] = (str(one["what"]), rate, str(one.get("reason", "")))
-        return found
+    def majority(self) -> OverSeeds | None:
+        """The rate of always predicting the most frequent label, if it was measured."""
+        control = self.controls.get("majority_class")
+        return None if control is None else control.rate
 
     @property
     def confusion(self) -> Confusion:
-        """The confusion matrices of all seeds, added up."""
-        labels = sorted({label for one in self.judged.values() for label in one["labels"]})
-        at = {label: k for k, label in enumerate(labels)}
+        """The sum of the confusion matrices of all seeds."""
+        matrices = [result.confusion for result in self.by_seed.values()]
+        labels = sorted({label for matrix in matrices for label in matrix.labels})
+        place = {label: k for k, label in enumerate(labels)}
         counts = [[0] * len(labels) for _ in labels]
-        for one in self.judged.values():
-            for label, row in zip(one["labels"], one["confusion"], strict=True):
-                for other, count in zip(one["labels"], row, strict=True):
-                    counts[at[label]][at[other]] += count
+        for matrix in matrices:
+            for label, row in zip(matrix.labels, matrix.counts, strict=True):
+                for other, count in zip(matrix.labels, row, strict=True):
+                    counts[place[label]][place[other]] += count
         return Confusion(tuple(labels), tuple(map(tuple, counts)))
 
-    def less(self, other: Arm) -> tuple[float, tuple[float, float]] | None:
-        """Return this rate less another's, seed by seed, with its interval; None with fewer than two seeds."""
+    def minus(self, other: ConditionResult) -> tuple[float, tuple[float, float]] | None:
+        """Return this rate minus another's, paired by seed, with its interval; None with fewer than two seeds."""
         seeds = [seed for seed in self.rates if seed in other.rates]
         if len(seeds) < 2 or not self.simulated:
             return None
         return mean_difference([self.rates[s] for s in seeds], [other.rates[s] for s in seeds], self.rate.n)
 
+    def _over_seeds(self, rates: list[float]) -> OverSeeds:
+        if not self.simulated:
+            rates = [sum(rates) / len(rates)]
+        return OverSeeds(tuple(rates), self.first.rate.n)
+
 
 @frozen(kw_only=True, eq=False)
 class Summary:
-    """Everything that came of an experiment: an arm a case, classifier and target; what failed; what is missing."""
+    """The results of an experiment: one condition per case, classifier and target."""
 
     planned: Planned
-    arms: tuple[Arm, ...]
-    results: Mapping[tuple[str, int], Mapping[str, Any]]
-    """Result of each task by name of the case and seed."""
-    failed: tuple[Done, ...]
+    conditions: tuple[ConditionResult, ...]
+    results: Mapping[tuple[str, int], AnyTaskResult]
+    """The result of each task, by the name of its case and the seed."""
+    failed: tuple[TaskResult, ...]
     missing: int
+    """Tasks without a result."""
     seconds: float
-    """Time that all tasks took, added up."""
+    """Total time of all tasks."""
     cpu_seconds: float = 0.0
-    """Processor time of the same."""
+    """Total processor time of all tasks."""
 
-    def arm(self, case: str = "", learner: str | None = None, target: str | None = None) -> Arm:
-        """Return the first arm of this case, and of this classifier and target where they are given. KeyError."""
-        for one in self.arms:
-            if one.case.name == case and learner in (None, one.learner) and target in (None, one.target):
-                return one
-        raise KeyError(f"no arm of case {case!r}, classifier {learner!r}, target {target!r}")
+    def condition(
+        self, case: str = "", classifier: str | None = None, target: str | None = None
+    ) -> ConditionResult:
+        """Return the first condition of this case, and of this classifier and target if given. Raises KeyError."""
+        for condition in self.conditions:
+            if (
+                condition.case.name == case
+                and classifier in (None, condition.classifier)
+                and target in (None, condition.target)
+            ):
+                return condition
+        raise KeyError(f"no condition with case {case!r}, classifier {classifier!r}, target {target!r}")
+
+    def recognition(self, case: str, seed: int) -> RecognitionResult | None:
+        """Return the recognition result of this case and seed, None if there is none."""
+        result = self.results.get((case, seed))
+        return result if isinstance(result, RecognitionResult) else None
+
+    def grasp_results(self) -> list[tuple[str, int, GraspResult]]:
+        """Return case, seed and result of every task of kind `grasp`."""
+        return [
+            (case, seed, result)
+            for (case, seed), result in self.results.items()
+            if isinstance(result, GraspResult)
+        ]
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as JSON values."""
+        """Return the JSON form that `graspsense experiment --json` prints."""
         return {
             "experiment": self.planned.name,
             "title": self.planned.experiment.title,
             "question": self.planned.experiment.question,
             "seeds": list(self.planned.seeds),
-            "arms": [
+            "conditions": [
                 {
                     "case": one.case.name,
                     "at": dict(one.case.at),
-                    "classifier": one.learner,
+                    "classifier": one.classifier,
                     "target": one.target,
                     "protocol": one.protocol,
                     "n": one.rate.n,
                     "rates": {str(seed): rate for seed, rate in one.rates.items()},
                     "rate": one.rate.mean,
                     "interval": list(one.rate.interval),
-                    "further": list(one.rate.further),
+                    "prediction_interval": list(one.rate.prediction),
                 }
-                for one in self.arms
+                for one in self.conditions
             ],
             "failed": [{"task": one.name, "reason": one.reason} for one in self.failed],
             "missing": self.missing,
@@ -146,34 +188,42 @@ class Summary:
 
 
 def summarise(planned: Planned, results: Results) -> Summary:
-    """Return what the results in a folder say of this experiment."""
-    judged: dict[tuple[str, str, str], dict[int, Mapping[str, Any]]] = {}
+    """Return the summary of the results in a folder. Raises DataDamaged if a result cannot be read."""
+    by_condition: dict[tuple[str, str, Target], dict[int, ClassifierResult]] = {}
     simulated: dict[str, bool] = {}
-    kept: dict[tuple[str, int], Mapping[str, Any]] = {}
+    decoded: dict[tuple[str, int], AnyTaskResult] = {}
     failed, missing, seconds, cpu_seconds = [], 0, 0.0, 0.0
     for case in planned.cases:
         for seed in planned.seeds:
-            done = results.get(planned.task(case, seed).key)
-            if done is None:
+            task_result = results.get(planned.task(case, seed).key)
+            if task_result is None:
                 missing += 1
                 continue
-            seconds += done.seconds
-            cpu_seconds += float(done.made.get("cpu_seconds", 0.0))
-            if done.result is None:
-                failed.append(done)
+            seconds += task_result.seconds
+            cpu_seconds += task_result.cpu_seconds
+            result = task_result.decoded(case.kind)
+            if result is None:
+                failed.append(task_result)
                 continue
-            kept[case.name, seed] = done.result
-            simulated[case.name] = bool(done.result.get("simulated", False))
-            for one in done.result.get("judged", ()):
-                judged.setdefault((case.name, one["learner"], one["target"]), {})[seed] = one
-    of = {case.name: case for case in planned.cases}
+            decoded[case.name, seed] = result
+            simulated[case.name] = result.simulated
+            if isinstance(result, RecognitionResult):
+                for one in result.classifiers:
+                    by_condition.setdefault((case.name, one.classifier, one.target), {})[seed] = one
+    case_of = {case.name: case for case in planned.cases}
     return Summary(
         planned=planned,
-        arms=tuple(
-            Arm(case=of[case], learner=learner, target=target, judged=by_seed, simulated=simulated[case])
-            for (case, learner, target), by_seed in judged.items()
+        conditions=tuple(
+            ConditionResult(
+                case=case_of[case],
+                classifier=classifier,
+                target=target,
+                by_seed=by_seed,
+                simulated=simulated[case],
+            )
+            for (case, classifier, target), by_seed in by_condition.items()
         ),
-        results=kept,
+        results=decoded,
         failed=tuple(failed),
         missing=missing,
         seconds=seconds,

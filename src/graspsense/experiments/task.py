@@ -1,4 +1,4 @@
-"""A task: what one worker does in one go, as plain data, so that it can be sent, stored and done again."""
+"""A task: one unit of work as plain data, so that it can be sent to a worker, stored and repeated."""
 
 from __future__ import annotations
 
@@ -10,23 +10,27 @@ import time
 import traceback
 from collections.abc import Mapping
 from contextlib import redirect_stdout
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import field, frozen
 
-from graspsense.core.errors import GraspsenseError, named
+from graspsense.core.errors import DataDamaged, GraspsenseError, named
 from graspsense.core.json_values import json_text
+from graspsense.evaluation.json_codec import from_json, to_json
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.versions import versions
+
+if TYPE_CHECKING:
+    from graspsense.experiments.task_results import AnyTaskResult
 
 State = Literal["done", "failed"]
 
 
 @frozen(kw_only=True)
 class Task:
-    """What is to be done: a kind of task (see `kinds`), its params as JSON values, and the seed of all randomness.
+    """A kind of task (see `kinds`), its parameters as JSON values, and the seed of all random numbers.
 
-    `name` is for people; it takes no part in the key.
+    `name` is for messages; it is not part of the key.
     """
 
     kind: str
@@ -36,25 +40,25 @@ class Task:
 
     @property
     def key(self) -> str:
-        """The hash of everything that the result follows from."""
+        """The hash of everything that determines the result."""
         text = _text({"kind": self.kind, "params": self.params, "seed": self.seed})
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
     def to_text(self) -> str:
-        """Return it as JSON text, in one line; a setting may be infinite, which Python's JSON can say."""
+        """Return JSON in one line. Settings may be infinite, which Python's JSON can write and read."""
         return _text({"kind": self.kind, "params": self.params, "seed": self.seed, "name": self.name})
 
     @classmethod
     def from_text(cls, text: str) -> Task:
-        """Return the task that `to_text` gave."""
+        """Return the task that `to_text` wrote."""
         return cls(**json.loads(text))
 
 
 @frozen(kw_only=True)
-class Done:
-    """What came of a task: a `result`, or a `reason` why there is none.
+class TaskResult:
+    """The result of a task as JSON values, or the `reason` why there is none.
 
-    `made` says where, when and with which versions; nothing of it is part of the result.
+    `made` records where, when and with which versions the task ran; it is not part of the result.
     """
 
     key: str
@@ -66,11 +70,28 @@ class Done:
 
     @property
     def seconds(self) -> float:
-        """How long the task took, 0 where that is not known."""
+        """The duration of the task, 0 if it is not known."""
         return float(self.made.get("seconds", 0.0))
 
+    @property
+    def cpu_seconds(self) -> float:
+        """The processor time of the task, 0 if it is not known."""
+        return float(self.made.get("cpu_seconds", 0.0))
+
+    def decoded(self, kind: str) -> AnyTaskResult | None:
+        """Return the result with its type, None if the task failed. Raises DataDamaged if it cannot be read."""
+        if self.result is None:
+            return None
+        try:
+            decoded: AnyTaskResult = from_json(self.result, kind_of(kind).result_class())
+        except Exception as error:
+            raise DataDamaged(
+                f"the result of {self.name or self.key} cannot be read: {named(error)}"
+            ) from error
+        return decoded
+
     def to_text(self) -> str:
-        """Return it as JSON text."""
+        """Return JSON in one line."""
         return json_text(
             {
                 "key": self.key,
@@ -83,8 +104,8 @@ class Done:
         )
 
     @classmethod
-    def from_text(cls, text: str) -> Done:
-        """Return what `to_text` gave. Raises ValueError, KeyError or TypeError for what is no such text."""
+    def from_text(cls, text: str) -> TaskResult:
+        """Return the result that `to_text` wrote. Raises ValueError, KeyError or TypeError for any other text."""
         values = json.loads(text)
         if values["state"] not in ("done", "failed") or (values["result"] is None) != (
             values["state"] == "failed"
@@ -93,15 +114,15 @@ class Done:
         return cls(**values)
 
     @classmethod
-    def failed(cls, task: Task, reason: str) -> Done:
-        """Return that a task has failed, for a reason that the task itself could not tell."""
+    def failed(cls, task: Task, reason: str) -> TaskResult:
+        """Return the result of a task that failed outside of its own function."""
         return cls(key=task.key, name=task.name, state="failed", reason=reason)
 
 
 def run_task(text: str) -> str:
-    """Do the task in this JSON text and return what came of it, as text: nothing else passes between processes.
+    """Run the task in this JSON text and return its result as JSON text; processes exchange nothing else.
 
-    Whatever a plugin raises is a failure with its reason; only what ends the process ends this.
+    An exception of a plugin becomes a failed result with its reason.
     """
     task = Task.from_text(text)
     begun, cpu = time.time(), time.process_time()
@@ -109,11 +130,11 @@ def run_task(text: str) -> str:
     result: Mapping[str, Any] | None = None
     reason = where = ""
     try:
-        # What a plugin prints is no part of anybody's answer.
+        # Plugins may print; standard output carries results only.
         with redirect_stdout(sys.stderr):
-            found = kind_of(task.kind).function()(task.params, task.seed)
-        # As text at once: what a plugin slipped in and JSON does not hold is found here.
-        result = json.loads(json_text(found))
+            returned = kind_of(task.kind).function()(task.params, task.seed)
+        # Encoded here, so that a value of a plugin that JSON cannot hold fails this task alone.
+        result = json.loads(json_text(to_json(returned)))
     except GraspsenseError as error:
         reason = str(error)
     except (Exception, SystemExit) as error:
@@ -127,7 +148,9 @@ def run_task(text: str) -> str:
         **({"traceback": where} if where else {}),
     }
     state: State = "failed" if result is None else "done"
-    return Done(key=task.key, name=task.name, state=state, result=result, reason=reason, made=made).to_text()
+    return TaskResult(
+        key=task.key, name=task.name, state=state, result=result, reason=reason, made=made
+    ).to_text()
 
 
 def _text(values: Mapping[str, Any]) -> str:

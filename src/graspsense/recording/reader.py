@@ -19,7 +19,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.roles import Reading
-from graspsense.core.signals import CELLS, NO_PADS, Frame, Pads
+from graspsense.core.signals import CELLS, NO_PADS, Frame, Pads, Phase
 from graspsense.core.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.layout import (
     CDR_HEADER,
@@ -116,12 +116,16 @@ class RecordedGrasp:
     def recording(self) -> Recording:
         """Return the grasp in the form that a gripper can replay."""
         units = {name: unit for name, unit in self.units.items() if SI_UNITS.get(name) != unit}
+        # An imported recording has no commands, and ends where the imported file ends.
+        known = not np.isnan(self.ticks["command"]).any()
         return Recording(
             name=f"recording {self.path.name} of {self.device.name or 'an unknown gripper'}",
             readings=self.readings(),
             rate_hz=self.device.rate_hz or 1000.0,
             units=units,
             notes=(*self.device.notes, REPLAY_NOTE),
+            commands=tuple(self.ticks["command"].tolist()) if known else None,
+            has_release=known and bool((self.ticks["phase"] == Phase.RELEASE).any()),
         )
 
 

@@ -17,7 +17,8 @@ class Recording:
     """One recorded grasp that can be replayed.
 
     `units` names the units that are not SI units. `notes` are sentences that a reader of the result needs.
-    `rate_hz` is the number of frames per unit of time.
+    `rate_hz` is the number of frames per unit of time. `commands` are the values that were commanded after each frame,
+    if they are known, and `has_release` states whether the recording goes on until the fingers are open again.
     """
 
     name: str
@@ -25,3 +26,5 @@ class Recording:
     rate_hz: float
     units: Mapping[str, str] = field(factory=dict)
     notes: tuple[str, ...] = ()
+    commands: tuple[float, ...] | None = None
+    has_release: bool = False

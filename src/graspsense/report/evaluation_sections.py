@@ -1,4 +1,4 @@
-"""The parts of a page that say how a rate was judged: controls, confusion, the tree."""
+"""Sections of a page about an evaluation: controls, confusion matrices, the decision tree."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from graspsense.report.tree import tree_list
 
 
 def controls_section(rows: Sequence[RateRow], missing: Sequence[str], of: str) -> Section:
-    """Return the rate, first in `rows`, beside its controls; `missing` says which could not be measured, and why."""
+    """Return the section with a rate, the first of `rows`, and its controls; `missing` lists those not measured."""
     text = (
-        "A rate can belong to the recording rather than to the things: classes recorded on different days, say. So the "
-        f"same was measured where it must not work. The figures are those of {of}."
+        "A rate may come from the recording rather than from the objects, for example if classes were recorded on "
+        f"different days. The controls measure this. The figures are those of {of}."
     )
-    picture = rates_picture(rows, "The rate, and what it has to be held against. Bars are 95 % intervals.")
+    picture = rates_picture(rows, "The rate and its controls. Bars are 95 % intervals.")
     return Section(
         id="controls",
-        title="Whether to believe it",
+        title="Controls",
         body=paragraph(text) + pair(picture, rates_list(rows)) + bullets(missing),
     )
 
 
 def confusion_section(first: tuple[str, Confusion], others: Sequence[tuple[str, Confusion]] = ()) -> Section:
-    """Return the confusion matrix that matters most, and others that are shown when they are asked for."""
+    """Return the section with the most important confusion matrix, and folded ones with the others."""
     body = confusion_table(first[1], f"{first[0]}.")
     body += "".join(folded(name, confusion_table(matrix, f"{name}.")) for name, matrix in others)
-    return Section(id="confusion", title="What is taken for what", body=body)
+    return Section(id="confusion", title="Confusion matrix", body=body)
 
 
 def tree_section(nodes: Sequence[TreeNode], of: str) -> Section:
-    """Return a decision tree; `of` says what grew it on what."""
+    """Return the section with a decision tree; `of` completes the sentence 'The tree that ...'."""
     text = (
-        f"The tree that {of}. Read from the top: each line is a question about the grasp, and an arrow leads to the "
-        "answer."
+        f"The tree that {of}. Read it from the top: each line is a condition on a feature, and an arrow leads to the "
+        "predicted label."
     )
-    return Section(id="tree", title="How it decides", body=paragraph(text) + tree_list(nodes))
+    return Section(id="tree", title="Decision tree", body=paragraph(text) + tree_list(nodes))
 
 
 def code(label: str, text: str) -> str:
-    """Return text as it stands, which scrolls by itself, also by keyboard."""
+    """Return preformatted text in a scrollable box."""
     return f'<pre tabindex="0" role="region" aria-label="{escape(label)}">{escape(text)}</pre>'

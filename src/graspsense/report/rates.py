@@ -8,7 +8,7 @@ from typing import Final
 from attrs import frozen
 
 from graspsense.report.html import facts, figure, table
-from graspsense.report.svg import DASHES, GRID, INKS, QUIET, Picture, Scale, number, reaching
+from graspsense.report.svg import DASHES, GRID, INKS, QUIET, AxisScale, Picture, number, reaching
 
 
 @frozen(kw_only=True)
@@ -36,7 +36,7 @@ def rates_picture(rows: Sequence[RateRow], caption: str) -> str:
     """Return a figure with a row for each rate: its name, a mark, and a bar for its interval."""
     bottom = 6.0 + ROW * len(rows)
     picture = Picture(bottom + 34)
-    scale = Scale(0.0, 100.0, 8.0, picture.width - 14)
+    scale = AxisScale(0.0, 100.0, 8.0, picture.width - 14)
     picture.x_axis(scale, 4, bottom, "recognised, in %")
     for k, row in enumerate(rows):
         y = 22.0 + ROW * k
@@ -56,7 +56,7 @@ def rates_over(
     picture = Picture(262 + 15 * len(series))
     xs = [x for points in series.values() for x, _ in points]
     x_scale = reaching(xs, 40, picture.width - 14)
-    y_scale = Scale(0.0, 100.0, 215, 24)
+    y_scale = AxisScale(0.0, 100.0, 215, 24)
     picture.y_axis(y_scale, 36, picture.width - 8, "recognised, in %")
     for x in dict.fromkeys(xs):
         picture.line([(x_scale(x), 24), (x_scale(x), 215)], GRID, width=1)

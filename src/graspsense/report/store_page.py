@@ -1,18 +1,20 @@
-"""The page of a store: what its trials are of, what was felt in them, and how well they can be told apart."""
+"""The page of a store: its trials, their measurements, and how well they can be recognised."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
+
+from attrs import frozen
 
 from graspsense.core.config import SelectedComponent, select_component
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import in_words
-from graspsense.evaluation.evaluate import Evaluation, evaluate
+from graspsense.evaluation.evaluate import evaluate
 from graspsense.recording.reader import read_recorded
 from graspsense.report.evaluation_sections import code, confusion_section, controls_section, tree_section
-from graspsense.report.grasps import grasp_as_json
+from graspsense.report.grasp_curve import GraspCurve, grasp_curve
 from graspsense.report.html import Page, Section, bullets, facts, folded, paragraph, table
 from graspsense.report.rates import RateRow
 from graspsense.report.traces import features_by_class, one_grasp, traces_by_class
@@ -22,13 +24,24 @@ from graspsense.store.store import Store
 
 if TYPE_CHECKING:
     from graspsense.core.labelled import Labelled, Target
+    from graspsense.evaluation.results import Evaluation
     from graspsense.store.rows import StoredTrial, TrialSummary
 
 GRASPS: Final = 3
-"""Of each label, drawn over each other."""
+"""Grasps of each label that are drawn over each other."""
 LISTED: Final = 200
-"""Trials in the list at the end; of more, the newest."""
+"""Largest number of trials in the list at the end; the newest are listed."""
 Progress = Callable[[str, int, int], None]
+
+
+@frozen
+class _TrialCount:
+    """The number of trials of one label and outcome that are set aside, or not."""
+
+    label: str | None
+    outcome: str
+    set_aside: bool
+    trials: int
 
 
 def store_page(
@@ -43,79 +56,68 @@ def store_page(
 ) -> Page:
     """Return the page of the store in this folder; `grasp` is the number of the trial that is shown over time.
 
-    Raises ConfigError where there is no store, no trial, or none of this number, DataDamaged.
+    Raises ConfigError if there is no store, no trial, or no trial of this number, DataDamaged.
     """
     with Store.read(folder) as store:
         listed = store.page(set_aside=None, limit=LISTED)
         if not listed:
             raise ConfigError(f"the store in {folder} has no trials yet: graspsense collect --save {folder}")
-        chosen = (
-            store.summary(grasp)
-            if grasp is not None
-            else next((one for one in listed if one.complete and one.set_aside is None), listed[0])
-        )
-        kept = store.trial(chosen.id)
-        groups = store.query(
-            "SELECT label, outcome, set_aside IS NOT NULL, count(*) FROM trial GROUP BY 1, 2, 3 ORDER BY 1, 2"
-        )
-        drawn = _drawn(store)
-    labelled, why_not = _labelled(folder)
-    found: Evaluation | None = None
+        if grasp is not None:
+            number = grasp
+        else:
+            usable = (one for one in listed if one.complete and one.set_aside is None)
+            number = next(usable, listed[0]).id
+        trial = store.trial(number)
+        counts = _trial_counts(store)
+        curves = _curves(store)
     learner = select_component("classifier", classifier)
-    if labelled is not None:
-        try:
-            found = evaluate(
-                learner,
-                labelled,
-                classifier=f"{learner.component.qualified} {learner.component.version}",
-                target=target,
-                folds=folds,
-                seed=seed,
-                learning_curve=False,
-                progress=progress,
-            )
-        except ConfigError as error:
-            why_not = str(error)
-    sections: list[Section] = []
-    if found is not None and labelled is not None:
-        sections += _judged(found, learner, labelled, classifier, seed)
-    sections += _felt(chosen, kept, drawn)
-    if labelled is not None:
-        body = paragraph(
-            "Each dot is one grasp; the bar reaches from the first to the third quartile, with the median across it. "
-            "What lies apart here can be told apart."
-        ) + features_by_class(
-            list(zip(labelled.table.names, labelled.table.units, strict=True)),
-            labelled.labels,
-            [[None if one != one else one for one in row] for row in labelled.table.values.tolist()],
+    labelled, evaluation, problem = None, None, ""
+    try:
+        labelled = labelled_store(folder)
+        evaluation = evaluate(
+            learner,
+            labelled,
+            classifier=f"{learner.component.qualified} {learner.component.version}",
+            target=target,
+            folds=folds,
+            seed=seed,
+            learning_curve=False,
+            progress=progress,
         )
-        sections.append(Section(id="features", title="What was drawn from it", body=body))
-    sections.append(_made_of(folder, listed, kept, groups))
+    except ConfigError as error:
+        problem = str(error)
+    sections: list[Section] = []
+    if evaluation is not None and labelled is not None:
+        sections += _evaluation_sections(evaluation, learner, labelled, classifier, seed)
+    sections += _measurement_sections(trial, curves)
+    if labelled is not None:
+        sections.append(_features_section(labelled))
+    sections.append(_provenance(folder, listed, trial, counts))
     return Page(
         kind="Store of trials",
         title=f"Grasps in {folder}",
-        question=f"Can a gripper tell by touch {TARGETS[target]}?",
-        answer=_answer(found, groups, why_not),
-        beside=_beside(found, labelled, target),
+        question=f"Can a gripper recognise {TARGETS[target]} by touch?",
+        answer=_answer(evaluation, sum(count.trials for count in counts), problem),
+        beside=_beside(evaluation, labelled, target),
         sections=tuple(sections),
     )
 
 
-def _labelled(folder: str) -> tuple[Labelled | None, str]:
-    try:
-        return labelled_store(folder), ""
-    except ConfigError as error:
-        return None, str(error)
+def _trial_counts(store: Store) -> list[_TrialCount]:
+    rows = store.query(
+        "SELECT label, outcome, set_aside IS NOT NULL, count(*) FROM trial GROUP BY 1, 2, 3 ORDER BY 1, 2"
+    )
+    return [_TrialCount(label, outcome, bool(aside), n) for label, outcome, aside, n in rows]
 
 
-def _drawn(store: Store) -> list[dict[str, Any]]:
-    """Return the newest whole grasps of each label, as far as their recordings can be read."""
+def _curves(store: Store) -> list[GraspCurve]:
+    """Return the newest complete grasps of each label, except those whose recordings cannot be read."""
     rows = store.query(
         """SELECT label, id, recording FROM trial
         WHERE complete = 1 AND set_aside IS NULL AND label IS NOT NULL ORDER BY label, id DESC"""
     )
     count: Counter[str] = Counter()
-    grasps = []
+    curves = []
     for label, number, recording in rows:
         if count[label] >= GRASPS:
             continue
@@ -124,100 +126,110 @@ def _drawn(store: Store) -> list[dict[str, Any]]:
         except (ConfigError, DataDamaged):
             continue
         count[label] += 1
-        grasps.append({"label": label, "trial": number, **grasp_as_json(trace)})
-    return grasps
+        curves.append(grasp_curve(trace, label, number))
+    return curves
 
 
-def _answer(found: Evaluation | None, groups: Sequence[tuple[Any, ...]], why_not: str) -> str:
-    total = sum(int(row[3]) for row in groups)
-    if found is None:
-        return f"There are {total} grasps, but no rate: {why_not}."
-    low, high = found.headline.interval
-    name = found.classifier.partition(" ")[0].rpartition("/")[2]
+def _answer(evaluation: Evaluation | None, total: int, problem: str) -> str:
+    if evaluation is None:
+        return f"There are {total} grasps, but no recognition rate: {problem}."
+    low, high = evaluation.headline.interval
+    name = evaluation.classifier.partition(" ")[0].rpartition("/")[2]
     return (
-        f"In {100 * found.headline.rate:.1f} % (95 %: {100 * low:.1f} to {100 * high:.1f}) of "
-        f"{found.headline.n} grasps, {name} tells {TARGETS[found.target]}."
+        f"{name} recognises {TARGETS[evaluation.target]} in {100 * evaluation.headline.rate:.1f} % "
+        f"(95 %: {100 * low:.1f} to {100 * high:.1f}) of {evaluation.headline.n} grasps."
     )
 
 
-def _beside(found: Evaluation | None, labelled: Labelled | None, target: Target) -> str:
-    if found is None or labelled is None:
+def _beside(evaluation: Evaluation | None, labelled: Labelled | None, target: Target) -> str:
+    if evaluation is None or labelled is None:
         return ""
-    guess = found.controls["majority_class"].rate
-    guessing = f" Guessing the commonest would be right in {100 * guess.rate:.0f} %." if guess else ""
-    text = (
-        "A gripper closes two fingers that feel force on a thing it cannot see into. From each grasp a few numbers are "
-        f"drawn ({', '.join(labelled.table.names)}); a classifier learns from them {TARGETS[target]}: "
-        f"{len(found.confusion.labels)} possible answers.{guessing} Every grasp is judged by "
-        f"{protocol_words(found.protocol)}. An interval holds the true rate in 95 of 100 such collections."
+    guess = evaluation.controls["majority_class"].rate
+    guessing = (
+        f" Always guessing the most frequent label is right in {100 * guess.rate:.0f} %." if guess else ""
     )
-    warnings = list(found.warnings)
+    text = (
+        "A gripper closes two fingers with force sensors on an object that it cannot see into. Each grasp gives a few "
+        f"numbers ({', '.join(labelled.table.names)}), from which a classifier learns {TARGETS[target]}. There are "
+        f"{len(evaluation.confusion.labels)} possible answers.{guessing} Every grasp is classified by "
+        f"{protocol_words(evaluation.protocol)}. A 95 % interval contains the true rate in 95 of 100 such collections."
+    )
+    warnings = list(evaluation.warnings)
     if labelled.provenance.get("simulated"):
-        warnings.append(
-            "there are simulated grasps among these: they come from a model of gripper and objects"
-        )
+        warnings.append("some of these grasps are simulated, with a model of gripper and objects")
     return paragraph(text) + bullets(warnings, "warning")
 
 
-def _judged(
-    found: Evaluation, learner: SelectedComponent, labelled: Labelled, classifier: str, seed: int
+def _evaluation_sections(
+    evaluation: Evaluation, learner: SelectedComponent, labelled: Labelled, classifier: str, seed: int
 ) -> list[Section]:
-    head = found.headline
+    """Return the controls, the confusion matrix, and a tree if the classifier grows one."""
+    head = evaluation.headline
     rows = [
         RateRow(name=classifier, rate=head.rate, interval=head.interval, what="the answer above", strong=True)
     ]
     missing = []
-    for name, one in {**found.protocols, **found.controls}.items():
-        called, good_for = control_words(name, one.what)
-        if one.rate is None:
-            missing.append(f"{called}: not measured ({one.reason})")
-        elif name != found.protocol:
-            rows.append(RateRow(name=called, rate=one.rate.rate, interval=one.rate.interval, what=good_for))
+    for name, measured in {**evaluation.protocols, **evaluation.controls}.items():
+        title, purpose = control_words(name, measured.what)
+        if measured.rate is None:
+            missing.append(f"{title}: not measured ({measured.reason})")
+        elif name != evaluation.protocol:
+            interval = measured.rate.interval
+            rows.append(RateRow(name=title, rate=measured.rate.rate, interval=interval, what=purpose))
+    title = f"{classifier}: {evaluation.confusion.n} predictions"
     sections = [
         controls_section(rows, missing, classifier),
-        confusion_section((f"{classifier}: {found.confusion.n} answers", found.confusion)),
+        confusion_section((title, evaluation.confusion)),
     ]
-    if found.target != "state":
-        aimed = labelled.aimed(found.target)
+    if evaluation.target != "state":
+        trials = labelled.aimed(evaluation.target)
         fitted = learner.create()
-        fitted.fit(aimed.table, aimed.labels, seed)
+        fitted.fit(trials.table, trials.labels, seed)
         nodes = fitted.tree()
         if nodes is not None:
             sections.append(tree_section(nodes, f"{classifier} grows on all of these grasps"))
     return sections
 
 
-def _felt(chosen: TrialSummary, kept: StoredTrial, drawn: Sequence[dict[str, Any]]) -> list[Section]:
-    sections = []
-    label = chosen.label or "no label"
+def _measurement_sections(trial: StoredTrial, curves: Sequence[GraspCurve]) -> list[Section]:
+    """Return one grasp over time with its features, and some grasps of each label drawn over each other."""
+    summary = trial.summary
+    label = summary.label or "no label"
     try:
-        shown = {"label": label, **grasp_as_json(read_recorded(kept.recording).trace())}
-        caption = f"Trial {chosen.id}: {label}, {chosen.outcome}, made {chosen.made_at}."
-        body = one_grasp(shown, caption)
+        curve = grasp_curve(read_recorded(trial.recording).trace(), label, summary.id)
+        body = one_grasp(curve, f"Trial {summary.id}: {label}, {summary.outcome}, made {summary.made_at}.")
     except (ConfigError, DataDamaged) as error:
-        body = paragraph(f"The recording of trial {chosen.id} cannot be shown: {error}")
+        body = paragraph(f"The recording of trial {summary.id} cannot be shown: {error}")
+    features = trial.result.features
     values = [
         (name, "missing" if value is None else in_words(value, unit))
-        for (name, unit), value in zip(
-            kept.result.features.features, kept.result.features.values, strict=True
-        )
+        for (name, unit), value in zip(features.features, features.values, strict=True)
     ]
-    sections.append(
-        Section(id="grasp", title="One grasp, from the approach to rest", body=body + facts(values))
-    )
-    if drawn:
-        text = f"The newest grasps of each kind, at most {GRASPS}, laid over each other."
-        sections.append(
-            Section(id="traces", title="What the fingers felt", body=paragraph(text) + traces_by_class(drawn))
-        )
+    sections = [Section(id="grasp", title="One grasp, from the approach to rest", body=body + facts(values))]
+    if curves:
+        text = f"The newest grasps of each label, at most {GRASPS}, drawn over each other."
+        body = paragraph(text) + traces_by_class(curves)
+        sections.append(Section(id="traces", title="Force and gap over time", body=body))
     return sections
 
 
-def _made_of(
-    folder: str, listed: Sequence[TrialSummary], kept: StoredTrial, groups: Sequence[tuple[Any, ...]]
+def _features_section(labelled: Labelled) -> Section:
+    body = paragraph(
+        "Each dot is one grasp. The bar spans the first to the third quartile, with the median across it. Labels "
+        "that lie apart here can be distinguished."
+    ) + features_by_class(
+        list(zip(labelled.table.names, labelled.table.units, strict=True)),
+        labelled.labels,
+        [[None if v != v else v for v in row] for row in labelled.table.values.tolist()],
+    )
+    return Section(id="features", title="Features", body=body)
+
+
+def _provenance(
+    folder: str, listed: Sequence[TrialSummary], trial: StoredTrial, counts: Sequence[_TrialCount]
 ) -> Section:
-    total = sum(int(row[3]) for row in groups)
-    made = kept.record.provenance
+    total = sum(count.trials for count in counts)
+    made = trial.record.provenance
     git = (made.get("git") or {}).get("graspsense") or {}
     pairs = [
         ("store", folder),
@@ -228,19 +240,25 @@ def _made_of(
         ("code", f"graspsense {made.get('graspsense', '?')}, commit {git.get('commit', 'unknown')}"),
         *((f"component {name}", str(one)) for name, one in (made.get("components") or {}).items()),
     ]
-    counts = [
-        (str(label or "no label"), str(outcome), "set aside" if aside else "counts", str(n))
-        for label, outcome, aside, n in groups
+    by_label = [
+        (
+            count.label or "no label",
+            count.outcome,
+            "set aside" if count.set_aside else "counts",
+            str(count.trials),
+        )
+        for count in counts
     ]
     rows = [
         (str(one.id), one.made_at, one.label or "", one.instance or "", one.outcome, one.set_aside or "")
         for one in listed
     ]
     newest = f"The newest {len(rows)} of {total} trials" if total > len(rows) else "All trials"
+    header = ("trial", "made", "label", "instance", "outcome", "set aside")
     body = (
         facts(pairs)
-        + table("Trials by label and outcome", ("label", "outcome", "state", "trials"), counts, 3)
-        + folded(newest, table(newest, ("trial", "made", "label", "thing", "outcome", "set aside"), rows))
-        + folded(f"Settings of trial {kept.summary.id}", code("settings", kept.record.settings_text))
+        + table("Trials by label and outcome", ("label", "outcome", "state", "trials"), by_label, 3)
+        + folded(newest, table(newest, header, rows))
+        + folded(f"Settings of trial {trial.summary.id}", code("settings", trial.record.settings_text))
     )
-    return Section(id="made", title="What it was made from", body=body)
+    return Section(id="made", title="Provenance", body=body)

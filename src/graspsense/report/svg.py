@@ -22,7 +22,7 @@ GRID: Final = "#dcdcdc"
 
 
 @frozen
-class Scale:
+class AxisScale:
     """A linear map from values to places in a picture."""
 
     low: float
@@ -45,14 +45,14 @@ class Scale:
         return [k * step for k in range(first, last + 1)]
 
 
-def reaching(values: Sequence[float], start: float, end: float, *, zero: bool = False) -> Scale:
+def reaching(values: Sequence[float], start: float, end: float, *, zero: bool = False) -> AxisScale:
     """Return the scale that shows all of these values, and zero where it is to be seen."""
     known = [one for one in values if math.isfinite(one)] or [0.0, 1.0]
     low, high = min(known), max(known)
     if zero:
         low, high = min(low, 0.0), max(high, 0.0)
     room = 0.04 * (high - low) or 0.5 * abs(high) or 1.0
-    return Scale(low if zero and low == 0.0 else low - room, high + room, start, end)
+    return AxisScale(low if zero and low == 0.0 else low - room, high + room, start, end)
 
 
 def number(value: float) -> str:
@@ -125,7 +125,7 @@ class Picture:
             f"{escape(words)}</text>"
         )
 
-    def x_axis(self, scale: Scale, top: float, bottom: float, title: str) -> None:
+    def x_axis(self, scale: AxisScale, top: float, bottom: float, title: str) -> None:
         """Draw the ticks of a horizontal axis, with lines up to `top`, and its title below."""
         for value in scale.ticks():
             x = scale(value)
@@ -133,7 +133,7 @@ class Picture:
             self.text(x, bottom + 13, number(value), at="middle", ink=QUIET)
         self.text((scale.start + scale.end) / 2, bottom + 28, title, at="middle", ink=QUIET)
 
-    def y_axis(self, scale: Scale, left: float, right: float, title: str) -> None:
+    def y_axis(self, scale: AxisScale, left: float, right: float, title: str) -> None:
         """Draw the ticks of a vertical axis, and its title above."""
         for value in scale.ticks(4):
             y = scale(value)

@@ -1,218 +1,228 @@
-"""What was felt: grasps over time, all of a class laid over each other, and the features of every label."""
+"""Pictures of measurements: grasps over time, drawn over each other by class, and the features of every label."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Final
 
+from attrs import frozen
+
+from graspsense.core.entries import FeatureSetEntry
+from graspsense.core.labelled import class_of
+from graspsense.core.plugins import installed
+from graspsense.report.grasp_curve import GraspCurve
 from graspsense.report.html import figure, folded, panels, table
-from graspsense.report.svg import DASHES, GRID, INKS, QUIET, Picture, Scale, number, reaching
+from graspsense.report.svg import DASHES, GRID, INKS, QUIET, AxisScale, Picture, number, reaching
 from graspsense.report.units import for_people, in_a_line
 
-MEANING: Final = {
-    "p_first": "how far apart the fingertips are when both have touched",
-    "p_steady": "how far apart they are once nothing moves any more",
-    "f_steady": "the force of a fingertip then",
-    "delta_t": "how long it takes from the touch to rest",
-    "dp_dt": "how fast the gap changes in that time",
-    "df_dt": "how fast the force rises in that time",
-}
-"""Features that a page can explain: those of Table I of Chitta, Piccoli and Sturm (ICRA 2010)."""
 STATES: Final = 8
-"""Lines that one picture can tell apart."""
+"""Largest number of line styles in one picture."""
 DRAWN: Final = 150
-"""Trials of a label that are drawn as dots; of more, every so manieth."""
+"""Largest number of dots per label; of more trials, every n-th is drawn."""
 PHASES: Final = {"approach": "#e9eff6", "squeeze": "#fbdcb4", "hold": "#c9e6cf"}
 OTHER_PHASE: Final = "#f3f3f3"
-"""Phases of a grasp, behind its lines; each is named as well."""
+"""Background colours of the phases of a grasp; each phase is also named."""
 
 
-def class_of(label: str) -> str:
-    """Return what is before the colon."""
-    return label.partition(":")[0]
-
-
-def traces_by_class(grasps: Sequence[Mapping[str, Any]]) -> str:
-    """Return a figure a class: the force of its grasps over time, a line a grasp, states by colour and dash."""
-    classes: dict[str, list[Mapping[str, Any]]] = {}
+def traces_by_class(grasps: Sequence[GraspCurve]) -> str:
+    """Return one figure per class: force and gap over time, one line per grasp, states by colour and dash."""
+    grasps = [grasp.until_release() for grasp in grasps]
+    classes: dict[str, list[GraspCurve]] = {}
     for grasp in grasps:
-        classes.setdefault(class_of(grasp["label"]), []).append(grasp)
-    grasps = [_without_release(grasp) for grasp in grasps]
-    classes = {name: [grasp for grasp in grasps if class_of(grasp["label"]) == name] for name in classes}
+        classes.setdefault(class_of(grasp.label), []).append(grasp)
     times = [t for grasp in grasps for t in _shown_times(grasp)]
-    forces = [f for grasp in grasps for f in grasp["force_n"] if f is not None]
-    gaps = [
-        gap
-        for grasp in grasps
-        for t, gap in zip(grasp["t_s"], grasp["gap_mm"], strict=True)
-        if gap is not None and t >= min(_shown_times(grasp))
-    ]
     if not times:
         return ""
-    return panels(
-        [_traces(name, of, (min(times), max(times)), forces, gaps) for name, of in sorted(classes.items())]
+    axes = _Axes(
+        times=(min(times), max(times)),
+        forces=[force for grasp in grasps for force in grasp.force_n if force is not None],
+        gaps=[
+            gap
+            for grasp in grasps
+            for t, gap in zip(grasp.t_s, grasp.gap_mm, strict=True)
+            if gap is not None and t is not None and t >= min(_shown_times(grasp))
+        ],
     )
+    return panels([_traces(name, of, axes) for name, of in sorted(classes.items())])
 
 
-def _without_release(grasp: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a grasp up to where the fingers open again."""
-    end = grasp["phase"].index("release") if "release" in grasp["phase"] else len(grasp["phase"])
-    return {
-        **grasp,
-        **{name: grasp[name][:end] for name in ("t_s", "gap_mm", "force_n", "phase")},
-    }
+@frozen
+class _Axes:
+    """The ranges that the pictures of all classes share."""
+
+    times: tuple[float, float]
+    forces: Sequence[float]
+    gaps: Sequence[float]
 
 
-def _shown_times(grasp: Mapping[str, Any]) -> list[float]:
-    """Return the times from shortly before the contact on: what comes earlier is the way through empty air."""
-    return [t for t in grasp["t_s"] if t is not None and t >= BEFORE_S] or list(grasp["t_s"])
+def _shown_times(grasp: GraspCurve) -> list[float]:
+    """Return the times from shortly before contact on; before that, the fingers move through free space."""
+    known = [t for t in grasp.t_s if t is not None]
+    return [t for t in known if t >= BEFORE_S] or known
 
 
 BEFORE_S: Final = -0.3
 
 
-def _traces(
-    name: str,
-    grasps: Sequence[Mapping[str, Any]],
-    times: tuple[float, float],
-    forces: Sequence[float],
-    gaps: Sequence[float],
-) -> str:
-    states = list(dict.fromkeys(grasp["label"] for grasp in grasps))[:STATES]
-    legend = 348.0
-    picture = Picture(legend + 15 * len(states) - 8)
-    x_scale = Scale(times[0], times[1], 36, picture.width - 10)
+LEGEND_TOP: Final = 348.0
+
+
+def _traces(name: str, grasps: Sequence[GraspCurve], axes: _Axes) -> str:
+    states = list(dict.fromkeys(grasp.label for grasp in grasps))[:STATES]
+    picture = Picture(LEGEND_TOP + 15 * len(states) - 8)
+    x_scale = AxisScale(*axes.times, 36, picture.width - 10)
     picture.text(2, 14, name, bold=True, size=13)
-    force = reaching(forces, 172, 40, zero=True)
-    gap = reaching(gaps, 300, 210)
-    unit = grasps[0].get("time_unit", "s")
-    picture.x_axis(x_scale, 40, 300, f"{'seconds' if unit == 's' else unit} since both pads touched")
+    force = reaching(axes.forces, 172, 40, zero=True)
+    gap = reaching(axes.gaps, 300, 210)
+    picture.x_axis(x_scale, 40, 300, f"{grasps[0].time_words} since both pads touched")
     picture.y_axis(force, 36, picture.width - 10, "force, N")
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
     for grasp in grasps:
-        if grasp["label"] not in states:
+        if grasp.label not in states:
             continue
-        k = states.index(grasp["label"])
-        for column, scale in (("force_n", force), ("gap_mm", gap)):
+        k = states.index(grasp.label)
+        for column, scale in ((grasp.force_n, force), (grasp.gap_mm, gap)):
             points = [
                 (x_scale(t), scale(v))
-                for t, v in zip(grasp["t_s"], grasp[column], strict=True)
-                if t is not None and v is not None and times[0] <= t <= times[1]
+                for t, v in zip(grasp.t_s, column, strict=True)
+                if t is not None and v is not None and axes.times[0] <= t <= axes.times[1]
             ]
             picture.line(points, INKS[k], width=1.4, dash=DASHES[k])
-    told = []
+    peaks = _legend(picture, states, grasps)
+    words = f"Force and gap over time for {len(grasps)} grasps of {name}: {', '.join(peaks)}"
+    return figure(picture.svg(words), f"{name}: one line per grasp.")
+
+
+def _legend(picture: Picture, states: Sequence[str], grasps: Sequence[GraspCurve]) -> list[str]:
+    """Draw the legend, and return the peak force of each state in words."""
+    peaks = []
     for k, label in enumerate(states):
-        y = legend + 15 * k
+        y = LEGEND_TOP + 15 * k
         picture.line([(36, y - 4), (66, y - 4)], INKS[k], width=2, dash=DASHES[k])
-        state = label.partition(":")[2] or label
-        picture.text(72, y, in_a_line(state))
-        peaks = [
-            max((f for f in grasp["force_n"] if f is not None), default=math.nan)
-            for grasp in grasps
-            if grasp["label"] == label
-        ]
-        told.append(f"{in_a_line(state)} up to {number(max(peaks))} N")
-    words = f"Force and gap over time for {len(grasps)} grasps of {name}: {', '.join(told)}"
-    return figure(picture.svg(words), f"{name}: every line is one grasp.")
+        state = in_a_line(label.partition(":")[2] or label)
+        picture.text(72, y, state)
+        peak = max(grasp.peak_force_n for grasp in grasps if grasp.label == label)
+        peaks.append(f"{state} up to {number(peak)} N")
+    return peaks
 
 
-def one_grasp(grasp: Mapping[str, Any], caption: str) -> str:
-    """Return a figure of one grasp from its beginning on: gap, force, and the phase behind them."""
-    t = [one for one in grasp["t_s"] if one is not None]
+def one_grasp(grasp: GraspCurve, caption: str) -> str:
+    """Return a figure of one grasp from its start: gap and force, with the phases behind them."""
+    t = [time for time in grasp.t_s if time is not None]
     if not t:
         return ""
-    named = list(dict.fromkeys(grasp["phase"]))
     picture = Picture(334)
-    x_scale = Scale(t[0], t[-1], 36, picture.width - 10)
-    gap = reaching([v for v in grasp["gap_mm"] if v is not None], 140, 44)
-    force = reaching([v for v in grasp["force_n"] if v is not None], 280, 176, zero=True)
-    begun, told = 0, []
-    phases = grasp["phase"]
+    x_scale = AxisScale(t[0], t[-1], 36, picture.width - 10)
+    gap = reaching([v for v in grasp.gap_mm if v is not None], 140, 44)
+    force = reaching([v for v in grasp.force_n if v is not None], 280, 176, zero=True)
+    durations = _phases(picture, grasp, t, x_scale)
+    picture.x_axis(x_scale, 24, 280, f"{grasp.time_words} since both pads touched")
+    picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
+    picture.y_axis(force, 36, picture.width - 10, "force, N")
+    for column, scale, ink in ((grasp.gap_mm, gap, INKS[0]), (grasp.force_n, force, INKS[1])):
+        points = [
+            (x_scale(time), scale(value))
+            for time, value in zip(grasp.t_s, column, strict=True)
+            if time is not None and value is not None
+        ]
+        picture.line(points, ink, width=2)
+    words = (
+        f"One grasp of {grasp.label} over time, gap above and force below. Phases: {', '.join(durations)} "
+        f"{grasp.time_unit}"
+    )
+    return figure(picture.svg(words), caption)
+
+
+def _phases(picture: Picture, grasp: GraspCurve, t: Sequence[float], x_scale: AxisScale) -> list[str]:
+    """Draw the phases behind the lines with their legend, and return the duration of each in words."""
+    start, durations = 0, []
+    phases = grasp.phase
     for k in range(1, len(phases) + 1):
-        if k < len(phases) and phases[k] == phases[begun]:
+        if k < len(phases) and phases[k] == phases[start]:
             continue
-        left, right = x_scale(t[begun]), x_scale(t[min(k, len(t) - 1)])
-        picture.box(left, 24, right - left, 256, PHASES.get(phases[begun], OTHER_PHASE), GRID)
-        told.append(f"{phases[begun]} for {t[min(k, len(t) - 1)] - t[begun]:.2f}")
-        begun = k
-    for k, phase in enumerate(named):
+        end = t[min(k, len(t) - 1)]
+        left, right = x_scale(t[start]), x_scale(end)
+        picture.box(left, 24, right - left, 256, PHASES.get(phases[start], OTHER_PHASE), GRID)
+        durations.append(f"{phases[start]} for {end - t[start]:.2f}")
+        start = k
+    for k, phase in enumerate(dict.fromkeys(phases)):
         x = 36 + 80.0 * k
         picture.box(x, 322, 12, 10, PHASES.get(phase, OTHER_PHASE), QUIET)
         picture.text(x + 16, 331, phase)
-    unit = grasp.get("time_unit", "s")
-    picture.x_axis(x_scale, 24, 280, f"{'seconds' if unit == 's' else unit} since both pads touched")
-    picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
-    picture.y_axis(force, 36, picture.width - 10, "force, N")
-    for column, scale, ink in (("gap_mm", gap, INKS[0]), ("force_n", force, INKS[1])):
-        points = [
-            (x_scale(one), scale(v))
-            for one, v in zip(grasp["t_s"], grasp[column], strict=True)
-            if one is not None and v is not None
-        ]
-        picture.line(points, ink, width=2)
-    words = f"One grasp of {grasp['label']} over time, gap above and force below. Phases: {', '.join(told)} {unit}"
-    return figure(picture.svg(words), caption)
+    return durations
 
 
 def features_by_class(
     features: Sequence[tuple[str, str]], labels: Sequence[str], values: Sequence[Sequence[float | None]]
 ) -> str:
-    """Return a figure a feature: a row a label, a dot a trial, a bar from the first to the third quartile."""
-    names = sorted(set(labels))
+    """Return one figure per feature: a row per label, a dot per trial, a bar from the first to the third quartile."""
+    meanings = feature_meanings()
     return panels(
         [
-            _feature(name, unit, names, labels, [row[k] for row in values])
+            _feature(name, unit, meanings.get(name, ""), labels, [row[k] for row in values])
             for k, (name, unit) in enumerate(features)
         ]
     )
 
 
+def feature_meanings() -> dict[str, str]:
+    """Return what each feature of the installed feature sets means, in a few words."""
+    entries = (component.entry for component in installed().components("feature-set"))
+    return {
+        feature.name: feature.meaning
+        for entry in entries
+        if isinstance(entry, FeatureSetEntry)
+        for feature in entry.features
+    }
+
+
 def _feature(
-    name: str, unit: str, names: Sequence[str], labels: Sequence[str], column: Sequence[float | None]
+    name: str, unit: str, meaning: str, labels: Sequence[str], column: Sequence[float | None]
 ) -> str:
     shown, factor = for_people(unit)
-    of: dict[str, list[float]] = {label: [] for label in names}
-    missing = 0
+    title = f"{name}, {shown}" if shown else name
+    of: dict[str, list[float]] = {label: [] for label in sorted(set(labels))}
     for label, value in zip(labels, column, strict=True):
-        if value is None:
-            missing += 1
-        else:
+        if value is not None:
             of[label].append(factor * value)
-    left = 12 + 6.1 * max(map(len, names))
-    bottom = 34.0 + 19 * len(names)
+    missing = sum(value is None for value in column)
+    left = 12 + 6.1 * max(map(len, of))
+    bottom = 34.0 + 19 * len(of)
     picture = Picture(bottom + 34)
-    scale = reaching([one for some in of.values() for one in some], min(left, 165), picture.width - 12)
-    picture.text(2, 14, f"{name}" + (f", {shown}" if shown else ""), bold=True, size=13)
+    scale = reaching([v for values in of.values() for v in values], min(left, 165), picture.width - 12)
+    picture.text(2, 14, title, bold=True, size=13)
     picture.x_axis(scale, 24, bottom, shown or "value")
-    rows: list[tuple[str, ...]] = []
-    for k, label in enumerate(names):
-        y = 38.0 + 19 * k
-        picture.text(scale.start - 6, y + 4, _short(label), at="end")
-        some = sorted(of[label])
-        if not some:
-            picture.text(scale.start + 4, y + 4, "missing in all", ink=QUIET)
-            rows.append((label, "0", "", "", ""))
-            continue
-        ink = INKS[list(dict.fromkeys(map(class_of, names))).index(class_of(label)) % len(INKS)]
-        step = max(1, math.ceil(len(some) / DRAWN))
-        # Dots of one row lie in three lines, in turn, so that they do not hide each other.
-        picture.dots([(scale(one), y + 4 * (i % 3 - 1)) for i, one in enumerate(some[::step])], ink)
-        low, middle, high = (_quantile(some, q) for q in (0.25, 0.5, 0.75))
-        picture.line([(scale(low), y), (scale(high), y)], "#1a1a1a", width=2.5)
-        picture.line([(scale(middle), y - 6), (scale(middle), y + 6)], "#1a1a1a", width=2.5)
-        rows.append((label, str(len(some)), *(f"{one:.4g}" for one in (low, middle, high))))
-    told = "; ".join(f"{row[0]} {row[3]}" for row in rows if row[3])
+    classes = list(dict.fromkeys(map(class_of, of)))
+    rows = [
+        _feature_row(picture, scale, 38.0 + 19 * k, label, sorted(values), classes.index(class_of(label)))
+        for k, (label, values) in enumerate(of.items())
+    ]
+    medians = "; ".join(f"{row[0]} {row[3]}" for row in rows if row[3])
     absent = f" Missing in {missing} of {len(column)} trials." if missing else ""
-    words = f"{name} of every label. Medians{f' in {shown}' if shown else ''}: {told}.{absent}"
-    numbers = table(
-        f"{name}{f', {shown}' if shown else ''}",
-        ("label", "trials", "1st quartile", "median", "3rd quartile"),
-        rows,
-        1,
-    )
-    caption = f"{name}: {MEANING[name]}.{absent}" if name in MEANING else f"{name}.{absent}"
+    words = f"{name} of every label. Medians{f' in {shown}' if shown else ''}: {medians}.{absent}"
+    header = ("label", "trials", "1st quartile", "median", "3rd quartile")
+    numbers = table(title, header, rows, 1)
+    caption = f"{name}: {meaning}.{absent}" if meaning else f"{name}.{absent}"
     return f"<div>{figure(picture.svg(words), caption)}{folded(f'{name} in numbers', numbers)}</div>"
+
+
+def _feature_row(
+    picture: Picture, scale: AxisScale, y: float, label: str, values: Sequence[float], colour: int
+) -> tuple[str, ...]:
+    """Draw the trials of one label, and return its row of the table."""
+    picture.text(scale.start - 6, y + 4, _short(label), at="end")
+    if not values:
+        picture.text(scale.start + 4, y + 4, "missing in all", ink=QUIET)
+        return (label, "0", "", "", "")
+    step = max(1, math.ceil(len(values) / DRAWN))
+    # The dots of a row alternate between three heights, so that they do not hide each other.
+    dots = [(scale(value), y + 4 * (i % 3 - 1)) for i, value in enumerate(values[::step])]
+    picture.dots(dots, INKS[colour % len(INKS)])
+    low, middle, high = (_quantile(values, q) for q in (0.25, 0.5, 0.75))
+    picture.line([(scale(low), y), (scale(high), y)], "#1a1a1a", width=2.5)
+    picture.line([(scale(middle), y - 6), (scale(middle), y + 6)], "#1a1a1a", width=2.5)
+    return (label, str(len(values)), *(f"{value:.4g}" for value in (low, middle, high)))
 
 
 def _short(label: str) -> str:

@@ -1,4 +1,4 @@
-"""The words for how rates were measured, and for the controls that stand beside them."""
+"""The words of a page for protocols, controls and targets."""
 
 from __future__ import annotations
 
@@ -6,48 +6,49 @@ from collections.abc import Mapping
 from typing import Final
 
 CONTROLS: Final[Mapping[str, tuple[str, str]]] = {
-    "majority_class": ("always the commonest answer", "guessing, without feeling anything"),
+    "majority_class": ("most frequent label", "always the same answer, without any measurement"),
     "shuffled_labels": (
-        "names shuffled",
-        "the same trials with wrong names: must be no better than guessing, or the measurement itself is wrong",
+        "shuffled labels",
+        "the same trials with wrong labels: a rate above guessing means that the evaluation itself is wrong",
     ),
     "before_contact": (
-        "before any touch",
-        "what the recording gives away before contact: must be no better than guessing",
+        "before contact",
+        "what the recording reveals before contact: a rate above guessing means that it reveals the labels",
     ),
-    "width_only": ("width alone", "what the first contact tells, without any squeeze"),
-    "instance_held_out": ("things never felt before", "no grasp of the very thing was learned from"),
+    "width_only": ("width alone", "what the first contact shows, without any squeeze"),
+    "instance_held_out": ("new objects", "no grasp of the same object was used for training"),
     "stratified_10_fold": (
         "ten stratified folds",
-        "the same things may be learned from and judged on, as in the paper",
+        "the same objects may occur in training and test, as in the paper",
     ),
     "recording_order": (
-        "in the order of recording",
-        "learned from other times of the recording than judged on",
+        "order of recording",
+        "training and test trials come from different times of the recording",
     ),
 }
-"""Control, by its name in `evaluate`, to what it is called on a page and what it is good for."""
+"""Name of a control in `evaluate` to its title on a page, and its purpose."""
 
 TARGETS: Final[Mapping[str, str]] = {
-    "both": "what the thing is and in what state",
-    "class": "what the thing is",
-    "state": "the state of a thing that is known",
+    "both": "the object and its state",
+    "class": "the object",
+    "state": "the state of a known object",
 }
+"""Target to what is recognised, in words."""
 
 
 def control_words(name: str, what: str) -> tuple[str, str]:
-    """Return what a control is called on a page, and what it is good for."""
+    """Return the title of a control on a page, and its purpose; `what` is used for a control without an entry."""
     return CONTROLS.get(name, (name.replace("_", " "), what))
 
 
 def protocol_words(protocol: str) -> str:
-    """Return how trials were dealt to learning and judging, as the end of a sentence."""
+    """Return how trials were split into training and test, as the end of a sentence."""
     if protocol == "instance_held_out":
-        return "a classifier that has learned neither from it nor from any other grasp of the very same thing"
+        return "a classifier that was trained neither on it nor on any other grasp of the same object"
     if protocol.startswith("stratified"):
         folds = protocol.split("_")[1]
         return (
-            f"a classifier that has not learned from it ({folds} folds, stratified by label), though perhaps from "
-            "other grasps of the same thing"
+            f"a classifier that was not trained on it ({folds} folds, stratified by label), but perhaps on other "
+            "grasps of the same object"
         )
-    return "a classifier that has learned from other trials altogether"
+    return "a classifier that was trained on other trials"

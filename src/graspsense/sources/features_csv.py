@@ -33,7 +33,7 @@ _HEADING: Final = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]")
 _DECIMAL_COMMA: Final = re.compile(r"[-+]?\d+,\d+")
 
 
-class Columns:
+class CsvColumns:
     """A CSV as columns of text, with the line that each row begins in."""
 
     def __init__(self, path: Path) -> None:
@@ -159,7 +159,7 @@ def read_labelled(
     Raises ConfigError where a column is not there or is no label, DataDamaged where the file is not what it
     claims to be.
     """
-    columns = Columns(path)
+    columns = CsvColumns(path)
     notes: list[str] = []
     simulated = False
     if _is_export(columns):
@@ -210,7 +210,7 @@ def read_labelled(
 
 def read_table(path: Path, names: Sequence[str]) -> FeatureTable:
     """Return these columns of a CSV. Raises ConfigError, DataDamaged."""
-    return Columns(path).table(list(names))
+    return CsvColumns(path).table(list(names))
 
 
 def write_labelled(path: Path, labelled: Labelled) -> None:
@@ -252,7 +252,7 @@ def _text(path: Path) -> str:
         ) from None
 
 
-def _labels(columns: Columns, label: str) -> list[str]:
+def _labels(columns: CsvColumns, label: str) -> list[str]:
     labels = _named(columns, label, "the label")
     if len(set(labels)) > max(2, len(labels) // 2):
         raise ConfigError(
@@ -266,7 +266,7 @@ def _labels(columns: Columns, label: str) -> list[str]:
     return labels
 
 
-def _named(columns: Columns, name: str, what: str) -> list[str]:
+def _named(columns: CsvColumns, name: str, what: str) -> list[str]:
     cells = columns.column(name, what)
     for line, cell in zip(columns.lines, cells, strict=True):
         if cell.lower() in MISSING:
@@ -274,12 +274,12 @@ def _named(columns: Columns, name: str, what: str) -> list[str]:
     return cells
 
 
-def _is_export(columns: Columns) -> bool:
+def _is_export(columns: CsvColumns) -> bool:
     """Whether `graspsense export` wrote this table of a store's trials."""
     return tuple(columns.names[: len(ABOUT)]) == ABOUT
 
 
-def _keep_counted(columns: Columns, label: str, notes: list[str]) -> None:
+def _keep_counted(columns: CsvColumns, label: str, notes: list[str]) -> None:
     """Keep the trials that `store:` would give: labelled, and ended by themselves. Raises DataDamaged."""
     labels, outcomes = columns.column(label, "the label"), columns.cells["outcome"]
     named = [i for i, cell in enumerate(labels) if cell.lower() not in MISSING]
@@ -293,7 +293,7 @@ def _keep_counted(columns: Columns, label: str, notes: list[str]) -> None:
     columns.keep(ended)
 
 
-def _feature_names(columns: Columns, taken: set[str], notes: list[str]) -> list[str]:
+def _feature_names(columns: CsvColumns, taken: set[str], notes: list[str]) -> list[str]:
     names, left, counters, blank = [], [], [], []
     for name in columns.names:
         if name in taken:

@@ -21,12 +21,12 @@ from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.roles import Reading
 from graspsense.core.signals import NO_PADS, Frame
 from graspsense.recording.replayable import Recording
-from graspsense.sources.features_csv import Columns
+from graspsense.sources.features_csv import CsvColumns
 
 NEEDED: Final = ("time", "gap", "force")
 KNOWN: Final = (*NEEDED, "effort", "velocity")
 FARTHEST_M: Final = 1.0
-"""A gap that is wider is likely not in metres."""
+"""A gap that is wider is not in metres."""
 
 
 def named(path: str, columns: Mapping[str, Sequence[str]]) -> str:
@@ -57,12 +57,12 @@ def read_squeeze(name: str) -> Recording:
         most = 2 if what == "force" else 1
         if len(names) > most:
             raise ConfigError(f"{len(names)} columns are given for {what}: {most} at most")
-    columns = Columns(Path(file).expanduser())
+    columns = CsvColumns(Path(file).expanduser())
     found = {what: [_column(columns, what, one) for one in names] for what, names in given.items()}
     return _recording(columns, found)
 
 
-def _column(columns: Columns, what: str, text: str) -> list[float]:
+def _column(columns: CsvColumns, what: str, text: str) -> list[float]:
     name, star, factor_text = text.rpartition("*")
     factor = 1.0
     if star and text not in columns.cells:
@@ -84,7 +84,7 @@ def _column(columns: Columns, what: str, text: str) -> list[float]:
     return values
 
 
-def _recording(columns: Columns, found: Mapping[str, list[list[float]]]) -> Recording:
+def _recording(columns: CsvColumns, found: Mapping[str, list[list[float]]]) -> Recording:
     (times,), (gaps,), forces = found["time"], found["gap"], found["force"]
     if len(times) < 2:
         raise DataDamaged(f"{columns.path} has one line only: a squeeze needs more")
@@ -95,6 +95,11 @@ def _recording(columns: Columns, found: Mapping[str, list[list[float]]]) -> Reco
             )
     steps = [now - before for before, now in pairwise(times)]
     steps.insert(0, steps[0])
+    if max(gaps) > FARTHEST_M:
+        raise DataDamaged(
+            f"{columns.path}: the gap goes up to {max(gaps):g} m, which no gripper has: where the column is in "
+            "mm, write COLUMN*0.001 for it"
+        )
     if "velocity" in found:
         (speeds,) = found["velocity"]
     else:
@@ -111,10 +116,6 @@ def _recording(columns: Columns, found: Mapping[str, list[list[float]]]) -> Reco
     notes = [f"{len(times)} lines of {columns.path.name}: taken to be in s, m and N"]
     if len(forces) == 1:
         notes.append("one force was recorded: it is taken for that of both pads")
-    if max(gaps) > FARTHEST_M:
-        notes.append(
-            f"the gap goes up to {max(gaps):g} m: where the column is in mm, write COLUMN*0.001 for it"
-        )
     return Recording(
         name=f"CSV {columns.path.name}", readings=readings, rate_hz=1.0 / median(steps), notes=tuple(notes)
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from graspsense.core.pipeline import grasp_with
@@ -39,7 +39,7 @@ def import_recording(
         try:
             file.metadata(START, record.section(START))
             file.metadata(DEVICE, record.section(DEVICE))
-            _write_readings(file, KINDS[kind](name))
+            _write_readings(file, KINDS[kind](name), trial.trace.phase.tolist())
             file.metadata(RESULT, record.section(RESULT))
             recording = file.finish()
         except BaseException:
@@ -50,11 +50,14 @@ def import_recording(
     return trial, store.add(record, recording)
 
 
-def _write_readings(file: RecordingWriter, recording: Recording) -> None:
+def _write_readings(file: RecordingWriter, recording: Recording, phases: Sequence[int]) -> None:
+    """Write all readings, each with the phase that the controller was in; the last one holds after its end."""
     counter = 0
-    for frame, pads in recording.readings:
+    after = len(recording.readings) - len(phases)
+    every_phase = [*phases, *[phases[-1] if phases else APPROACH] * after]
+    for (frame, pads), phase in zip(recording.readings, every_phase, strict=True):
         if pads.counter != counter:
             counter = pads.counter
             file.pads(pads.t_s, PADS.pack(pads.t_s, pads.counter, *pads.left, *pads.right))
         # The commands of the other program are not known.
-        file.tick(frame.t_s, TICK.pack(*frame, APPROACH, 0, math.nan, math.nan, math.nan))
+        file.tick(frame.t_s, TICK.pack(*frame, phase, 0, math.nan, math.nan, math.nan))

@@ -88,6 +88,7 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
     """Gives the frames of a recording, one a read; commands have no effect on what has happened."""
 
     _recording: Recording | None = None
+    _commands: tuple[float, ...] | None = None
     _next = 0
 
     def open(self, seed: int) -> DeviceInfo:
@@ -97,7 +98,7 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
         """
         kind, name = kind_and_name(self.config.recording)
         recording = KINDS[kind](name)
-        self._recording, self._next = recording, 0
+        self._recording, self._commands, self._next = recording, recording.commands, 0
         return DeviceInfo(
             name=recording.name,
             clock="virtual",
@@ -106,6 +107,7 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
             speed_limit_m_s=inf,
             opening=None,
             relaxed=Command(EFFORT, 0.0, inf, inf),
+            has_release=recording.has_release,
             units=recording.units,
             notes=recording.notes,
         )
@@ -129,6 +131,10 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
     def close(self) -> None:
         """Let go of the recording."""
         self._recording = None
+
+    def recorded_commands(self) -> Sequence[float] | None:
+        """Return the commands of the recording, None where it does not hold them."""
+        return self._commands
 
     def report(self) -> Mapping[str, float | int | str | bool]:
         """Return which recording this is and how many of its frames were read."""

@@ -22,7 +22,7 @@ Kind = Literal["CSV", "data set", "simulated"]
 
 
 @frozen(kw_only=True)
-class Source(Group):
+class TrialSource(Group):
     """Labelled trials, as a user describes them.
 
     `source` is `simulated`, the name of a CSV, or a data set with its folder (`icub:FOLDER`, `store:DIR`).
@@ -65,7 +65,7 @@ def kind_of(source: str) -> Kind:
 
 
 def labelled_trials(
-    source: Source,
+    source: TrialSource,
     *,
     settings: Callable[[], Settings],
     features: Callable[[], FeatureSet[Any]],
@@ -89,7 +89,7 @@ def labelled_trials(
     return found.of_class(source.only) if source.only else found
 
 
-def groups_of(source: Source) -> tuple[Group, ...]:
+def groups_of(source: TrialSource) -> tuple[Group, ...]:
     """Return the groups of simulated trials that a source describes. Raises ConfigError."""
     keys: Mapping[str, Any] = {name: getattr(source, name) for name in fields_dict(Group)}
     own = Group(**keys)
@@ -98,7 +98,7 @@ def groups_of(source: Source) -> tuple[Group, ...]:
     return source.groups or (own,)
 
 
-def _csv(source: Source) -> Labelled:
+def _csv(source: TrialSource) -> Labelled:
     from graspsense.sources.features_csv import read_labelled
 
     if not source.label:
@@ -113,7 +113,7 @@ def _csv(source: Source) -> Labelled:
     )
 
 
-def _data_set(source: Source, features: FeatureSet[Any]) -> Labelled:
+def _data_set(source: TrialSource, features: FeatureSet[Any]) -> Labelled:
     from graspsense.core.plugins import installed
 
     name, _, folder = source.source.partition(":")

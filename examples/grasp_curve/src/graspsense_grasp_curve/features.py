@@ -47,22 +47,22 @@ UNITS: Final = tuple(feature.unit for feature in CURVE)
 IMAGE: Final = NAMES[5:]
 LEAST_TRAVEL_M: Final = 2e-4
 LEAST_LOSS: Final = 0.02
-"""Share of the peak that the force must lose in the hold for a relaxation to be seen beside the cells' steps."""
+"""Share of the peak by which the force must fall in the hold for the relaxation to exceed the steps of the cells."""
 
 
 @frozen(kw_only=True)
 class GraspCurveConfig:
-    """When contact is."""
+    """The threshold of contact."""
 
     contact_force_n: float = field(default=CONTACT_FORCE_N, validator=gt(0.0))
-    """On each pad."""
+    """Force on each pad at contact."""
 
 
 class GraspCurve(FeatureSet[GraspCurveConfig]):
-    """Draws the eight features of the table above."""
+    """Extracts the eight features of the table above."""
 
     def extract(self, trace: Trace) -> Features:
-        """Return the features; one that this trace does not show is NaN with its reason."""
+        """Return the features; an undefined one is NaN with its reason."""
         values, reasons = _curve(trace, self.config.contact_force_n)
         return Features(
             names=NAMES,
@@ -90,7 +90,7 @@ class ChittaAndCurve(FeatureSet[GraspCurveConfig]):
 
 
 def _curve(trace: Trace, contact_force_n: float) -> tuple[dict[str, float], dict[str, str]]:
-    """Return what is defined, and why the rest is not."""
+    """Return the defined features, and the reasons for the others."""
     known = np.isfinite(trace.gap_m) & np.isfinite(trace.force_left_n) & np.isfinite(trace.force_right_n)
     touch = known & (trace.force_left_n >= contact_force_n) & (trace.force_right_n >= contact_force_n)
     touch &= trace.phase <= HOLD
@@ -138,7 +138,7 @@ def _stiffness_ratio(gap: Floats, force: Floats) -> float | str:
 
 
 def _in_time(trace: Trace, force: Floats) -> Floats:
-    """Return the force as a line from cell image to cell image, where there are images.
+    """Return the force, interpolated linearly between cell images if there are any.
 
     In between, a gripper gives the force of the image before: at the speed of a release it would be paired with a gap
     that is millimetres further on, and give back more than was put in.
@@ -156,7 +156,7 @@ def _hysteresis(gap: Floats, force: Floats, squeeze: Any, release: Any) -> float
     put_in = _work(gap[squeeze], force[squeeze])
     if not put_in > 1e-6:
         return "no work was done in the squeeze"
-    # What was given back while opening over the way that was squeezed.
+    # The work that the object gave back while the fingers opened over the squeezed distance.
     way = release[gap[release] <= gap[squeeze[0]]]
     given_back = -_work(gap[way], force[way]) if len(way) > 1 else 0.0
     return 1.0 - given_back / put_in
@@ -177,7 +177,7 @@ def _relaxation(t_s: Floats, force: Floats, held: Any) -> float | str:
 
 
 def _moments(trace: Trace, contact_s: float, peak_s: float) -> tuple[float, float, float] | str:
-    """Return area, row and spread of the contact in the last image up to the peak, or why there are none."""
+    """Return area, row and spread of the contact in the last image before the peak, or the reason for their absence."""
     before = np.flatnonzero(trace.pad_t_s < contact_s)
     upto = np.flatnonzero((trace.pad_t_s <= peak_s) & (trace.pad_t_s >= contact_s))
     if not len(trace.pad_t_s):

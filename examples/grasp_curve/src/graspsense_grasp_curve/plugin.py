@@ -1,4 +1,4 @@
-"""What this distribution brings; numpy is imported when features are drawn."""
+"""The components of this distribution. numpy is imported when features are extracted."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ CURVE = (
 
 @hookimpl
 def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
-    """Return the eight alone, and with the six of Table I before them."""
+    """Return two sets: the eight features, and these after the six of Table I."""
     channels = (
         Channel("gap", "m"),
         Channel("force_left", "N"),

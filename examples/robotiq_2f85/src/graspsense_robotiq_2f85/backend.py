@@ -61,14 +61,14 @@ class Robotiq2F85Config:
     address: int = field(default=9, validator=and_(ge(1), le(247)))
     reply_timeout_s: float = field(default=0.1, validator=gt(0.0))
     newtons_per_ampere: float = field(default=150.0, validator=gt(0.0))
-    """Grip force over motor current. An assumption: the manual gives none, so measure yours."""
+    """Grip force per motor current. The manual does not give it, so this is an assumption: measure yours."""
     vanishes_s: float = field(default=inf, validator=gt(0.0))
-    """When the cable of the fake one is pulled, for tests."""
+    """Time at which the cable of the emulated gripper is pulled, for tests."""
 
 
 @final
 class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
-    """Commands become a position that moves, with a speed and a force; each read is one exchange with the gripper."""
+    """Turns commands into a moving target position with a speed and a force; each read is one exchange."""
 
     _client: Client | None = None
     _fake: Fake | None = None
@@ -117,14 +117,14 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
         )
 
     def read(self, timeout_s: float) -> Reading | None:
-        """Wait for the next hundredth of a second, then ask the gripper. Raises DeviceLost."""
+        """Wait for the next multiple of 10 ms, then exchange data with the gripper. Raises DeviceLost."""
         wait_s = self._due_s - time.monotonic()
         if wait_s > timeout_s:
             time.sleep(timeout_s)
             return None
         if wait_s > 0.0:
             time.sleep(wait_s)
-        # On a grid, so that what an exchange takes does not lower the rate; what is late is not made up for.
+        # On a grid of times, so that the duration of an exchange does not lower the rate; lost time is not made up.
         self._due_s = max(self._due_s, time.monotonic()) + 1.0 / RATE_HZ
         status = self._exchanged()
         now_s = time.monotonic()
@@ -141,7 +141,7 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
         )
 
     def apply(self, command: Command) -> None:
-        """Take a command for the next exchange. The gripper cannot be told less than 20 N."""
+        """Store a command for the next exchange. The smallest force of the gripper is 20 N."""
         kind, value, effort_limit, speed_limit = command
         gap_m = self._recent[-1][1] if self._recent else self._target_m
         force = effort_limit
@@ -154,7 +154,7 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
         else:
             speed, goal = 0.0, gap_m
         if speed <= SPEEDS_M_S[0]:
-            # Slower than it can go: a goal that moves on by as much as the time since the last frame allows.
+            # Below its smallest speed, the target moves on by the distance for the time since the last frame.
             if speed == 0.0:
                 self._target_m = gap_m
             step = speed / RATE_HZ
@@ -172,10 +172,10 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
         )
 
     def tare(self, images: Sequence[Pads]) -> None:
-        """Nothing to zero: there are no pads."""
+        """Do nothing: there are no pads."""
 
     def close(self) -> None:
-        """Tell it to stay where it is, as far as it can be told, and let go of the line."""
+        """Stop the fingers if the gripper still responds, and close the connection."""
         client, self._client = self._client, None
         if client is not None:
             with suppress(OSError, NoReply):
@@ -187,11 +187,11 @@ class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
             fake.close()
 
     def report(self) -> dict[str, float | int | str | bool]:
-        """Return how many frames came, and how many exchanges had to be repeated."""
+        """Return the number of frames, and of repeated exchanges."""
         return {"frames": getattr(self, "_frames", 0), "repeated": getattr(self, "_retries", 0)}
 
     def dry_run_backend(self) -> Robotiq2F85:
-        """Return the fake one."""
+        """Return the emulated gripper."""
         return Robotiq2F85(Robotiq2F85Config(port="fake", newtons_per_ampere=self.config.newtons_per_ampere))
 
     def _exchange(self, request: Request) -> Status:

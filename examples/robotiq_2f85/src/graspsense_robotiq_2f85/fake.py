@@ -1,4 +1,4 @@
-"""A gripper in software on a pseudo-terminal and on TCP, for tests and for trying things out; nothing is measured.
+"""An emulated gripper on a pseudo-terminal and on TCP, for tests and first trials.
 
     python -m graspsense_robotiq_2f85.fake
 
@@ -46,7 +46,7 @@ READ_AND_WRITE: Final = 23
 
 
 class Fingers:
-    """The fingers and a springy thing between them, on the clock that is given with each look."""
+    """The fingers and an elastic object between them, at the time that each call gives."""
 
     def __init__(self, thing_m: float, stiffness_n_m: float, vanishes_s: float) -> None:
         self.registers = [0] * COUNT
@@ -56,11 +56,11 @@ class Fingers:
         self._object = MOVING
 
     def vanished(self, now_s: float) -> bool:
-        """Return whether its cable was pulled, so long after it was activated."""
+        """Return whether the cable is pulled at this time after activation."""
         return bool(self.registers[0] >> 8 & 1) and now_s - self._active_since_s > self._vanishes_s
 
     def write(self, at: int, values: list[int], now_s: float) -> None:
-        """Take output registers."""
+        """Receive output registers."""
         was_active = request_of(self.registers).active
         self.look(now_s)
         self.registers[at : at + len(values)] = values
@@ -68,7 +68,7 @@ class Fingers:
             self._active_since_s = now_s
 
     def look(self, now_s: float) -> list[int]:
-        """Move up to now, and return the input registers."""
+        """Move up to the present time, and return the input registers."""
         request, passed = request_of(self.registers), now_s - self._now_s
         self._now_s = now_s
         up = request.active and now_s - self._active_since_s >= ACTIVATION_S
@@ -81,11 +81,11 @@ class Fingers:
         return [status << 8, request.position, position_of(self._gap_m) << 8 | amperes]
 
     def _moved(self, position: int, speed: int, force: int, passed_s: float) -> float:
-        """Move the fingers and return the motor's current."""
+        """Move the fingers and return the current of the motor."""
         nearest = min(max(position, OPEN_BYTE), CLOSED_BYTE)
         wanted = gap_of(nearest)
         step = value_of(speed, SPEEDS_M_S) * passed_s
-        # Where the spring pushes as hard as the motor may.
+        # The position at which the spring balances the motor.
         stop = self._thing_m - value_of(force, FORCES_N) / self._stiffness_n_m
         before = self._gap_m
         if wanted < before:
@@ -94,7 +94,7 @@ class Fingers:
         else:
             reached = min(wanted, before + step)
             self._object = MOVING
-        # Asked for a position beyond its stroke, it is there at the stroke's end.
+        # A target beyond the stroke is reached at the end of the stroke.
         if position_of(reached) == nearest:
             self._object = THERE
         self._gap_m = reached
@@ -161,7 +161,7 @@ class Fake:
                 self._heard(self._ours, True, buffers)
 
     def _heard(self, handle: int, rtu: bool, buffers: dict[int, bytes]) -> bool:
-        """Take what came through this handle and answer it; return whether there is still somebody."""
+        """Answer the data of this handle; return whether the client is still connected."""
         data = os.read(handle, 512)
         reply, buffers[handle] = self._answer(buffers.get(handle, b"") + data, rtu)
         if reply and not self._fingers.vanished(self._now()):
@@ -172,7 +172,7 @@ class Fake:
         return time.monotonic() - self._began_s
 
     def _answer(self, data: bytes, rtu: bool) -> tuple[bytes, bytes]:
-        """Return the reply to what came, and what is left of it: half a request waits for its end."""
+        """Return the reply to the data, and the remaining data: an incomplete request waits for its end."""
         if not rtu:
             if len(data) < 8 or len(data) < 6 + struct.unpack(">H", data[4:6])[0]:
                 return b"", data

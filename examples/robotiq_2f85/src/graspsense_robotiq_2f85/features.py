@@ -1,4 +1,4 @@
-"""The features of Table I that need no force: the paper's own, with contact taken from the effort."""
+"""The features of Table I that need no force, with contact detected from the effort."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
 
 @frozen(kw_only=True)
 class WithoutPadsConfig:
-    """When contact and rest are."""
+    """Thresholds of contact and rest."""
 
     contact_effort_n: float = field(default=10.5, validator=gt(0.0))
-    """More than the motor needs to move the fingers freely."""
+    """Effort at contact, above that for moving the fingers freely."""
     rest_speed_m_s: float = field(default=1e-3, validator=gt(0.0))
     rest_window_s: float = field(default=0.15, validator=gt(0.0))
 
 
 class WithoutPads(FeatureSet[WithoutPadsConfig]):
-    """Draws p_first, p_steady, delta_t and dp_dt."""
+    """Extracts p_first, p_steady, delta_t and dp_dt."""
 
     def extract(self, trace: Trace) -> Features:
-        """Return the four features; a reason that speaks of a pad means the effort."""
+        """Return the four features; in the reasons, the force of a pad stands for the effort."""
         config = self.config
         six = create(
             "feature-set",

@@ -1,4 +1,4 @@
-"""A law for a gripper that feels through its motor: close until it has stood still."""
+"""A control law for a gripper without pads: close until the fingers are at rest."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class CloseUntilStoppedConfig:
     closing_speed_m_s: float = field(default=0.02, validator=gt(0.0))
     grip_force_n: float = field(default=25.0, validator=gt(0.0))
     contact_effort_n: float = field(default=10.5, validator=gt(0.0))
-    """More than the motor needs to move the fingers freely."""
+    """Effort at contact, above that for moving the fingers freely."""
     rest_speed_m_s: float = field(default=1e-3, validator=gt(0.0))
     rest_window_s: float = field(default=0.15, validator=gt(0.0))
     closed_gap_m: float = field(default=0.002, validator=gt(0.0))
@@ -42,7 +42,7 @@ class CloseUntilStoppedConfig:
 
 
 class Numbers(NamedTuple):
-    """The numbers of `CloseUntilStoppedConfig`."""
+    """The parameters of `CloseUntilStoppedConfig`."""
 
     closing_speed_m_s: float
     grip_force_n: float
@@ -63,7 +63,7 @@ class State(NamedTuple):
 
 
 def step(params: Numbers, state: State, frame: Frame, pads: Pads) -> tuple[Command, State]:
-    """Close; squeeze from the contact on; hold once the fingers have stood still."""
+    """Close; squeeze from contact on; hold when the fingers are at rest."""
     phase, outcome, seconds = state.phase, state.outcome, state.seconds + frame.dt_s
     still = watch(state.still, frame.t_s, frame.gap_m, params.rest_speed_m_s, params.rest_window_s)
     if outcome == RUNNING:
@@ -80,12 +80,12 @@ def step(params: Numbers, state: State, frame: Frame, pads: Pads) -> tuple[Comma
 
 
 class CloseUntilStopped(Controller[CloseUntilStoppedConfig]):
-    """Closes at a set speed with a set force until it has stood still."""
+    """Closes at a given speed with a given force until the fingers are at rest."""
 
     step = staticmethod(step)
 
     def params(self) -> Numbers:
-        """Return the law's numbers."""
+        """Return the parameters of the law."""
         return Numbers(*(float(getattr(self.config, name)) for name in Numbers._fields))
 
     def init(self) -> State:

@@ -18,20 +18,20 @@ BAUD: Final = 115200
 
 
 class NoReply(Exception):
-    """Nothing came in time, or nothing that is a reply; the text says what."""
+    """No reply came in time, or an invalid one; the text describes it."""
 
 
 class Line(Protocol):
-    """Bytes out and in, within a time-out."""
+    """Sends and receives bytes within a time-out."""
 
     def send(self, data: bytes) -> None:
-        """Send all of it, and forget what came before."""
+        """Send all bytes, and discard those received before."""
 
     def receive(self, count: int) -> bytes:
-        """Return so many bytes, or fewer where no more came in time."""
+        """Return this number of bytes, or fewer if no more came in time."""
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close it."""
 
 
 class SerialLine:
@@ -43,16 +43,16 @@ class SerialLine:
         self._port: Any = serial.Serial(port, BAUD, timeout=timeout_s, write_timeout=timeout_s)
 
     def send(self, data: bytes) -> None:
-        """Send all of it, and forget what came before."""
+        """Send all bytes, and discard those received before."""
         self._port.reset_input_buffer()
         self._port.write(data)
 
     def receive(self, count: int) -> bytes:
-        """Return so many bytes, or fewer where no more came in time."""
+        """Return this number of bytes, or fewer if no more came in time."""
         return bytes(self._port.read(count))
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close it."""
         self._port.close()
 
 
@@ -66,7 +66,7 @@ class SocketLine:
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def send(self, data: bytes) -> None:
-        """Send all of it, and forget what came before."""
+        """Send all bytes, and discard those received before."""
         self._socket.setblocking(False)
         with suppress(BlockingIOError):
             while self._socket.recv(4096):
@@ -75,7 +75,7 @@ class SocketLine:
         self._socket.sendall(data)
 
     def receive(self, count: int) -> bytes:
-        """Return so many bytes, or fewer where no more came in time."""
+        """Return this number of bytes, or fewer if no more came in time."""
         found = b""
         while len(found) < count:
             try:
@@ -88,7 +88,7 @@ class SocketLine:
         return found
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close it."""
         self._socket.close()
 
 
@@ -110,7 +110,7 @@ class Client:
         self._transaction = 0
 
     def exchange(self, write: int, values: Sequence[int], read: int, count: int) -> list[int]:
-        """Write these registers and return those. Raises NoReply, OSError."""
+        """Write the output registers and return the input registers. Raises NoReply, OSError."""
         request = struct.pack(
             f">BHHHHB{len(values)}H",
             READ_AND_WRITE,
@@ -127,7 +127,7 @@ class Client:
         return list(struct.unpack(f">{count}H", reply[2:]))
 
     def close(self) -> None:
-        """Let go of the line."""
+        """Close the connection."""
         self._line.close()
 
     def _over_rtu(self, request: bytes, length: int) -> bytes:

@@ -1,4 +1,4 @@
-"""What this distribution brings; the serial line is imported when a gripper is opened."""
+"""The components of this distribution. The serial port is imported when a gripper is opened."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FEATURES = (
     Feature("delta_t", "s", "time from contact to rest"),
     Feature("dp_dt", "m/s", "mean rate of the gap from contact to rest"),
 )
-"""Four of the six features of Table I; for f_steady and df_dt one needs a force, and the 2F-85 has none."""
+"""Four of the six features of Table I; f_steady and df_dt need a force, which the 2F-85 does not measure."""
 
 
 @hookimpl
@@ -46,7 +46,7 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
 
 @hookimpl
 def graspsense_controllers() -> Iterable[ControllerEntry]:
-    """Return the law for a gripper that feels through its motor."""
+    """Return the control law for a gripper without pads."""
     yield ControllerEntry(
         name="close-until-stopped",
         target="graspsense_robotiq_2f85.law:CloseUntilStopped",
@@ -59,7 +59,7 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:
 
 @hookimpl
 def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
-    """Return the features that can be had without pads."""
+    """Return the features that need no pads."""
     yield FeatureSetEntry(
         name="chitta-without-pads",
         target="graspsense_robotiq_2f85.features:WithoutPads",
@@ -72,7 +72,7 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
 
 @hookimpl
 def graspsense_pipelines() -> Iterable[PipelineEntry]:
-    """Return the three of them together."""
+    """Return the pipeline of gripper, controller and features."""
     yield PipelineEntry(
         name="robotiq-2f85",
         resource="graspsense_robotiq_2f85:pipelines/robotiq-2f85.toml",

@@ -1,4 +1,4 @@
-"""The registers of a 2F-85 (Robotiq, 2F-85 & 2F-140 instruction manual, "Control") and what their bytes mean.
+"""The registers of a 2F-85 (Robotiq, 2F-85 & 2F-140 instruction manual, "Control") and the meaning of their bytes.
 
 Three output registers from 0x03E8: action, position request, speed and force. Three input registers from 0x07D0:
 status, fault and echo, position and current. Speeds go from 20 to 150 mm/s and forces from 20 to 235 N over a byte;
@@ -23,11 +23,11 @@ AMPERES_A_STEP: Final = 0.010
 
 ACTIVE: Final = 3
 MOVING, STOPPED_OPENING, STOPPED_CLOSING, THERE = range(4)
-"""What the object bits say of the fingers."""
+"""The meaning of the object bits."""
 
 
 class Request(NamedTuple):
-    """What the gripper is asked for; bytes."""
+    """A request to the gripper, in bytes."""
 
     active: bool
     go: bool
@@ -41,7 +41,7 @@ class Request(NamedTuple):
 
 
 class Status(NamedTuple):
-    """What the gripper says; bytes and bits."""
+    """The status of the gripper, in bytes and bits."""
 
     active: bool
     state: int
@@ -52,13 +52,13 @@ class Status(NamedTuple):
 
 
 def request_of(registers: Sequence[int]) -> Request:
-    """Return what these output registers ask for."""
+    """Return the request in these output registers."""
     action, position, both = registers
     return Request(bool(action >> 8 & 1), bool(action >> 11 & 1), position & 0xFF, both >> 8, both & 0xFF)
 
 
 def status_of(registers: Sequence[int]) -> Status:
-    """Return what these input registers say."""
+    """Return the status in these input registers."""
     first, second, third = registers
     status = first >> 8
     return Status(
@@ -78,7 +78,7 @@ def position_of(gap_m: float) -> int:
 
 
 def byte_of(value: float, within: tuple[float, float]) -> int:
-    """Return the byte of a speed or force: the greatest that is not above it, and 0 for what lies below all."""
+    """Return the byte of a speed or force: the largest one whose value is not above it, or 0."""
     low, high = within
     return int(min(max((value - low) / (high - low), 0.0), 1.0) * 255.0 + 1e-9)
 

@@ -95,3 +95,8 @@ class SimConfig:
     """Number of cells of the gripping face, the ones nearest to its middle; the others read no force."""
     pad_delay_s: float = field(default=0.0, validator=and_(ge(0.0), le(0.04)))
     """Time between the sampling of a cell image and its arrival: 0.01 with the reports of the PR2's driver."""
+
+    @property
+    def has_forced_steps(self) -> bool:
+        """Whether the settings prescribe the scheme or the length of the steps."""
+        return self.scheme != "auto" or self.step_s is not None

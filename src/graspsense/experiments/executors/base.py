@@ -1,30 +1,30 @@
-"""What an executor is."""
+"""The interface of executors."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from graspsense.experiments.task import Done, Task
+from graspsense.experiments.task import Task, TaskResult
 
 
 class ExecutorLost(Exception):
-    """All that could do tasks is gone: a scheduler that was stopped, workers that do not start."""
+    """Nothing is left that could run tasks: the scheduler was stopped, or no worker starts."""
 
 
 class Executor(Protocol):
-    """Does tasks and yields what came of each as soon as it is there, in any order.
+    """Runs tasks and yields the result of each as soon as it is available, in any order.
 
-    A task that cannot be done is a `Done` with its reason; only what ends the whole run is raised. Whatever was not
-    yielded when the iterator ends or is closed was not done. Raises ExecutorLost.
+    A task that fails yields a `TaskResult` with the reason. Tasks without a result when the iterator ends were not run.
+    Raises ExecutorLost if the run cannot continue.
     """
 
     @property
     def workers(self) -> int:
-        """How many tasks it does at once."""
+        """Number of tasks that run at the same time."""
 
-    def run(self, tasks: Sequence[Task]) -> Iterator[Done]:
-        """Do them."""
+    def run(self, tasks: Sequence[Task]) -> Iterator[TaskResult]:
+        """Run the tasks."""
 
     def close(self) -> None:
-        """Let go of the workers, whatever they are doing."""
+        """Stop the workers, whatever they are doing."""

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 
 from graspsense.core.errors import ConfigError, PluginUnavailable, named
 from graspsense.experiments.executors.base import ExecutorLost
-from graspsense.experiments.task import Done, Task, run_task
+from graspsense.experiments.task import Task, TaskResult, run_task
 from graspsense.experiments.versions import differences, versions
 
 HINT: Final = 'the executor dask needs Dask: pip install "graspsense[dask]", or pip install dask distributed'
@@ -55,7 +55,7 @@ class DaskCluster:
         """How many tasks its workers do at once."""
         return max(int(sum(self._client.nthreads().values())), 1)
 
-    def run(self, tasks: Sequence[Task]) -> Iterator[Done]:
+    def run(self, tasks: Sequence[Task]) -> Iterator[TaskResult]:
         """Do them, a task whose worker died once more at the end and alone.
 
         Raises ExecutorLost where the scheduler goes, ConfigError where versions differ.
@@ -71,7 +71,7 @@ class DaskCluster:
         # Alone, so that only the task itself can be what ends its worker.
         for task, text in self._answers(victims, "alone"):
             reason = "it ended its worker, also when it was tried again alone"
-            yield Done.failed(task, reason) if text is None else _done(task, text)
+            yield TaskResult.failed(task, reason) if text is None else _done(task, text)
 
     def _answers(
         self, tasks: Sequence[Task], turn: Literal["first", "alone"]
@@ -185,11 +185,11 @@ class DaskCluster:
             )
 
 
-def _done(task: Task, answer: str | Exception) -> Done:
+def _done(task: Task, answer: str | Exception) -> TaskResult:
     """Return what came of a task, from its answer or from what kept the answer from coming."""
     if isinstance(answer, Exception):
-        return Done.failed(task, f"its worker could not do it: {named(answer)}")
-    return Done.from_text(answer)
+        return TaskResult.failed(task, f"its worker could not do it: {named(answer)}")
+    return TaskResult.from_text(answer)
 
 
 def _parts() -> tuple[Any, Any]:

@@ -17,7 +17,7 @@ from contextlib import suppress
 from typing import Final
 
 from graspsense.experiments.executors.base import ExecutorLost
-from graspsense.experiments.task import Done, Task
+from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.versions import differences, versions
 
 ATTEMPTS: Final = 2
@@ -33,7 +33,7 @@ class Processes:
         self.workers = workers
         self._running: list[_Worker] = []
 
-    def run(self, tasks: Sequence[Task]) -> Iterator[Done]:
+    def run(self, tasks: Sequence[Task]) -> Iterator[TaskResult]:
         """Do them, as many at once as there are workers. Raises ExecutorLost where no worker starts."""
         waiting = deque(tasks)
         attempts: dict[str, int] = {}
@@ -51,7 +51,7 @@ class Processes:
                             self._compare(line)
                         else:
                             worker.task = None
-                            yield Done.from_text(line)
+                            yield TaskResult.from_text(line)
                         if waiting:
                             worker.begin(waiting.popleft())
                     if alive:
@@ -65,7 +65,7 @@ class Processes:
                             # Last, so that it cannot take others along before they are done.
                             waiting.append(task)
                         else:
-                            yield Done.failed(task, f"it ended its worker {ATTEMPTS} times ({how})")
+                            yield TaskResult.failed(task, f"it ended its worker {ATTEMPTS} times ({how})")
                     elif not worker.ready:
                         starts_lost += 1
                         if starts_lost > self.workers:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from graspsense.experiments.task import Done, Task, run_task
+from graspsense.experiments.task import Task, TaskResult, run_task
 
 
 class Serial:
@@ -12,10 +12,10 @@ class Serial:
 
     workers = 1
 
-    def run(self, tasks: Sequence[Task]) -> Iterator[Done]:
+    def run(self, tasks: Sequence[Task]) -> Iterator[TaskResult]:
         """Do them in their order."""
         for task in tasks:
-            yield Done.from_text(run_task(task.to_text()))
+            yield TaskResult.from_text(run_task(task.to_text()))
 
     def close(self) -> None:
         """Do nothing: there are no workers."""

@@ -1,4 +1,4 @@
-"""What came of the paper: every published figure beside ours, every claim with its number, figures redrawn."""
+"""The findings on the paper: published figures beside ours, tested claims, and figures drawn again."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
-from typing import Any
 
-from graspsense.core.tree import TreeNode
 from graspsense.experiments.findings import Findings, FoundTable, code
 from graspsense.experiments.paper import claims as claimed
 from graspsense.experiments.paper.claims import Claim, claims, curve
 from graspsense.experiments.paper.published import Published, published
-from graspsense.experiments.paper.rows import HEADER, Row, arm_of, people_beside_robot, rows
+from graspsense.experiments.paper.rows import (
+    HEADER,
+    RateComparison,
+    condition_result,
+    people_beside_robot,
+    rows,
+)
 from graspsense.experiments.summary import Summary
 from graspsense.report.html import Section, bullets, figure, pair, panels, paragraph
 from graspsense.report.matrix import confusion_table
@@ -25,19 +29,19 @@ from graspsense.report.tree import tree_list
 
 
 def findings(summary: Summary) -> Findings:
-    """Return what came out, of as much of the paper as the experiment holds."""
+    """Return the findings on the parts of the paper that the experiment contains."""
     paper = published()
     held = rows(summary, paper)
     checked = claims(summary)
     tables = []
     if held:
         tables.append(_rates_table(held))
-    people = arm_of(summary, "table_5", "state") or arm_of(summary, "table_6", "state")
+    people = condition_result(summary, "table_5", "state") or condition_result(summary, "table_6", "state")
     if people is not None:
         tables.append(
             FoundTable(
                 id="people",
-                title="People, the paper's robot and ours: the state of an Odwalla bottle",
+                title="State of an Odwalla bottle: people, the robot of the paper, and ours",
                 header=("state", "people (Table VI)", "their robot, 23 N (Table V)", "ours, 23 N"),
                 rows=tuple(people_beside_robot(paper, people)),
                 note=paper.matrix("table_6").note,
@@ -47,7 +51,7 @@ def findings(summary: Summary) -> Findings:
         tables.append(
             FoundTable(
                 id="claims",
-                title="What the paper says, and whether it holds here",
+                title="Claims of the paper",
                 header=claimed.HEADER,
                 rows=tuple(one.cells for one in checked),
             )
@@ -60,8 +64,8 @@ def findings(summary: Summary) -> Findings:
         tables.append(
             FoundTable(
                 id="failures",
-                title="What does not come out, and what makes it fail",
-                header=("what", "what makes it fail"),
+                title="Figures and claims that differ, with the cause",
+                header=("figure or claim", "cause"),
                 rows=tuple(failing),
             )
         )
@@ -81,101 +85,101 @@ def findings(summary: Summary) -> Findings:
     )
 
 
-def _answer(held: Sequence[Row], checked: Sequence[Claim]) -> str:
+def _answer(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
     parts = []
-    for sort in ("predicted", "fitted"):
-        of = [row for row in held if row.published.sort == sort]
+    for basis in ("predicted", "fitted"):
+        of = [row for row in held if row.published.basis == basis]
         if of:
             good = sum(row.within for row in of)
-            parts.append(f"{good} of {len(of)} {sort} rates have the published one within one further run")
-    for sort in ("predicted", "fitted"):
-        of_claims = [one for one in checked if one.sort == sort]
+            parts.append(
+                f"{good} of {len(of)} {basis} rates have the printed rate within the interval of one more run"
+            )
+    for basis in ("predicted", "fitted"):
+        of_claims = [one for one in checked if one.basis == basis]
         if of_claims:
             good = sum(one.holds for one in of_claims)
-            parts.append(f"{good} of {len(of_claims)} {sort} claims hold")
-    return "In simulation " + "; ".join(parts) + "." if parts else "How the grasps went stands in the table."
+            parts.append(f"{good} of {len(of_claims)} {basis} claims hold")
+    return "In simulation, " + "; ".join(parts) + "." if parts else "The table shows how the grasps went."
 
 
 def _grasps_table(summary: Summary) -> FoundTable | None:
-    """Return how the grasps of each case went, by what was grasped; None where no case is of kind `grasp`."""
+    """Return how the grasps of each case went, by object; None if no case is of kind `grasp`."""
     found: list[tuple[str, ...]] = []
     for case in summary.planned.cases:
         rows = [
-            row
-            for (name, _), result in summary.results.items()
-            if name == case.name
-            for row in result.get("rows", ())
+            row for name, _, result in summary.grasp_results() if name == case.name for row in result.rows
         ]
-        for label in dict.fromkeys(row["label"] for row in rows):
-            of = [row for row in rows if row["label"] == label]
-            outcomes = Counter(row["outcome"] for row in of)
+        for label in dict.fromkeys(row.label for row in rows):
+            of = [row for row in rows if row.label == label]
+            outcomes = Counter(row.outcome for row in of)
             found.append(
                 (
                     case.name,
                     label,
                     str(len(of)),
                     ", ".join(f"{outcome} {n}" for outcome, n in outcomes.most_common()),
-                    _median(of, "true_peak_force_n", 1.0, 1),
-                    f"{max(row['true_peak_force_n'] for row in of):.1f}",
-                    _median(of, "speed_m_s", 1e3, 0),
-                    _median(of, "delta_t", 1.0, 2),
-                    str(sum(bool(row["broken"]) for row in of)),
+                    _median([row.true_peak_force_n for row in of], 1.0, 1),
+                    f"{max(row.true_peak_force_n for row in of):.1f}",
+                    _median([row.speed_m_s for row in of], 1e3, 0),
+                    _median([row.features.get("delta_t") for row in of], 1.0, 2),
+                    str(sum(row.broken for row in of)),
                 )
             )
     if not found:
         return None
     return FoundTable(
         id="grasps",
-        title="How the grasps went",
+        title="Grasps by case and object",
         header=(
             "case",
-            "grasped",
+            "object",
             "grasps",
-            "ended",
+            "outcomes",
             "median true peak, N",
-            "greatest, N",
-            "median speed at the contact, mm/s",
+            "largest true peak, N",
+            "median speed at contact, mm/s",
             "median time to rest, s",
             "broken",
         ),
         rows=tuple(found),
-        note="The true peak is the model's own, whatever the pads saw of it.",
+        note="The true peak is the force in the model, which the pads may miss.",
         numbers=4,
     )
 
 
-def _median(rows: Sequence[Mapping[str, Any]], key: str, factor: float, digits: int) -> str:
-    known = [factor * row[key] for row in rows if row[key] is not None]
+def _median(values: Sequence[float | None], factor: float, digits: int) -> str:
+    known = [factor * value for value in values if value is not None]
     return f"{statistics.median(known):.{digits}f}" if known else "none"
 
 
-def _rates_table(held: Sequence[Row]) -> FoundTable:
+def _rates_table(held: Sequence[RateComparison]) -> FoundTable:
     return FoundTable(
         id="published",
         title="Published rates beside ours",
         header=HEADER,
         rows=tuple(row.cells for row in held),
-        note="Ours are means over the seeds; each seed has bottles, grasps and folds of its own. `published within "
-        "that` holds the printed rate, by its counts, against where one further run of ours would lie at 95 %. Where "
-        "one more run scatters widely that is easily met: the last column asks the reverse.",
+        note="Our rates are means over the seeds. Each seed has its own bottles, grasps and folds. `printed within "
+        "that` "
+        "states whether the printed rate, from its counts, is within the 95 % interval of one more run of ours. A wide "
+        "interval is easily met, so the last column compares the other way round.",
         numbers=3,
     )
 
 
 @cache
 def _reasons() -> Mapping[str, str]:
-    """Return what makes a row or claim fail, by its id, as it was found out and written down."""
+    """Return the known causes of differences, by the id of the figure or claim."""
     text = files("graspsense.experiments.paper").joinpath("reasons.toml").read_text(encoding="utf-8")
     return {str(key): str(value) for key, value in tomllib.loads(text).items()}
 
 
-UNKNOWN = "not looked into yet"
+UNKNOWN = "not yet investigated"
 
 
-def _failing(held: Sequence[Row], checked: Sequence[Claim]) -> list[tuple[str, str]]:
+def _failing(held: Sequence[RateComparison], checked: Sequence[Claim]) -> list[tuple[str, str]]:
     found = [
         (
-            f"{row.published.where}, {row.published.what} ({row.published.sort}): printed "
+            f"{row.published.where}, {row.published.what} ({row.published.basis}): printed "
             f"{100 * row.published.printed:.1f} %, here {100 * row.ours.mean:.1f} %",
             _reasons().get(row.published.id, UNKNOWN),
         )
@@ -183,16 +187,16 @@ def _failing(held: Sequence[Row], checked: Sequence[Claim]) -> list[tuple[str, s
         if not row.within or row.indistinguishable is False
     ]
     return found + [
-        (f"{one.says} ({one.sort}): {one.number}", _reasons().get(one.id, UNKNOWN))
+        (f"{one.says} ({one.basis}): {one.number}", _reasons().get(one.id, UNKNOWN))
         for one in checked
         if not one.holds
     ]
 
 
-def _notes(paper: Published, held: Sequence[Row]) -> tuple[str, ...]:
+def _notes(paper: Published, held: Sequence[RateComparison]) -> tuple[str, ...]:
     fitted = paper.fitted
     return (
-        f"{fitted.count} numbers were fitted to Tables II and III at 20 N and to the authors' tree: "
+        f"FittedParameters to Tables II and III at 20 N and to the authors' tree were {fitted.count} numbers: "
         f"{'; '.join(fitted.parameters)}. {fitted.rests}",
         *(f"{row.published.where}: {row.published.note}" for row in held if row.published.note),
         *(f"{one.where}: {one.note}" for one in paper.matrices if one.note),
@@ -204,14 +208,15 @@ def _sections(summary: Summary, paper: Published) -> list[Section]:
     found = []
     matrices = _matrices(summary, paper)
     if matrices:
-        found.append(Section(id="matrices", title="What is taken for what, theirs and ours", body=matrices))
+        found.append(Section(id="matrices", title="Confusion matrices, theirs and ours", body=matrices))
     drawn = [*_calibration(summary), *_courses(summary)]
     if drawn:
         body = paragraph(
-            "Force control drives in with a constant effort; hybrid control closes at 10 mm/s until both pads touch "
-            "and squeezes then. The forces drawn are those that the pads felt, every 41 ms; the true peak lies between."
+            "Force control closes with a constant effort. Hybrid control closes at 10 mm/s until both pads touch, "
+            "and then "
+            "squeezes. The drawn forces are the pads' readings, every 41 ms; the true peak may lie between two of them."
         ) + panels(drawn)
-        found.append(Section(id="figures", title="The figures again", body=body))
+        found.append(Section(id="figures", title="The figures of the paper with our data", body=body))
     found += _tree(summary, paper)
     return found
 
@@ -219,8 +224,8 @@ def _sections(summary: Summary, paper: Published) -> list[Section]:
 def _matrices(summary: Summary, paper: Published) -> str:
     body = []
     for id_, target in (("table_2", "class"), ("table_5", "state")):
-        arm = arm_of(summary, id_, target)
-        if arm is None:
+        condition = condition_result(summary, id_, target)
+        if condition is None:
             continue
         theirs = paper.matrix(id_)
         body.append(
@@ -229,7 +234,8 @@ def _matrices(summary: Summary, paper: Published) -> str:
                     theirs.confusion, f"{theirs.where}, as printed: {theirs.confusion.n} trials."
                 ),
                 confusion_table(
-                    arm.confusion, f"Ours, {arm.confusion.n} answers of {len(arm.judged)} seeds."
+                    condition.confusion,
+                    f"Ours, {condition.confusion.n} predictions of {len(condition.by_seed)} seeds.",
                 ),
             )
             + paragraph(theirs.note)
@@ -262,43 +268,41 @@ def _calibration(summary: Summary) -> list[str]:
 
 
 def _courses(summary: Summary) -> list[str]:
-    found = []
-    of = {one.name: one for one in summary.planned.cases}
-    for (name, seed), result in summary.results.items():
-        case = of[name]
+    """Return the grasps of Figs. 5 and 6, of the first seed."""
+    figures = []
+    case_of = {case.name: case for case in summary.planned.cases}
+    for name, seed, result in summary.grasp_results():
+        case = case_of[name]
         if (case.part or summary.planned.name) not in ("fig_5", "fig_6") or seed != summary.planned.seeds[0]:
             continue
-        for course in result.get("grasps", ()):
-            row = result["rows"][course["trial"]]
-            how = str(case.at.get("variant", ""))
-            fig = "Fig. 5" if how == "force" else "Fig. 6"
-            found.append(
-                one_grasp(
-                    course,
-                    f"{fig}: {how} control on the {course['label']}, 23 N. Contact {row['contact_s'] or 0:.2f} s "
-                    f"after the start, at {1e3 * (row['speed_m_s'] or 0):.0f} mm/s; "
-                    f"true peak {row['true_peak_force_n']:.0f} N.",
-                )
+        for grasp in result.grasps:
+            row = result.rows[grasp.trial]
+            control = str(case.at.get("variant", ""))
+            number = "Fig. 5" if control == "force" else "Fig. 6"
+            caption = (
+                f"{number}: {control} control on the {grasp.label}, 23 N. Contact {row.contact_s or 0:.2f} s after the "
+                f"start, at {1e3 * (row.speed_m_s or 0):.0f} mm/s; true peak {row.true_peak_force_n:.0f} N."
             )
-    return found
+            figures.append(one_grasp(grasp, caption))
+    return figures
 
 
 def _tree(summary: Summary, paper: Published) -> list[Section]:
+    """Return the authors' tree beside the first tree of ours."""
+    seed = summary.planned.seeds[0]
     for name in ("table_5", "table_6", "table_4"):
         for case in summary.planned.cases:
-            result: Mapping[str, Any] | None = summary.results.get((case.name, summary.planned.seeds[0]))
+            result = summary.recognition(case.name, seed)
             if (case.part or summary.planned.name) != name or result is None:
                 continue
-            for judged in result.get("judged", ()):
-                if judged.get("tree"):
-                    nodes = [TreeNode.from_json(node) for node in judged["tree"]]
-                    theirs = "\n".join(paper.authors_tree.lines)
-                    body = (
-                        pair(f"<h3>The authors' tree</h3>{code(theirs)}", f"<h3>Ours</h3>{tree_list(nodes)}")
-                        + bullets([paper.authors_tree.note])
-                        + paragraph(
-                            f"Ours is grown on all grasps of seed {summary.planned.seeds[0]} at 23 N."
-                        )
-                    )
-                    return [Section(id="trees", title="The learned tree beside the authors' own", body=body)]
+            tree = next((one.tree for one in result.classifiers if one.tree), None)
+            if tree is None:
+                continue
+            theirs = code("\n".join(paper.authors_tree.lines))
+            body = (
+                pair(f"<h3>The authors' tree</h3>{theirs}", f"<h3>Ours</h3>{tree_list(tree)}")
+                + bullets([paper.authors_tree.note])
+                + paragraph(f"Ours is grown on all grasps of seed {seed} at 23 N.")
+            )
+            return [Section(id="trees", title="Our tree beside the authors' tree", body=body)]
     return []

@@ -1,4 +1,4 @@
-"""What the paper prints, from the file beside this one."""
+"""The figures that the paper prints, from `published.toml`."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from graspsense.core.strict import structured
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import wilson
 
-Sort = Literal["fitted", "predicted"]
+Basis = Literal["fitted", "predicted"]
 
 
 @frozen(kw_only=True)
 class PublishedRate:
-    """A rate that the paper prints, and where ours comes from."""
+    """A rate that the paper prints, and the condition of ours that it is compared with."""
 
     id: str
     where: str
     what: str
     printed: float
-    sort: Sort
+    basis: Basis
     experiment: str
     target: str
     at: Mapping[str, Any] = field(factory=dict)
-    """What the case of the experiment differs in."""
+    """The swept values that select the case of the experiment."""
     class_: str = ""
     correct: int | None = None
     n: int | None = None
@@ -37,18 +37,18 @@ class PublishedRate:
 
     @property
     def rate(self) -> float:
-        """The rate: that of the counts where there are any, else the printed one."""
+        """The rate from the counts if they are known, otherwise the printed rate."""
         return self.printed if self.correct is None or self.n is None else self.correct / self.n
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """Its 95 % Wilson interval, where the counts are known."""
+        """The 95 % Wilson interval if the counts are known."""
         return None if self.correct is None or self.n is None else wilson(self.correct, self.n)
 
 
 @frozen(kw_only=True)
 class PublishedMatrix:
-    """A confusion matrix that the paper prints, as it is printed."""
+    """A confusion matrix as the paper prints it."""
 
     id: str
     where: str
@@ -59,7 +59,7 @@ class PublishedMatrix:
 
     @property
     def confusion(self) -> Confusion:
-        """The matrix with the truth in rows."""
+        """The matrix with true labels in rows."""
         printed = self.answered_by_true
         counts = printed if self.true_class_is == "row" else tuple(zip(*printed, strict=True))
         return Confusion(self.labels, tuple(tuple(row) for row in counts))
@@ -67,7 +67,7 @@ class PublishedMatrix:
 
 @frozen(kw_only=True)
 class Lines:
-    """Sentences, and what they are of."""
+    """Lines of text with a note."""
 
     lines: tuple[str, ...]
     note: str = ""
@@ -75,13 +75,13 @@ class Lines:
 
 @frozen(kw_only=True)
 class Published:
-    """Everything that is held against what comes out here."""
+    """All figures of the paper that are compared with ours."""
 
     rates: tuple[PublishedRate, ...]
     matrices: tuple[PublishedMatrix, ...]
     authors_tree: Lines
     inconsistencies: Lines
-    fitted: Fitted
+    fitted: FittedParameters
 
     def matrix(self, id_: str) -> PublishedMatrix:
         """Return a matrix by its id."""
@@ -89,8 +89,8 @@ class Published:
 
 
 @frozen(kw_only=True)
-class Fitted:
-    """What of the model was fitted to the paper, and how many numbers these are."""
+class FittedParameters:
+    """The parameters of the model that were fitted to the paper, and their number."""
 
     parameters: tuple[str, ...]
     count: int
@@ -99,7 +99,7 @@ class Fitted:
 
 @cache
 def published() -> Published:
-    """Return what the paper prints."""
+    """Return the figures of the paper."""
     values: dict[str, Any] = tomllib.loads(
         files("graspsense.experiments.paper").joinpath("published.toml").read_text(encoding="utf-8")
     )

@@ -1,4 +1,4 @@
-"""Every published rate beside ours."""
+"""Published rates compared with ours."""
 
 from __future__ import annotations
 
@@ -7,69 +7,68 @@ from typing import Any
 
 from attrs import frozen
 
-from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import wilson
 from graspsense.evaluation.over_seeds import OverSeeds
-from graspsense.experiments.experiment import Case
+from graspsense.experiments.experiment import ExperimentCase
 from graspsense.experiments.findings import percent, span
 from graspsense.experiments.paper.published import Published, PublishedRate
-from graspsense.experiments.summary import Arm, Summary
+from graspsense.experiments.summary import ConditionResult, Summary
 
 
 @frozen(kw_only=True)
-class Row:
-    """A published rate, ours over the seeds, and how they lie to each other."""
+class RateComparison:
+    """A published rate and ours over the seeds."""
 
     published: PublishedRate
     ours: OverSeeds
 
     @property
     def within(self) -> bool:
-        """Whether the published rate lies where one further run of ours would."""
-        low, high = self.ours.further
+        """Whether the published rate is within the prediction interval of one more run of ours."""
+        low, high = self.ours.prediction
         return low <= self.published.rate <= high
 
     @property
     def indistinguishable(self) -> bool | None:
-        """Whether ours lies in the interval of the published rate; None where that has none."""
+        """Whether our mean is within the interval of the published rate; None if that has none."""
         interval = self.published.interval
         return None if interval is None else interval[0] <= self.ours.mean <= interval[1]
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Return it as a row of a table."""
+        """The row of a table."""
         one = self.published
         its = one.interval
         near = self.indistinguishable
         return (
             one.where,
             one.what,
-            one.sort,
+            one.basis,
             percent(one.printed),
             f"{one.correct}/{one.n} = {percent(one.rate)}, {span(its)}" if its else "counts not given",
             percent(self.ours.mean),
             span(self.ours.interval),
-            span(self.ours.further),
+            span(self.ours.prediction),
             "yes" if self.within else "no",
             "not known" if near is None else ("yes" if near else "no"),
         )
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as JSON values."""
+        """Return the fields as JSON values."""
         one = self.published
         return {
             "id": one.id,
             "where": one.where,
             "what": one.what,
-            "sort": one.sort,
+            "basis": one.basis,
             "printed": one.printed,
             "published": one.rate,
             "published_interval": None if one.interval is None else list(one.interval),
             "ours": self.ours.mean,
             "interval": list(self.ours.interval),
-            "further": list(self.ours.further),
+            "prediction_interval": list(self.ours.prediction),
             "seeds": len(self.ours.rates),
-            "published_within_further": self.within,
+            "published_within_prediction": self.within,
             "ours_within_published_interval": self.indistinguishable,
             "note": one.note,
         }
@@ -78,60 +77,66 @@ class Row:
 HEADER = (
     "where",
     "what",
-    "ours is",
+    "basis",
     "printed",
-    "its counts and 95 %",
-    "ours, mean",
+    "printed counts, 95 %",
+    "our mean",
     "95 % of the mean",
     "95 % of one more run",
-    "published within that",
-    "ours within the published 95 %",
+    "printed within that",
+    "our mean within the printed 95 %",
 )
 
 
-def rows(summary: Summary, paper: Published) -> list[Row]:
-    """Return a row for each published rate of which there are results."""
+def rows(summary: Summary, paper: Published) -> list[RateComparison]:
+    """Return a comparison for each published rate that there are results for."""
     found = []
     for one in paper.rates:
-        arm = arm_of(summary, one.experiment, one.target, one.at)
-        if arm is None:
+        condition = condition_result(summary, one.experiment, one.target, one.at)
+        if condition is None:
             continue
-        rates = of_class(arm, one.class_) if one.class_ else arm.rate
+        rates = of_class(condition, one.class_) if one.class_ else condition.rate
         if rates is not None:
-            found.append(Row(published=one, ours=rates))
+            found.append(RateComparison(published=one, ours=rates))
     return found
 
 
-def arm_of(
+def condition_result(
     summary: Summary,
     experiment: str,
     target: str,
     at: Mapping[str, Any] | None = None,
-    learner: str = "c45",
-) -> Arm | None:
-    """Return the arm of a case of an experiment, which may stand alone or be part of another one.
+    classifier: str = "c45",
+) -> ConditionResult | None:
+    """Return the condition of a case of an experiment, which may be part of another experiment; None if there is none.
 
-    `at` holds what the case differs in, as `Case.at`.
+    `at` holds the swept values of the case, as `ExperimentCase.at`.
     """
-    for arm in summary.arms:
-        if is_of(arm.case, summary, experiment, at) and arm.learner == learner and arm.target == target:
-            return arm
+    for condition in summary.conditions:
+        if (
+            is_of(condition.case, summary, experiment, at)
+            and condition.classifier == classifier
+            and condition.target == target
+        ):
+            return condition
     return None
 
 
-def is_of(case: Case, summary: Summary, experiment: str, at: Mapping[str, Any] | None = None) -> bool:
-    """Return whether a case is of this experiment, and differs from its others in this."""
+def is_of(
+    case: ExperimentCase, summary: Summary, experiment: str, at: Mapping[str, Any] | None = None
+) -> bool:
+    """Return whether a case belongs to this experiment and has these swept values."""
     wanted = at or {}
     return (case.part or summary.planned.name) == experiment and all(
         case.at.get(key) == value for key, value in wanted.items()
     )
 
 
-def of_class(arm: Arm, name: str) -> OverSeeds | None:
+def of_class(condition: ConditionResult, name: str) -> OverSeeds | None:
     """Return the rates among the trials of one class, from the confusion matrices of the seeds."""
     rates, n = [], 0
-    for judged in arm.judged.values():
-        matrix = Confusion(tuple(judged["labels"]), tuple(map(tuple, judged["confusion"])))
+    for result in condition.by_seed.values():
+        matrix = result.confusion
         chosen = [i for i, label in enumerate(matrix.labels) if label.partition(":")[0] == name]
         total = sum(sum(matrix.counts[i]) for i in chosen)
         if total:
@@ -140,8 +145,8 @@ def of_class(arm: Arm, name: str) -> OverSeeds | None:
     return OverSeeds(tuple(rates), n) if rates else None
 
 
-def people_beside_robot(paper: Published, robot: Arm) -> list[tuple[str, ...]]:
-    """Return a row a state: people (Table VI), the paper's robot (Table V), and ours at 23 N."""
+def people_beside_robot(paper: Published, robot: ConditionResult) -> list[tuple[str, ...]]:
+    """Return one row per state: people (Table VI), the robot of the paper (Table V), and ours at 23 N."""
     people, theirs = paper.matrix("table_6").confusion, paper.matrix("table_5").confusion
     found: list[tuple[str, ...]] = []
     for i, state in enumerate(people.labels):
@@ -170,11 +175,11 @@ def people_beside_robot(paper: Published, robot: Arm) -> list[tuple[str, ...]]:
     return found
 
 
-def _of_state(arm: Arm, state: str) -> OverSeeds:
+def _of_state(condition: ConditionResult, state: str) -> OverSeeds:
     rates, n = [], 1
-    for judged in arm.judged.values():
-        i = next(k for k, label in enumerate(judged["labels"]) if label.endswith(state))
-        row = judged["confusion"][i]
+    for result in condition.by_seed.values():
+        i = next(k for k, label in enumerate(result.confusion.labels) if label.endswith(state))
+        row = result.confusion.counts[i]
         n = sum(row)
         rates.append(row[i] / n)
     return OverSeeds(tuple(rates), n)

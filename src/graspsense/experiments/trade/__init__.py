@@ -1,1 +1,1 @@
-"""Recognition against what it costs: seconds, force, speed, squeezes, sensing, the physics' accuracy."""
+"""Recognition rates against their cost: time, force, speed, squeezes, sensing, accuracy of the model."""

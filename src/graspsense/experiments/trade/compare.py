@@ -1,59 +1,62 @@
-"""The task `compare`: classifiers on the same folds, trial by trial; and each feature's worth, by leaving it out."""
+"""The task `compare`: classifiers on the same folds, trial by trial, and the effect of leaving out each feature."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
 
 from graspsense.core.strict import structured
-from graspsense.experiments.trade.costs import CostOnly
-from graspsense.experiments.trade.judging import (
+from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
+from graspsense.experiments.trade.costs import CostSettings
+from graspsense.experiments.trade.trade_task import (
     STRATIFIED,
-    aimed,
-    answers,
-    dealt,
-    entry,
-    learners_of,
+    classifiers_of,
+    predictions,
     settings_of,
+    simulated_result,
+    stratified_folds,
+    target_labels,
+    trial_groups,
 )
 from graspsense.sources.simulated import simulated
-from graspsense.sources.trial_source import Source, groups_of
+
+WITHOUT: Final = "without "
+"""Prefix of the name of a classifier that has all features except one."""
 
 
 @frozen(kw_only=True)
-class Comparing(CostOnly):
+class ComparisonSettings(CostSettings):
     """The keys of `[judge]`."""
 
     without: bool = True
-    """Whether the first classifier is judged without each of the features, too."""
+    """Whether to evaluate the first classifier also without each of the features."""
 
 
-WITHOUT = "without "
-
-
-def compare(params: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Return the rate of each classifier, with which trials it got right (`right`) and the fold of each (`fold`)."""
-    judge = structured(params["judge"], Comparing, "[judge]")
-    data = simulated(
-        settings_of(params), groups=groups_of(structured(params["data"], Source, "[data]")), seed=seed
-    )
-    learners = learners_of(params)
-    tables = {name: (learner, data.table) for name, learner in learners.items()}
-    if judge.without:
-        first = next(iter(learners.values()))
+def compare(params: Mapping[str, Any], seed: int) -> RecognitionResult:
+    """Return the rate of each classifier, with the correct trials and the fold of each trial."""
+    settings = structured(params["judge"], ComparisonSettings, "[judge]")
+    data = simulated(settings_of(params), groups=trial_groups(params), seed=seed)
+    classifiers = classifiers_of(params)
+    tables = {name: (learner, data.table) for name, learner in classifiers.items()}
+    if settings.without:
+        first = next(iter(classifiers.values()))
         for feature in data.table.names:
-            others = [one for one in data.table.names if one != feature]
+            others = [name for name in data.table.names if name != feature]
             tables[f"{WITHOUT}{feature}"] = (first, data.table.columns(others))
-    judged = []
-    for target in judge.targets:
-        folds = dealt(data.labels, target, seed)
-        told = aimed(data.labels, target)
-        fold = np.concatenate(folds).tolist() if len(folds) == 1 else None
+    results = []
+    for target in settings.targets:
+        folds = stratified_folds(data.labels, target, seed)
+        true = target_labels(data.labels, target)
+        fold = tuple(np.concatenate(folds).tolist()) if len(folds) == 1 else None
         for name, (learner, table) in tables.items():
-            given = answers(learner, table, data.labels, target, folds, seed)
-            right = [int(one == other) for one, other in zip(told, given, strict=True)]
-            judged.append(entry(name, target, told, given, STRATIFIED, 0.0, right=right, fold=fold))
-    return {"source": data.source, "simulated": True, "notes": list(data.notes), "judged": judged}
+            predicted = predictions(learner, table, data.labels, target, folds, seed)
+            correct = tuple(a == b for a, b in zip(true, predicted, strict=True))
+            results.append(
+                ClassifierResult.of(
+                    name, target, STRATIFIED, true, predicted, cost=0.0, correct=correct, fold=fold
+                )
+            )
+    return simulated_result(data, results)

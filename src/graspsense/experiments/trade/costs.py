@@ -1,52 +1,58 @@
-"""The task `trade`: as `recognise`, with what each case costs."""
+"""The task `trade`: like `recognise`, with the cost of each case."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Literal
 
-from attrs import asdict, field, frozen
+from attrs import asdict, evolve, field, frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.core.strict import structured
-from graspsense.experiments.recognise import Judging, recognise
+from graspsense.experiments.recognise import EvaluationSettings, recognise
+from graspsense.experiments.task_results import RecognitionResult, TrialValues
 
 
 @frozen(kw_only=True, slots=False)
 class Cost:
-    """What a rate is set against."""
+    """The cost that rates are plotted against."""
 
     cost: str = "seconds"
-    """A key of the settings, as `controller.probing_force_n`, or `seconds`: of a grasp, from the open gripper on."""
+    """A key of the settings, such as `controller.probing_force_n`, or `seconds`: the duration of a grasp."""
     cheap: Literal["low", "high"] = "low"
-    """Whether a low or a high value is the cheap one."""
+    """Whether low or high values are cheap."""
     axis: str = "seconds of a grasp"
-    """How it is called."""
+    """The title of the axis."""
 
 
 @frozen(kw_only=True)
-class TradeJudging(Judging, Cost):
+class TradeSettings(EvaluationSettings, Cost):
     """The keys of `[judge]`: those of `recognise`, and the cost."""
 
 
 @frozen(kw_only=True)
-class CostOnly(Cost):
-    """The keys of `[judge]` of tasks that judge by themselves."""
+class CostSettings(Cost):
+    """The keys of `[judge]` of tasks with an evaluation of their own."""
 
     targets: tuple[Literal["both", "class", "state"], ...] = field(default=("state",))
 
 
-def trade(params: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Return what `recognise` does, with the cost of each rate. Raises ConfigError for a cost that is no key."""
-    judge = structured(params["judge"], TradeJudging, "[judge]")
-    own = asdict(judge)
+def trade(params: Mapping[str, Any], seed: int) -> RecognitionResult:
+    """Return the result of `recognise`, with the cost of each rate.
+
+    Raises ConfigError if the cost is not a number among the settings.
+    """
+    settings = structured(params["judge"], TradeSettings, "[judge]")
+    own = asdict(settings)
     for key in asdict(Cost()):
         del own[key]
     result = recognise({**params, "judge": own}, seed)
-    cost = seconds(params["settings"], result) if judge.cost == "seconds" else _setting(params, judge.cost)
-    for one in result["judged"]:
-        one["cost"] = cost
-    return result
+    if settings.cost == "seconds":
+        assert result.trials is not None
+        cost = mean_seconds(params["settings"], result.trials)
+    else:
+        cost = _setting(params, settings.cost)
+    return evolve(result, classifiers=tuple(evolve(one, cost=cost) for one in result.classifiers))
 
 
 def _setting(params: Mapping[str, Any], key: str) -> float:
@@ -55,19 +61,19 @@ def _setting(params: Mapping[str, Any], key: str) -> float:
         return float(params["settings"][table][name])
     except (KeyError, TypeError, ValueError):
         raise ConfigError(
-            f"judge.cost = {key!r} is no number among the settings of this experiment"
+            f"judge.cost = {key!r} is not a number among the settings of this experiment"
         ) from None
 
 
-def seconds(settings: Mapping[str, Any], result: Mapping[str, Any]) -> float:
-    """Return how long a grasp takes on average: the way to the contact at the closing speed, and to rest."""
-    names = [str(one[0]) for one in result["features"]]
-    first, rest = names.index("p_first"), names.index("delta_t")
+def mean_seconds(settings: Mapping[str, Any], trials: TrialValues) -> float:
+    """Return the mean duration of a grasp: closing to the contact at the closing speed, then until rest.
+
+    Raises ConfigError if no grasp came to rest.
+    """
     open_m = float(settings["gripper"]["open_gap_m"])
     speed_m_s = float(settings["controller"]["closing_speed_m_s"])
-    rows: Sequence[Sequence[float | None]] = result["values"]
-    pairs = [(row[first], row[rest]) for row in rows]
-    whole = [(open_m - p) / speed_m_s + t for p, t in pairs if p is not None and t is not None]
-    if not whole:
-        raise ConfigError("no grasp became steady, so that none has a time")
-    return sum(whole) / len(whole)
+    pairs = zip(trials.column("p_first"), trials.column("delta_t"), strict=True)
+    durations = [(open_m - p) / speed_m_s + t for p, t in pairs if p is not None and t is not None]
+    if not durations:
+        raise ConfigError("no grasp came to rest, so there is no duration")
+    return sum(durations) / len(durations)

@@ -1,4 +1,4 @@
-"""The task `early`: how much of a grasp it takes. Features of the trace until some time after the contact."""
+"""The task `early`: recognition from the first part of a grasp, up to some time after contact."""
 
 from __future__ import annotations
 
@@ -11,42 +11,44 @@ from attrs import field, frozen
 from graspsense.core.features import Features, table_of
 from graspsense.core.signals import Phase
 from graspsense.core.strict import structured
-from graspsense.experiments.trade.costs import CostOnly
-from graspsense.experiments.trade.judging import (
+from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
+from graspsense.experiments.trade.costs import CostSettings
+from graspsense.experiments.trade.trade_task import (
     STRATIFIED,
-    aimed,
-    answers,
-    dealt,
-    entry,
-    learners_of,
+    classifiers_of,
+    predictions,
     settings_of,
+    simulated_result,
+    stratified_folds,
+    target_labels,
+    trial_groups,
 )
 from graspsense.sources.simulated import simulated
-from graspsense.sources.trial_source import Source, groups_of
 
 if TYPE_CHECKING:
     from graspsense.core.trace import Trace
 
 
 @frozen(kw_only=True)
-class Early(CostOnly):
+class EarlySettings(CostSettings):
     """The keys of `[judge]`."""
 
     moments_s: tuple[float, ...] = field(default=(0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.2))
-    """Seconds after the contact of both pads at which an answer is asked for."""
+    """Seconds after the contact of both pads at which a prediction is made."""
 
 
-def early(params: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Return the rate at each moment, learned and judged on what is known until then.
+def early(params: Mapping[str, Any], seed: int) -> RecognitionResult:
+    """Return the rate at each moment, trained and tested on the trace up to it.
 
-    Before rest all features but p_first are missing, which C4.5 has a rule for; it is the fingers' rest that brings
-    them. The cost is the mean time from the contact to the answer, or to rest where that comes first.
+    Before rest, all features except `p_first` are missing. The cost is the mean time from contact to the moment, or to
+    rest if that comes first.
     """
-    judge = structured(params["judge"], Early, "[judge]")
+    early_settings = structured(params["judge"], EarlySettings, "[judge]")
+    moments = early_settings.moments_s
     settings = settings_of(params)
     feature_set = settings.features.create()
-    rows: dict[float, list[Features]] = {moment: [] for moment in judge.moments_s}
-    used: dict[float, list[float]] = {moment: [] for moment in judge.moments_s}
+    rows: dict[float, list[Features]] = {moment: [] for moment in moments}
+    used_s: dict[float, list[float]] = {moment: [] for moment in moments}
 
     def cut(number: int, label: str, trace: Trace) -> None:
         del number, label
@@ -54,25 +56,23 @@ def early(params: Mapping[str, Any], seed: int) -> dict[str, Any]:
         ended = np.flatnonzero(trace.phase >= int(Phase.HOLD))
         contact = float(trace.t_s[squeezed[0]]) if len(squeezed) else float(trace.t_s[-1])
         end = float(trace.t_s[ended[0]]) if len(ended) else float(trace.t_s[-1])
-        for moment in judge.moments_s:
+        for moment in moments:
             rows[moment].append(feature_set.extract(trace.until(contact + moment)))
-            used[moment].append(min(moment, end - contact))
+            used_s[moment].append(min(moment, end - contact))
 
-    data = simulated(
-        settings,
-        groups=groups_of(structured(params["data"], Source, "[data]")),
-        seed=seed,
-        on_trace=cut,
-    )
-    judged = []
-    for name, learner in learners_of(params).items():
-        for target in judge.targets:
-            folds = dealt(data.labels, target, seed)
-            for moment, of in rows.items():
-                given = answers(learner, table_of(of), data.labels, target, folds, seed)
-                cost = float(np.mean(used[moment]))
-                called = f"{moment:g} s" + (f", {name}" if len(params["learners"]) > 1 else "")
-                judged.append(
-                    entry(called, target, aimed(data.labels, target), given, STRATIFIED, cost, x=moment)
+    data = simulated(settings, groups=trial_groups(params), seed=seed, on_trace=cut)
+    results = []
+    for name, learner in classifiers_of(params).items():
+        suffix = f", {name}" if len(params["learners"]) > 1 else ""
+        for target in early_settings.targets:
+            folds = stratified_folds(data.labels, target, seed)
+            true = target_labels(data.labels, target)
+            for moment, features in rows.items():
+                predicted = predictions(learner, table_of(features), data.labels, target, folds, seed)
+                cost = float(np.mean(used_s[moment]))
+                results.append(
+                    ClassifierResult.of(
+                        f"{moment:g} s{suffix}", target, STRATIFIED, true, predicted, cost=cost
+                    )
                 )
-    return {"source": data.source, "simulated": True, "notes": list(data.notes), "judged": judged}
+    return simulated_result(data, results)

@@ -1,4 +1,4 @@
-"""Which of several cases nothing beats: none is both cheaper and better."""
+"""The Pareto front of cost and rate."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Sequence
 
 
 def front(costs: Sequence[float], rates: Sequence[float], *, cheap_is_low: bool = True) -> list[bool]:
-    """Return for each case whether it lies on the Pareto front.
+    """Return whether each case is on the Pareto front.
 
-    A case is off it where another one is at least as cheap and at least as good, and better in one of the two.
+    A case is not on the front if another one is at least as cheap and at least as good, and better in one of the two.
     """
     if not cheap_is_low:
-        costs = [-one for one in costs]
-    found = []
+        costs = [-cost for cost in costs]
+    on_front = []
     for cost, rate in zip(costs, rates, strict=True):
         beaten = any(
             other <= cost and better >= rate and (other < cost or better > rate)
             for other, better in zip(costs, rates, strict=True)
         )
-        found.append(not beaten)
-    return found
+        on_front.append(not beaten)
+    return on_front

@@ -1,9 +1,9 @@
-"""The task `next_squeeze`: stop when sure enough, else squeeze with the force that promises most per second.
+"""The task `next_squeeze`: stop when sure enough, or else squeeze with the force that promises most per second.
 
-At the contact the width alone gives a first answer; each squeeze then gives one from all six features, at its own
-force. How much an answer is worth is known from a cross validation within the training trials: how often each label
-is given it. By that (Bayes' rule, the squeezes taken as independent of each other) the answers so far become a
-belief, and each squeeze that could follow promises so much information in so many seconds.
+At contact, the width alone gives a first prediction. Each squeeze then gives a prediction from all features, at its own
+force. A cross validation within the training trials measures how often each label gets each prediction at each force.
+With these frequencies, Bayes' rule turns the predictions so far into probabilities of the labels, taking squeezes as
+independent. The next squeeze is the one with the largest expected information per second.
 """
 
 from __future__ import annotations
@@ -20,42 +20,50 @@ from graspsense.core.config import settings_from
 from graspsense.core.strict import structured
 from graspsense.evaluation.evaluate import INSTANCE_HELD_OUT
 from graspsense.evaluation.folds import instance_held_out
-from graspsense.experiments.trade.costs import CostOnly
-from graspsense.experiments.trade.judging import aimed, entry, learners_of
+from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
+from graspsense.experiments.trade.costs import CostSettings
+from graspsense.experiments.trade.trade_task import (
+    classifiers_of,
+    simulated_result,
+    target_labels,
+    trial_groups,
+)
+from graspsense.recording.controls import width_feature
 from graspsense.sources.simulated import simulated
-from graspsense.sources.trial_source import Source, groups_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from graspsense.core.config import SelectedComponent
     from graspsense.core.features import FeatureTable
+    from graspsense.core.labelled import Labelled
 
     Floats = NDArray[np.float64]
 
 OPENED_M: Final = 0.010
 """Between squeezes the fingers open past the contact by this, as in the authors' code, and close again."""
 PRIOR: Final = 1.0
-"""Trials that every label counts for besides its own, spread over all answers: few were seen of each."""
+"""Pseudo-trials per label, spread evenly over all predictions, because few trials of each label are available."""
+INNER_FOLDS: Final = 3
 
 
 @frozen(kw_only=True)
-class NextSqueeze(CostOnly):
+class NextSqueezeSettings(CostSettings):
     """The keys of `[judge]`."""
 
     forces_n: tuple[float, ...] = (14.0, 17.0, 20.0, 23.0)
     fixed_n: float = 20.0
-    """The single squeeze that it is held against."""
+    """The force of the single squeeze that the sequential choice is compared with."""
     sure: tuple[float, ...] = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-    """Thresholds: how probable a label has to be to stop. Each is a case."""
+    """Thresholds of the probability at which to stop. Each is a case."""
     most: int = field(default=3, validator=ge(1))
-    """Squeezes at the most."""
+    """Largest number of squeezes."""
     folds: int = field(default=5, validator=ge(2))
 
 
 @frozen(kw_only=True, eq=False)
-class Squeezed:
-    """What one force gives: the answer to each trial, as the number of a label, and the seconds it took."""
+class SqueezeAnswers:
+    """The predictions for the test trials at one force, as numbers of labels, and the seconds of each squeeze."""
 
     answer: NDArray[np.int64]
     seconds: Floats
@@ -63,16 +71,36 @@ class Squeezed:
 
 @frozen(kw_only=True, eq=False)
 class Promise:
-    """What was learned of one force: how often each label (a row) gets each answer, and its seconds by label."""
+    """What a force promises: how often each label (row) gets each prediction, and the mean seconds of each label."""
 
     confusion: Floats
     seconds: Floats
 
     def rate(self, belief: Floats, again_s: float) -> float:
-        """Return the information, in bits per second, that a squeeze is expected to give."""
+        """Return the expected information of a squeeze, in bits per second.
+
+        `belief` holds the probabilities of the labels, `again_s` the time to open and close before the squeeze.
+        """
         answer = belief @ self.confusion
         gained = _entropy(answer) - float(belief @ [_entropy(row) for row in self.confusion])
         return gained / (float(belief @ self.seconds) + again_s)
+
+
+@frozen(kw_only=True, eq=False)
+class Forces:
+    """The predictions and promises of every force, for one fold."""
+
+    answers: Mapping[float, SqueezeAnswers]
+    promises: Mapping[float, Promise]
+
+
+@frozen(kw_only=True)
+class Decision:
+    """The predicted label as its number, the seconds from contact on, and the number of squeezes."""
+
+    answer: int
+    seconds: float
+    squeezes: int
 
 
 def _entropy(shares: Floats) -> float:
@@ -82,148 +110,178 @@ def _entropy(shares: Floats) -> float:
 
 def decide(
     trial: int,
-    contact: tuple[Squeezed, Promise],
-    squeezed: Mapping[float, Squeezed],
-    promises: Mapping[float, Promise],
+    contact: tuple[SqueezeAnswers, Promise],
+    forces: Forces,
+    *,
     sure: float,
     most: int,
     again_s: float,
-) -> tuple[int, float, int]:
-    """Return the answer for a trial, the seconds it took from the contact on, and how many squeezes."""
-    felt, known = contact
-    belief = _scaled(known.confusion[:, felt.answer[trial]])
-    # The squeezes feel the width as well, so they take the place of what the width alone said.
+) -> Decision:
+    """Return the decision for a trial.
+
+    `contact` holds the predictions from the width alone. Squeezing stops when a label has the probability `sure`, or
+    after `most` squeezes. `again_s` is the time to open and close between squeezes.
+    """
+    first, known = contact
+    belief = _normalised(known.confusion[:, first.answer[trial]])
+    # The squeezes measure the width as well, so they replace the prediction from the width alone.
     evidence = np.ones(len(belief))
     seconds = 0.0
     used: list[float] = []
     while True:
-        left = [force for force in squeezed if force not in used]
+        left = [force for force in forces.answers if force not in used]
         opens = again_s if used else 0.0
-        best = max(left, key=lambda force: promises[force].rate(belief, opens), default=None)
+        best = max(left, key=lambda force: forces.promises[force].rate(belief, opens), default=None)
         if best is None or belief.max() >= sure or len(used) >= most:
-            return int(belief.argmax()), seconds, len(used)
-        one = squeezed[best]
-        seconds += opens + float(one.seconds[trial])
-        evidence = evidence * promises[best].confusion[:, one.answer[trial]]
-        belief = _scaled(evidence)
+            return Decision(answer=int(belief.argmax()), seconds=seconds, squeezes=len(used))
+        answers = forces.answers[best]
+        seconds += opens + float(answers.seconds[trial])
+        evidence = evidence * forces.promises[best].confusion[:, answers.answer[trial]]
+        belief = _normalised(evidence)
         used.append(best)
 
 
-def _scaled(weights: Floats) -> Floats:
+def _normalised(weights: Floats) -> Floats:
     shares: Floats = weights / weights.sum()
     return shares
 
 
-def next_squeeze(params: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Return the rate and the mean seconds of fixed squeezes and of the sequential choice at each threshold."""
-    judge = structured(params["judge"], NextSqueeze, "[judge]")
-    groups = groups_of(structured(params["data"], Source, "[data]"))
-    tables: dict[float, FeatureTable] = {}
-    data = None
-    for force in judge.forces_n:
-        settings = {table: dict(keys) for table, keys in params["settings"].items()}
-        settings["controller"]["probing_force_n"] = force
-        # The same seed: each force squeezes the same thing in the same place.
-        data = simulated(settings_from(settings, "the settings of the task"), groups=groups, seed=seed)
-        tables[force] = data.table
-    assert data is not None
-    instances = data.instances or ()
-    target = judge.targets[0]
-    told = np.array(aimed(data.labels, target))
-    labels = np.unique(told)
-    learner = next(iter(learners_of(params).values()))
-    speed = float(params["settings"]["controller"]["closing_speed_m_s"])
-    window = float(params["settings"]["controller"].get("rest_window_s", 0.05))
-    again_s = OPENED_M / speed
-    durations = {
-        force: np.nan_to_num(
-            table.values[:, table.names.index("delta_t")],
-            nan=float(params["settings"]["controller"].get("steady_timeout_s", 3.0)),
+def next_squeeze(params: Mapping[str, Any], seed: int) -> RecognitionResult:
+    """Return the rate and the mean seconds of single squeezes, and of the sequential choice at each threshold."""
+    settings = structured(params["judge"], NextSqueezeSettings, "[judge]")
+    data, tables = _tables(params, settings, seed)
+    target = settings.targets[0]
+    learning = _Learning(
+        learner=next(iter(classifiers_of(params).values())),
+        true=np.array(target_labels(data.labels, target)),
+        instances=data.instances or (),
+        seed=seed,
+    )
+    decisions = _decisions(params, settings, learning, tables)
+    results = []
+    for name, rows in decisions.items():
+        results.append(
+            ClassifierResult.of(
+                name,
+                target,
+                INSTANCE_HELD_OUT,
+                [true for true, _ in rows],
+                [str(learning.labels[decision.answer]) for _, decision in rows],
+                cost=math.fsum(decision.seconds for _, decision in rows) / len(rows),
+                squeezes=sum(decision.squeezes for _, decision in rows) / len(rows),
+            )
         )
-        + window
-        for force, table in tables.items()
-    }
-    chosen: dict[str, list[tuple[str, str, float, int]]] = {}
-    folds = instance_held_out(told.tolist(), instances, judge.folds, seed)
-    for fold in range(int(folds.max()) + 1):
-        test, training = np.flatnonzero(folds == fold), np.flatnonzero(folds != fold)
-        width = next(iter(tables.values())).columns(["p_first"])
-
-        def learned(
-            table: FeatureTable,
-            took: Floats,
-            training: NDArray[np.int64] = training,
-            test: NDArray[np.int64] = test,
-        ) -> tuple[Squeezed, Promise]:
-            known = told[training].tolist()
-            answer = _answers(learner, table, training, known, test, labels, seed)
-            things = [instances[i] for i in training.tolist()]
-            promise = _promise(learner, table, training, known, things, took, labels, seed)
-            return Squeezed(answer=answer, seconds=took[test]), promise
-
-        contact = learned(width, np.zeros(len(told)))
-        of_force = {force: learned(table, durations[force]) for force, table in tables.items()}
-        squeezed = {force: one for force, (one, _) in of_force.items()}
-        promises = {force: one for force, (_, one) in of_force.items()}
-        for k, i in enumerate(test.tolist()):
-            for force in tables:
-                best = int(squeezed[force].answer[k])
-                row = (str(told[i]), str(labels[best]), float(squeezed[force].seconds[k]), 1)
-                chosen.setdefault(fixed_name(force), []).append(row)
-            for sure in judge.sure:
-                best, took, used = decide(k, contact, squeezed, promises, sure, judge.most, again_s)
-                row = (str(told[i]), str(labels[best]), took, used)
-                chosen.setdefault(f"sequential, sure at {sure:g}", []).append(row)
-    judged = []
-    for name, rows in chosen.items():
-        true, given, took_s, used_n = zip(*rows, strict=True)
-        cost = math.fsum(took_s) / len(rows)
-        judged.append(
-            entry(name, target, true, given, INSTANCE_HELD_OUT, cost, squeezes=sum(used_n) / len(rows))
-        )
-    return {"source": data.source, "simulated": True, "notes": list(data.notes), "judged": judged}
+    return simulated_result(data, results)
 
 
 def fixed_name(force: float) -> str:
-    """Return how the single squeeze of a force is called."""
+    """Return the name of the single squeeze with this force."""
     return f"one squeeze of {force:g} N"
 
 
-def _answers(
-    learner: SelectedComponent,
-    table: FeatureTable,
-    training: NDArray[np.int64],
-    known: Sequence[str],
-    test: NDArray[np.int64],
-    labels: NDArray[np.str_],
-    seed: int,
-) -> NDArray[np.int64]:
-    """Return the answer to each of these trials, as the number of its label."""
-    classifier = learner.create()
-    classifier.fit(table.rows(training), known, seed)
-    numbers = np.searchsorted(labels, np.array(classifier.classes()))
-    answers: NDArray[np.int64] = numbers[classifier.probabilities(table.rows(test)).argmax(axis=1)]
-    return answers
-
-
-def _promise(
-    learner: SelectedComponent,
-    table: FeatureTable,
-    training: NDArray[np.int64],
-    known: Sequence[str],
-    things: Sequence[str],
-    seconds: Floats,
-    labels: NDArray[np.str_],
-    seed: int,
-) -> Promise:
-    folds = instance_held_out(known, things, 3, seed)
-    counts = np.full((len(labels), len(labels)), PRIOR / len(labels))
-    true = np.searchsorted(labels, np.array(known))
-    for fold in range(int(folds.max()) + 1):
-        inner, other = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
-        given = _answers(
-            learner, table, training[inner], [known[i] for i in inner.tolist()], training[other], labels, seed
+def _tables(
+    params: Mapping[str, Any], settings: NextSqueezeSettings, seed: int
+) -> tuple[Labelled, dict[float, FeatureTable]]:
+    """Return the trials, and their features at each force. The same seed gives the same objects and placements."""
+    tables: dict[float, FeatureTable] = {}
+    for force in settings.forces_n:
+        values = {table: dict(keys) for table, keys in params["settings"].items()}
+        values["controller"]["probing_force_n"] = force
+        data = simulated(
+            settings_from(values, "the settings of the task"), groups=trial_groups(params), seed=seed
         )
-        np.add.at(counts, (true[other], given), 1.0)
-    means = np.array([seconds[training[true == k]].mean() for k in range(len(labels))])
-    return Promise(confusion=counts / counts.sum(axis=1, keepdims=True), seconds=means)
+        tables[force] = data.table
+    return data, tables
+
+
+def _decisions(
+    params: Mapping[str, Any],
+    settings: NextSqueezeSettings,
+    learning: _Learning,
+    tables: Mapping[float, FeatureTable],
+) -> dict[str, list[tuple[str, Decision]]]:
+    """Return the true label and the decision of each trial, for each single squeeze and each threshold."""
+    controller = params["settings"]["controller"]
+    again_s = OPENED_M / float(controller["closing_speed_m_s"])
+    seconds = {force: _squeeze_seconds(table, controller) for force, table in tables.items()}
+    first = next(iter(tables.values()))
+    width = first.columns([width_feature(first.names) or first.names[0]])
+    decisions: dict[str, list[tuple[str, Decision]]] = {}
+    folds = instance_held_out(learning.true.tolist(), learning.instances, settings.folds, learning.seed)
+    for fold in range(int(folds.max()) + 1):
+        test, training = np.flatnonzero(folds == fold), np.flatnonzero(folds != fold)
+        contact = learning.learned(width, np.zeros(len(learning.true)), training, test)
+        learned = {
+            force: learning.learned(table, seconds[force], training, test) for force, table in tables.items()
+        }
+        forces = Forces(
+            answers={force: answers for force, (answers, _) in learned.items()},
+            promises={force: promise for force, (_, promise) in learned.items()},
+        )
+        for k, i in enumerate(test.tolist()):
+            true = str(learning.true[i])
+            for force, answers in forces.answers.items():
+                single = Decision(
+                    answer=int(answers.answer[k]), seconds=float(answers.seconds[k]), squeezes=1
+                )
+                decisions.setdefault(fixed_name(force), []).append((true, single))
+            for sure in settings.sure:
+                decision = decide(k, contact, forces, sure=sure, most=settings.most, again_s=again_s)
+                decisions.setdefault(f"sequential, sure at {sure:g}", []).append((true, decision))
+    return decisions
+
+
+def _squeeze_seconds(table: FeatureTable, controller: Mapping[str, Any]) -> Floats:
+    """Return the seconds of each squeeze: until rest, and the window that detects it."""
+    until_rest: Floats = np.nan_to_num(
+        table.values[:, table.names.index("delta_t")],
+        nan=float(controller.get("steady_timeout_s", 3.0)),
+    )
+    return until_rest + float(controller.get("rest_window_s", 0.05))
+
+
+@frozen(kw_only=True, eq=False, slots=False)
+class _Learning:
+    """What the models of all forces and folds share."""
+
+    learner: SelectedComponent
+    true: NDArray[np.str_]
+    """The true label of each trial."""
+    instances: Sequence[str]
+    seed: int
+
+    @property
+    def labels(self) -> NDArray[np.str_]:
+        """The different labels, sorted."""
+        return np.unique(self.true)
+
+    def learned(
+        self, table: FeatureTable, seconds: Floats, training: NDArray[np.int64], test: NDArray[np.int64]
+    ) -> tuple[SqueezeAnswers, Promise]:
+        """Return the predictions for the test trials, and the promise measured within the training trials."""
+        answers = SqueezeAnswers(answer=self._answers(table, training, test), seconds=seconds[test])
+        return answers, self._promise(table, training, seconds)
+
+    def _answers(
+        self, table: FeatureTable, training: NDArray[np.int64], test: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """Return the prediction for each test trial, as the number of its label."""
+        classifier = self.learner.create()
+        classifier.fit(table.rows(training), self.true[training].tolist(), self.seed)
+        numbers = np.searchsorted(self.labels, np.array(classifier.classes()))
+        answers: NDArray[np.int64] = numbers[classifier.probabilities(table.rows(test)).argmax(axis=1)]
+        return answers
+
+    def _promise(self, table: FeatureTable, training: NDArray[np.int64], seconds: Floats) -> Promise:
+        known = self.true[training].tolist()
+        instances = [self.instances[i] for i in training.tolist()]
+        folds = instance_held_out(known, instances, INNER_FOLDS, self.seed)
+        n = len(self.labels)
+        counts = np.full((n, n), PRIOR / n)
+        true = np.searchsorted(self.labels, np.array(known))
+        for fold in range(int(folds.max()) + 1):
+            inner, other = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
+            answers = self._answers(table, training[inner], training[other])
+            np.add.at(counts, (true[other], answers), 1.0)
+        means = np.array([seconds[training[true == k]].mean() for k in range(n)])
+        return Promise(confusion=counts / counts.sum(axis=1, keepdims=True), seconds=means)

@@ -10,22 +10,22 @@ from attrs import frozen
 
 @frozen
 class McNemar:
-    """Trials that only the first, or only the second, got right, and the exact two-sided p of that."""
+    """Numbers of trials that only the first, or only the second classifier predicts correctly."""
 
     only_first: int
     only_second: int
 
     @property
     def p(self) -> float:
-        """The probability of such a difference or a greater one, were both equally good."""
+        """The exact two-sided p-value under the hypothesis that both are equally good."""
         from scipy.stats import binomtest
 
         n = self.only_first + self.only_second
         return 1.0 if n == 0 else float(binomtest(self.only_first, n, 0.5).pvalue)
 
 
-def mcnemar(first: Sequence[int], second: Sequence[int]) -> McNemar:
-    """Return McNemar's counts for two lists of right (1) and wrong (0) answers to the same trials."""
+def mcnemar(first: Sequence[bool], second: Sequence[bool]) -> McNemar:
+    """Return McNemar's counts; the lists state which of the same trials are predicted correctly."""
     pairs = list(zip(first, second, strict=True))
     return McNemar(sum(a > b for a, b in pairs), sum(a < b for a, b in pairs))
 

@@ -1,64 +1,83 @@
-"""The task `physics`: learned on grasps of a model that is wrong by so much, judged on grasps of the model itself."""
+"""The task `physics`: train on grasps of a model with a parameter error, and test on grasps of the correct model."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 from attrs import field, frozen
 from attrs.validators import ge
 
-from graspsense.core.config import settings_from
+from graspsense.core.config import SelectedComponent, settings_from
 from graspsense.core.errors import ConfigError
+from graspsense.core.labelled import Labelled, Target, class_of
 from graspsense.core.strict import structured
 from graspsense.experiments.recognise import TEST_SEED_OFFSET
-from graspsense.experiments.trade.costs import CostOnly
-from graspsense.experiments.trade.judging import aimed, entry, learners_of, settings_of
+from graspsense.experiments.task_results import ClassifierResult, RecognitionResult
+from graspsense.experiments.trade.costs import CostSettings
+from graspsense.experiments.trade.trade_task import (
+    classifiers_of,
+    settings_of,
+    simulated_result,
+    target_labels,
+    trial_groups,
+)
 from graspsense.sources.simulated import simulated
-from graspsense.sources.trial_source import Source, groups_of
+
+PROTOCOL: Final = "learned_on_another_model"
 
 
 @frozen(kw_only=True)
-class Physics(CostOnly):
+class ModelErrorSettings(CostSettings):
     """The keys of `[judge]`."""
 
     error: float = field(default=0.0, validator=ge(-0.9))
-    """By this share the keys of the gripper named in `of` are too large where it is learned."""
+    """Relative error of the gripper settings named in `of`, in the model for training."""
     of: tuple[str, ...] = ("coulomb_n", "breakaway_n", "load_share", "rotor_kg_m2", "skin_n_m")
     learned_on: Mapping[str, Any] = field(factory=dict)
-    """Further keys of the gripper where it is learned, as `accuracy`."""
+    """Further gripper settings of the model for training, such as `accuracy`."""
 
 
-PROTOCOL = "learned_on_another_model"
+def physics(params: Mapping[str, Any], seed: int) -> RecognitionResult:
+    """Return the rates on the correct model of classifiers trained on the wrong one. Raises ConfigError."""
+    settings = structured(params["judge"], ModelErrorSettings, "[judge]")
+    groups = trial_groups(params)
+    training = simulated(_wrong_model(params, settings), groups=groups, seed=seed)
+    test = simulated(settings_of(params), groups=groups, seed=seed + TEST_SEED_OFFSET)
+    cost = float(settings.learned_on.get("accuracy", settings.error))
+    results = []
+    for name, learner in classifiers_of(params).items():
+        for target in settings.targets:
+            true, predicted = _predictions(learner, training, test, target, seed)
+            results.append(ClassifierResult.of(name, target, PROTOCOL, true, predicted, cost=cost))
+    return simulated_result(test, results)
 
 
-def physics(params: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Return how often a classifier is right on the model that learned on the wrong one. Raises ConfigError."""
-    judge = structured(params["judge"], Physics, "[judge]")
+def _wrong_model(params: Mapping[str, Any], settings: ModelErrorSettings) -> Any:
     wrong = {table: dict(keys) for table, keys in params["settings"].items()}
-    for key in judge.of:
+    for key in settings.of:
         try:
-            wrong["gripper"][key] *= 1.0 + judge.error
+            wrong["gripper"][key] *= 1.0 + settings.error
         except (KeyError, TypeError):
-            raise ConfigError(f"judge.of: {key!r} is no number among the gripper's settings") from None
-    wrong["gripper"].update(judge.learned_on)
-    groups = groups_of(structured(params["data"], Source, "[data]"))
-    known = simulated(settings_from(wrong, "the wrong model"), groups=groups, seed=seed)
-    asked = simulated(settings_of(params), groups=groups, seed=seed + TEST_SEED_OFFSET)
-    cost = float(judge.learned_on.get("accuracy", judge.error))
-    judged = []
-    for name, learner in learners_of(params).items():
-        for target in judge.targets:
-            true: list[str] = []
-            given: list[str] = []
-            for kind in (
-                sorted({label.partition(":")[0] for label in known.labels}) if target == "state" else [""]
-            ):
-                one, other = (data.of_class(kind) if kind else data for data in (known, asked))
-                classifier = learner.create()
-                classifier.fit(one.table, aimed(one.labels, target), seed)
-                classes = classifier.classes()
-                true += aimed(other.labels, target)
-                given += [classes[k] for k in classifier.probabilities(other.table).argmax(axis=1)]
-            judged.append(entry(name, target, true, given, PROTOCOL, cost, x=cost))
-    return {"source": asked.source, "simulated": True, "notes": list(asked.notes), "judged": judged}
+            raise ConfigError(
+                f"judge.of: {key!r} is not a number among the settings of the gripper"
+            ) from None
+    wrong["gripper"].update(settings.learned_on)
+    return settings_from(wrong, "the wrong model")
+
+
+def _predictions(
+    learner: SelectedComponent, training: Labelled, test: Labelled, target: Target, seed: int
+) -> tuple[list[str], list[str]]:
+    """Return true and predicted labels, with a model for each class if the target is `state`."""
+    true: list[str] = []
+    predicted: list[str] = []
+    classes = sorted({class_of(label) for label in training.labels}) if target == "state" else [""]
+    for name in classes:
+        known, tested = (data.of_class(name) if name else data for data in (training, test))
+        classifier = learner.create()
+        classifier.fit(known.table, target_labels(known.labels, target), seed)
+        labels = classifier.classes()
+        true += target_labels(tested.labels, target)
+        predicted += [labels[k] for k in classifier.probabilities(tested.table).argmax(axis=1)]
+    return true, predicted

@@ -1,78 +1,92 @@
-"""The task `squeezes`: the same thing squeezed several times, each time placed anew, and the answers put together."""
+"""The task `squeezes`: the same object squeezed several times, each time placed anew, with combined predictions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from attrs import field, frozen
 from attrs.validators import ge
 
+from graspsense.core.config import SelectedComponent
 from graspsense.core.errors import ConfigError
+from graspsense.core.labelled import Labelled, Target
 from graspsense.core.strict import structured
 from graspsense.evaluation.evaluate import INSTANCE_HELD_OUT
 from graspsense.evaluation.folds import instance_held_out
-from graspsense.experiments.trade.costs import CostOnly, seconds
-from graspsense.experiments.trade.judging import FOLDS, aimed, entry, groups_of, learners_of, settings_of
+from graspsense.experiments.task_results import ClassifierResult, RecognitionResult, TrialValues
+from graspsense.experiments.trade.costs import CostSettings, mean_seconds
+from graspsense.experiments.trade.trade_task import (
+    FOLDS,
+    classifiers_of,
+    settings_of,
+    simulated_result,
+    target_labels,
+    trial_groups,
+    trials_by_class,
+)
 from graspsense.sources.simulated import simulated
-from graspsense.sources.trial_source import Source
-from graspsense.sources.trial_source import groups_of as groups_of_source
 
-LEAST = 1e-3
-"""A label that a tree gives no trial may still be the right one."""
+MIN_PROBABILITY: Final = 1e-3
+"""Lower bound on a probability: a label that a tree gives no trial may still be correct."""
 
 
 @frozen(kw_only=True)
-class Squeezes(CostOnly):
-    """The keys of `[judge]`. `[data]` gives each thing `most` trials: its squeezes."""
+class RepeatSettings(CostSettings):
+    """The keys of `[judge]`. `[data]` must give each object `most` trials, its squeezes."""
 
     most: int = field(default=4, validator=ge(1))
+    """Largest number of squeezes."""
 
 
-def squeezes(params: Mapping[str, Any], seed: int) -> dict[str, Any]:
-    """Return the rate after one, two ... squeezes, the probabilities of all of them multiplied.
+def squeezes(params: Mapping[str, Any], seed: int) -> RecognitionResult:
+    """Return the rates after one, two, ... squeezes, with the product of their probabilities.
 
-    No model knew the thing that it is asked about. Each squeeze costs a whole approach.
+    No model was trained on the object that it is tested on. Each squeeze costs a complete approach. Raises ConfigError
+    if the number of trials is not a multiple of the number of squeezes.
     """
-    judge = structured(params["judge"], Squeezes, "[judge]")
-    settings = settings_of(params)
-    source = structured(params["data"], Source, "[data]")
-    data = simulated(settings, groups=groups_of_source(source), seed=seed)
-    n = judge.most
-    if len(data) % n:
+    settings = structured(params["judge"], RepeatSettings, "[judge]")
+    data = simulated(settings_of(params), groups=trial_groups(params), seed=seed)
+    if len(data) % settings.most:
         raise ConfigError(
-            f"{len(data)} trials are no multiple of judge.most = {n} squeezes: set data.trials to it"
+            f"{len(data)} trials are not a multiple of judge.most = {settings.most} squeezes: set data.trials to it"
         )
-    result = {
-        "features": list(zip(data.table.names, data.table.units, strict=True)),
-        "values": [[None if np.isnan(v) else v for v in row] for row in data.table.values.tolist()],
-    }
-    one_s = seconds(params["settings"], result)
-    judged = []
-    things = data.instances or ()
-    for name, learner in learners_of(params).items():
-        for target in judge.targets:
-            told = np.array(aimed(data.labels, target))
-            chosen: dict[int, list[str]] = {k: [] for k in range(1, n + 1)}
-            true: list[str] = []
-            for rows in groups_of(data.labels, target):
-                labels = [str(one) for one in told[rows]]
-                folds = instance_held_out(labels, [things[i] for i in rows], FOLDS, seed)
-                for fold in range(int(folds.max()) + 1):
-                    test, training = rows[folds == fold], rows[folds != fold]
-                    classifier = learner.create()
-                    classifier.fit(data.table.rows(training), [str(one) for one in told[training]], seed)
-                    shares = np.log(np.maximum(classifier.probabilities(data.table.rows(test)), LEAST))
-                    # The squeezes of one thing in one state follow each other.
-                    of_thing = shares.reshape(len(test) // n, n, -1).cumsum(axis=1)
-                    classes = classifier.classes()
-                    true += [str(one) for one in told[test[::n]]]
-                    for k in chosen:
-                        chosen[k] += [classes[best] for best in of_thing[:, k - 1].argmax(axis=1)]
-            for k, given in chosen.items():
-                called = f"{k} squeeze{'s' if k > 1 else ''}" + (
-                    f", {name}" if len(params["learners"]) > 1 else ""
+    one_s = mean_seconds(params["settings"], TrialValues.of(data))
+    results = []
+    for name, learner in classifiers_of(params).items():
+        suffix = f", {name}" if len(params["learners"]) > 1 else ""
+        for target in settings.targets:
+            true, predicted = _combined_predictions(learner, data, target, settings.most, seed)
+            for k, labels in predicted.items():
+                title = f"{k} squeeze{'s' if k > 1 else ''}{suffix}"
+                results.append(
+                    ClassifierResult.of(title, target, INSTANCE_HELD_OUT, true, labels, cost=k * one_s)
                 )
-                judged.append(entry(called, target, true, given, INSTANCE_HELD_OUT, k * one_s, x=k))
-    return {"source": data.source, "simulated": True, "notes": list(data.notes), "judged": judged}
+    return simulated_result(data, results)
+
+
+def _combined_predictions(
+    learner: SelectedComponent, data: Labelled, target: Target, n: int, seed: int
+) -> tuple[list[str], dict[int, list[str]]]:
+    """Return the true label of each object, and for 1 to `n` squeezes the predicted ones."""
+    instances = data.instances or ()
+    all_labels = np.array(target_labels(data.labels, target))
+    predicted: dict[int, list[str]] = {k: [] for k in range(1, n + 1)}
+    true: list[str] = []
+    for rows in trials_by_class(data.labels, target):
+        labels = [str(label) for label in all_labels[rows]]
+        folds = instance_held_out(labels, [instances[i] for i in rows], FOLDS, seed)
+        for fold in range(int(folds.max()) + 1):
+            test, training = rows[folds == fold], rows[folds != fold]
+            classifier = learner.create()
+            classifier.fit(data.table.rows(training), [str(label) for label in all_labels[training]], seed)
+            probabilities = classifier.probabilities(data.table.rows(test))
+            # The squeezes of one object in one state are consecutive trials.
+            logs = np.log(np.maximum(probabilities, MIN_PROBABILITY)).reshape(len(test) // n, n, -1)
+            sums = logs.cumsum(axis=1)
+            classes = classifier.classes()
+            true += [str(label) for label in all_labels[test[::n]]]
+            for k in predicted:
+                predicted[k] += [classes[best] for best in sums[:, k - 1].argmax(axis=1)]
+    return true, predicted

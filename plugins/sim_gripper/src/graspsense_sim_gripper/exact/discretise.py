@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,22 +13,21 @@ from graspsense_sim_gripper.exact.modes import LinearScene, Shape
 from graspsense_sim_gripper.exact.propagate import ExactPlant, workspace_size
 from graspsense_sim_gripper.exact.tables import Tables, listed_tables_of, tables_of
 from graspsense_sim_gripper.exact.term_states import n_numbers
+from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.remainder import linear as lumped_form
 from graspsense_sim_gripper.terms.term import LinearForm, OwnContact
-
-if TYPE_CHECKING:
-    from graspsense_sim_gripper.problem import GraspSetup
 
 
 def applicable(config: SimConfig, setup: GraspSetup) -> str:
     """Return why a grasp is not discretised exactly; empty if it is.
 
-    This is the only place that decides between time steps and the matrix exponential. Raises TypeError for a term whose
+    This is the only place that decides between time steps and the matrix exponential. Steps are prescribed by the
+    settings, by a level of the reduction that divides each tick, and by a reference. Raises TypeError for a term whose
     linear form has other states than its law.
     """
     drive, model, steps = setup.plant.drive, setup.plant.thing, setup.plant.steps
-    if config.scheme != "auto" or steps.longest_s < math.inf or steps.settle > 0.0:
+    if config.has_forced_steps or steps.longest_s < math.inf or steps.settle > 0.0:
         return "the scheme or the length of its steps is prescribed"
     if drive.link.finger_m != 0.0:
         return "the ratio of the linkage varies with the gap"

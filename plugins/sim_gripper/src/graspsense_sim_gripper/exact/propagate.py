@@ -85,12 +85,11 @@ class TickResult(NamedTuple):
 
 
 def bind_move(
-    kinds: Sequence[str], shape: Shape, step_move: Callable[..., PlantState], **constructors: Any
+    kinds: Sequence[str], shape: Shape, step_move: Callable[..., PlantState]
 ) -> Callable[[Any, PlantState, float, float], PlantState]:
     """Return `move` for an object of these terms and modes of this shape.
 
-    `step_move` advances the plant by time steps in the ticks that are not linear. `constructors` are of the plant's
-    named tuples, where the interpreter has faster ones than the classes (`graspsense.plugin_api.maker`).
+    `step_move` advances the plant by time steps in the ticks that are not linear.
     """
     constants = _constants(shape)
     n, n_outputs = shape.n_states, padded(FIRST_GUARD + shape.n_guards)
@@ -104,7 +103,7 @@ def bind_move(
         "bound_by_modes": bind(_product, ROWS=n_outputs, COLUMNS=2 * n, FROM=dx, TO=bound, OF_MAGNITUDE=1),
     }
     pack, unpack = term_state_functions(kinds)
-    parts = {**constants, **products, **constructors, "pack": pack, "unpack": unpack, "step_move": step_move}
+    parts = {**constants, **products, "pack": pack, "unpack": unpack, "step_move": step_move}
     bound_move: Callable[[Any, PlantState, float, float], PlantState] = _bind_called(move, parts, {})
     return bound_move
 

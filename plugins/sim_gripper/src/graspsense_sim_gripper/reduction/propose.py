@@ -42,11 +42,6 @@ STIFFEST_N_M: Final = 1e6
 SCHEMES: Final = {EXPLICIT: "Verlet", STIFF: "TR-BDF2", MEAN_FORCE: "mean force"}
 
 
-def has_forced_steps(config: SimConfig) -> bool:
-    """Return whether the settings prescribe the scheme or the length of the steps."""
-    return config.scheme != "auto" or config.step_s is not None
-
-
 def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | None = None) -> Grip:
     """Return the nominal object as it is gripped with this force, after the fingers touch it at this speed.
 

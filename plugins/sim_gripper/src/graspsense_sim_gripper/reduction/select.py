@@ -28,7 +28,7 @@ from graspsense_sim_gripper.reduction.error import deviation
 from graspsense_sim_gripper.reduction.levels import FULL_SCALES, REFERENCE_SCALES, LevelScale, scales_for
 from graspsense_sim_gripper.reduction.model import DROPPED, Reduction, Verification
 from graspsense_sim_gripper.reduction.probe import Grip
-from graspsense_sim_gripper.reduction.propose import grip_of, has_forced_steps, propose
+from graspsense_sim_gripper.reduction.propose import grip_of, propose
 from graspsense_sim_gripper.reduction.verify import Sensitivity, TrialGrasps, trial_grasps
 
 ACCEPTED_WITH_SPREAD: Final = 0.5
@@ -74,7 +74,7 @@ def select(
 def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
     config, grip = problem.model_config, grip_of(problem)
     reference = propose(problem, grip, _reference_scale(config, FULL_SCALES[0]))
-    not_verified = has_forced_steps(config) or config.fidelity == "reference"
+    not_verified = config.has_forced_steps or config.fidelity == "reference"
     if not_verified or math.isinf(reference.contact.error):
         return propose(problem, grip)
     try:

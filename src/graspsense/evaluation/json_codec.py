@@ -1,0 +1,42 @@
+"""The JSON form of results: one codec for everything that an evaluation or an experiment returns.
+
+`to_json` and `from_json` are inverse for attrs classes of numbers, texts, tuples, mappings and other such classes.
+A rate is written with its share and interval, which are computed again when it is read.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, TypeVar
+
+import cattrs
+
+from graspsense.core.json_values import json_ready
+from graspsense.evaluation.intervals import RecognitionRate
+
+T = TypeVar("T")
+
+
+def to_json(value: Any) -> Any:
+    """Return a result as JSON values; NaN becomes None."""
+    return json_ready(_CONVERTER.unstructure(value))
+
+
+def from_json(values: Any, cls: type[T]) -> T:
+    """Return the result of this class from JSON values.
+
+    Raises ValueError, TypeError, KeyError or an exception group of cattrs if the values do not describe one.
+    """
+    return _CONVERTER.structure(values, cls)
+
+
+def _write_rate(rate: RecognitionRate) -> dict[str, Any]:
+    return {"correct": rate.correct, "n": rate.n, "rate": rate.rate, "interval": list(rate.interval)}
+
+
+def _read_rate(values: Any, _: type) -> RecognitionRate:
+    return RecognitionRate(correct=values["correct"], n=values["n"])
+
+
+_CONVERTER: Final = cattrs.Converter()
+_CONVERTER.register_unstructure_hook(RecognitionRate, _write_rate)
+_CONVERTER.register_structure_hook(RecognitionRate, _read_rate)

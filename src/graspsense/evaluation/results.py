@@ -1,0 +1,65 @@
+"""The results of an evaluation, with types from the measurement up to the page that shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from attrs import field, frozen
+
+from graspsense.core.labelled import Target
+from graspsense.evaluation.confusion import Confusion
+from graspsense.evaluation.intervals import Difference, RecognitionRate
+
+
+@frozen
+class Measurement:
+    """A rate under one protocol or control, or the reason why it could not be measured.
+
+    `what` defines it. `difference` is the rate of the protocol named in `difference_of`, minus this rate.
+    """
+
+    what: str
+    rate: RecognitionRate | None = None
+    reason: str = ""
+    difference: Difference | None = None
+    difference_of: str = ""
+
+
+@frozen
+class CurvePoint:
+    """One point of the learning curve: the mean number of training trials, and the rate."""
+
+    trained_on: float
+    rate: RecognitionRate
+
+
+@frozen(kw_only=True)
+class Evaluation:
+    """The result of `graspsense evaluate`; its JSON form is what `--json` prints."""
+
+    source: str
+    classifier: str
+    settings: Mapping[str, Any] = field(factory=dict)
+    target: Target
+    features: tuple[tuple[str, str], ...]
+    """Name and unit of each feature."""
+    folds: int
+    seed: int
+    protocol: str
+    """The protocol of `headline`."""
+    headline: RecognitionRate
+    confusion: Confusion
+    """The confusion matrix of `headline`."""
+    protocols: Mapping[str, Measurement]
+    controls: Mapping[str, Measurement]
+    by_class: Mapping[str, RecognitionRate]
+    """The rate of the headline among the trials of each class (`class` of `class:state`)."""
+    unknown: RecognitionRate
+    """Held-out trials that the model of their fold calls unknown. In all rates they count by their predicted label."""
+    learning_curve: tuple[CurvePoint, ...]
+    warnings: tuple[str, ...]
+    """Findings of the controls that cast doubt on the headline."""
+    notes: tuple[str, ...]
+    confusions: Mapping[str, Confusion] = field(factory=dict)
+    """The confusion matrix of each protocol that was measured."""

@@ -1,0 +1,155 @@
+"""The results of tasks, with types. Files and worker processes hold their JSON form (`evaluation.json_codec`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from attrs import field, frozen
+
+from graspsense.core.labelled import Target
+from graspsense.core.tree import TreeNode
+from graspsense.evaluation.confusion import Confusion, confusion
+from graspsense.evaluation.intervals import RecognitionRate
+from graspsense.evaluation.results import Measurement
+from graspsense.report.grasp_curve import GraspCurve
+
+if TYPE_CHECKING:
+    from graspsense.core.labelled import Labelled
+
+
+@frozen(kw_only=True)
+class ClassifierResult:
+    """The rate of one classifier for one target, with its confusion matrix.
+
+    `cost` is what the rate costs in a trade-off experiment, `squeezes` the mean number of squeezes per answer. For
+    paired tests, `correct` states which trials are predicted correctly, and `fold` the fold of each trial.
+    """
+
+    classifier: str
+    target: Target
+    protocol: str
+    rate: RecognitionRate
+    confusion: Confusion
+    controls: Mapping[str, Measurement] = field(factory=dict)
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    tree: tuple[TreeNode, ...] | None = None
+    """The tree that the classifier grows on all trials; None if it grows none, or was not asked to."""
+    cost: float | None = None
+    squeezes: float | None = None
+    correct: tuple[bool, ...] | None = None
+    fold: tuple[int, ...] | None = None
+
+    @classmethod
+    def of(
+        cls,
+        classifier: str,
+        target: Target,
+        protocol: str,
+        true: Sequence[str],
+        predicted: Sequence[str],
+        **more: Any,
+    ) -> ClassifierResult:
+        """Return the result of these predictions; `more` are further fields."""
+        matrix = confusion(true, predicted)
+        return cls(
+            classifier=classifier,
+            target=target,
+            protocol=protocol,
+            rate=RecognitionRate(matrix.correct, matrix.n),
+            confusion=matrix,
+            **more,
+        )
+
+
+@frozen(kw_only=True)
+class TrialValues:
+    """The labels and features of the trials of a task; None for a missing value."""
+
+    features: tuple[tuple[str, str], ...]
+    """Name and unit of each feature."""
+    labels: tuple[str, ...]
+    instances: tuple[str, ...] | None
+    values: tuple[tuple[float | None, ...], ...]
+
+    @classmethod
+    def of(cls, labelled: Labelled) -> TrialValues:
+        """Return the labels and features of these trials."""
+        table = labelled.table
+        return cls(
+            features=tuple(zip(table.names, table.units, strict=True)),
+            labels=labelled.labels,
+            instances=labelled.instances,
+            values=tuple(
+                tuple(None if math.isnan(value) else value for value in row) for row in table.values.tolist()
+            ),
+        )
+
+    def column(self, name: str) -> tuple[float | None, ...]:
+        """Return the values of a feature. Raises ValueError if there is no such feature."""
+        k = [feature for feature, _ in self.features].index(name)
+        return tuple(row[k] for row in self.values)
+
+    def by_label(self, name: str) -> dict[str, list[float]]:
+        """Return the values of a feature for each label, without missing values."""
+        values: dict[str, list[float]] = {}
+        for label, value in zip(self.labels, self.column(name), strict=True):
+            if value is not None:
+                values.setdefault(label, []).append(value)
+        return values
+
+
+@frozen(kw_only=True)
+class RecognitionResult:
+    """The result of a task that measures recognition rates."""
+
+    source: str
+    simulated: bool
+    notes: tuple[str, ...] = ()
+    provenance: Mapping[str, Any] = field(factory=dict)
+    trials: TrialValues | None = None
+    classifiers: tuple[ClassifierResult, ...] = ()
+    grasps: tuple[GraspCurve, ...] = ()
+    """Some grasps of the first seed."""
+
+
+@frozen(kw_only=True)
+class GraspRow:
+    """How one grasp went. A quantity is None if it is not defined, for example without contact.
+
+    `contact_s` is the time of contact of both pads from the start of the approach; `lead_s` how long one pad touched
+    before the other; `speed_m_s` the closing speed shortly before contact; `closed_m` how far the fingers closed;
+    `effort_at_contact_n` and `max_effort_n` the commanded effort at contact, and its maximum from then on;
+    `left_counts` and `right_counts` the increase of the summed pad cells from the start to the end of the squeeze.
+    """
+
+    label: str
+    outcome: str
+    contact_s: float | None = None
+    lead_s: float | None = None
+    speed_m_s: float | None = None
+    closed_m: float | None = None
+    effort_at_contact_n: float | None = None
+    max_effort_n: float | None = None
+    left_counts: float | None = None
+    right_counts: float | None = None
+    true_peak_force_n: float = 0.0
+    """The peak force in the model, which the pads may miss."""
+    broken: bool = False
+    """Whether the model of the object broke."""
+    features: Mapping[str, float | None] = field(factory=dict)
+
+
+@frozen(kw_only=True)
+class GraspResult:
+    """The result of a task of kind `grasp`."""
+
+    source: str
+    simulated: bool
+    rows: tuple[GraspRow, ...]
+    grasps: tuple[GraspCurve, ...] = ()
+
+
+AnyTaskResult = RecognitionResult | GraspResult

@@ -1,0 +1,112 @@
+"""The findings of one trade-off: a table, a picture and a recommendation."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import Any, Final
+
+from attrs import frozen
+
+from graspsense.experiments.findings import FoundTable, percent, span
+from graspsense.experiments.summary import ConditionResult
+from graspsense.experiments.trade.trade_point import Advice, TradePoint, advise, trade_points
+from graspsense.report.html import figure
+from graspsense.report.svg import DASHES, INKS, QUIET, AxisScale, Picture, reaching
+from graspsense.report.wording import TARGETS
+
+LEFT: Final = 40.0
+
+
+@frozen(kw_only=True)
+class Report:
+    """The findings of one part of an experiment; `text` sums them up in a few sentences."""
+
+    text: str
+    tables: tuple[FoundTable, ...]
+    picture: str = ""
+    advice: tuple[Advice, ...] = ()
+
+
+def cost_report(part: str, title: str, conditions: Sequence[ConditionResult], cost: Any) -> Report:
+    """Return the rates against their cost; `cost` holds the keys of `Cost`."""
+    rows: list[tuple[str, ...]] = []
+    advice: list[Advice] = []
+    series: dict[str, Sequence[TradePoint]] = {}
+    for target in dict.fromkeys(condition.target for condition in conditions):
+        points = trade_points([one for one in conditions if one.target == target], cost.cheap == "low")
+        advice.append(advise(points, title, cost.axis))
+        rows += [
+            (
+                point.name,
+                TARGETS[target],
+                f"{point.cost:.3g}",
+                percent(point.condition.rate.mean),
+                span(point.condition.rate.interval),
+                "yes" if point.on_front else "no",
+            )
+            for point in points
+        ]
+        series[TARGETS[target]] = points
+    text = " ".join(one.text for one in advice)
+    table = FoundTable(
+        id=part,
+        title=title,
+        header=("case", "recognises", cost.axis, "recognised", "95 % of the mean", "on the Pareto front"),
+        rows=tuple(rows),
+        note=text,
+        numbers=2,
+    )
+    return Report(
+        text=text, tables=(table,), picture=_picture(series, cost.axis, title), advice=tuple(advice)
+    )
+
+
+def damage_table() -> tuple[FoundTable, list[str]]:
+    """Return the forces that damage each container, and the reason for each."""
+    text = files("graspsense.experiments.trade").joinpath("damage.toml").read_text(encoding="utf-8")
+    known: Mapping[str, Mapping[str, Any]] = tomllib.loads(text)
+    table = FoundTable(
+        id="damage",
+        title="Force from which a container is damaged",
+        header=("container", "force on a pad, N", "probing force, N"),
+        rows=tuple(
+            (name, f"{one['force_n']:g}", f"{1.5 * one['force_n'] + 7:.0f}") for name, one in known.items()
+        ),
+        note="These are assumptions, not measurements. A probing force is an effort: the friction of the default "
+        "gripper takes 7 N of it, plus half of the force on the pads.",
+        numbers=1,
+    )
+    return table, [f"Damage, {name}: {one['reason']}" for name, one in known.items()]
+
+
+def _picture(series: Mapping[str, Sequence[TradePoint]], axis: str, title: str) -> str:
+    """Return the rates against their costs, with a line through the Pareto front of each target."""
+    costs = [point.cost for points in series.values() for point in points]
+    picture = Picture(262 + 15 * (len(series) + 1))
+    x = reaching(costs, LEFT, picture.width - 14)
+    y = AxisScale(0.0, 100.0, 215, 24)
+    picture.y_axis(y, LEFT - 4, picture.width - 8, "recognised, in %")
+    picture.x_axis(x, 24, 215, axis)
+    words = []
+    for k, (target, points) in enumerate(series.items()):
+        ink = INKS[k % len(INKS)]
+        on_front = sorted((point for point in points if point.on_front), key=lambda point: point.cost)
+        line = [(x(point.cost), y(100 * point.condition.rate.mean)) for point in on_front]
+        picture.line(line, ink, dash=DASHES[k % len(DASHES)])
+        for point in points:
+            place = x(point.cost)
+            low, high = (y(100 * rate) for rate in point.condition.rate.interval)
+            picture.line([(place, low), (place, high)], ink, width=1.2)
+            size = 4.0 if point.on_front else 1.8
+            picture.mark(place, y(100 * point.condition.rate.mean), ink, k, size)
+        legend = 262.0 + 15 * k
+        picture.mark(53, legend - 4, ink, k)
+        picture.text(62, legend, target)
+        words.append(f"{target}: " + ", ".join(f"{point.name} {point.rate_text}" for point in points))
+    picture.text(
+        LEFT, 262.0 + 15 * len(series), "large, joined: on the Pareto front; small: not on it", ink=QUIET
+    )
+    caption = f"{title}. Bars are 95 % intervals of the mean."
+    return figure(picture.svg(f"Recognition rate against {axis}. {'; '.join(words)}"), caption)

@@ -1,0 +1,95 @@
+"""The findings on choosing the next squeeze, compared with a single squeeze of fixed force."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from graspsense.experiments.findings import FoundTable, percent, span
+from graspsense.experiments.summary import ConditionResult
+from graspsense.experiments.trade.cost_findings import Report
+from graspsense.experiments.trade.next_squeeze import fixed_name
+from graspsense.experiments.trade.trade_point import TradePoint, mean_cost, trade_points
+
+Difference = tuple[float, tuple[float, float]]
+
+
+def compare_sequential(
+    part: str, title: str, conditions: Sequence[ConditionResult], fixed_n: float
+) -> Report:
+    """Return the comparison of every case with the single squeeze of `fixed_n`."""
+    fixed = next(one for one in conditions if one.classifier == fixed_name(fixed_n))
+    rows, faster = [], []
+    for point in trade_points(conditions, True):
+        difference = saved = None
+        if point.condition is not fixed:
+            difference, saved = point.condition.minus(fixed), _seconds_minus(point.condition, fixed)
+        rows.append(_cells(point, difference, saved))
+        as_good = difference is not None and difference[0] >= 0.0
+        if point.name.startswith("sequential") and as_good and saved is not None and saved[1][1] < 0.0:
+            faster.append((point, saved))
+    header = (
+        "case",
+        "seconds from contact",
+        "squeezes",
+        "recognised",
+        "95 % of the mean",
+        f"points above {fixed_n:g} N",
+        "95 % of that",
+        f"seconds above {fixed_n:g} N",
+        "95 % of that",
+        "on the Pareto front",
+    )
+    text = _text(fixed, fixed_n, faster)
+    table = FoundTable(id=part, title=title, header=header, rows=tuple(rows), note=text, numbers=1)
+    return Report(text=text, tables=(table,))
+
+
+def _text(fixed: ConditionResult, fixed_n: float, faster: Sequence[tuple[TradePoint, Difference]]) -> str:
+    rate = f"{percent(fixed.rate.mean)} ({span(fixed.rate.interval)})"
+    seconds = mean_cost(fixed)
+    if not faster:
+        return (
+            f"A single squeeze of {fixed_n:g} N recognises {rate} in {seconds:.2f} s from contact. Choosing the "
+            "next squeeze does not reach this rate in less time, at any threshold."
+        )
+    point, (value, (low, high)) = min(faster, key=lambda pair: pair[1][0])
+    return (
+        f"Choosing the next squeeze saves time: with {point.name}, {point.rate_text} are recognised in "
+        f"{point.cost:.2f} s "
+        f"from contact. A single squeeze of {fixed_n:g} N needs {seconds:.2f} s for {rate}. The saving is "
+        f"{-value:.2f} s (95 %: {-high:.2f} to {-low:.2f})."
+    )
+
+
+def _cells(point: TradePoint, difference: Difference | None, saved: Difference | None) -> tuple[str, ...]:
+    squeezes = [one.squeezes or 0.0 for one in point.condition.by_seed.values()]
+    return (
+        point.name,
+        f"{point.cost:.2f}",
+        f"{math.fsum(squeezes) / len(squeezes):.2f}",
+        percent(point.condition.rate.mean),
+        span(point.condition.rate.interval),
+        "" if difference is None else f"{100 * difference[0]:+.1f}",
+        "" if difference is None else " to ".join(f"{100 * x:+.1f}" for x in difference[1]),
+        "" if saved is None else f"{saved[0]:+.2f}",
+        "" if saved is None else " to ".join(f"{x:+.2f}" for x in saved[1]),
+        "yes" if point.on_front else "no",
+    )
+
+
+def _seconds_minus(condition: ConditionResult, other: ConditionResult) -> Difference | None:
+    """Return the seconds of one condition minus another's, paired by seed, with a 95 % interval by Student's t."""
+    from scipy.special import stdtrit
+
+    each = [
+        (result.cost or 0.0) - (other.by_seed[seed].cost or 0.0)
+        for seed, result in condition.by_seed.items()
+        if seed in other.by_seed
+    ]
+    if len(each) < 2:
+        return None
+    mean = math.fsum(each) / len(each)
+    variance = math.fsum((value - mean) ** 2 for value in each) / (len(each) - 1)
+    half = float(stdtrit(len(each) - 1, 0.975)) * math.sqrt(variance / len(each))
+    return mean, (mean - half, mean + half)

@@ -1,0 +1,82 @@
+"""A grasp reduced to what a page draws: gap, force and phase over time, at a few hundred instants."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.core.signals import Phase
+
+if TYPE_CHECKING:
+    from graspsense.core.trace import Trace
+
+INSTANTS: Final = 240
+"""Instants kept per grasp, equally spaced in ticks. The ticks around each change of phase are kept as well."""
+
+
+@frozen(kw_only=True)
+class GraspCurve:
+    """One grasp over time. A missing value is None.
+
+    Times count from the contact of both pads, which is the change from approach to squeeze, or from the start if there
+    was no contact. `force_n` is the mean of both pads.
+    """
+
+    label: str
+    trial: int
+    """Number of the trial within its task or store."""
+    t_s: tuple[float | None, ...]
+    gap_mm: tuple[float | None, ...]
+    force_n: tuple[float | None, ...]
+    phase: tuple[str, ...]
+    time_unit: str = "s"
+
+    def until_release(self) -> GraspCurve:
+        """Return the curve up to where the fingers open again."""
+        end = self.phase.index("release") if "release" in self.phase else len(self.phase)
+        return GraspCurve(
+            label=self.label,
+            trial=self.trial,
+            t_s=self.t_s[:end],
+            gap_mm=self.gap_mm[:end],
+            force_n=self.force_n[:end],
+            phase=self.phase[:end],
+            time_unit=self.time_unit,
+        )
+
+    @property
+    def time_words(self) -> str:
+        """The unit of time, in words."""
+        return "seconds" if self.time_unit == "s" else self.time_unit
+
+    @property
+    def peak_force_n(self) -> float:
+        """The largest force; NaN if there is none."""
+        return max((force for force in self.force_n if force is not None), default=float("nan"))
+
+
+def grasp_curve(trace: Trace, label: str, trial: int) -> GraspCurve:
+    """Return the curve of a trace."""
+    n = len(trace)
+    instants = set(np.linspace(0, n - 1, min(n, INSTANTS)).round().astype(int).tolist())
+    changes = np.flatnonzero(np.diff(trace.phase)) + 1
+    instants |= {int(k) for k in changes} | {int(k) - 1 for k in changes}
+    chosen = sorted(instants)
+    squeezed = np.flatnonzero(trace.phase >= int(Phase.SQUEEZE))
+    zero = float(trace.t_s[squeezed[0]]) if len(squeezed) else (float(trace.t_s[0]) if n else 0.0)
+    force = (trace.force_left_n[chosen] + trace.force_right_n[chosen]) / 2.0
+    return GraspCurve(
+        label=label,
+        trial=trial,
+        t_s=_rounded(trace.t_s[chosen] - zero, 4),
+        gap_mm=_rounded(trace.gap_m[chosen] * 1e3, 3),
+        force_n=_rounded(force, 3),
+        phase=tuple(Phase(int(phase)).name.lower() for phase in trace.phase[chosen]),
+        time_unit=trace.units.get("t", "s"),
+    )
+
+
+def _rounded(values: Any, digits: int) -> tuple[float | None, ...]:
+    return tuple(None if np.isnan(value) else round(float(value), digits) for value in values)
