@@ -1,4 +1,4 @@
-"""What came out of an experiment beyond its rates: an answer, tables, and what is drawn of it."""
+"""The findings of an experiment beyond its rates: an answer, tables and pictures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MARKDOWN: Final = "report.md"
 
 @frozen(kw_only=True)
 class FoundTable:
-    """A table of plain texts; columns from `numbers` on are numbers."""
+    """A table of plain texts; columns from index `numbers` on are numbers."""
 
     id: str
     title: str
@@ -27,7 +27,7 @@ class FoundTable:
     numbers: int = 99
 
     def section(self, drawn: str = "") -> Section:
-        """Return it as a part of a page, below what is drawn of it."""
+        """Return the section of the table; `drawn` is the picture above it."""
         body = (paragraph(self.note) if self.note else "") + drawn
         return Section(
             id=self.id, title=self.title, body=body + table(self.title, self.header, self.rows, self.numbers)
@@ -35,7 +35,7 @@ class FoundTable:
 
     @property
     def markdown(self) -> list[str]:
-        """Return it as lines of Markdown."""
+        """The table as lines of Markdown."""
         lines = [f"## {self.title}", ""]
         if self.note:
             lines += [self.note, ""]
@@ -48,25 +48,25 @@ class FoundTable:
 
 @frozen(kw_only=True)
 class Findings:
-    """What came out. `drawn` are pictures by the id of the table above which they stand; `values` go into the JSON."""
+    """The findings. `drawn` has a picture for the id of a table; `values` go into the JSON output."""
 
     answer: str
     tables: tuple[FoundTable, ...] = ()
     notes: tuple[str, ...] = ()
-    """What a reader has to know beside the answer."""
+    """What a reader must know besides the answer."""
     drawn: Mapping[str, str] = field(factory=dict)
     sections: tuple[Section, ...] = ()
     values: Mapping[str, Any] = field(factory=dict)
 
     def page_sections(self) -> list[Section]:
-        """Return the tables with what is drawn of them, then the further parts."""
+        """Return the tables with their pictures, then the notes and the further sections."""
         found = [one.section(self.drawn.get(one.id, "")) for one in self.tables]
         if self.notes:
             found.append(Section(id="notes", title="Notes", body=bullets(self.notes)))
         return [*found, *self.sections]
 
     def markdown(self, title: str, made: Mapping[str, Any], cpu_seconds: float) -> str:
-        """Return it as Markdown, with the command, date and machine that made it."""
+        """Return the findings as Markdown, with the command, date and machine."""
         git = (made.get("git") or {}).get("graspsense") or {}
         commit = str(git.get("commit", "unknown"))[:12] + (" with changes" if git.get("dirty") else "")
         lines = [
@@ -88,7 +88,7 @@ class Findings:
 
 
 def write_markdown(path: Path, text: str) -> None:
-    """Write the Markdown beside the page."""
+    """Write the Markdown file."""
     path.write_text(text, encoding="utf-8")
 
 
@@ -103,7 +103,7 @@ def span(interval: Sequence[float]) -> str:
 
 
 def code(text: str) -> str:
-    """Return text as it stands, for a page."""
+    """Return preformatted text, for a page."""
     return f'<pre tabindex="0" role="region" aria-label="text">{escape(text)}</pre>'
 
 

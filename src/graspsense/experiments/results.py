@@ -1,10 +1,10 @@
-"""Results on the disk: a folder with one file a task, each whole or not there.
+"""Results on the disk: a folder with one file per task, each complete or absent.
 
 OUT/experiment.toml   the experiment with every value filled in; it runs again by itself
 OUT/pipelines/*.toml  the resolved pipelines that it names
 OUT/parts/*.toml      the experiments that it consists of, likewise
 OUT/provenance.json   versions, commit, machine, hashes of the files that were read
-OUT/results/KEY.json  what came of a task, written and flushed when it was done
+OUT/results/KEY.json  the result of a task, written and flushed when it ended
 OUT/report.html       the page
 """
 
@@ -46,15 +46,15 @@ class Results:
     folder: Path
 
     def path(self, key: str) -> Path:
-        """Return where what came of a task lies."""
+        """Return the file of the result of a task."""
         return self.folder / RESULTS / f"{key}.json"
 
     def add(self, done: TaskResult) -> None:
-        """Keep what came of a task; when this returns the disk has it. Raises SaveFailed."""
+        """Store the result of a task; when this returns, it is on the disk. Raises SaveFailed."""
         _write(self.path(done.key), done.to_text() + "\n")
 
     def get(self, key: str) -> TaskResult | None:
-        """Return what came of a task; None where nothing did, or where its file is not whole."""
+        """Return the result of a task; None if there is none or its file is incomplete."""
         try:
             done = TaskResult.from_text(self.path(key).read_text(encoding="utf-8"))
         except (OSError, ValueError, KeyError, TypeError):
@@ -62,16 +62,16 @@ class Results:
         return done if done.key == key else None
 
     def of(self, keys: Sequence[str]) -> dict[str, TaskResult]:
-        """Return what came of these tasks, in their order, without those of which nothing did."""
+        """Return the results of those of these tasks that have one, in their order."""
         found = ((key, self.get(key)) for key in keys)
         return {key: done for key, done in found if done is not None}
 
     def any(self) -> bool:
-        """Whether there are results here already."""
+        """Whether the folder has results."""
         return next((self.folder / RESULTS).glob("*.json"), None) is not None
 
     def begin(self, planned: Planned, command: str) -> None:
-        """Write what the results follow from beside them. Raises SaveFailed."""
+        """Write the experiment, its pipelines and its provenance next to the results. Raises SaveFailed."""
         texts = {f"{name}.toml": to_toml(one) for name, one in planned.pipelines.items()}
         for name, text in texts.items():
             _write(self.folder / PIPELINES / name, text)
@@ -91,7 +91,7 @@ class Results:
         _write(self.folder / PROVENANCE, json.dumps(provenance, indent=2, ensure_ascii=False) + "\n")
 
     def provenance(self) -> dict[str, Any]:
-        """Return what `begin` wrote, nothing where it cannot be read."""
+        """Return the provenance that `begin` wrote; empty if it cannot be read."""
         try:
             found = json.loads((self.folder / PROVENANCE).read_text(encoding="utf-8"))
         except (OSError, ValueError):
@@ -100,7 +100,7 @@ class Results:
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Hold the folder: no other run writes here meanwhile. Raises ConfigError, SaveFailed."""
+        """Lock the folder against other runs. Raises ConfigError if another run has it, SaveFailed."""
         try:
             (self.folder / RESULTS).mkdir(parents=True, exist_ok=True)
             (self.folder / PIPELINES).mkdir(exist_ok=True)
@@ -122,7 +122,7 @@ class Results:
 
 
 def resolved(planned: Planned) -> str:
-    """Return the experiment as a file with every value filled in."""
+    """Return the experiment as a file with all values."""
     values: dict[str, Any] = plain(planned.experiment)
     values["seeds"] = list(planned.seeds)
     if planned.parts:
@@ -150,7 +150,7 @@ def resolved(planned: Planned) -> str:
 
 
 def _unswept(planned: Planned) -> list[Any]:
-    """Return the classifiers that the pipelines brought, where the sweep does not change them."""
+    """Return the classifiers of the pipelines, unless the sweep changes them."""
     swept = any(key.split(".")[0] == "classifier" for key in planned.experiment.sweep)
     varied = any(one.classifier for one in planned.experiment.variants)
     return [] if swept or varied else list(planned.cases[0].learners)

@@ -1,4 +1,4 @@
-"""Running an experiment: what is missing is done, kept at once, and accounted for in the end."""
+"""Running an experiment: the missing tasks are run, and each result is stored at once."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Account:
 
     @property
     def missing(self) -> int:
-        """Tasks of which nothing came."""
+        """Tasks without a result."""
         return self.total - self.kept - self.done - len(self.failed)
 
     @property
@@ -43,7 +43,7 @@ class Account:
 
     @property
     def words(self) -> str:
-        """Return it in a sentence."""
+        """The account in a sentence."""
         parts = [f"{self.done} done now"]
         if self.kept:
             parts.append(f"{self.kept} kept from before")
@@ -64,7 +64,7 @@ def run_experiment(
     progress: Callable[[str, int, int], None] | None = None,
     said: Callable[[str], None] | None = None,
 ) -> Account:
-    """Do every task that has no result yet, and return what came of it.
+    """Run every task that has no result yet, and return the account of the run.
 
     `executor` is asked for only where something is missing. Ctrl-C, the workers' end and a disk that takes no
     further result stop the run; what was done until then is kept. Raises ConfigError where there are results
@@ -124,7 +124,7 @@ def run_experiment(
 
 
 def _notes(known: Sequence[TaskResult]) -> list[str]:
-    """Return what differs between what made the results that are there and what runs now."""
+    """Return the differences between the versions of the existing results and those of this process."""
     found: list[str] = []
     for one in known:
         for line in differences(versions(), one.made.get("versions", {})):

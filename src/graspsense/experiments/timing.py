@@ -1,4 +1,4 @@
-"""How long the rest will take, said no more exactly than is known."""
+"""An estimate of the remaining time, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 
 class TimeLeft:
-    """The time that is left for the rest of `total` tasks, from how long those that are done have taken.
+    """The remaining time for `total` tasks, from the durations of those that ended.
 
     The first task of each worker is left out where others are known: it imports and compiles.
     """
@@ -20,12 +20,12 @@ class TimeLeft:
         self._begun = clock()
 
     def add(self, seconds: float) -> None:
-        """Take in that a task is done."""
+        """Add the duration of a task that ended."""
         self._seconds.append(seconds)
 
     @property
     def bounds_s(self) -> tuple[float, float] | None:
-        """Two standard errors below and above the estimate; None where nothing can be said yet."""
+        """Two standard errors below and above the estimate; None if there is no estimate yet."""
         rest = self.total - len(self._seconds)
         known = self._seconds[self.workers :]
         if len(known) < 2:
@@ -39,7 +39,7 @@ class TimeLeft:
 
     @property
     def words(self) -> str:
-        """Return it as a person reads it."""
+        """The estimate in words."""
         bounds = self.bounds_s
         if bounds is None:
             return f"time left not known yet ({_short(self._clock() - self._begun)} so far)"

@@ -1,4 +1,4 @@
-"""Which versions a process works with, and how two processes differ."""
+"""The versions that a process uses, and the differences between two processes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LIBRARIES: Final = ("numpy", "scipy", "scikit-learn", "numba")
 
 @cache
 def versions() -> Mapping[str, str]:
-    """Return the version of everything that a result may follow from: Python, libraries, plugins, processor."""
+    """Return the versions that a result may depend on: Python, libraries, plugins, processor."""
     found = {"python": platform.python_version(), "graspsense": __version__, "machine": platform.machine()}
     for name in _LIBRARIES:
         try:
@@ -31,7 +31,7 @@ def versions() -> Mapping[str, str]:
 
 
 def differences(here: Mapping[str, str], there: Mapping[str, str]) -> list[str]:
-    """Return in words what differs between two processes."""
+    """Return the differences between two processes, in words."""
     return [
         f"{name}: {here.get(name, 'not installed')} here, {there.get(name, 'not installed')} there"
         for name in sorted(here.keys() | there.keys())

@@ -1,4 +1,4 @@
-"""Where labelled trials come from: a CSV of features, a data set that a plugin reads, or the simulator."""
+"""Sources of labelled trials: a CSV of features, a data set that a plugin reads, or simulation."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ class TrialSource(Group):
 
     source: str = SIMULATED
     only: str | None = None
-    """Only trials of this class, what is before the colon of a label."""
+    """Use the trials of this class only."""
     groups: tuple[Group, ...] = ()
-    """simulated: several groups of trials in place of the one that the keys of this table describe."""
+    """simulated: several groups of trials, in place of the one that the keys of this table describe."""
     label: str | None = None
-    """CSV: the column that says what was grasped. Likewise `instance` and `order`."""
+    """CSV: the column with the label. Likewise `instance` and `order`."""
     instance: str | None = None
     order: str | None = None
     columns: tuple[str, ...] = ()
-    """CSV: the columns to learn from; none stands for all numbers."""
+    """CSV: the columns to learn from; empty for all columns of numbers."""
     before: tuple[str, ...] = ()
-    """CSV: columns known before any contact."""
+    """CSV: columns that are known before contact."""
     unreliable: bool = False
-    """Data set: whether to take in what its author calls unreliable."""
+    """Data set: whether to include trials that its author calls unreliable."""
 
     @property
     def kind(self) -> Kind:
-        """What kind of source it is. Raises ConfigError where it is none."""
+        """The kind of source. Raises ConfigError if the text names no source."""
         return kind_of(self.source)
 
 
 def kind_of(source: str) -> Kind:
-    """Return what kind of source this names. Raises ConfigError where it is none."""
+    """Return the kind of source that this text names. Raises ConfigError if it names none."""
     if source == SIMULATED:
         return "simulated"
     if source.lower().endswith((".csv", ".tsv", ".txt")) or Path(source).is_file():

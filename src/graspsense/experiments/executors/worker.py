@@ -10,7 +10,7 @@ import sys
 
 
 def main() -> None:
-    """Work until there is no further line."""
+    """Run tasks until the input ends."""
     # Whatever else prints to standard output, here or in a library below, goes to standard error.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
