@@ -23,6 +23,7 @@ from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
 from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.timing import TimeLeft
+from graspsense.store.store import Store
 
 EXPERIMENT = """
 title = "Near ones"
@@ -371,6 +372,15 @@ def test_an_experiment_is_not_a_part_of_itself(tmp_path):
         read_experiment(str(tmp_path / "itself.toml"))
     with pytest.raises(ConfigError, match=r"cannot be a part of itself: a\.toml > b\.toml > a\.toml"):
         read_experiment(str(tmp_path / "a.toml"))
+
+
+def test_an_experiment_does_not_write_into_a_store(run, file, tmp_path):
+    Store.open(tmp_path / "trials").close()
+    code, _, err = run("experiment", file, "--out", tmp_path / "trials", "--executor", "serial")
+
+    assert code == 2
+    assert "is a store of trials" in err
+    assert not (tmp_path / "trials" / "report.html").exists()
 
 
 def test_a_slip_in_the_number_of_seeds_is_refused_at_once(file):

@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+from attrs import evolve
 from kept import begun, ended, keep, write_recording
 from mcap.reader import make_reader
 
@@ -101,6 +102,7 @@ def test_a_recording_that_is_being_written_is_left_alone(store):
     file = write_recording(store.recordings / "a.mcap", 100, ended(), finish=False)
     (found,) = recover_store(store)
     assert (found.what, found.why) == ("busy", "it is being written")
+    assert verify_store(store.folder).unfinished == ()
     file.finish()
     assert [one.what for one in recover_store(store)] == ["added"]
 
@@ -140,6 +142,15 @@ def test_a_lost_database_is_made_again_from_the_recordings(store):
         assert [one.what for one in recover_store(new)] == ["added"] * len(numbers)
         after = [(one.label, one.outcome, new.trial(one.id).result.features.values) for one in new.page()]
     assert sorted(after) == sorted(before)
+
+
+def test_recordings_without_a_database_get_their_numbers_in_the_order_of_recording(store):
+    for name, hour in (("c.mcap", 10), ("a.mcap", 11), ("b.mcap", 9)):
+        record = evolve(ended(label=f"hour:{hour}"), made_at=f"2026-11-21T{hour:02}:00:00.000+00:00")
+        write_recording(store.recordings / name, 60, record)
+    recover_store(store)
+
+    assert [one.label for one in reversed(store.page())] == ["hour:9", "hour:10", "hour:11"]
 
 
 def test_a_damaged_file_alone_is_written_anew_as_far_as_it_can_be_read(tmp_path):

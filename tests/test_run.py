@@ -252,3 +252,17 @@ def test_a_full_disk_under_stdout_is_told_without_a_traceback(arguments):
     assert ran.returncode == 2
     assert ran.stderr.splitlines()[-1] == "graspsense: No space left on device"
     assert "Traceback" not in ran.stderr
+
+
+def test_a_label_and_the_object_of_a_simulated_gripper_agree(tmp_path):
+    store = str(tmp_path / "kept")
+    plain = ("run", "--json", "--save", store, "-o", "classifier.type=none")
+    told = graspsense(*plain, "--label", "can:full_open")
+    assert told.returncode == 0, told.stderr
+    with Store.read(store) as opened:
+        assert opened.trial(1).record.settings["gripper"]["object"] == "can:full_open"
+    refused = graspsense(*plain, "--label", "can:full_open", "--object", "can:empty_open")
+    assert refused.returncode == 2
+    assert "label and object must agree" in refused.stderr
+    with Store.read(store) as opened:
+        assert len(opened.page()) == 1

@@ -6,6 +6,7 @@ import struct
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 
 import pytest
 from kept import ended, keep, write_recording
@@ -17,7 +18,7 @@ from graspsense.store import schema
 from graspsense.store.labels import labels_of
 from graspsense.store.recover import recover_store
 from graspsense.store.store import Store
-from graspsense.store.verify import verify_store
+from graspsense.store.verify import verify_file, verify_store
 
 
 @pytest.fixture
@@ -311,8 +312,11 @@ def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
                 kept += 1
         assert "full" in str(told.value) or "No space" in str(told.value)
         assert kept >= 1
+    with suppress(OSError):  # and every last byte
+        (disk / "filler").write_bytes(b"x" * 10_000_000)
     found = verify_store(disk)
     assert (found.trials, found.problems) == (kept, ())
+    assert verify_file(disk / "store.sqlite").trials == kept
 
 
 def test_a_grasp_ends_as_it_would_have_when_the_disk_fills_up_under_it(mounted):

@@ -71,7 +71,7 @@ def collect(
         # A pipeline may name the model that these trials are for.
         talk(f"note: collecting without predictions: {str(error).splitlines()[0]}")
         options = (*options, *GRIPPER_ALONE)
-    finds = first.values["gripper"].get("object") is not None
+    finds = bool(first.gripper.create().objects())
 
     def settings_for(word: str, number: int) -> Settings:
         return settings_of(pipeline, gripper, word if finds else object_name, options, number)

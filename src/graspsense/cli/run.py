@@ -62,6 +62,14 @@ def run(
     if explain_model:
         options = (*options, "gripper.explain=true")
     settings = settings_of(pipeline, gripper, object_name, options, seed)
+    if label is not None and not agrees(settings, label):
+        if object_name is not None or any(one.startswith("gripper.object=") for one in options):
+            raise click.UsageError(
+                f"--label {label} is not what the gripper holds, which is {settings.values['gripper']['object']}: a "
+                "simulated gripper grasps what it is told, so label and object must agree. Leave --object out to grasp "
+                "what the label says"
+            )
+        settings = settings_of(pipeline, gripper, label, options, seed)
     check(settings)
     if dry_run:
         _say_what_would_be_done(settings, as_json)
@@ -94,6 +102,17 @@ def run(
         raise click.exceptions.Exit(EXIT_NOT_KEPT)
     if trial.outcome in (Outcome.ABORTED, Outcome.DEVICE_LOST):
         raise click.exceptions.Exit(EXIT_ABORTED)
+
+
+def agrees(settings: Settings, label: str) -> bool:
+    """Return whether this label can be that of what the gripper holds, as far as the gripper can be told what that is.
+
+    A file of an object can be labelled with any name, a real gripper holds what is really there.
+    """
+    held = str(settings.values["gripper"].get("object") or "").partition("#")[0]
+    known = {name for kind in settings.gripper.create().objects() for name in kind.full_names}
+    named = label.partition("#")[0]
+    return held == named or not known & {held, named}
 
 
 def draw_grasp(trial: Trial, path: Path) -> None:

@@ -17,6 +17,10 @@ from graspsense.experiments.versions import differences, versions
 from graspsense.recording.atomic_file import SaveFailed
 
 
+STORE_FILE = "store.sqlite"
+"""The file by which a folder is a store of trials; this room does not know the store itself."""
+
+
 @frozen(kw_only=True)
 class Account:
     """What came of a run: of `total` tasks so many were `kept` from before, `done`, and `failed`; the rest is missing.
@@ -71,6 +75,11 @@ def run_experiment(
     already and `resume` is not set, SaveFailed where nothing can be written to begin with.
     """
     tasks = list({task.key: task for task in planned.tasks()}.values())
+    if (results.folder / STORE_FILE).exists():
+        raise ConfigError(
+            f"{results.folder} is a store of trials, and the page of an experiment would replace its own: name another "
+            "folder by --out"
+        )
     with results.alone():
         if results.any() and not resume:
             raise ConfigError(

@@ -90,12 +90,12 @@ def connect_read_only(path: Path) -> tuple[sqlite3.Connection, Path | None]:
         return connection, None
     except sqlite3.OperationalError as error:
         connection.close()
-        if error.sqlite_errorcode & 0xFF not in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY):
+        if error.sqlite_errorcode & 0xFF not in _NO_SHARED_MEMORY:
             raise
     except BaseException:
         connection.close()
         raise
-    # A read-only disk has no place for the shared-memory file of readers. There is no writer either, so none is needed.
+    # A read-only or full disk has no place for the shared-memory file of readers. Without a writer none is needed.
     log = path.with_name(path.name + "-wal")
     if log.is_file() and log.stat().st_size:
         copy = Path(tempfile.mkdtemp(prefix="graspsense-"))
@@ -103,6 +103,15 @@ def connect_read_only(path: Path) -> tuple[sqlite3.Connection, Path | None]:
             shutil.copyfile(source, copy / source.name)
         return sqlite3.connect(copy / path.name, isolation_level=None), copy
     return sqlite3.connect(f"file:{name}?immutable=1", uri=True, isolation_level=None), None
+
+
+_NO_SHARED_MEMORY: Final = (
+    sqlite3.SQLITE_CANTOPEN,
+    sqlite3.SQLITE_READONLY,
+    sqlite3.SQLITE_FULL,
+    sqlite3.SQLITE_IOERR,
+)
+"""Results where the shared-memory file of readers cannot be made."""
 
 
 @contextmanager

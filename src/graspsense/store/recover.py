@@ -69,9 +69,10 @@ def recover_store(store: Store) -> list[Recovered]:
         with _locked(path) as mine:
             if mine:  # an unfinished copy, whose original still exists
                 path.unlink()
-    for path in sorted(folder.glob("*.mcap")):
-        if path.name not in known:
-            results.append(_add_row(store, path))
+    without_row = [path for path in folder.glob("*.mcap") if path.name not in known]
+    # With several of them the database is lost: their trials get their numbers in the order of recording.
+    for path in sorted(without_row, key=_made_at) if len(without_row) > 1 else without_row:
+        results.append(_add_row(store, path))
     for path in sorted(folder.glob(f"*.mcap{PART}")):
         with _locked(path) as mine:
             if not mine:
@@ -122,6 +123,14 @@ def write_copy(grasp: RecordedGrasp, path: Path) -> RecordingInfo:
     except BaseException:
         file.remove()
         raise
+
+
+def _made_at(path: Path) -> tuple[str, str]:
+    """Return when a recording was made, then its name; a recording that cannot be read comes first."""
+    try:
+        return read_recorded(path).record().made_at, path.name
+    except GraspsenseError:
+        return "", path.name
 
 
 def _complete(store: Store, part: Path) -> Recovered:
@@ -204,6 +213,15 @@ def _beside(path: Path) -> Path:
 def _why(grasp: RecordedGrasp) -> str:
     lost = f"; {grasp.lost} messages in it are lost" if grasp.lost else ""
     return (grasp.damage or "it has no end") + lost
+
+
+def is_being_written(path: Path) -> bool:
+    """Return whether a writer is at work on this file; a file that has gone in the meantime is finished."""
+    try:
+        with _locked(path) as mine:
+            return not mine
+    except ConfigError:
+        return True
 
 
 @contextmanager

@@ -12,7 +12,8 @@ from attrs import frozen
 from graspsense.core.errors import DataDamaged, GraspsenseError
 from graspsense.recording.layout import PART
 from graspsense.recording.reader import read_recorded
-from graspsense.store.recover import CUT
+from graspsense.store.opening import FILE
+from graspsense.store.recover import CUT, is_being_written
 from graspsense.store.store import Store, integrity, stored_rows
 
 Progress = Callable[[int, int], None]
@@ -64,7 +65,8 @@ def verify_store(folder: str | Path, progress: Progress | None = None) -> Verifi
         unfinished = []
         for path in sorted(store.recordings.iterdir() if store.recordings.is_dir() else ()):
             if path.name.endswith(PART):
-                unfinished.append(f"{path.name} was never finished")
+                if not is_being_written(path):
+                    unfinished.append(f"{path.name} was never finished")
             elif path.suffix == ".mcap" and path.name not in names:
                 unfinished.append(f"{path.name} has no row")
             elif not path.name.endswith((".mcap", CUT)):
@@ -75,7 +77,12 @@ def verify_store(folder: str | Path, progress: Progress | None = None) -> Verifi
 
 
 def verify_file(path: str | Path) -> Verified:
-    """Check the checksums, the end and the message numbers of a recording. Raises ConfigError, DataDamaged."""
+    """Check the checksums, the end and the message numbers of a recording. Raises ConfigError, DataDamaged.
+
+    For the database of a store, check the store.
+    """
+    if Path(path).name == FILE:
+        return verify_store(Path(path).parent)
     read_recorded(path)
     return Verified(trials=0, recordings=1, problems=(), unfinished=())
 
