@@ -16,7 +16,6 @@ from graspsense.experiments.timing import TimeLeft
 from graspsense.experiments.versions import differences, versions
 from graspsense.recording.atomic_file import SaveFailed
 
-
 STORE_FILE = "store.sqlite"
 """The file by which a folder is a store of trials; this room does not know the store itself."""
 
