@@ -9,7 +9,7 @@ import pytest
 from graspsense.core.plugins import Component, IsolatedPlugins
 from graspsense.plugin_api import hookimpl
 from graspsense.testing import CHECKS, FLOOR, examine
-from graspsense.testing.checks import Report, Result, outcome_of
+from graspsense.testing.checks import ConformanceReport, Result, outcome_of
 from graspsense.testing.conformance import Examined
 from graspsense.testing.subject import Subject
 
@@ -69,7 +69,7 @@ def test_a_part_of_which_most_was_skipped_does_not_conform():
     results = [Result("lab/x", "classifier", f"c{i}", "t", "skipped", "no time") for i in range(12)]
     results += [Result("lab/x", "classifier", f"d{i}", "t", "passed") for i in range(7)]
 
-    (failure,) = Report(results).failures
+    (failure,) = ConformanceReport(results).failures
 
     assert failure.startswith(
         "lab/x: only 7 of 19 checks of a classifier ran, 15 must. Skipped: c0: no time;"

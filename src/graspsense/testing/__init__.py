@@ -16,7 +16,7 @@ Only the last two import pytest.
 
 from __future__ import annotations
 
-from graspsense.testing.checks import FLOOR, Check, Report, Result
+from graspsense.testing.checks import FLOOR, Check, ConformanceReport, Result
 from graspsense.testing.conformance import CHECKS, Conformance, Examined, examine, parametrize_checks
 
 __all__ = [
@@ -24,8 +24,8 @@ __all__ = [
     "FLOOR",
     "Check",
     "Conformance",
+    "ConformanceReport",
     "Examined",
-    "Report",
     "Result",
     "examine",
     "parametrize_checks",

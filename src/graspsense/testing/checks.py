@@ -105,7 +105,7 @@ def _place(error: BaseException) -> str:
 
 
 @define
-class Report:
+class ConformanceReport:
     """The results of the checks of one or several components."""
 
     results: list[Result] = field(factory=list)

@@ -11,7 +11,7 @@ from graspsense.core.errors import PluginUnavailable, UnknownName
 from graspsense.core.plugins import Component, Plugins, installed
 from graspsense.core.strict import keys_of
 from graspsense.testing import backend, classifier, controller, features, package
-from graspsense.testing.checks import Check, Report, Result, outcome_of
+from graspsense.testing.checks import Check, ConformanceReport, Result, outcome_of
 from graspsense.testing.subject import Package, Subject, package_of
 
 CHECKS: Final[Mapping[str, tuple[Check, ...]]] = {
@@ -79,7 +79,9 @@ class FloorCase:
         """Fail if too few checks of the component ran."""
         import pytest
 
-        report = Report([self.examined.result(self.subject, one) for one in checks_for(self.subject)])
+        report = ConformanceReport(
+            [self.examined.result(self.subject, one) for one in checks_for(self.subject)]
+        )
         print(report.counts())  # noqa: T201 (pytest shows it beside a failure, and with -rP)
         text = report.below_floor(self.subject.name, self.subject.role)
         if text:
@@ -115,9 +117,9 @@ class Examined:
                 yield BoundCheck(check, subject, self)
             yield FloorCase(subject, self)
 
-    def report(self, told: Callable[[Result], None] = lambda _: None) -> Report:
+    def report(self, told: Callable[[Result], None] = lambda _: None) -> ConformanceReport:
         """Run every check and return the results; `told` is called with each of them."""
-        report = Report()
+        report = ConformanceReport()
         for subject in self.subjects:
             for check in checks_for(subject):
                 result = self.result(subject, check)

@@ -58,7 +58,7 @@ class GraspCurveConfig:
     """Force on each pad at contact."""
 
 
-class GraspCurve(FeatureSet[GraspCurveConfig]):
+class GraspCurveFeatures(FeatureSet[GraspCurveConfig]):
     """Extracts the eight features of the table above."""
 
     def extract(self, trace: Trace) -> Features:
@@ -80,7 +80,7 @@ class ChittaAndCurve(FeatureSet[GraspCurveConfig]):
         six = create("feature-set", "graspsense/chitta", contact_force_n=self.config.contact_force_n).extract(
             trace
         )
-        more = GraspCurve(self.config).extract(trace)
+        more = GraspCurveFeatures(self.config).extract(trace)
         return Features(
             names=six.names + more.names,
             values=six.values + more.values,

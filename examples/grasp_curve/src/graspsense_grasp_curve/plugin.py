@@ -43,7 +43,7 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
     )
     yield FeatureSetEntry(
         name="grasp-curve",
-        target="graspsense_grasp_curve.features:GraspCurve",
+        target="graspsense_grasp_curve.features:GraspCurveFeatures",
         config="graspsense_grasp_curve.features:GraspCurveConfig",
         summary="peak, stiffness ratio, hysteresis, relaxation and moments of the contact image",
         requires=channels,

@@ -13,7 +13,7 @@ from graspsense_c45.splits import ALL_VALUES, LEAF, GrowingTree
 from graspsense_c45.training_set import TrainingSet
 
 
-class Level(Protocol):
+class NodeLevel(Protocol):
     """The rows of all open nodes of one depth. An open node is one that may still be split."""
 
     def candidates(self) -> CandidateSplits:
@@ -29,7 +29,7 @@ class Level(Protocol):
         """Continue with these children; return their indices among all children, in the order of the new layout."""
 
 
-def grow(training: TrainingSet, level: Level) -> GrowingTree:
+def grow(training: TrainingSet, level: NodeLevel) -> GrowingTree:
     """Return the unpruned tree, whose thresholds are midpoints.
 
     `depthfirst.growing.grow` grows the same tree; `tests/test_engines.py` holds the two equal to the bit.

@@ -40,7 +40,7 @@ class _Block:
 
 
 class UnweightedLevel:
-    """The open nodes of a depth; see `growing.Level`. leaf_of_row: the node that each row has come to."""
+    """The open nodes of a depth; see `growing.NodeLevel`. leaf_of_row: the node that each row has come to."""
 
     def __init__(self, training: TrainingSet) -> None:
         self._training = training
@@ -58,7 +58,7 @@ class UnweightedLevel:
         self._measure()
 
     def candidates(self) -> CandidateSplits:
-        """See `growing.Level`."""
+        """See `growing.NodeLevel`."""
         training = self._training
         n_attributes, n_nodes = len(training.value_counts), len(self._sizes)
         candidates = CandidateSplits.none(n_attributes, n_nodes)
@@ -80,7 +80,7 @@ class UnweightedLevel:
         return candidates
 
     def thresholds(self, feature: Indices) -> Reals:
-        """See `growing.Level`."""
+        """See `growing.NodeLevel`."""
         low, high = np.zeros(feature.shape), np.full(feature.shape, np.nan)
         for block in self._blocks:
             nodes, at = self._begins(block, feature)
@@ -90,7 +90,7 @@ class UnweightedLevel:
         return midpoints(low, high)
 
     def split(self, feature: Indices, category: Indices, n_children: Indices) -> FixedPoint:
-        """See `growing.Level`."""
+        """See `growing.NodeLevel`."""
         training = self._training
         first_child = np.cumsum(n_children) - n_children
         n_all = int(n_children.sum())
@@ -108,7 +108,7 @@ class UnweightedLevel:
         return self._child_counts
 
     def descend(self, open_children: Mask) -> Indices:
-        """See `growing.Level`."""
+        """See `growing.NodeLevel`."""
         if not open_children.any():
             return np.zeros(0, dtype=np.int64)
         # Slot 0 marks rows that have come to a leaf, slot s + 1 rows that go to child s.

@@ -20,7 +20,7 @@ from graspsense_c45.training_set import TrainingSet
 
 
 class WeightedLevel:
-    """The open nodes of a depth; see `growing.Level`.
+    """The open nodes of a depth; see `growing.NodeLevel`.
 
     leaf_of_row: the node that each row has come to, where no value is missing.
     """
@@ -43,7 +43,7 @@ class WeightedLevel:
         self.leaf_of_row = np.zeros(n, dtype=np.int32)
 
     def candidates(self) -> CandidateSplits:
-        """See `growing.Level`."""
+        """See `growing.NodeLevel`."""
         training = self._training
         n_nodes = len(self._node_weight)
         candidates = CandidateSplits.none(len(training.value_counts), n_nodes)
@@ -64,7 +64,7 @@ class WeightedLevel:
         return candidates
 
     def thresholds(self, feature: Indices) -> Reals:
-        """See `growing.Level`."""
+        """See `growing.NodeLevel`."""
         training = self._training
         self._threshold = np.full(feature.shape, np.nan)
         for a in self._numeric:
@@ -77,7 +77,7 @@ class WeightedLevel:
         return self._threshold
 
     def split(self, feature: Indices, category: Indices, n_children: Indices) -> FixedPoint:
-        """See `growing.Level`."""
+        """See `growing.NodeLevel`."""
         training = self._training
         first_child = np.cumsum(n_children) - n_children
         n_all = int(n_children.sum())
@@ -103,7 +103,7 @@ class WeightedLevel:
         return self._child_counts
 
     def descend(self, open_children: Mask) -> Indices:
-        """See `growing.Level`."""
+        """See `growing.NodeLevel`."""
         n_old, n_slots = len(self._rows), int(self._n_children.max(initial=0))
         rows, weights, nodes, children = [], [], [], []
         maps = []

@@ -27,7 +27,7 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.plant import Steps
 from graspsense_sim_gripper.problem import ControllerStep, GraspController, Problem
 from graspsense_sim_gripper.reduction.levels import Level
-from graspsense_sim_gripper.reduction.model import Decision, Reduction, Verification
+from graspsense_sim_gripper.reduction.model import Reduction, TermDecision, Verification
 from graspsense_sim_gripper.terms.registry import laws_of
 from graspsense_sim_gripper.terms.term import WorkingPoint
 
@@ -190,9 +190,9 @@ def _from_values(values: dict[str, Json]) -> Reduction:
             "treatment": tuple(values["treatment"]),
             "point": WorkingPoint(**values["point"]),
             "steps": Steps(**values["steps"]),
-            "decisions": tuple(Decision(**decision) for decision in values["decisions"]),
-            "scheme": Decision(**values["scheme"]),
-            "contact": Decision(**values["contact"]),
+            "decisions": tuple(TermDecision(**decision) for decision in values["decisions"]),
+            "scheme": TermDecision(**values["scheme"]),
+            "contact": TermDecision(**values["contact"]),
             "level": Level(**values["level"]),
             "verification": None if verification is None else Verification(**verification),
         }

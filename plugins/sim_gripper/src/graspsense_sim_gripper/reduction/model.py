@@ -17,7 +17,7 @@ FORCE_MARGIN: Final = 1.5
 
 
 @frozen(kw_only=True)
-class Decision:
+class TermDecision:
     """What became of a term: kept, a limit or dropped; the number that decided; the error that it may cause."""
 
     term: str
@@ -47,9 +47,9 @@ class Reduction:
     """For each term `kept`, `dropped` or the name of its limit; the last entry is that of the pads."""
     point: WorkingPoint
     steps: Steps
-    decisions: tuple[Decision, ...]
-    scheme: Decision
-    contact: Decision
+    decisions: tuple[TermDecision, ...]
+    scheme: TermDecision
+    contact: TermDecision
     """Whether the peak force of a contact this stiff is resolved."""
     error: float
     """Relative error of the force that leaving out terms may cause."""
@@ -71,7 +71,7 @@ class Reduction:
     def with_exact_discretisation(self) -> Reduction:
         """Return the same model where the exact discretisation of a linear scene replaces the steps."""
         what = "linear between changes of contact"
-        scheme = Decision(term="steps", decision="exact discretisation", what=what, number=0.0, error=0.0)
+        scheme = TermDecision(term="steps", decision="exact discretisation", what=what, number=0.0, error=0.0)
         return evolve(self, scheme=scheme)
 
     def as_values(self) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from graspsense_sim_gripper.reduction.levels import (
     step_tolerance,
     steps_for,
 )
-from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Decision, Reduction
+from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction, TermDecision
 from graspsense_sim_gripper.reduction.probe import Grip, damping, stiffness
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import NO_STATE, WorkingPoint, no_rates
@@ -74,7 +74,7 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = UNVERIFIED) -> Red
         point=grip.point,
         steps=_with_settings(steps_for(level, scheme, dt_s), config),
         decisions=decisions,
-        scheme=Decision(
+        scheme=TermDecision(
             term="steps",
             decision=SCHEMES[scheme],
             what="damping rate times tick",
@@ -134,12 +134,12 @@ def _oscillates(kind: str, params: TermParams, point: WorkingPoint) -> bool:
     return any(rate.what == "swings" for rate in term.rates(params, point))
 
 
-def _resolution(grip: Grip, dt_s: float) -> Decision:
+def _resolution(grip: Grip, dt_s: float) -> TermDecision:
     """Return whether the peak force of the contact is resolved, and its natural frequency times the tick."""
     within_tick, at_once = stiffness(grip, dt_s)
     number = math.sqrt(max(within_tick, 0.0) / grip.mass_kg) * dt_s
     resolved = max(within_tick, at_once) <= 1.05 * STIFFEST_N_M and number <= 1.05
-    return Decision(
+    return TermDecision(
         term="contact",
         decision="peak resolved" if resolved else "peak not resolved",
         what="natural frequency times tick",
@@ -148,11 +148,11 @@ def _resolution(grip: Grip, dt_s: float) -> Decision:
     )
 
 
-def _reduce(grip: Grip, max_error: float) -> tuple[tuple[str, ...], tuple[Decision, ...], float, Thing]:
+def _reduce(grip: Grip, max_error: float) -> tuple[tuple[str, ...], tuple[TermDecision, ...], float, Thing]:
     """Return what becomes of each term and of the pads, why, the error of all that, and the reduced model."""
     kinds, point = grip.kinds, grip.point
     treatment, errors, spent, model = [KEPT] * (len(kinds) + 1), [0.0] * len(kinds), 0.0, grip.model
-    decisions: list[Decision] = []
+    decisions: list[TermDecision] = []
     if max_error > 0.0:
         alternatives = grip.alternatives()
         # The terms that matter least are decided first, each for the cheapest candidate within the tolerance.
@@ -176,18 +176,20 @@ def _reduce(grip: Grip, max_error: float) -> tuple[tuple[str, ...], tuple[Decisi
     return tuple(treatment), tuple(decisions), spent, model
 
 
-def _pads_decision(grip: Grip, name: str, error: float) -> Decision:
+def _pads_decision(grip: Grip, name: str, error: float) -> TermDecision:
     share = grip.forces[0][-1] / grip.model.skins_n_m / max(grip.point.compression_m, 1e-9)
     what = "their compression over the total compression"
-    return Decision(term="pads", decision=name, what=what, number=share, error=error)
+    return TermDecision(term="pads", decision=name, what=what, number=share, error=error)
 
 
-def _term_decisions(grip: Grip, treatment: Sequence[str], errors: Sequence[float]) -> list[Decision]:
+def _term_decisions(grip: Grip, treatment: Sequence[str], errors: Sequence[float]) -> list[TermDecision]:
     decisions = []
     for i, kind in enumerate(grip.kinds):
         what, number = _deciding(kind, grip.model.terms[i + 1].params, grip.point)
         decision = treatment[i] if treatment[i] in (KEPT, DROPPED) else f"limit: {treatment[i]}"
-        decisions.append(Decision(term=kind, decision=decision, what=what, number=number, error=errors[i]))
+        decisions.append(
+            TermDecision(term=kind, decision=decision, what=what, number=number, error=errors[i])
+        )
     return decisions
 
 
