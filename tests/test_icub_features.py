@@ -108,7 +108,7 @@ def test_the_first_frame_alone_gives_the_class_away_before_any_touch(found):
 
     assert leak.rate.n == 203
     assert leak.rate.rate >= 0.9
-    assert any("before any contact" in warning for warning in found.warnings)
+    assert any("from before contact" in warning for warning in found.warnings)
 
 
 @real_data
