@@ -325,7 +325,7 @@ class Forgetful(Law):
 _grasps: list[float] = []
 
 
-@ruling("two-runs-do-not-meet", "keep nothing in the class")
+@ruling("two-runs-do-not-meet", "keep no state in the class")
 def _(command, after, frame):
     _grasps.append(frame.t_s)
     return command._replace(value=command.value + 1e-6 * len(_grasps)), after
