@@ -128,7 +128,7 @@ def press(
     # It comes with its speed, so that the tick of a slow controller does not blur it.
     motion = state.motion
     state = state._replace(motion=motion._replace(speed_rev_s=-speed_m_s / motion.jacobian_m_rev))
-    carrying = drive.coulomb_n + drive.damping_n_s_m * speed_m_s
+    carrying = drive.friction.coulomb_n + drive.friction.damping_n_s_m * speed_m_s
     forces = np.zeros(max(round(seconds / dt), 1))
     loop = _compiled(plant.setup.kinds) if fast and plant.by == "steps" else bind(_pressing, move=plant.move)
     state = loop(plant.params, state, carrying, effort_n, dt, forces)

@@ -65,7 +65,7 @@ def block() -> dict[str, float]:
 def eggs() -> dict[str, float]:
     crush = np.array(
         [
-            unverified_setup(SimConfig(), "egg", s).plant.thing.terms[1].params.crush_force_n
+            unverified_setup(SimConfig(), "egg", s).plant.object.terms[1].params.crush_force_n
             for s in range(EGGS)
         ]
     )

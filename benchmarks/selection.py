@@ -136,7 +136,7 @@ def controller_is_stable(setup: GraspSetup, reduction: Reduction) -> bool:
     in between.
     """
     loop = create("controller", "hybrid").config
-    dt, damping = setup.dt_s, setup.plant.drive.damping_n_s_m
+    dt, damping = setup.dt_s, setup.plant.drive.friction.damping_n_s_m
     mass = setup.plant.drive.inertia / setup.state.motion.jacobian_m_rev**2
     gain, integral = loop.velocity_gain_n_s_m, loop.integral_gain_n_m * setup.dt_s
     for stiffness in (0.0, mass * (reduction.contact.number / dt) ** 2):

@@ -40,7 +40,7 @@ from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue
-from graspsense_sim_gripper.plant import PlantParams
+from graspsense_sim_gripper.stepping.scheme import PlantParams
 
 HERE = Path(__file__).parent
 REPEATS = 7
@@ -205,17 +205,17 @@ def plant() -> dict[str, Any]:
     n = int(np.sum((trace.phase >= APPROACH) & (trace.phase <= HOLD)))
     us = run.u[:n]
     params: PlantParams = unverified_setup(config, config.object, 0).plant
-    drive, thing = params.drive, params.thing
+    drive, thing = params.drive, params.object
     _, rate = contact_rate(config)
     spring = 20000.0
-    stiffness = 1.0 / (1.0 / spring + 1.0 / thing.skins_n_m)
+    stiffness = 1.0 / (1.0 / spring + 1.0 / thing.pads.stiffness_n_m)
     way = config.open_gap_m - thing.width_m
 
     def model(count: int, repeats: int) -> Run:
         xml = NEAREST.format(
             step=1e-3 / count,
-            damping=drive.damping_n_s_m,
-            friction=drive.coulomb_n,
+            damping=drive.friction.damping_n_s_m,
+            friction=drive.friction.coulomb_n,
             mass=drive.inertia / rate**2,
             stiffness=stiffness,
             way=way,

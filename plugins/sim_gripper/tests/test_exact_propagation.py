@@ -70,7 +70,7 @@ def along(config, spec, efforts, *, exact=True, speed_m_s=0.0):
     for effort in efforts:
         state = move(params, state, effort, setup.dt_s)
         speed = -state.motion.speed_rev_s * state.motion.jacobian_m_rev
-        rows.append((setup.plant.thing.width_m - state.motion.gap_m, state.contact.left_n, speed))
+        rows.append((setup.plant.object.width_m - state.motion.gap_m, state.contact.left_n, speed))
     return *np.array(rows).T, state
 
 
@@ -325,7 +325,7 @@ def test_without_a_drive_stored_energy_does_not_increase(change, terms):
         q = state.contact.left.states[2][0] if "maxwell" in dict(terms) else 0.0
         cover = (
             0.05 - state.motion.gap_m - d
-            if setup.plant.thing.skins_n_m < math.inf and state.contact.left_n > 0
+            if setup.plant.object.pads.stiffness_n_m < math.inf and state.contact.left_n > 0
             else 0.0
         )
         stored = k * d * d + q * q / arm + (0.5 * config.skin_n_m * cover * cover if cover else 0.0)

@@ -47,7 +47,7 @@ def test_the_number_changes_nothing_else_of_a_trial():
     assert with_number.sensor == without.sensor
     assert with_number.plant.drive == without.plant.drive
     assert with_number.state.contact.offset_m == without.state.contact.offset_m
-    assert with_number.plant.thing.width_m != without.plant.thing.width_m
+    assert with_number.plant.object.width_m != without.plant.object.width_m
 
 
 def test_a_numbered_instance_has_the_model_of_all_of_its_kind():

@@ -8,23 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graspsense.plugin_api import bind, gap_and_rate, revolutions_at, straight_linkage
-from graspsense_sim_gripper.compiled.compose import plant_move, sum_of
+from graspsense.plugin_api import gap_and_rate, revolutions_at, straight_linkage
+from graspsense_sim_gripper.compiled.compose import bind_reachable, plant_move, sum_of
 from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
+from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, solve_contact
+from graspsense_sim_gripper.dynamics.drive import Drive, Friction, sliding_friction, stribeck_excess
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState
-from graspsense_sim_gripper.plant import (
-    EXPLICIT,
-    MEAN_FORCE,
-    STIFF,
-    Drive,
-    PlantParams,
-    Skin,
-    Steps,
-    Thing,
-    friction,
-    rubbing,
-    squeeze,
-)
+from graspsense_sim_gripper.stepping.scheme import EXPLICIT, MEAN_FORCE, STIFF, PlantParams, Steps
 from graspsense_sim_gripper.terms.elastic import Elastic, elastic
 from graspsense_sim_gripper.terms.foam import Foam
 from graspsense_sim_gripper.terms.gas import Gas
@@ -48,18 +38,20 @@ def drive(coulomb=7.0, breakaway=8.0, load=0.5, damping=10.0, link=LINK):
     return Drive(
         link=link,
         inertia=4 * math.pi**2 * 4e-7,
-        coulomb_n=coulomb,
-        breakaway_n=breakaway,
-        stribeck_m_s=0.002,
-        load_share=load,
-        damping_n_s_m=damping,
+        friction=Friction(
+            coulomb_n=coulomb,
+            breakaway_n=breakaway,
+            stribeck_m_s=0.002,
+            load_friction_coefficient=load,
+            damping_n_s_m=damping,
+        ),
         closed_rev=revolutions_at(link, 0.0),
         open_rev=revolutions_at(link, 0.086),
     )
 
 
 def thing(*terms, width=0.05, table=0.0, skins=inf):
-    return Thing(width, table, skins, tuple(terms))
+    return ObjectModel(width, table, PadCompliance(skins), tuple(terms))
 
 
 def at(gap, states=(), offset=0.0, speed_m_s=0.0, link=LINK):
@@ -119,19 +111,21 @@ def test_a_free_drive_falls_as_newton_says():
 
 @given(st.floats(-0.02, 0.02).filter(lambda v: abs(abs(v) - 0.009) > 1e-5))
 def test_what_friction_changes_by_is_its_slope_and_that_by_how_it_bends(speed_m_s):
-    numbers = drive()
-    more, slope, curved = rubbing(numbers, speed_m_s)
-    assert friction(numbers, speed_m_s, 4.0) == numbers.coulomb_n + 0.5 * 4.0 + more
-    ahead, behind = (rubbing(numbers, speed_m_s + h)[0] for h in (1e-7, -1e-7))
+    numbers = drive().friction
+    more, slope, curved = stribeck_excess(numbers, speed_m_s)
+    assert sliding_friction(numbers, speed_m_s, 4.0) == numbers.coulomb_n + 0.5 * 4.0 + more
+    ahead, behind = (stribeck_excess(numbers, speed_m_s + h)[0] for h in (1e-7, -1e-7))
     # The thousandth of a newton that is left of it at 9 mm/s is cut off there.
     assert slope == pytest.approx((ahead - behind) / 2e-7, rel=1e-5, abs=1e-4)
-    ahead, behind = (rubbing(numbers, speed_m_s + h)[1] for h in (1e-7, -1e-7))
+    ahead, behind = (stribeck_excess(numbers, speed_m_s + h)[1] for h in (1e-7, -1e-7))
     assert curved == pytest.approx((ahead - behind) / 2e-7, rel=1e-5, abs=0.1)
 
 
 def test_friction_that_changes_from_its_greatest_within_a_tick_is_seen():
     # It has no slope there: the fingers all but stand.
-    params = PlantParams(drive()._replace(stribeck_m_s=5e-4), thing(), Steps(2e-4))
+    numbers = drive()
+    numbers = numbers._replace(friction=numbers.friction._replace(stribeck_m_s=5e-4))
+    params = PlantParams(numbers, thing(), Steps(2e-4))
     start = at(0.06, (), speed_m_s=-1e-7)
     ends = [run(params, start, 60.0, TICK, laws=(), dt=dt) for dt in (TICK, 1e-6)]
     one, fine = (end.motion.speed_rev_s * end.motion.jacobian_m_rev for end in ends)
@@ -171,9 +165,9 @@ def test_the_reflected_mass_of_each_linkage(name, closed_kg, open_kg):
 
 
 def energy(params, state):
-    stiffness = params.thing.terms[0].k1_n_m
+    stiffness = params.object.terms[0].k1_n_m
     kinetic = 0.5 * params.drive.inertia * state.motion.speed_rev_s**2
-    return kinetic + 0.5 * stiffness * max(params.thing.width_m - state.motion.gap_m, 0.0) ** 2
+    return kinetic + 0.5 * stiffness * max(params.object.width_m - state.motion.gap_m, 0.0) ** 2
 
 
 @settings(max_examples=40, deadline=None)
@@ -253,7 +247,9 @@ def test_what_is_let_go_at_first_comes_back_from_the_tick_on_in_which_it_was(dam
     states = (NoState(), NoState())
     pressed, _ = law(params, states, 1e-3, 1e-3, 1e-3, 0.0)
     before = ContactState(1e-3, pressed, 0.0, states, 0.0, 0.0)
-    after = bind(squeeze, advance=law)(Thing(0.05, 0.0, inf, params), before, -1e-4, -1.0, 1e-3)
+    after = bind_reachable(solve_contact, {"object_force": law})(
+        ObjectModel(0.05, 0.0, PadCompliance(), params), before, -1e-4, -1.0, 1e-3
+    )
     assert after.force_n == 0.0
     assert after.compression_m < 1e-3
     rate = (after.compression_m - 1e-3) / 1e-3
@@ -405,7 +401,7 @@ def test_steps_that_grow_slowly_see_what_rings_after_a_touch(tolerance):
     # Half a kilogram behind a stiff contact, felt through covers that damp: it rings at some 200 rad/s.
     free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=0.0, link=STRAIGHT)
     free = free._replace(inertia=100.0 * STRAIGHT.pitch_m**2)
-    body = Thing(0.05, 0.0, 1e4, (Surface(0.5, 1e3, 1.0, 2e4),), Skin(50.0, 0.0, 1.0))
+    body = ObjectModel(0.05, 0.0, PadCompliance(1e4, 50.0), (Surface(0.5, 1e3, 1.0, 2e4),))
     start = at(0.0501, (OscillatorState(0.0, 0.0),), speed_m_s=-0.1, link=STRAIGHT)
 
     def force(steps):
@@ -434,7 +430,9 @@ def test_a_tick_that_is_to_settle_is_halved_even_where_no_error_asks_for_it():
 
 def test_what_stands_is_looked_at_in_steps_no_longer_than_the_longest():
     # A light liquid behind soft covers swings some five times in the tick through which the fingers stand.
-    body = Thing(0.05, 0.0, 1.5e4, (Elastic(2000.0, 0.0), Liquid(1e-3, 1e-3, 0.02, 1e-11)))
+    body = ObjectModel(
+        0.05, 0.0, PadCompliance(1.5e4), (Elastic(2000.0, 0.0), Liquid(1e-3, 1e-3, 0.02, 1e-11))
+    )
     laws, states = [elastic, liquid], (NoState(), OscillatorState(0.0, 0.0))
     start = run(PlantParams(drive(), body, FINE), at(0.0499, states, speed_m_s=-0.05), 15.0, 0.5, laws)
     assert start.motion.speed_rev_s == 0.0
@@ -450,7 +448,7 @@ def test_what_stands_is_looked_at_in_steps_no_longer_than_the_longest():
 def test_a_pushed_object_is_pressed_only_from_when_the_second_finger_meets_it():
     # Covers that damp: had they been closing on it since the step began, they would have borne 4 N when they meet.
     free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=0.0)
-    body = Thing(0.05, 0.1, 4e4, SPRING, Skin(50.0, 0.0, 1.0))
+    body = ObjectModel(0.05, 0.1, PadCompliance(4e4, 50.0), SPRING)
     coarse, fine = (PlantParams(free, body, Steps(6e-6, longest_s=longest)) for longest in (inf, 1e-5))
     for begun in range(8):
         start = at(0.0505 + 5e-6 * begun, (NoState(),), offset=2.4e-4, speed_m_s=-0.1)
@@ -462,7 +460,7 @@ def test_a_pushed_object_is_pressed_only_from_when_the_second_finger_meets_it():
 def test_what_a_touch_begins_with_is_not_rounding_however_fine_the_steps():
     # Where the second finger touches, a strong damper makes 0.1 N of what rounding leaves of a rate over a picosecond.
     free = drive(coulomb=0.0, breakaway=0.0, load=0.0, damping=0.0)
-    body = Thing(0.05, 0.0, 8e3, (Elastic(200.0, 0.0), Loss(3e5)), held=1)
+    body = ObjectModel(0.05, 0.0, PadCompliance(8e3), (Elastic(200.0, 0.0), Loss(3e5)), held=1)
     start = at(0.0521, (NoState(), NoState()), offset=1e-3, speed_m_s=-0.1)
     after = run(PlantParams(free, body, Steps(1e-10)), start, 0.0, 0.0425, [elastic, loss])
     assert after.contact.left_n > 0.0
@@ -481,8 +479,8 @@ def test_covers_and_object_carry_one_force_however_stiff_they_are(stiffness, ski
         if hertz
         else (elastic, Elastic(stiffness, 0.0), NoState())
     )
-    search = bind(squeeze, advance=sum_of([law]))
-    body = Thing(0.05, 0.0, skins, (params,))
+    search = bind_reachable(solve_contact, {"object_force": sum_of([law])})
+    body = ObjectModel(0.05, 0.0, PadCompliance(skins), (params,))
     now = ContactState(0.0, 0.0, 0.0, (state,), 0.0, 0.0)
     for closure in (1e-6, 1e-4, 5e-3, 1e-2, 5e-3, 1e-4, -1e-3, -0.02, 1e-5, 3e-3):
         now = search(body, now, closure, 0.0, 1e-3)

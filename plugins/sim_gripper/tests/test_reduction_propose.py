@@ -104,7 +104,7 @@ def test_instances_share_the_model_of_their_kind():
     problem = problem_of(SimConfig(sensor="ideal"), find("odwalla:empty_open"))
     model = propose(problem, grip_of(problem))
     one, other = (instantiate(problem, model, seed) for seed in (1, 2))
-    kept = [[term.kept for term in setup.plant.thing.terms] for setup in (one, other)]
+    kept = [[term.kept for term in setup.plant.object.terms] for setup in (one, other)]
     assert kept[0] == kept[1]
     assert one.plant.steps == other.plant.steps == model.steps
     assert one.terms != other.terms

@@ -33,11 +33,11 @@ from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
-from graspsense_sim_gripper.plant import PlantParams
 from graspsense_sim_gripper.problem import GraspController
 from graspsense_sim_gripper.reduction.propose import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N, PadBuffers, apply_tare, sense
+from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.terms.registry import find_term
 
 _sense = bind_reachable(sense, {}, INTERPRETED)

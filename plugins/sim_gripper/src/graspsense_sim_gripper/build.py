@@ -26,17 +26,19 @@ from graspsense.plugin_api import (
 from graspsense_sim_gripper.compiled.compose import all_kept, uncompressed
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
+from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance
+from graspsense_sim_gripper.dynamics.drive import Drive, Friction
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
 from graspsense_sim_gripper.objects.instance import Instance, cell_weights, central_cells, sample
 from graspsense_sim_gripper.objects.library import find, split_number
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.plant import Drive, PlantParams, Skin, Steps, Thing
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.reduction.candidates import reduced
 from graspsense_sim_gripper.reduction.levels import step_tolerance
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
 from graspsense_sim_gripper.sensing import ImageClock, PadCells, SensorParams, initial_sensor
+from graspsense_sim_gripper.stepping.scheme import PlantParams, Steps
 
 EFFORT_LIMIT_N: Final = 100.0
 SPEED_LIMIT_M_S: Final = 0.2
@@ -167,19 +169,22 @@ def _plant(
     gripper = _gripper(config)
     drive = gripper.drive
     if config.spread:
-        friction_n = max(drive.coulomb_n + config.coulomb_spread_n * float(rng.standard_normal()), 0.0)
-        drive = drive._replace(coulomb_n=friction_n, breakaway_n=max(float(config.breakaway_n), friction_n))
+        friction_n = max(
+            drive.friction.coulomb_n + config.coulomb_spread_n * float(rng.standard_normal()), 0.0
+        )
+        breakaway_n = max(float(config.breakaway_n), friction_n)
+        friction = drive.friction._replace(coulomb_n=friction_n, breakaway_n=breakaway_n)
+        drive = drive._replace(friction=friction)
     if instance is None:
         # Thinner than the closed gap, so that no finger ever touches it.
-        model = Thing(-1.0, 0.0, gripper.skins_n_m, all_kept(()), gripper.skin)
+        model = ObjectModel(-1.0, 0.0, gripper.pads, all_kept(()))
         at_rest, offset = uncompressed(()), 0.0
     else:
-        model = Thing(
+        model = ObjectModel(
             width_m=instance.width_m,
-            table_n=instance.table_n,
-            skins_n_m=gripper.skins_n_m,
+            table_friction_n=instance.table_n,
             terms=all_kept(instance.terms),
-            skin=gripper.skin,
+            pads=gripper.pads,
             held=1 if instance.spec.held else 0,
         )
         at_rest, offset = uncompressed(instance.kinds), instance.offset_m
@@ -191,8 +196,7 @@ class _Gripper(NamedTuple):
     """What is the same in every grasp of a config."""
 
     drive: Drive
-    skins_n_m: float
-    skin: Skin
+    pads: PadCompliance
     steps: Steps
     """Those without a reduced model."""
     motion: Motion
@@ -205,22 +209,25 @@ def _gripper(config: SimConfig) -> _Gripper:
     drive = Drive(
         link=link,
         inertia=_inertia(config),
-        coulomb_n=float(config.coulomb_n),
-        breakaway_n=max(float(config.breakaway_n), float(config.coulomb_n)),
-        stribeck_m_s=float(config.stribeck_m_s),
-        load_share=float(config.load_share),
-        damping_n_s_m=float(config.damping_n_s_m),
+        friction=Friction(
+            coulomb_n=float(config.coulomb_n),
+            breakaway_n=max(float(config.breakaway_n), float(config.coulomb_n)),
+            stribeck_m_s=float(config.stribeck_m_s),
+            load_friction_coefficient=float(config.load_share),
+            damping_n_s_m=float(config.damping_n_s_m),
+        ),
         closed_rev=revolutions_at(link, 0.0),
         open_rev=revolutions_at(link, config.open_gap_m),
         lag_s=float(config.drive_lag_s),
     )
-    skin = Skin(
+    pads = PadCompliance(
+        stiffness_n_m=0.5 * float(config.skin_n_m),
         damping_n_s_m=0.5 * float(config.skin_damping_n_s_m),
-        arm_n_m=0.5 * float(config.skin_creep_n_m),
-        tau_s=float(config.skin_creep_s),
+        branch_n_m=0.5 * float(config.skin_creep_n_m),
+        branch_tau_s=float(config.skin_creep_s),
     )
     motion = Motion(drive.open_rev, 0.0, *gap_and_rate(link, drive.open_rev))
-    return _Gripper(drive, 0.5 * float(config.skin_n_m), skin, Steps(step_tolerance(config.accuracy)), motion)
+    return _Gripper(drive, pads, Steps(step_tolerance(config.accuracy)), motion)
 
 
 def _linkage(config: SimConfig) -> ScrewLinkage:

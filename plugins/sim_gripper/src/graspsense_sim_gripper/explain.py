@@ -41,7 +41,7 @@ def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> d
         "touched": True,
         "peak_n": forces_n[peak],
         "compression_m": deepest,
-        "pads_m": forces_n[peak] / setup.plant.thing.skins_n_m,
+        "pads_m": forces_n[peak] / setup.plant.object.pads.stiffness_n_m,
         "speed_m_s": point.speed_m_s,
         "seconds": point.seconds,
         "terms": rows,

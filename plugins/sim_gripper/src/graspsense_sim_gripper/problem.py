@@ -14,8 +14,8 @@ from graspsense.plugin_api import CELLS, Controller, DeviceInfo, RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.objects.spec import ObjectSpec, TermParams
-from graspsense_sim_gripper.plant import PlantParams
 from graspsense_sim_gripper.sensing import SensorParams, SensorState
+from graspsense_sim_gripper.stepping.scheme import PlantParams
 
 IMAGES_PER_BLOCK: Final = 64
 

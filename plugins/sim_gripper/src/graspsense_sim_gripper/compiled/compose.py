@@ -14,14 +14,18 @@ from types import FunctionType
 from typing import Any, Final, NamedTuple, TypeVar
 
 from graspsense.plugin_api import Frame, bind, maker, tick
-from graspsense_sim_gripper import plant
+from graspsense_sim_gripper.dynamics.contact import BalanceSearch, ObjectModel, PadLoad, solve_contact
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
 from graspsense_sim_gripper.exact.propagate import bind_move
 from graspsense_sim_gripper.loop import SimulationState, grasp
-from graspsense_sim_gripper.plant import PlantParams, Thing
 from graspsense_sim_gripper.problem import ControllerStep
 from graspsense_sim_gripper.sensing import Encoder, SensorState
+from graspsense_sim_gripper.stepping.advance import advance, move
+from graspsense_sim_gripper.stepping.converge import refine_until_converged
+from graspsense_sim_gripper.stepping.implicit import SpeedSearch
+from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start
+from graspsense_sim_gripper.stepping.tr_bdf2 import Stage
 from graspsense_sim_gripper.terms.registry import find_term, laws_of
 from graspsense_sim_gripper.terms.remainder import Kept, Remainder
 from graspsense_sim_gripper.terms.term import NO_STATE, Law
@@ -37,11 +41,14 @@ TermParams = Any
 """A tuple with parameters of its own type for each term."""
 PlantMove = Callable[[Any, PlantState, float, float], PlantState]
 """Takes the plant's model, its state, the effort and the length of the tick."""
-ContactSolver = Callable[[Thing, ContactState, float, float, float], ContactState]
+ContactSolver = Callable[[ObjectModel, ContactState, float, float, float], ContactState]
 
 INTERPRETED: Final[Constructors] = {
     kind: maker(kind)
-    for kind in (PlantState, Motion, Contact, ContactState, StepState, SensorState, Encoder, Frame)
+    for kind in (
+        *(PlantState, Motion, Contact, ContactState, StepState, SensorState, Encoder, Frame),
+        *(Start, Attempt, SpeedSearch, Stage, PadLoad, BalanceSearch),
+    )
 }
 """Named tuples that a tick creates, each with a constructor that the interpreter runs in half the time."""
 
@@ -181,8 +188,8 @@ class Composition(NamedTuple):
 
 @lru_cache(maxsize=64)
 def contact_solver(kinds: tuple[str, ...]) -> ContactSolver:
-    """Return `squeeze` for an object of these terms."""
-    return bind(plant.squeeze, advance=sum_of(laws_of(kinds)))
+    """Return `solve_contact` for an object of these terms."""
+    return bind_reachable(solve_contact, {"object_force": sum_of(laws_of(kinds))}, INTERPRETED)
 
 
 def plant_move(
@@ -192,8 +199,8 @@ def plant_move(
 
     `converges`: whether the steps of a tick may be halved until the result no longer changes.
     """
-    move = bind(plant.move, _driven=plant._settled if converges else plant._driven)
-    return bind_reachable(move, {"advance": sum_of(laws)})
+    over_a_tick = refine_until_converged if converges else advance
+    return bind_reachable(bind(move, advance=over_a_tick), {"object_force": sum_of(laws)})
 
 
 @lru_cache(maxsize=64)

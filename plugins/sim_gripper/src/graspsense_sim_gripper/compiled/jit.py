@@ -6,13 +6,31 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from typing import Any, Final
 
 from graspsense.plugin_api import CompileOptions, Inlining, compile_function, first_call
-from graspsense_sim_gripper import plant
 from graspsense_sim_gripper.compiled.compose import Composition, grasp_loop
+from graspsense_sim_gripper.dynamics.contact import pad_forces, solve_contact
 from graspsense_sim_gripper.exact.propagate import cold_calls
 from graspsense_sim_gripper.problem import ControllerStep
+from graspsense_sim_gripper.stepping.advance import advance, attempt_of, move, take_step, take_steps
+from graspsense_sim_gripper.stepping.converge import refine_until_converged
+
+_REMAIN_CALLS: Final = {
+    # Every scheme reaches the object's laws through the contact: inlined, they would be compiled for each scheme again.
+    pad_forces.__code__: ("solve_contact",),
+    solve_contact.__code__: ("_release_from_rigid_pads",),
+    # Seldom called: inlined, they would take registers from velocity Verlet.
+    attempt_of.__code__: ("tr_bdf2", "mean_force"),
+    take_step.__code__: ("stick",),
+}
+
+
+def _remaining_calls(function: Callable[..., Any]) -> tuple[str, ...]:
+    """Return the names of the functions that remain calls in the code of this one."""
+    return _REMAIN_CALLS.get(function.__code__) or cold_calls(function)
+
 
 OPTIONS: Final = CompileOptions(
     # Nothing here creates an array, and counting references to the arrays that are passed took half of a tick.
@@ -21,9 +39,9 @@ OPTIONS: Final = CompileOptions(
         short_code=400,
         long_code=2000,
         before_typing=frozenset(
-            function.__code__ for function in (plant.move, plant._driven, plant._settled, plant._stepped)
+            function.__code__ for function in (move, advance, refine_until_converged, take_steps)
         ),
-        cold_calls=cold_calls,
+        cold_calls=_remaining_calls,
     ),
     install="graspsense-sim-gripper[fast]",
 )
@@ -38,6 +56,7 @@ def compile_part(function: Callable[..., Any]) -> Callable[..., Any]:
     return compile_function(function, OPTIONS)
 
 
+@lru_cache(maxsize=64)
 def compiled_loop(composition: Composition, step: ControllerStep) -> Callable[..., Any]:
     """Return the compiled loop of a composition under a controller with this step. Raises NotCompilable."""
     with _COMPILING:

@@ -54,7 +54,7 @@ def layout_of(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> Padded
         return _with_kinds(setup.kinds, kinds)
     if is_common(setup.kinds):
         return _with_kinds(setup.kinds, common_kinds())
-    return _with_kept(setup.kinds, tuple([term.kept for term in setup.plant.thing.terms[1:]]))
+    return _with_kept(setup.kinds, tuple([term.kept for term in setup.plant.object.terms[1:]]))
 
 
 @cache
@@ -92,9 +92,9 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
     sensor = sensor._replace(left=cells[0], right=cells[1])
     layout, plant, state = layout_of(setup, kinds), setup.plant, setup.state
     if setup.kinds != layout.kinds:
-        own = plant.thing.terms
+        own = plant.object.terms
         terms = tuple([own[i] if i >= 0 else filler.params for i, filler in layout.sources])
-        plant = plant._replace(thing=plant.thing._replace(terms=terms))
+        plant = plant._replace(object=plant.object._replace(terms=terms))
         left = _padded_state(state.contact.left, layout)
         both_same = state.contact.right is state.contact.left
         right = left if both_same else _padded_state(state.contact.right, layout)

@@ -26,12 +26,12 @@ def applicable(config: SimConfig, setup: GraspSetup) -> str:
     settings, by a level of the reduction that divides each tick, and by a reference. Raises TypeError for a term whose
     linear form has other states than its law.
     """
-    drive, model, steps = setup.plant.drive, setup.plant.thing, setup.plant.steps
+    drive, model, steps = setup.plant.drive, setup.plant.object, setup.plant.steps
     if config.has_forced_steps or steps.longest_s < math.inf or steps.settle > 0.0:
         return "the scheme or the length of its steps is prescribed"
     if drive.link.finger_m != 0.0:
         return "the ratio of the linkage varies with the gap"
-    if drive.breakaway_n != drive.coulomb_n:
+    if drive.friction.breakaway_n != drive.friction.coulomb_n:
         return "friction is greater at rest than while sliding"
     if model.held == 1 and setup.state.contact.offset_m != 0.0:
         return "the object is held off the centre line, so that each half would have modes of its own"
@@ -61,15 +61,14 @@ def discretise(
 
 
 def _tables(setup: GraspSetup, *, on_arrays: bool) -> tuple[Shape, Tables] | None:
-    drive, model = setup.plant.drive, setup.plant.thing
+    drive, model = setup.plant.drive, setup.plant.object
     scene = LinearScene(
         drive.inertia / setup.state.motion.jacobian_m_rev**2,
-        drive.damping_n_s_m,
-        drive.breakaway_n > 0.0,
-        drive.load_share,
+        drive.friction.damping_n_s_m,
+        drive.friction.breakaway_n > 0.0,
+        drive.friction.load_friction_coefficient,
         drive.lag_s,
-        model.skins_n_m,
-        model.skin,
+        model.pads,
         tuple(form for _, form in _forms(setup) if form is not None),
     )
     return tables_of(scene, setup.dt_s) if on_arrays else listed_tables_of(scene, setup.dt_s)
@@ -77,7 +76,7 @@ def _tables(setup: GraspSetup, *, on_arrays: bool) -> tuple[Shape, Tables] | Non
 
 def _forms(setup: GraspSetup) -> list[tuple[str, LinearForm | OwnContact | None]]:
     """Return the kinds of the terms that the model keeps, with their linear forms."""
-    lumped, *terms = setup.plant.thing.terms
+    lumped, *terms = setup.plant.object.terms
     forms: list[tuple[str, LinearForm | OwnContact | None]] = []
     if lumped.kept == 1:
         forms.append(("", lumped_form(lumped.params)))

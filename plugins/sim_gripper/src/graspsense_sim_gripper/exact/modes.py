@@ -38,8 +38,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from graspsense_sim_gripper.dynamics.contact import PadCompliance
 from graspsense_sim_gripper.exact.expm import Array
-from graspsense_sim_gripper.plant import Skin
 from graspsense_sim_gripper.terms.term import LinearForm, OwnContact
 
 STUCK, CLOSING, OPENING = range(3)
@@ -58,9 +58,7 @@ class LinearScene(NamedTuple):
     has_friction: bool
     load_friction_coefficient: float
     lag_s: float
-    pads_n_m: float
-    """Stiffness of the two pads in series; inf: rigid pads."""
-    pads: Skin
+    pads: PadCompliance
     forms: tuple[LinearForm | OwnContact, ...]
 
 
@@ -103,9 +101,11 @@ class Layout:
 
     def __init__(self, scene: LinearScene) -> None:
         self.scene = scene
-        self.rigid_pads = scene.pads_n_m == math.inf
+        self.rigid_pads = scene.pads.stiffness_n_m == math.inf
         self.separable = not (self.rigid_pads and all(_only_pushes(form) for form in scene.forms))
-        self.pad_states = not self.rigid_pads and (scene.pads.damping_n_s_m > 0.0 or scene.pads.arm_n_m > 0.0)
+        self.pad_states = not self.rigid_pads and (
+            scene.pads.damping_n_s_m > 0.0 or scene.pads.branch_n_m > 0.0
+        )
         self.lags = scene.lag_s > 0.0
         self.has_friction = scene.has_friction or scene.load_friction_coefficient > 0.0
         self.n_contacts = sum(isinstance(form, OwnContact) for form in scene.forms)
@@ -188,9 +188,9 @@ def mode_matrices(layout: Layout, mode: tuple[bool, int, int]) -> ModeMatrices |
     if compressed:
         # Of two equal forces, that of the softer spring has the smaller rounding error.
         force = terms.spring_n_m * compression + terms.damper_n_s_m * balance.rate + terms.own
-        softer_pads = not layout.rigid_pads and scene.pads_n_m < terms.spring_n_m + terms.gain_n_m
-        if softer_pads and _pads(layout).damping_n_s_m == 0.0:
-            force = scene.pads_n_m * (layout.row(0) - compression) + layout.branch
+        softer_pads = not layout.rigid_pads and scene.pads.stiffness_n_m < terms.spring_n_m + terms.gain_n_m
+        if softer_pads and _pads(layout)[0] == 0.0:
+            force = scene.pads.stiffness_n_m * (layout.row(0) - compression) + layout.branch
     rates = np.zeros((layout.n_columns, layout.n_columns))
     rates[0] = speed
     if motion != STUCK:
@@ -263,16 +263,17 @@ class _Balance(NamedTuple):
     """The rows of δ and p as the mode is entered."""
 
 
-def _pads(layout: Layout) -> Skin:
+def _pads(layout: Layout) -> tuple[float, float, float]:
     """Return damper and Maxwell branch of the pads; the time constant is 1 s where there are none."""
-    return layout.scene.pads if layout.pad_states else Skin(0.0, 0.0, 1.0)
+    pads = layout.scene.pads
+    return (pads.damping_n_s_m, pads.branch_n_m, pads.branch_tau_s) if layout.pad_states else (0.0, 0.0, 1.0)
 
 
 def _in_contact(layout: Layout, terms: _Terms, compression: Array, speed: Array) -> _Balance | None:
     closure, branch = layout.row(0), layout.branch
     if layout.rigid_pads:
         return _Balance(speed, layout.row(), (closure, layout.row()))
-    pads_n_m = layout.scene.pads_n_m
+    pads_n_m = layout.scene.pads.stiffness_n_m
     damping, branch_n_m, tau = _pads(layout)
     if terms.damper_n_s_m + damping > 0.0:
         excess = (
@@ -305,7 +306,7 @@ def _separated(layout: Layout, terms: _Terms, compression: Array) -> _Balance | 
         else:
             return None
         entered = -terms.own / spring if spring > 0.0 else layout.compression
-    pads_n_m, (damping, branch_n_m, tau) = layout.scene.pads_n_m, _pads(layout)
+    pads_n_m, (damping, branch_n_m, tau) = layout.scene.pads.stiffness_n_m, _pads(layout)
     pad_rate, pad_entered = layout.row(), layout.row()
     if damping > 0.0:
         pad_rate = -(pads_n_m * layout.pad + layout.branch) / damping
@@ -323,7 +324,7 @@ def _add_state_rates(
     if layout.separable:
         rates[2] = balance.rate
     if layout.pad_states:
-        _, branch_n_m, tau = layout.scene.pads
+        _, branch_n_m, tau = _pads(layout)
         rates[3] = balance.pad_rate
         rates[4] = branch_n_m * balance.pad_rate - layout.branch / tau
     for place, form in terms.forms:

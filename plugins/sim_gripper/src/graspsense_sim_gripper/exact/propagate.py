@@ -24,6 +24,7 @@ from types import FunctionType
 from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import bind
+from graspsense_sim_gripper.dynamics.contact import RECOVERED_M
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
 from graspsense_sim_gripper.exact.expm import MAX_BISECTIONS
 from graspsense_sim_gripper.exact.modes import (
@@ -38,7 +39,7 @@ from graspsense_sim_gripper.exact.modes import (
 )
 from graspsense_sim_gripper.exact.tables import GROUP, Table, Tables, padded
 from graspsense_sim_gripper.exact.term_states import term_state_functions
-from graspsense_sim_gripper.plant import IN_SHAPE_M, PlantParams
+from graspsense_sim_gripper.stepping.scheme import PlantParams
 
 INDEX_MASK: Final = 0x3FFFFFFF
 """An index after `&` with this is known not to be negative, which compiled code otherwise checks at each access."""
@@ -250,7 +251,7 @@ def propagate(params: ExactPlant, state: PlantState, effort_n: float, dt: float)
 
 def _load(params: ExactPlant, state: PlantState, effort_n: float) -> Mode:
     """Write X0, and return the mode. Which of the terms' own contacts are closed is a guess that the guards correct."""
-    drive, model, ws = params.plant.drive, params.plant.thing, params.workspace
+    drive, model, ws = params.plant.drive, params.plant.object, params.workspace
     left = state.contact.left
     closure = model.width_m - state.motion.gap_m
     ws[X0] = closure
@@ -263,7 +264,7 @@ def _load(params: ExactPlant, state: PlantState, effort_n: float) -> Mode:
             ws[X0 + 3], ws[X0 + 4] = pad, left.branch_n
         if left.force_n <= 0.0 and closure - compression - pad < -GAP_TOL_M:
             compressed = 0
-        elif model.skins_n_m == math.inf:
+        elif model.pads.stiffness_n_m == math.inf:
             compression = closure
         ws[X0 + 2] = compression
     pack(model.terms, left.states, ws, X0 + TERM_STATES)
@@ -273,7 +274,7 @@ def _load(params: ExactPlant, state: PlantState, effort_n: float) -> Mode:
     motion = STUCK
     at_rest = ws[X0 + 1] == 0.0
     if N_MOTIONS == 3:
-        ws[X0 + N_STATES + 1] = drive.coulomb_n
+        ws[X0 + N_STATES + 1] = drive.friction.coulomb_n
         if not at_rest:
             motion = CLOSING if ws[X0 + 1] > 0.0 else OPENING
     contacts = (1 << N_CONTACTS) - 1 if left.force_n > 0.0 else 0
@@ -286,7 +287,7 @@ def _store(
     """Return the plant with X1 as its state, and before that whether the fingers are within their travel."""
     drive, ws = params.plant.drive, params.workspace
     revolutions, _, gap, jacobian = state.motion
-    closed_by = ws[X1] - (params.plant.thing.width_m - gap)
+    closed_by = ws[X1] - (params.plant.object.width_m - gap)
     # The next tick waits for this, and a product is available sooner than a quotient.
     rev_per_m = 1.0 / jacobian
     revolutions1 = revolutions - closed_by * rev_per_m
@@ -302,7 +303,7 @@ def _store(
 
 def _store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_open_end: bool) -> Contact:
     """Return the object and the forces on the pads as in X1."""
-    model, ws, before = params.plant.thing, params.workspace, contact.left
+    model, ws, before = params.plant.object, params.workspace, contact.left
     # A mode that is entered at the very end of the tick has not acted yet.
     force = max(ws[X1 + N_STATES + FORCE], 0.0) if result.compressed == 1 else 0.0
     touched, closure = result.touched, ws[X1]
@@ -311,10 +312,10 @@ def _store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_
         pad_m, branch_n = ws[X1 + 3], ws[X1 + 4]
     if SEPARABLE == 1:
         compression = ws[X1 + 2]
-        in_shape = closure < 0.0 and abs(compression) + abs(pad_m) <= IN_SHAPE_M
+        in_shape = closure < 0.0 and abs(compression) + abs(pad_m) <= RECOVERED_M
         if result.compressed == 1:
             touched = 1
-        elif in_shape and (not at_open_end or model.swings == 0):
+        elif in_shape and (not at_open_end or model.overshoots == 0):
             touched = 0
     else:
         if closure >= 0.0:

@@ -24,10 +24,10 @@ from attrs import asdict
 import graspsense.plugin_api as plugin_api
 from graspsense.plugin_api import NotCompilable, cache_folder, fingerprint
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.plant import Steps
 from graspsense_sim_gripper.problem import ControllerStep, GraspController, Problem
 from graspsense_sim_gripper.reduction.levels import Level
 from graspsense_sim_gripper.reduction.model import Reduction, TermDecision, Verification
+from graspsense_sim_gripper.stepping.scheme import Steps
 from graspsense_sim_gripper.terms.registry import laws_of
 from graspsense_sim_gripper.terms.term import WorkingPoint
 

@@ -8,21 +8,24 @@ from typing import Final
 
 from attrs import evolve
 
-from graspsense_sim_gripper.plant import PlantParams, Thing
+from graspsense_sim_gripper.dynamics.contact import ObjectModel
 from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction
+from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.remainder import Kept, Remainder
 from graspsense_sim_gripper.terms.term import WorkingPoint
 
-Candidate = tuple[str, Thing]
+Candidate = tuple[str, ObjectModel]
 """The name of a simplification, and the model with it."""
 RIGID_PADS: Final = "rigid"
 ELASTIC_PADS: Final = "springs"
 RELAXED_PADS: Final = "springs that do not creep"
 
 
-def without_term(model: Thing, kinds: Sequence[str], i: int, point: WorkingPoint) -> Iterator[Candidate]:
+def without_term(
+    model: ObjectModel, kinds: Sequence[str], i: int, point: WorkingPoint
+) -> Iterator[Candidate]:
     """Yield the model with term `i` dropped, then with each of the term's limits."""
     params = model.terms[i + 1].params
     yield DROPPED, _with(model, i, Kept(0, params), 0.0, 0.0)
@@ -35,39 +38,40 @@ def without_term(model: Thing, kinds: Sequence[str], i: int, point: WorkingPoint
         yield limit.name, _with(model, i, term, limit.spring_n_m, limit.damper_n_s_m)
 
 
-def simpler_pads(model: Thing) -> Iterator[Candidate]:
+def simpler_pads(model: ObjectModel) -> Iterator[Candidate]:
     """Yield the model with simpler pads, the simplest first."""
-    skin = model.skin
-    if model.skins_n_m < math.inf:
-        yield RIGID_PADS, model._replace(skins_n_m=math.inf)
-    if skin.damping_n_s_m > 0.0 or skin.arm_n_m > 0.0:
-        elastic = skin._replace(damping_n_s_m=0.0, arm_n_m=0.0)
-        yield ELASTIC_PADS, model._replace(skin=elastic)
-        yield RELAXED_PADS, model._replace(skins_n_m=model.skins_n_m + skin.arm_n_m, skin=elastic)
+    pads = model.pads
+    if pads.stiffness_n_m < math.inf:
+        yield RIGID_PADS, model._replace(pads=pads._replace(stiffness_n_m=math.inf))
+    if pads.damping_n_s_m > 0.0 or pads.branch_n_m > 0.0:
+        elastic = pads._replace(damping_n_s_m=0.0, branch_n_m=0.0)
+        yield ELASTIC_PADS, model._replace(pads=elastic)
+        relaxed = elastic._replace(stiffness_n_m=pads.stiffness_n_m + pads.branch_n_m)
+        yield RELAXED_PADS, model._replace(pads=relaxed)
 
 
-def named(name: str, candidates: Iterator[Candidate]) -> Thing:
+def named(name: str, candidates: Iterator[Candidate]) -> ObjectModel:
     """Return the model of the candidate with this name."""
     return next(model for candidate, model in candidates if candidate == name)
 
 
 def reduced(setup: GraspSetup, reduction: Reduction) -> GraspSetup:
     """Return the grasp of an instance with all its terms as the reduction simulates it, with its steps."""
-    model = reduce_model(setup.plant.thing, setup.kinds, reduction)
+    model = reduce_model(setup.plant.object, setup.kinds, reduction)
     return evolve(setup, plant=PlantParams(setup.plant.drive, model, reduction.steps))
 
 
-def reduce_model(model: Thing, kinds: Sequence[str], reduction: Reduction) -> Thing:
+def reduce_model(model: ObjectModel, kinds: Sequence[str], reduction: Reduction) -> ObjectModel:
     """Return the full model of an instance as the reduction simulates it."""
     for i, treatment in enumerate(reduction.treatment[:-1]):
         if treatment != KEPT:
             model = named(treatment, without_term(model, kinds, i, reduction.point))
     if reduction.treatment[-1] != KEPT:
         model = named(reduction.treatment[-1], simpler_pads(model))
-    return model._replace(swings=1 if reduction.oscillates else 0)
+    return model._replace(overshoots=1 if reduction.oscillates else 0)
 
 
-def _with(model: Thing, i: int, term: Kept, spring_n_m: float, damper_n_s_m: float) -> Thing:
+def _with(model: ObjectModel, i: int, term: Kept, spring_n_m: float, damper_n_s_m: float) -> ObjectModel:
     """Return the model with another term `i`, and with more of the spring and damper that limits leave."""
     before = model.terms[0].params
     spring, damper = before.spring_n_m + spring_n_m, before.damper_n_s_m + damper_n_s_m

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, Literal, NamedTuple
 
-from graspsense_sim_gripper.plant import Steps
+from graspsense_sim_gripper.stepping.scheme import Steps
 
 STEP_SHARE: Final = 0.34
 """The error of a step is this share of the accuracy to the power of 1.5: many steps then add up to a part of it."""

@@ -6,8 +6,8 @@ from typing import Any, Final
 
 from attrs import asdict, evolve, frozen
 
-from graspsense_sim_gripper.plant import Steps
 from graspsense_sim_gripper.reduction.levels import Level
+from graspsense_sim_gripper.stepping.scheme import Steps
 from graspsense_sim_gripper.terms.term import WorkingPoint
 
 KEPT: Final = "kept"

@@ -14,7 +14,7 @@ from typing import Final
 from attrs import evolve, frozen
 
 from graspsense_sim_gripper.compiled.compose import contact_solver, uncompressed
-from graspsense_sim_gripper.plant import Thing
+from graspsense_sim_gripper.dynamics.contact import ObjectModel
 from graspsense_sim_gripper.reduction.candidates import without_term
 from graspsense_sim_gripper.terms.term import WorkingPoint
 
@@ -47,7 +47,7 @@ class Grip:
     """An object as it is gripped: its full model, its paths and the force along them. No accuracy changes these."""
 
     def __init__(
-        self, model: Thing, kinds: tuple[str, ...], force_n: float, speed_m_s: float, mass_kg: float
+        self, model: ObjectModel, kinds: tuple[str, ...], force_n: float, speed_m_s: float, mass_kg: float
     ) -> None:
         self.model, self.kinds = model, kinds
         self.mass_kg = mass_kg
@@ -67,7 +67,7 @@ class Grip:
             ]
         return self._alternatives
 
-    def error_of(self, model: Thing, max_error: float = MAX_CHANGE) -> float:
+    def error_of(self, model: ObjectModel, max_error: float = MAX_CHANGE) -> float:
         """Return the largest relative change of the force on the paths with this model.
 
         What is larger than `max_error` is returned as infinite.
@@ -82,7 +82,7 @@ class Grip:
         return worst
 
 
-def forces_along(model: Thing, kinds: Sequence[str], path: ProbePath) -> Iterator[float]:
+def forces_along(model: ObjectModel, kinds: Sequence[str], path: ProbePath) -> Iterator[float]:
     """Yield the force at each point of the path."""
     press = contact_solver(tuple(kinds))
     contact, before = uncompressed(kinds), 0.0
@@ -113,7 +113,7 @@ def stiffness(grip: Grip, dt_s: float) -> tuple[float, float]:
     return largest, at_once / touch
 
 
-def damping(grip: Grip, model: Thing, dt_s: float) -> float:
+def damping(grip: Grip, model: ObjectModel, dt_s: float) -> float:
     """Return the damping (N s/m) of the pads and the object in this model, over a tick at the end of the fast path."""
     if not grip.kinds:
         return 0.0
@@ -134,7 +134,7 @@ def damping(grip: Grip, model: Thing, dt_s: float) -> float:
 
 
 def _paths(
-    model: Thing, kinds: Sequence[str], force_n: float, speed_m_s: float, mass_kg: float
+    model: ObjectModel, kinds: Sequence[str], force_n: float, speed_m_s: float, mass_kg: float
 ) -> tuple[list[ProbePath], WorkingPoint]:
     """Return the paths up to the expected force, and the working point that they reach."""
     depth = _depth(model, kinds, force_n, speed_m_s)
@@ -155,7 +155,7 @@ def _paths(
     return paths, WorkingPoint(slow_depth, speed_m_s, slow_depth / speed_m_s + HOLD_S, force_n)
 
 
-def _depth(model: Thing, kinds: Sequence[str], force_n: float, speed_m_s: float) -> float:
+def _depth(model: ObjectModel, kinds: Sequence[str], force_n: float, speed_m_s: float) -> float:
     """Return how far the fingers close against this force, by bisection; at speed 0 within the time of a squeeze."""
     lower, upper = 0.0, MAX_DEPTH * max(model.width_m, 1e-4)
     for _ in range(40):

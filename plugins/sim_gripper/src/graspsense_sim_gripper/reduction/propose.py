@@ -13,8 +13,9 @@ from typing import Final
 
 from graspsense.plugin_api import gap_and_rate, revolutions_at
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.contact import ObjectModel
+from graspsense_sim_gripper.dynamics.drive import Drive
 from graspsense_sim_gripper.objects.spec import TermParams
-from graspsense_sim_gripper.plant import EXPLICIT, MEAN_FORCE, STIFF, Drive, Steps, Thing
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.reduction.candidates import named, simpler_pads, without_term
 from graspsense_sim_gripper.reduction.levels import (
@@ -27,6 +28,7 @@ from graspsense_sim_gripper.reduction.levels import (
 )
 from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction, TermDecision
 from graspsense_sim_gripper.reduction.probe import Grip, damping, stiffness
+from graspsense_sim_gripper.stepping.scheme import EXPLICIT, MEAN_FORCE, STIFF, Steps
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import NO_STATE, WorkingPoint, no_rates
 
@@ -50,11 +52,11 @@ def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | N
     config, setup = problem.model_config, _nominal(problem)
     drive = setup.plant.drive
     return Grip(
-        setup.plant.thing,
+        setup.plant.object,
         setup.kinds,
         config.expected_force_n or force_n or FORCE_N,
         config.expected_speed_m_s or speed_m_s or SPEED_M_S,
-        _mass_kg(drive, min(max(setup.plant.thing.width_m, 0.0), config.open_gap_m)),
+        _mass_kg(drive, min(max(setup.plant.object.width_m, 0.0), config.open_gap_m)),
     )
 
 
@@ -65,7 +67,7 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = UNVERIFIED) -> Red
         scale = FULL_SCALES[0]
     level = scale.at(config.accuracy)
     treatment, decisions, error, model = _reduce(grip, level.model_tol)
-    rate = (drive.damping_n_s_m + damping(grip, model, dt_s)) / grip.mass_kg
+    rate = (drive.friction.damping_n_s_m + damping(grip, model, dt_s)) / grip.mass_kg
     contact = _resolution(grip, dt_s)
     scheme = _scheme(config.accuracy, rate, contact.number / dt_s, dt_s, config.coulomb_n > 0.0)
     return Reduction(
@@ -148,7 +150,9 @@ def _resolution(grip: Grip, dt_s: float) -> TermDecision:
     )
 
 
-def _reduce(grip: Grip, max_error: float) -> tuple[tuple[str, ...], tuple[TermDecision, ...], float, Thing]:
+def _reduce(
+    grip: Grip, max_error: float
+) -> tuple[tuple[str, ...], tuple[TermDecision, ...], float, ObjectModel]:
     """Return what becomes of each term and of the pads, why, the error of all that, and the reduced model."""
     kinds, point = grip.kinds, grip.point
     treatment, errors, spent, model = [KEPT] * (len(kinds) + 1), [0.0] * len(kinds), 0.0, grip.model
@@ -177,7 +181,7 @@ def _reduce(grip: Grip, max_error: float) -> tuple[tuple[str, ...], tuple[TermDe
 
 
 def _pads_decision(grip: Grip, name: str, error: float) -> TermDecision:
-    share = grip.forces[0][-1] / grip.model.skins_n_m / max(grip.point.compression_m, 1e-9)
+    share = grip.forces[0][-1] / grip.model.pads.stiffness_n_m / max(grip.point.compression_m, 1e-9)
     what = "their compression over the total compression"
     return TermDecision(term="pads", decision=name, what=what, number=share, error=error)
 

@@ -21,7 +21,6 @@ from attrs import evolve
 from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.plant import Steps
 from graspsense_sim_gripper.problem import GraspController, Problem
 from graspsense_sim_gripper.reduction.cache import ReductionCache
 from graspsense_sim_gripper.reduction.error import deviation
@@ -30,6 +29,7 @@ from graspsense_sim_gripper.reduction.model import DROPPED, Reduction, Verificat
 from graspsense_sim_gripper.reduction.probe import Grip
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
 from graspsense_sim_gripper.reduction.verify import Sensitivity, TrialGrasps, trial_grasps
+from graspsense_sim_gripper.stepping.scheme import Steps
 
 ACCEPTED_WITH_SPREAD: Final = 0.5
 ACCEPTED: Final = 0.8

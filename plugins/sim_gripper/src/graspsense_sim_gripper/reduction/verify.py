@@ -40,12 +40,12 @@ from graspsense_sim_gripper.loop import (
     SimulationState,
     has_ended,
 )
-from graspsense_sim_gripper.plant import EXPLICIT, Steps
 from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
 from graspsense_sim_gripper.reduction.candidates import reduced
 from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.sensing import Bias, PadBuffers
+from graspsense_sim_gripper.stepping.scheme import EXPLICIT, Steps
 
 MAX_SECONDS: Final = 40.0
 """The longest trial grasp, and the longest approach in it."""
@@ -133,7 +133,7 @@ class TrialGrasps:
         if self._start is None:
             self._start = self._approach(setup)
         start = self._start
-        bias = Bias(force_n, travel, setup.plant.thing.width_m)
+        bias = Bias(force_n, travel, setup.plant.object.width_m)
         setup = evolve(setup, sensor=setup.sensor._replace(bias=bias))
         until = start.progress.loop.ticks + self._max_ticks()
         end = self._runner(setup, start.from_open)(setup.plant.steps, start, until)
@@ -153,7 +153,7 @@ class TrialGrasps:
         """Return the grasp shortly before the first contact, or where it ended, and whether it came to the contact."""
         # No short steps, as nothing happens.
         steps = setup.plant.steps._replace(scheme=EXPLICIT, longest_s=math.inf)
-        reach = setup.plant.thing.width_m + 2.0 * abs(setup.state.contact.offset_m)
+        reach = setup.plant.object.width_m + 2.0 * abs(setup.state.contact.offset_m)
         state, link = setup.state, setup.plant.drive.link
         if not from_open:
             near = revolutions_at(link, min(state.motion.gap_m, reach + NEAR_M))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.terms.relaxation import late_share, mean_share
+from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
 from graspsense_sim_gripper.terms.term import Limit, Rate, Term, WorkingPoint
 from graspsense_sim_gripper.terms.vent import conductance, vented
 
@@ -63,7 +63,7 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float, v1: float)
     kept, heat_share = 1.0, 1.0
     if warm:
         kept = math.exp(-h / heat_s)
-        heat_share = mean_share(h / heat_s, kept)
+        heat_share = phi1(h / heat_s, kept)
         exponent = 1.0 + (exponent - 1.0) * heat_share
 
     # What the heat adds, as if it were swept volume.
@@ -92,8 +92,8 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float, v1: float)
         x = h * through * stiff
         decay = math.exp(-x)
         # What is swept faster at the end than in the mean the vent has had less time for.
-        late = ((area + slope * d1) * v1 * h - (swept1 - swept0)) * late_share(x, decay)
-        rise = rise * decay + ((swept1 - swept0 + heated) * mean_share(x, decay) + late) * stiff
+        late = ((area + slope * d1) * v1 * h - (swept1 - swept0)) * phi_ramp(x, decay)
+        rise = rise * decay + ((swept1 - swept0 + heated) * phi1(x, decay) + late) * stiff
     else:
         rise += (swept1 - swept0 + heated) * stiff
     if rise < lowest:

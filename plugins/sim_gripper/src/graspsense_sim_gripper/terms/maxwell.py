@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.relaxation import late_share, mean_share
+from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
 from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, WorkingPoint
 
 
@@ -28,8 +28,8 @@ def maxwell(
     """Return the branch's force, exact where the rate of compression changes evenly: q' = k d' - q / tau."""
     x = h / params.tau_s
     decay = math.exp(-x)
-    late = late_share(x, decay)
-    force = state.force_n * decay + params.k_n_m * ((d1 - d0) * (mean_share(x, decay) - late) + h * v1 * late)
+    late = phi_ramp(x, decay)
+    force = state.force_n * decay + params.k_n_m * ((d1 - d0) * (phi1(x, decay) - late) + h * v1 * late)
     return force, MaxwellState(force)
 
 

@@ -6,7 +6,7 @@ import math
 from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.terms.oscillator import OscillatorState, moved
-from graspsense_sim_gripper.terms.relaxation import late_share, mean_share
+from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
 from graspsense_sim_gripper.terms.term import Limit, LinearForm, OwnContact, Rate, Term, WorkingPoint
 
 MOST_LOOKS: Final = 64
@@ -78,12 +78,10 @@ def _massless(
         return contact * max(d1 - y, 0.0), OscillatorState(y, 0.0)
     x = h * both / damping
     decay = math.exp(-x)
-    late = late_share(x, decay)
+    late = phi_ramp(x, decay)
     # What it lags behind the balance.
     share = contact / both
-    behind = (share * d0 - state.y_m) * decay + share * (
-        (d1 - d0) * (mean_share(x, decay) - late) + h * v1 * late
-    )
+    behind = (share * d0 - state.y_m) * decay + share * ((d1 - d0) * (phi1(x, decay) - late) + h * v1 * late)
     y = share * d1 - behind
     if d1 - y < 0.0:
         y = state.y_m * math.exp(-h * k / damping)

@@ -1,0 +1,301 @@
+"""The contact: two compliant pads in series with the object, and the object on its table.
+
+The pads' compression and the object's add up to the closure (the object's width less the gap), and both carry one
+force. The object's mass is negligible beside the drive's inertia, so this balance is algebraic; `solve_contact` solves
+it by a bracketed secant search. The rate of the compression, which dampers of the object need, is a backward difference
+of second order (BDF2 with variable steps).
+
+An object that is free stands on a table: the finger that touches first pushes it, against the friction of the table,
+until both fingers touch. An object that is held fast stays where it is, and each finger presses its own half.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+
+from graspsense_sim_gripper.dynamics.roots import MAX_ITERATIONS, bracketed_secant
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState
+from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
+
+FORCE_ATOL_N: Final = 1e-9
+FORCE_RTOL: Final = 1e-11
+"""Absolute and relative tolerance of the balance of forces."""
+LENGTH_RTOL: Final = 1e-14
+"""Further tolerance, relative to the force of the pads if the object gave way nowhere: the rounding of lengths."""
+ARGUMENT_RTOL: Final = 4e-16
+"""A bracket that is narrower than this, relative to its place, holds no further number."""
+MIN_SLOPE_N_M: Final = 1e-9
+MIN_SLOPE_SHARE: Final = 1e-3
+"""The least slope of the balance with which a secant step is taken, absolute and relative to the pads' stiffness."""
+CONTACT_TOL_M: Final = 1e-10
+"""A contact is located to this."""
+RECOVERED_M: Final = 1e-12
+"""A compression of less than this is the rounding of the search: the object has recovered its shape."""
+
+
+class PadCompliance(NamedTuple):
+    """The two fingertip pads in series: a spring, with a damper and a Maxwell branch in parallel to it."""
+
+    stiffness_n_m: float = math.inf
+    """inf: rigid pads."""
+    damping_n_s_m: float = 0.0
+    branch_n_m: float = 0.0
+    """Stiffness of the Maxwell branch, by which the pads creep."""
+    branch_tau_s: float = 1.0
+    """Relaxation time of the Maxwell branch."""
+
+
+class ObjectModel(NamedTuple):
+    """The object between the fingers, and the pads it is pressed through."""
+
+    width_m: float
+    table_friction_n: float
+    """Friction of the table, which the finger that touches first has to overcome."""
+    pads: PadCompliance
+    terms: Any
+    """The parameters of the object's terms, in their order."""
+    held: int = 0
+    """1: the object is held fast. The finger that touches first then presses it instead of pushing it."""
+    overshoots: int = 1
+    """0: a released object recovers its shape and never swings beyond it, so that nothing can happen meanwhile."""
+
+
+class PadLoad(NamedTuple):
+    """The pads' force as a linear function of the object's compression d: `push_n - stiffness_n_m * d`."""
+
+    stiffness_n_m: float
+    push_n: float
+    base_m: float
+    span_s: float
+    """The rate of the compression is (d - base_m) / span_s."""
+
+
+class BalanceSearch(NamedTuple):
+    """The state of a secant search for the object's compression."""
+
+    compression_m: float
+    last_m: float
+    last_n: float
+    """Force of the object at `last_m`."""
+    slope_n_m: float
+    """Stiffness of the object, as the secant has it."""
+    total_n_m: float
+    """That of the balance: of the object and the pads."""
+    lower_m: float
+    upper_m: float
+    n: int
+
+
+class _Creep(NamedTuple):
+    """How the pads' damper and Maxwell branch act over a step."""
+
+    decay: float
+    """Share of the branch's force that is left at the end."""
+    mean_n_m: float
+    """Stiffness of the branch against the mean rate of the pads' compression."""
+    ramp_n_m: float
+    """Stiffness of the branch against the change of that rate from its mean to the end."""
+    damper_n_s_m: float
+    """What resists the rate at the end."""
+    free_pad_m: float
+    """Compression of the pads at the end if nothing pressed them."""
+
+
+_NO_CREEP: Final = _Creep(1.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _unbound(params: Any, states: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
+    raise TypeError("the object has no terms: bind object_force to the sum of its laws")
+
+
+object_force: Callable[[Any, Any, float, float, float, float], tuple[float, Any]] = _unbound
+"""The law of the whole object, which the composition of the scene binds."""
+
+
+def solve_contact(
+    model: ObjectModel, now: ContactState, closure_m: float, speed_m_s: float, h: float
+) -> ContactState:
+    """Return the object after the fingers have come to `closure_m` within `h`, closing at `speed_m_s` at the end.
+
+    Where the force would be tensile, object and pads are separated and recover freely.
+    """
+    if model.pads.stiffness_n_m < math.inf:
+        return _press_through_pads(model, now, closure_m, speed_m_s, h) if h > 0.0 else now
+    d0, force0, slope, states0, pad0, branch0, rate0, _ = now
+    force, states = object_force(model.terms, states0, d0, closure_m, h, speed_m_s)
+    # A finger that is still behind where the object stood presses it only if the object has not recovered so far.
+    if force >= 0.0 and (force <= 0.0 or force0 > 0.0 or closure_m >= d0):
+        return ContactState(closure_m, force, slope, states, pad0, branch0, rate0, math.inf)
+    return _release_from_rigid_pads(model, now, force, closure_m, speed_m_s, h) if h > 0.0 else now
+
+
+def _release_from_rigid_pads(
+    model: ObjectModel, now: ContactState, force_n: float, closure_m: float, speed_m_s: float, h: float
+) -> ContactState:
+    """Return the object that rigid pads at `closure_m` would pull with `force_n`: separated, or pressed after all."""
+    d0, force0, slope, states0, _, branch0, _, _ = now
+    load = PadLoad(0.0, 0.0, d0, h)
+    total = _release_slope(slope, force_n, force0, d0, closure_m)
+    search = BalanceSearch(d0 + (0.0 - force0) / total, d0, 0.0, slope, total, -math.inf, math.inf, 0)
+    search, force, states = _balance(model.terms, now, load, search, h)
+    if closure_m > search.compression_m:
+        # Free, it would have ended behind the pads: they press it where they are.
+        d1 = closure_m
+        force, states = object_force(model.terms, states0, d0, d1, h, speed_m_s)
+        if force >= 0.0:
+            return ContactState(
+                d1, force, search.slope_n_m, states, now.pad_m, branch0, now.rate_m_s, math.inf
+            )
+        total = _release_slope(search.slope_n_m, force, force0, d0, closure_m)
+        _, last, last_n, slope, _, lower, upper, n = search
+        search = BalanceSearch(d0 - force0 / total, last, last_n, slope, total, lower, upper, n)
+        search, force, states = _balance(model.terms, now, load, search, h)
+    d1 = search.compression_m
+    return ContactState(d1, 0.0, search.slope_n_m, states, 0.0, branch0, (d1 - d0) / h, math.inf)
+
+
+def _release_slope(slope: float, force: float, force0: float, d0: float, closure_m: float) -> float:
+    """Return the slope with which the search for the end of a separated object begins."""
+    total = max(slope, MIN_SLOPE_N_M)
+    if d0 > closure_m:
+        # No search has met a slope yet. One that is too small would begin far from the end.
+        total = max(total, (force0 - force) / (d0 - closure_m))
+    return total
+
+
+def _press_through_pads(
+    model: ObjectModel, now: ContactState, closure_m: float, speed_m_s: float, h: float
+) -> ContactState:
+    """Return the object behind compliant pads: pressed or separated, whichever of the two is consistent."""
+    pads = model.pads
+    d0, force0, slope, _, pad0, branch0, rate0, span = now
+    pressed = force0 > 0.0
+    over, base = h, d0
+    if pressed:
+        ahead = h / (h + span)
+        over = h / (1.0 + ahead)
+        base += over * ahead * rate0
+    stiffness, push, creep = pads.stiffness_n_m, pads.stiffness_n_m * closure_m, _NO_CREEP
+    creeps = pads.damping_n_s_m > 0.0 or pads.branch_n_m > 0.0
+    if creeps:
+        creep = _creep(pads, now, h)
+        decay, mean, _, damper, _ = creep
+        stiffness += mean + damper / over
+        push += branch0 * decay + mean * (closure_m - pad0) + damper * (speed_m_s + base / over)
+    n_changes = 0
+    while True:
+        k, c = (stiffness, push) if pressed else (0.0, 0.0)
+        total = max(k + slope, MIN_SLOPE_SHARE * k, MIN_SLOPE_N_M)
+        search = BalanceSearch(
+            d0 + (c - k * d0 - force0) / total, d0, 0.0, slope, total, -math.inf, math.inf, 0
+        )
+        search, force, states = _balance(model.terms, now, PadLoad(k, c, base, over), search, h)
+        d1, slope = search.compression_m, search.slope_n_m
+        if force >= 0.0 if pressed else n_changes > 0 or closure_m <= d1 + creep.free_pad_m:
+            break
+        pressed, n_changes = not pressed, n_changes + 1
+        over, base = h, d0
+    rate = (d1 - d0) / h
+    if not pressed:
+        pad = creep.free_pad_m
+        branch = branch0 * creep.decay + (creep.mean_n_m + creep.ramp_n_m) * (pad - pad0)
+        return ContactState(d1, 0.0, slope, states, pad, branch, rate, math.inf)
+    span = h if force0 > 0.0 else math.inf
+    if not creeps:
+        return ContactState(d1, force, slope, states, pad0, branch0, rate, span)
+    pad = closure_m - d1
+    branch = branch0 * creep.decay + creep.mean_n_m * (pad - pad0)
+    branch += creep.ramp_n_m * h * (speed_m_s - (d1 - base) / over)
+    return ContactState(d1, force, slope, states, pad, branch, rate, span)
+
+
+def _creep(pads: PadCompliance, now: ContactState, h: float) -> _Creep:
+    """Return how the pads' damper and branch act over a step of `h`."""
+    x = h / pads.branch_tau_s
+    decay = math.exp(-x)
+    ramp = pads.branch_n_m * phi_ramp(x, decay)
+    mean = pads.branch_n_m * phi1(x, decay) - ramp
+    damper = pads.damping_n_s_m + ramp * h
+    # Backward Euler, which is enough for pads that touch nothing.
+    free = ((mean + damper / h) * now.pad_m - now.branch_n * decay) / (pads.stiffness_n_m + mean + damper / h)
+    return _Creep(decay, mean, ramp, damper, free)
+
+
+def _balance(
+    terms: Any, now: ContactState, load: PadLoad, search: BalanceSearch, h: float
+) -> tuple[BalanceSearch, float, Any]:
+    """Search the compression at which the object bears the pads' force; return it with the force and terms' states."""
+    d0, states0 = now.compression_m, now.states
+    k, c, base, over = load
+    d1, last, last_n, slope, total, lower, upper, n = search
+    while True:
+        force, states = object_force(terms, states0, d0, d1, h, (d1 - base) / over)
+        miss = force - (c - k * d1)
+        # The difference of two forces that are closer than this is mostly rounding.
+        if n > 0 and abs(force - last_n) > 1e-12 * abs(force) and d1 != last:
+            slope = max((force - last_n) / (d1 - last), 0.0)
+            total = max(k + slope, MIN_SLOPE_SHARE * k, MIN_SLOPE_N_M)
+        n += 1
+        tolerance = FORCE_ATOL_N + FORCE_RTOL * abs(force) + LENGTH_RTOL * abs(c)
+        if n >= MAX_ITERATIONS or not abs(miss) > tolerance:
+            break
+        if miss > 0.0:
+            upper = d1
+        else:
+            lower = d1
+        d2 = bracketed_secant(d1, miss, last, total, lower, upper)
+        if d2 == d1 or not upper - lower > ARGUMENT_RTOL * abs(d1):
+            break
+        last, last_n, d1 = d1, force, d2
+    return BalanceSearch(d1, last, last_n, slope, total, lower, upper, n), force, states
+
+
+def pad_forces(
+    model: ObjectModel, contact: Contact, gap_m: float, speed_m_s: float, h: float, still: bool
+) -> Contact:
+    """Return the contact after the fingers have come to this gap within `h`, closing at `speed_m_s` at the end.
+
+    `still`: the fingers did not move. The time that the contact was behind (`pending_s`) is made up for.
+    """
+    left_n, right_n, offset, touched, left, right, pending = contact
+    table_n, h = model.table_friction_n, h + pending
+    closure = model.width_m - gap_m
+    left1_n = right1_n = 0.0
+    # A pad that alone held the object against the table goes on doing so.
+    against_left = min(left_n, table_n) if left_n > right_n else 0.0
+    against_right = min(right_n, table_n) if right_n > left_n else 0.0
+    if still:
+        left1_n, right1_n = against_left, against_right
+    elif model.held == 0 and -closure <= 2.0 * abs(offset):
+        pushed = 0.5 * max(-closure, 0.0)
+        if pushed < abs(offset):
+            right1_n = table_n if offset > 0.0 else 0.0
+            left1_n = table_n - right1_n
+        elif closure > 0.0:
+            left1_n, right1_n = against_left, against_right
+        offset = pushed if offset >= 0.0 else -pushed
+    # Held fast, each finger presses its own half as if the other did the same. Free, both press the whole.
+    shift = 2.0 * offset if model.held == 1 else 0.0
+    for side in range(1 + model.held):
+        half = left if side == 0 else right
+        half_closure = closure - shift if side == 0 else closure + shift
+        if still or half_closure >= 0.0 or half.compression_m != 0.0:
+            span = h
+            if (
+                0.0 <= half_closure <= CONTACT_TOL_M
+                and half.compression_m == 0.0
+                and half_closure < h * speed_m_s
+            ):
+                # The contact has only just begun: a damper of the pad has acted since then and no longer.
+                span = half_closure / speed_m_s
+            half = solve_contact(model, half, half_closure, speed_m_s, span)
+        if side == 0:
+            left = half
+        else:
+            right = half
+    if model.held == 1:
+        return Contact(left.force_n, right.force_n, offset, touched, left, right, 0.0)
+    left1_n, right1_n = max(left.force_n, left1_n), max(left.force_n, right1_n)
+    return Contact(left1_n, right1_n, offset, touched, left, right, 0.0)

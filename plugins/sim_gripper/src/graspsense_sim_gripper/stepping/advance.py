@@ -1,0 +1,179 @@
+"""The plant over a tick: the loop over the steps of a tick, and what a tick needs beside it."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from graspsense.plugin_api import gap_and_rate
+from graspsense_sim_gripper.dynamics.contact import RECOVERED_M
+from graspsense_sim_gripper.dynamics.drive import Drive, is_held
+from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState
+from graspsense_sim_gripper.stepping.coast import coast
+from graspsense_sim_gripper.stepping.control import (
+    FREE_GROWTH,
+    MAX_STEPS,
+    MIN_STEP_S,
+    accept,
+    after_contact,
+    next_length,
+    relative_error,
+)
+from graspsense_sim_gripper.stepping.events import first
+from graspsense_sim_gripper.stepping.mean_force import mean_force
+from graspsense_sim_gripper.stepping.scheme import (
+    EXPLICIT,
+    STIFF,
+    Attempt,
+    PlantParams,
+    Start,
+    comes_to_rest,
+    start_of,
+)
+from graspsense_sim_gripper.stepping.stick import stick
+from graspsense_sim_gripper.stepping.tr_bdf2 import tr_bdf2
+from graspsense_sim_gripper.stepping.verlet import verlet
+from graspsense_sim_gripper.terms.phi import phi1
+
+LAG_PIECES: Final = 4
+MAX_LAG_PIECES: Final = 1000
+"""Pieces per time constant in which the force of a drive that lags is constant, and how many there are at most."""
+REST_SHARE: Final = 1e-12
+"""A remainder of the tick below this share of it is rounding."""
+
+
+def move(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
+    """Return the plant after `dt` in which this force was commanded (N, positive squeezes)."""
+    lag = params.drive.lag_s
+    n_pieces, h, mean = 1, dt, effort_n
+    if lag > 0.0:
+        n_pieces = min(max(math.ceil(LAG_PIECES * dt / lag), 1), MAX_LAG_PIECES)
+        h = dt / n_pieces
+    for _ in range(n_pieces):
+        if lag > 0.0:
+            # The exact first-order response, of which each piece has the mean.
+            decay, difference = math.exp(-h / lag), state.effort_n - effort_n
+            mean = effort_n + difference * phi1(h / lag, decay)
+            motion, contact, step, _, peak = state
+            state = PlantState(motion, contact, step, effort_n + difference * decay, peak)
+        state = advance(params, state, mean, h)
+    return state
+
+
+def advance(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
+    """Return the plant after `dt` under a constant force."""
+    if rests(params.drive, state, effort_n):
+        return state
+    if may_coast(params, state, dt):
+        coasts, after = coast(params, state, effort_n, dt)
+        if coasts:
+            return after
+    after, _ = take_steps(params, state, effort_n, dt)
+    return after
+
+
+def take_steps(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> tuple[PlantState, int]:
+    """Return the plant after `dt` under a constant force, and the number of attempted steps."""
+    left, n = dt, 0
+    while True:
+        h, forced = next_length(params.steps, state.step, left, n)
+        state, used = take_step(params, state, effort_n, h, left, forced)
+        left -= used
+        n += 1
+        if not (left > REST_SHARE * dt and n <= MAX_STEPS):
+            return state, n
+
+
+def take_step(
+    params: PlantParams, state: PlantState, effort_n: float, h: float, left_s: float, forced: bool
+) -> tuple[PlantState, float]:
+    """Return the plant after an attempted step of `h`, and how long it was: 0 where the step was rejected.
+
+    Fingers that stand still do so for the longest step, as a rule for all that is left of the tick. `forced`: the step
+    is accepted whatever its error.
+    """
+    drive, _, steps = params
+    contact, step = state.contact, state.step
+    if state.motion.speed_rev_s == 0.0 and is_held(drive, state, effort_n):
+        if contact.touched == 0:
+            return state, left_s
+        return stick(params, state, effort_n, left_s if forced else min(left_s, steps.longest_s))
+    start = start_of(params, state, effort_n)
+    if comes_to_rest(start):
+        attempt = _standing(start)
+        after_step = StepState(step.next_s, step.n_steps + 1, step.unresolved)
+    else:
+        attempt = attempt_of(params, start, effort_n, h)
+        if steps.scheme != EXPLICIT and h > MIN_STEP_S and not forced:
+            fraction = first(params, start, attempt)
+            if fraction > 0.0:
+                retry = StepState(h * fraction, step.n_steps, step.unresolved)
+                return PlantState(state.motion, contact, retry, state.effort_n, state.peak_n), 0.0
+        attempt = _without_reversal(start, attempt)
+        error = relative_error(steps, start, attempt)
+        growth = FREE_GROWTH if contact.touched == 0 else steps.growth
+        accepted, after_step = accept(error, attempt.duration_s, step, growth, forced)
+        if not accepted:
+            return PlantState(state.motion, contact, after_step, state.effort_n, state.peak_n), 0.0
+        if state.motion.gap_m > start.meeting_m >= attempt.motion.gap_m and steps.tolerance < math.inf:
+            after_step = after_contact(steps, after_step)
+    return _completed(params, state, start, attempt, after_step), attempt.duration_s
+
+
+def rests(drive: Drive, state: PlantState, effort_n: float) -> bool:
+    """Return whether nothing moves: the drive is held, and nothing relaxes between the fingers."""
+    return state.contact.touched == 0 and state.motion.speed_rev_s == 0.0 and is_held(drive, state, effort_n)
+
+
+def may_coast(params: PlantParams, state: PlantState, dt: float) -> bool:
+    """Return whether the fingers move and the step control allows one step for the whole tick."""
+    return state.motion.speed_rev_s != 0.0 and params.steps.longest_s >= dt <= state.step.next_s
+
+
+def _standing(start: Start) -> Attempt:
+    """Return the start of a step at rest, after no time."""
+    revolutions, _, gap, jacobian = start.motion
+    return Attempt(Motion(revolutions, 0.0, gap, jacobian), start.contact, 0.0, 0.0, 0.0)
+
+
+def attempt_of(params: PlantParams, start: Start, effort_n: float, h: float) -> Attempt:
+    """Return a step of `h` by the scheme of these parameters."""
+    if params.steps.scheme == EXPLICIT:
+        return verlet(params, start, effort_n, h)
+    if params.steps.scheme == STIFF:
+        return tr_bdf2(params, start, effort_n, h)
+    return mean_force(params, start, effort_n, h)
+
+
+def _without_reversal(start: Start, attempt: Attempt) -> Attempt:
+    """Return the attempt with speed zero where the motion has reversed: friction turns round there."""
+    revolutions, speed, gap, jacobian = attempt.motion
+    if speed * start.direction > 0.0:
+        return attempt
+    motion = Motion(revolutions, 0.0, gap, jacobian)
+    return Attempt(
+        motion, attempt.contact, attempt.duration_s, attempt.speed_error_m_s, attempt.force_error_n
+    )
+
+
+def _completed(
+    params: PlantParams, state: PlantState, start: Start, attempt: Attempt, step: StepState
+) -> PlantState:
+    """Return the plant after an accepted step, with the contact, the peak and the ends of travel brought up to date."""
+    drive, peak = params.drive, state.peak_n
+    revolutions, speed, gap, jacobian = attempt.motion
+    left_n, right_n, offset, touched, left, right, pending = attempt.contact
+    if touched == 1 or gap <= start.reach_m:
+        # Released and recovered, the object is as it was before the first contact.
+        shape = abs(left.compression_m) + abs(left.pad_m) + abs(right.compression_m)
+        touched = 0 if gap > start.reach_m and left_n + right_n == 0.0 and shape <= RECOVERED_M else 1
+        peak = max(peak, left.force_n, right.force_n)
+    if revolutions >= drive.open_rev and speed >= 0.0:
+        revolutions, speed = drive.open_rev, 0.0
+        gap, jacobian = gap_and_rate(drive.link, revolutions)
+    elif revolutions <= drive.closed_rev and speed <= 0.0:
+        revolutions, speed = drive.closed_rev, 0.0
+        gap, jacobian = gap_and_rate(drive.link, revolutions)
+    motion = Motion(revolutions, speed, gap, jacobian)
+    contact = Contact(left_n, right_n, offset, touched, left, right, pending)
+    return PlantState(motion, contact, step, state.effort_n, peak)

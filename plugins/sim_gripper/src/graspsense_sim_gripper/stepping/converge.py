@@ -1,0 +1,76 @@
+"""A tick that is repeated in shorter steps until its end no longer changes, for a reference or a tight tolerance."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from graspsense_sim_gripper.dynamics.state import PlantState
+from graspsense_sim_gripper.stepping.advance import may_coast, rests, take_steps
+from graspsense_sim_gripper.stepping.coast import SHAPE_SCALE_M, coast
+from graspsense_sim_gripper.stepping.control import MAX_STEPS
+from graspsense_sim_gripper.stepping.scheme import FORCE_SCALE_N, SPEED_SCALE_M_S, PlantParams, Steps
+
+MAX_HALVINGS: Final = 4
+ERROR_RATIO: Final = 0.125
+"""Ratio of the errors of a step and of one half as long."""
+MIN_TOLERANCE: Final = 1e-8
+"""Halving asks for no tolerance below this. The error of a step is then rounding, which shorter steps make worse."""
+
+
+def refine_until_converged(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
+    """Return what `advance` does, from steps that are halved until the end of the tick has converged.
+
+    The state before the tick has to be kept for this, which costs compiled code 5 % where no tick is refined.
+    """
+    drive, model, steps = params
+    if rests(drive, state, effort_n):
+        return state
+    if steps.settle <= 0.0 and may_coast(params, state, dt):
+        coasts, after = coast(params, state, effort_n, dt)
+        if coasts:
+            return after
+    before = after = state
+    n_before = n_halvings = 0
+    while True:
+        after, n = take_steps(PlantParams(drive, model, steps), state, effort_n, dt)
+        if (
+            steps.settle <= 0.0
+            or n_halvings == MAX_HALVINGS
+            # Half as long they would be too many, and too short to be of use.
+            or 4 * n > MAX_STEPS
+            or (after.contact.touched == 0 and after.motion.speed_rev_s == 0.0)
+        ):
+            return after
+        # The steps of the next attempt are the same if half of the tick was their limit already.
+        if n > n_before > 0 and _alike(before, after, steps.settle):
+            return after
+        steps = _halved(steps, dt)
+        before, n_before, n_halvings = after, n, n_halvings + 1
+
+
+def _alike(before: PlantState, after: PlantState, share: float) -> bool:
+    """Return whether speed, force and shapes differ by no more than this share."""
+    speed0 = before.motion.speed_rev_s * before.motion.jacobian_m_rev
+    speed1 = after.motion.speed_rev_s * after.motion.jacobian_m_rev
+    force0 = before.contact.left_n + before.contact.right_n
+    force1 = after.contact.left_n + after.contact.right_n
+    # No force tells of a released object's shape until the object strikes the fingers again.
+    left0, left1 = before.contact.left.compression_m, after.contact.left.compression_m
+    right0, right1 = before.contact.right.compression_m, after.contact.right.compression_m
+    return (
+        abs(speed1 - speed0) <= share * max(abs(speed1), SPEED_SCALE_M_S)
+        and abs(force1 - force0) <= share * max(force1, FORCE_SCALE_N)
+        and abs(left1 - left0) <= share * max(abs(left1), SHAPE_SCALE_M)
+        and abs(right1 - right0) <= share * max(abs(right1), SHAPE_SCALE_M)
+    )
+
+
+def _halved(steps: Steps, dt: float) -> Steps:
+    """Return steps of half the length, also where the end of the tick `dt` cut them."""
+    return Steps(
+        max(ERROR_RATIO * steps.tolerance, min(steps.tolerance, MIN_TOLERANCE)),
+        steps.scheme,
+        0.5 * min(steps.longest_s, dt),
+        steps.settle,
+        1.0 + 0.5 * (steps.growth - 1.0),
+    )

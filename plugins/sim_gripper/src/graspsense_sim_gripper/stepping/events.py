@@ -1,0 +1,74 @@
+"""Events that end a step: a contact, an end of the travel, a reversal, the release of the object.
+
+After an event the equation of motion is another one, so no step goes beyond it. The explicit scheme knows its path in
+advance and ends at the event (`drift`). An implicit scheme goes beyond it, and `first` says by how much.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from graspsense.plugin_api import gap_and_rate
+from graspsense_sim_gripper.dynamics.contact import CONTACT_TOL_M
+from graspsense_sim_gripper.dynamics.drive import ARREST_M_S
+from graspsense_sim_gripper.dynamics.state import Motion
+from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start, end_of_travel
+
+NEWTON_ITERATIONS: Final = 4
+"""Of the search for a contact on the parabola, begun from the secant."""
+MIN_FRACTION: Final = 0.01
+MAX_FRACTION: Final = 0.99
+"""A repeated step is shorter by at least a hundredth, and no shorter than a hundredth."""
+
+
+def drift(params: PlantParams, start: Start, h: float) -> tuple[Motion, float]:
+    """Return the motion under constant acceleration after `h` or at an earlier event, and the time until then."""
+    drive = params.drive
+    revolutions, speed, gap, _ = start.motion
+    rate, direction, meeting = start.acceleration, start.direction, start.meeting_m
+    t = h
+    if rate * direction < 0.0 and (speed + rate * h) * direction <= 0.0:
+        t = -speed / rate
+    revolutions1 = revolutions + t * (speed + 0.5 * rate * t)
+    gap1, jacobian1 = gap_and_rate(drive.link, revolutions1)
+    if gap > meeting > gap1:
+        t = t * (gap - meeting) / (gap - gap1)
+        for _ in range(NEWTON_ITERATIONS):
+            revolutions1 = revolutions + t * (speed + 0.5 * rate * t)
+            gap1, jacobian1 = gap_and_rate(drive.link, revolutions1)
+            correction = (gap1 - meeting) / (jacobian1 * (speed + rate * t))
+            if not 0.0 < t - correction <= h:
+                break
+            t -= correction
+        gap1 = min(gap1, meeting)
+    end = end_of_travel(drive, direction)
+    if (revolutions1 - end) * direction > 0.0:
+        # The object is pressed as far as the travel goes, and no further.
+        t = min(max(t * (end - revolutions) / (revolutions1 - revolutions), 0.0), t)
+        revolutions1 = end
+        gap1, jacobian1 = gap_and_rate(drive.link, end)
+    return Motion(revolutions1, speed + rate * t, gap1, jacobian1), t
+
+
+def first(params: PlantParams, start: Start, attempt: Attempt) -> float:
+    """Return the fraction of an implicit step after which an event lies inside it, by the secant; 0: there is none."""
+    revolutions, speed, gap, jacobian = start.motion
+    revolutions1, speed1, gap1, jacobian1 = attempt.motion
+    direction, meeting = start.direction, start.meeting_m
+    end = end_of_travel(params.drive, direction)
+    load = 0.5 * (start.contact.left_n + start.contact.right_n)
+    load1 = 0.5 * (attempt.contact.left_n + attempt.contact.right_n)
+    fraction = 0.0
+    if gap > meeting and gap1 < meeting - CONTACT_TOL_M:
+        fraction = (gap - meeting) / (gap - gap1)
+    elif (revolutions1 - end) * direction * abs(jacobian) > CONTACT_TOL_M:
+        fraction = (end - revolutions) / (revolutions1 - revolutions)
+    elif speed1 * direction < 0.0 and speed != 0.0 and abs(speed1 * jacobian1) >= ARREST_M_S:
+        fraction = abs(speed) / (abs(speed) + abs(speed1))
+    elif load > 0.0 and load1 == 0.0 and gap1 > gap:
+        # Released on the way: beyond the end of the recovering object nothing drives the fingers.
+        surface = params.object.width_m - attempt.contact.left.compression_m - attempt.contact.left.pad_m
+        beyond = gap1 - surface
+        if beyond > CONTACT_TOL_M:
+            fraction = max(1.0 - beyond / (gap1 - gap), MIN_FRACTION)
+    return min(max(fraction, MIN_FRACTION), MAX_FRACTION) if fraction > 0.0 else 0.0

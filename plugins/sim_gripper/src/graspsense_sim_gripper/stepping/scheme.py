@@ -1,0 +1,107 @@
+"""What every scheme of a step is given and returns.
+
+A scheme is a function `scheme(params, start, effort_n, h) -> Attempt`. It does not decide whether its step is accepted.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from graspsense_sim_gripper.dynamics.contact import ObjectModel
+from graspsense_sim_gripper.dynamics.drive import (
+    ARREST_M_S,
+    Drive,
+    acceleration,
+    breakaway_friction,
+    sliding_friction,
+)
+from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
+
+EXPLICIT: Final = 0
+STIFF: Final = 1
+MEAN_FORCE: Final = 2
+"""The schemes: velocity Verlet, TR-BDF2, and the discrete gradient (see the modules of these names)."""
+SPEED_SCALE_M_S: Final = 1e-3
+FORCE_SCALE_N: Final = 1.0
+"""Errors are relative to the speed and the force, or to these where they are smaller."""
+
+
+class Steps(NamedTuple):
+    """How a tick is divided into steps."""
+
+    tolerance: float
+    """Error of a step, relative to force and speed, beyond which it is rejected."""
+    scheme: int = EXPLICIT
+    longest_s: float = math.inf
+    settle: float = 0.0
+    """Relative change of speed and force that is left when the steps of a tick are halved; 0: they are not halved."""
+    growth: float = 2.0
+    """Greatest ratio of a step to the last one while something is touched.
+
+    After a contact at time t_c a step is then at most (growth - 1) (t - t_c) long, however short the first one was."""
+
+
+class PlantParams(NamedTuple):
+    """What does not change during a grasp: the drive, the object, and how a tick is divided into steps."""
+
+    drive: Drive
+    object: ObjectModel
+    steps: Steps
+
+
+class Start(NamedTuple):
+    """The state before a step, with what every scheme derives from it."""
+
+    motion: Motion
+    contact: Contact
+    direction: float
+    """+1: the gap opens, or would; -1: it closes."""
+    acceleration: float
+    """rev/s2"""
+    reach_m: float
+    """The gap at which the finger that is nearer to the object touches it."""
+    meeting_m: float
+    """The gap of the next contact: `reach_m`, or that of the other finger where one touches already."""
+
+
+class Attempt(NamedTuple):
+    """What a scheme returns: the state after the step, and estimates of its errors."""
+
+    motion: Motion
+    contact: Contact
+    duration_s: float
+    """Shorter than the step that was asked for where the scheme itself ends at an event."""
+    speed_error_m_s: float
+    force_error_n: float
+
+
+def start_of(params: PlantParams, state: PlantState, effort_n: float) -> Start:
+    """Return the start of a step under this effort, from a state that is not held."""
+    drive, model, _ = params
+    motion, contact = state.motion, state.contact
+    _, speed, gap, jacobian = motion
+    load = 0.5 * (contact.left_n + contact.right_n)
+    net = load - effort_n
+    if speed == 0.0:
+        direction = 1.0 if net > 0.0 else -1.0
+        friction_n = breakaway_friction(drive.friction, load)
+    else:
+        direction = 1.0 if speed > 0.0 else -1.0
+        friction_n = sliding_friction(drive.friction, speed * jacobian, load)
+    rate = acceleration(drive, jacobian, speed, net, friction_n, direction)
+    offset = 2.0 * abs(contact.offset_m)
+    reach = model.width_m + offset
+    meeting = reach if gap > reach else model.width_m - (offset if model.held == 1 else 0.0)
+    return Start(motion, contact, direction, rate, reach, meeting)
+
+
+def comes_to_rest(start: Start) -> bool:
+    """Return whether the drive stands still from here on, being slow and slowing down."""
+    slowing = start.acceleration * start.direction < 0.0
+    return slowing and abs(start.motion.speed_rev_s * start.motion.jacobian_m_rev) < ARREST_M_S
+
+
+def end_of_travel(drive: Drive, direction: float) -> float:
+    """Return the angle (revolutions) at which the travel in this direction ends."""
+    return drive.open_rev if direction > 0.0 else drive.closed_rev

@@ -1,0 +1,39 @@
+"""A drive that friction holds: the fingers stand still while the object relaxes between them, until they slip."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from graspsense_sim_gripper.dynamics.contact import pad_forces
+from graspsense_sim_gripper.dynamics.drive import breakaway_friction
+from graspsense_sim_gripper.dynamics.state import Motion, PlantState
+from graspsense_sim_gripper.stepping.control import MIN_STEP_S
+from graspsense_sim_gripper.stepping.scheme import PlantParams
+
+SLIP_ITERATIONS: Final = 6
+SLIP_TOL_N: Final = 1e-6
+"""The breakaway force is exceeded by at most this when the fingers begin to slip."""
+SLIP_AIM_N: Final = 5e-7
+"""The search for that moment aims at half of it, so that the fingers do slip."""
+MIN_MARGIN_N: Final = 1e-9
+"""Fingers that are closer than this to slipping are not searched for it."""
+MIN_SHARE: Final = 1e-6
+"""Least share of the step to which the search shortens it."""
+
+
+def stick(params: PlantParams, state: PlantState, effort_n: float, h: float) -> tuple[PlantState, float]:
+    """Return the plant after the fingers have stood still for `h`, or until they begin to slip, and that time."""
+    friction = params.drive.friction
+    (revolutions, _, gap, jacobian), contact, step, given, peak = state
+    load = 0.5 * (contact.left_n + contact.right_n)
+    margin = breakaway_friction(friction, load) - abs(load - effort_n)
+    t, after = h, contact
+    for _ in range(SLIP_ITERATIONS):
+        after = pad_forces(params.object, contact, gap, 0.0, t, True)
+        load1 = 0.5 * (after.left_n + after.right_n)
+        margin1 = breakaway_friction(friction, load1) - abs(load1 - effort_n)
+        if margin1 >= -SLIP_TOL_N or margin < MIN_MARGIN_N or t < MIN_SHARE * h:
+            break
+        t = max(t * (margin + SLIP_AIM_N) / (margin - margin1), min(t, MIN_STEP_S))
+    peak = max(peak, after.left.force_n, after.right.force_n)
+    return PlantState(Motion(revolutions, 0.0, gap, jacobian), after, step, given, peak), t
