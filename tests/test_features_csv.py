@@ -63,7 +63,7 @@ def test_what_counts_as_missing(csv, gap):
     [
         ("", DataDamaged, "is empty: it needs a header line"),
         ("\n\n  \n", DataDamaged, "is empty"),
-        ("what,p_first\n", DataDamaged, "has a header and no trial"),
+        ("what,p_first\n", DataDamaged, "has a header but no trials"),
         (
             GOOD.replace("what", "class"),
             ConfigError,
@@ -72,33 +72,37 @@ def test_what_counts_as_missing(csv, gap):
         (
             GOOD.replace("a,0.05,6", "a,0.05", 1),
             DataDamaged,
-            "line 2: 2 values where the header names 3 columns",
+            "line 2: 2 values, but the header names 3 columns",
         ),
         (
             GOOD.replace("a,0.05,6", "a,wide,6", 1),
             DataDamaged,
-            "line 2: p_first is 'wide', which is no number",
+            "line 2: p_first is 'wide', which is not a number",
         ),
         (
             GOOD.replace("a,0.05,6", 'a,"0,05",6', 1),
             DataDamaged,
-            "which is no number (write a decimal point)",
+            "which is not a number (write a decimal point)",
         ),
-        (GOOD.replace("a,0.05,6", "a,5_0,6", 1), DataDamaged, "line 2: p_first is '5_0', which is no number"),
+        (
+            GOOD.replace("a,0.05,6", "a,5_0,6", 1),
+            DataDamaged,
+            "line 2: p_first is '5_0', which is not a number",
+        ),
         (GOOD.replace("a,0.05,6", "a,inf,6", 1), DataDamaged, "line 2: p_first is infinite"),
         (GOOD.replace("a,0.05,6", ",0.05,6", 1), DataDamaged, "line 2: what (the label) is empty"),
         (GOOD.replace("a,0.05,6", 'a,"0.05,6', 1), DataDamaged, "line "),
         (GOOD.replace("f_steady", "p_first"), DataDamaged, "two columns are named 'p_first'"),
         (GOOD.replace("f_steady", ""), DataDamaged, "column 3 has no name"),
-        (GOOD.replace("a,", "unknown,"), ConfigError, "'unknown' is no label"),
+        (GOOD.replace("a,", "unknown,"), ConfigError, "'unknown' cannot be a label"),
         (GOOD.encode("utf-16"), DataDamaged, "is UTF-16: save it as UTF-8"),
         (
             GOOD.replace("b,", "flaschenöffner,").encode("latin-1"),
             DataDamaged,
             "line 3: byte 0xf6 is not UTF-8",
         ),
-        (b"PK\x03\x04\x00\x00what,p", DataDamaged, "holds zero bytes: it is no text"),
-        ("what,p\na,\nb,\n" * 1, DataDamaged, "no feature has a single value: p"),
+        (b"PK\x03\x04\x00\x00what,p", DataDamaged, "contains zero bytes: it is not a text file"),
+        ("what,p\na,\nb,\n" * 1, DataDamaged, "no feature has any value: p"),
         ("what,name\na,x\na,y\nb,z\n", ConfigError, "has no column of numbers besides what"),
     ],
 )
@@ -110,7 +114,7 @@ def test_what_cannot_be_read_says_where_and_why(csv, content, error, said):
 
 
 def test_a_column_of_numbers_is_no_label(csv):
-    with pytest.raises(ConfigError, match="that is no label"):
+    with pytest.raises(ConfigError, match="cannot be the label"):
         read_labelled(csv("what,p\n" + "".join(f"{i * 1.1},{i % 2}\n" for i in range(9))), "what")
 
 
@@ -125,8 +129,8 @@ def test_counters_and_texts_are_no_features_unless_asked_for(csv):
 
     found = read_labelled(path, "what")
     assert found.table.names == ("p",)
-    assert any("trial, time (--features takes them in)" in note for note in found.notes)
-    assert any("hold no numbers: comment" in note for note in found.notes)
+    assert any("trial, time (use --features to include them)" in note for note in found.notes)
+    assert any("have no numbers: comment" in note for note in found.notes)
     assert read_labelled(path, "what", features=["trial", "p"]).table.names == ("trial", "p")
 
 
@@ -136,8 +140,10 @@ def test_constant_and_empty_columns_are_noted(csv):
         csv("what,p,same,empty,\n".replace(",\n", ",void\n") + "\n".join(lines) + "\n"), "what"
     )
 
-    assert "constant, so that they tell nothing apart: same" in found.notes
-    assert "not used, as they hold no value: empty, void (--features takes them in)" in found.notes
+    assert "constant, and so without information: same" in found.notes
+    assert (
+        "not used, because they have no values: empty, void (use --features to include them)" in found.notes
+    )
     assert found.table.names == ("p", "same")
 
 
@@ -156,7 +162,7 @@ def test_instances_order_and_what_is_known_before_the_contact(csv):
     assert found.order == tuple(range(11, -1, -1))
     assert found.before_contact is not None
     assert found.before_contact.table.names == ("start",)
-    with pytest.raises(ConfigError, match="'when' is no feature here"):
+    with pytest.raises(ConfigError, match="'when' cannot be a feature"):
         read_labelled(path, "what", order="when", features=["when", "p"])
 
 

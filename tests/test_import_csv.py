@@ -48,13 +48,11 @@ def test_one_force_is_that_of_both_pads_and_said_so(squeeze):
     recording = read_squeeze(name_of(squeeze, force=["F left"]))
     frame = recording.readings[-1].frame
     assert frame.force_left_n == frame.force_right_n > 1.0
-    assert any("one force was recorded" in note for note in recording.notes)
+    assert any("single force was recorded" in note for note in recording.notes)
 
 
 def test_a_gap_in_millimetres_is_refused(squeeze):
-    with pytest.raises(
-        DataDamaged, match=r"goes up to 74 m, which no gripper has.* write COLUMN\*0\.001 for it"
-    ):
+    with pytest.raises(DataDamaged, match=r"reaches 74 m, which no gripper has.* write COLUMN\*0\.001"):
         read_squeeze(name_of(squeeze, gap="opening"))
     assert not [one for one in read_squeeze(name_of(squeeze)).notes if "gap" in one]
 
@@ -65,10 +63,13 @@ def test_a_gap_in_millimetres_is_refused(squeeze):
         ("", "which column of .* is time"),
         ("?time=stamp ms&gap=opening", "is force"),
         ("?time=stamp ms&gap=opning&force=F left", "no column 'opning'.*Did you mean 'opening'"),
-        ("?time=stamp ms&gap=opening&force=F left&forse=x", "'forse' is no part of a squeeze.*'force'"),
-        ("?time=stamp ms&gap=opening*mm&force=F left", "'mm' in 'opening\\*mm' is no factor"),
-        ("?time=stamp ms&gap=opening*0&force=F left", "is no factor"),
-        ("?time=stamp ms&gap=opening&gap=opening&force=F left", "2 columns are given for gap: 1 at most"),
+        ("?time=stamp ms&gap=opening&force=F left&forse=x", "'forse' is not a quantity of a grasp.*'force'"),
+        ("?time=stamp ms&gap=opening*mm&force=F left", "'mm' in 'opening\\*mm' is not a factor"),
+        ("?time=stamp ms&gap=opening*0&force=F left", "the factor 0 must be finite and not 0"),
+        (
+            "?time=stamp ms&gap=opening&gap=opening&force=F left",
+            "2 columns are given for gap; at most 1 can be",
+        ),
     ],
 )
 def test_a_name_that_makes_no_sense_is_told(squeeze, query, says):
@@ -79,10 +80,10 @@ def test_a_name_that_makes_no_sense_is_told(squeeze, query, says):
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ("5000;1;1;1;x", "line 4: the time goes from .* it must rise"),
+        ("5000;1;1;1;x", "line 4: the time goes from .* it must increase"),
         ("5002;;1;1;x", r"line 4: opening \(gap\) is missing"),
-        ("5002;wide;1;1;x", "line 4: opening is 'wide', which is no number"),
-        ("5002;1;1;1", "line 4: 4 values where the header names 5"),
+        ("5002;wide;1;1;x", "line 4: opening is 'wide', which is not a number"),
+        ("5002;1;1;1", "line 4: 4 values, but the header names 5"),
     ],
 )
 def test_a_line_that_is_no_squeeze_is_told_with_its_number(squeeze, line, says):
@@ -116,7 +117,7 @@ def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squ
         "classifier.type=none", "--json",
     )  # fmt: skip
     assert code == 0, err
-    assert "2200 lines of squeeze.csv: taken to be in s, m and N" in err
+    assert "2200 lines of squeeze.csv, read as s, m and N" in err
     assert json.loads(out)["trials"] == [{"source": str(squeeze), "trial": 1, "outcome": "steady"}]
     with Store.read(store) as opened:
         kept = opened.trial(1)

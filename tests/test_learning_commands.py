@@ -103,7 +103,7 @@ def test_a_model_of_states_or_classes(run, csv, tmp_path):
     model = tmp_path / "states.json"
     code, _, err = run("train", csv, "--label", "what", "--out", model, "--target", "state")
     assert code == 2
-    assert "name it with --only, one of can, jar" in err
+    assert "select it with --only: can, jar" in err
     assert run("train", csv, "--label", "what", "--out", model, "--target", "state", "--only", "jar")[0] == 0
     assert json.loads(model.read_text())["target"] == "state"
     assert run("train", csv, "--label", "what", "--out", model, "--target", "class", "--json")[0] == 0
@@ -164,7 +164,11 @@ def test_the_picture_of_the_confusion(run, csv, tmp_path):
         (["evaluate", "simulated", "--objects", "canoe"], 2, "no object named 'canoe'"),
         (["evaluate", "simulated", "--objects", "can,can:full_open"], 2, "an object is named twice"),
         (["evaluate", "simulated", "--objects", "can:full_open#3"], 2, "without an instance"),
-        (["train", "x.csv", "--label", "y", "--out", "model.pkl"], 2, "a model's file ends in .json"),
+        (
+            ["train", "x.csv", "--label", "y", "--out", "model.pkl"],
+            2,
+            "the name of a model's file must end in .json",
+        ),
         (
             ["train", "x.csv", "--label", "y", "--out", "gone/model.json"],
             2,

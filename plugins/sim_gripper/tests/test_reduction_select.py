@@ -229,4 +229,4 @@ def test_gas_that_is_spent_is_reported(tmp_path):
         law = create("controller", "hybrid", probing_force_n=force)
         found.append(run_grasp(SimBackend(config), law, RunConfig()).report["beyond"])
     assert found[0] == ""
-    assert found[1].startswith("gas: pressed by more than it holds")
+    assert found[1].startswith("gas: more than its volume was displaced")

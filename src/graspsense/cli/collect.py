@@ -1,4 +1,4 @@
-"""`graspsense collect`: labelled trials, one after the other, with an operator."""
+"""`graspsense collect`: record labelled trials with an operator."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from types import FrameType
 
     from graspsense.core.config import Settings
+    from graspsense.store.collecting import Collection
+    from graspsense.store.store import Store
 
 
 @click.command(short_help="Collect labelled trials with an operator.")
@@ -45,16 +47,12 @@ def collect(
 ) -> None:
     """Prompt for the next object, grasp it and store the trial (Enter: grasp, u: undo, r: repeat, q: stop).
 
-    Objects are grasped in rounds, so that no class is recorded as one batch. The command can be stopped or killed at
-    any time, and continues where it was. With a simulated gripper, the label selects the object. Answers can come from
-    a file or a pipe.
+    Objects are grasped in rounds, so that no class is recorded as one batch. The command can be stopped or killed, and
+    continues where it was. With a simulated gripper, the label selects the object. Answers can come from a file.
     """
-    from graspsense.core.errors import ConfigError
-    from graspsense.core.model import model_for
     from graspsense.core.plugins import installed
     from graspsense.core.wiring import check
     from graspsense.store.collecting import Collection, Wanted
-    from graspsense.store.recover import recover_store
     from graspsense.store.store import Store
 
     wanted = Wanted(
@@ -65,11 +63,7 @@ def collect(
     )
     first = settings_of(pipeline, gripper, object_name, options, seed)
     check(first)
-    try:
-        model_for(first, installed())
-    except ConfigError as error:
-        # A pipeline may name the model that these trials are for.
-        talk(f"note: collecting without predictions: {str(error).splitlines()[0]}")
+    if not _has_model(first):
         options = (*options, *GRIPPER_ALONE)
     finds = bool(first.gripper.create().objects())
 
@@ -77,9 +71,7 @@ def collect(
         return settings_of(pipeline, gripper, word if finds else object_name, options, number)
 
     with Store.open(save) as store:
-        for one in recover_store(store):
-            number = f" as trial {one.trial}" if one.trial is not None else ""
-            talk(f"{one.file.name}: {one.what}{number}{f' ({one.why})' if one.why else ''}")
+        _recover(store)
         collection = Collection(
             store=store,
             wanted=wanted,
@@ -90,16 +82,7 @@ def collect(
             changed=changed,
         )
 
-        def stop(signum: int, frame: FrameType | None) -> None:
-            del signum, frame
-            collection.stopping = True
-            raise KeyboardInterrupt
-
-        previous = signal.signal(signal.SIGTERM, stop)
-        try:
-            collection.run()
-        finally:
-            signal.signal(signal.SIGTERM, previous)
+        _run_until_stopped(collection)
         counts = collection.counts()
     done = all(n >= each for n in counts.values())
     if as_json:
@@ -111,8 +94,52 @@ def collect(
             click.echo(f"{word:<24}{n:>4} of {each}")
 
 
+def _has_model(settings: Settings) -> bool:
+    """Return whether the model of the pipeline can be used; if not, print why.
+
+    A pipeline can name the model that is to be trained on these trials.
+    """
+    from graspsense.core.errors import ConfigError
+    from graspsense.core.model import model_for
+    from graspsense.core.plugins import installed
+
+    try:
+        model_for(settings, installed())
+    except ConfigError as error:
+        talk(f"note: collecting without predictions: {str(error).splitlines()[0]}")
+        return False
+    return True
+
+
+def _recover(store: Store) -> None:
+    """Complete the trials of an interrupted run, and print what became of each."""
+    from graspsense.store.recover import recover_store
+
+    for one in recover_store(store):
+        number = f" as trial {one.trial}" if one.trial is not None else ""
+        talk(f"{one.file.name}: {one.what}{number}{f' ({one.why})' if one.why else ''}")
+
+
+def _run_until_stopped(collection: Collection) -> None:
+    """Run the collection; SIGTERM ends it as Ctrl-C does."""
+
+    def stop(signum: int, frame: FrameType | None) -> None:
+        del signum, frame
+        collection.stopping = True
+        raise KeyboardInterrupt
+
+    previous = signal.signal(signal.SIGTERM, stop)
+    try:
+        collection.run()
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+
+
 def _ask(question: str) -> str | None:
-    """Ask on the terminal, or take the next line of what stands in for it; None at its end or where it is closed."""
+    """Ask on the terminal and return the answer in lower case, None at the end of the input.
+
+    Without a terminal, the next line of the standard input is the answer.
+    """
     click.echo(question, err=True, nl=False)
     if sys.stdin is None:
         return None

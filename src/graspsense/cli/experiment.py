@@ -1,4 +1,4 @@
-"""`graspsense experiment`: a file of sweeps and seeds, run to the end, whatever comes between."""
+"""`graspsense experiment`: run or resume an experiment that is described by a file."""
 
 from __future__ import annotations
 
@@ -92,9 +92,7 @@ def experiment(
         problem = str(error)
     more = findings_of(found)
     if as_json:
-        told = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
-        where = None if page is None else str(page)
-        echo_json({**found.as_json(), **told, "page": where, **_counts(account, problem)})
+        _print_json(found, more, page, _counts(account, problem))
     else:
         _print(found, more, account, f"none: {problem}" if problem else str(page))
     if account.stopped == "interrupted":
@@ -129,6 +127,11 @@ def _plan(names: list[str], as_json: bool) -> None:
     else:
         click.echo("\n".join(names))
         click.echo(f"{len(names)} tasks")
+
+
+def _print_json(found: Summary, more: Findings | None, page: Path | None, counts: dict[str, object]) -> None:
+    findings = {} if more is None else {"answer": more.answer, "findings": dict(more.values)}
+    echo_json({**found.as_json(), **findings, "page": None if page is None else str(page), **counts})
 
 
 def _print(found: Summary, more: Findings | None, account: Account, page: str) -> None:

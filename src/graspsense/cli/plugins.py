@@ -224,8 +224,8 @@ def _rows(loaded: Plugins) -> list[dict[str, Any]]:
             one.version,
             "loaded",
             one.entry.summary,
-            advice=(*_clash(one, loaded), *advice[one.distribution]),
         )
+        | {"advice": [*_clash(one, loaded), *advice[one.distribution]]}
         for one in loaded.components()
     ]
     bringing = {one.distribution for one in loaded.components()}
@@ -238,8 +238,8 @@ def _rows(loaded: Plugins) -> list[dict[str, Any]]:
             status.state,
             ", ".join(status.hooks),
             status.reason,
-            advice[status.distribution],
         )
+        | {"advice": list(advice[status.distribution])}
         for status in loaded.statuses
         if status.state != "loaded" or status.distribution not in bringing
     ]
@@ -260,7 +260,6 @@ def _row(
     state: str,
     summary: str,
     reason: str = "",
-    advice: tuple[str, ...] = (),
 ) -> dict[str, Any]:
     return {
         "role": role,
@@ -270,7 +269,7 @@ def _row(
         "state": state,
         "summary": summary,
         "reason": reason,
-        "advice": list(advice),
+        "advice": [],
     }
 
 

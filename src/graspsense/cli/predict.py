@@ -1,4 +1,4 @@
-"""`graspsense predict`: what a model says of trials."""
+"""`graspsense predict`: the predictions of a model for labelled or unlabelled trials."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from graspsense.cli.output import echo_json, echo_table, talk
 from graspsense.cli.sources import SOURCES, is_csv, source_options, trials_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from graspsense.core.features import FeatureTable, Prediction
     from graspsense.core.model import Model
 
 MOST_WITH_REASONS: Final = 1000
-"""Trials that are explained one by one; of more, nobody reads every reason, and each takes a millisecond."""
+"""Largest number of trials whose predictions are given with reasons, which take about a millisecond each."""
 
 
 @click.command(
@@ -34,7 +36,6 @@ MOST_WITH_REASONS: Final = 1000
 @click.option("--json", "as_json", is_flag=True, help="Print every prediction with its reasons as JSON.")
 def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     """Predict and print."""
-    from graspsense.cli.progress import ProgressLine
     from graspsense.core.errors import ConfigError
     from graspsense.core.model import load_model
     from graspsense.core.plugins import installed
@@ -42,27 +43,14 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     from graspsense.evaluation.json_codec import to_json
 
     asked = load_model(model, installed())
-    labels: tuple[str, ...] | None = None
-    notes: tuple[str, ...] = ()
-    table: FeatureTable
-    if is_csv(source) and not given["label"]:
-        from graspsense.sources.features_csv import read_table
-
-        table = read_table(Path(source), asked.names)
-    else:
-        with ProgressLine() as progress:
-            labelled = trials_of(
-                source, progress, {**given, "features": given["features"] or ",".join(asked.names)}
-            )
-        table, notes = labelled.table, labelled.notes
-        labels = labelled.aimed(asked.target).labels
-    misfit = asked.misfit(table)
-    if misfit:
-        raise ConfigError(misfit)
+    table, labels, notes = _trials(asked, source, given)
+    mismatch = asked.misfit(table)
+    if mismatch:
+        raise ConfigError(mismatch)
     if len(table) > MOST_WITH_REASONS:
         notes = (
             *notes,
-            f"reasons are given for up to {MOST_WITH_REASONS} trials; these are more, so none has any",
+            f"predictions of more than {MOST_WITH_REASONS} trials are given without reasons",
         )
         predictions = _without_reasons(asked, table)
     else:
@@ -92,6 +80,29 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     for text in (*warnings, *notes):
         talk(f"note: {text}")
     click.echo(asked.in_a_line)
+    _print(predictions, labels)
+    if rate is not None:
+        click.echo(f"\nrate        {rate.words}   (an answer of unknown counts as wrong)")
+
+
+def _trials(
+    model: Model, source: str, given: Mapping[str, Any]
+) -> tuple[FeatureTable, tuple[str, ...] | None, tuple[str, ...]]:
+    """Return the features of the trials, their labels (None if the source has none), and notes."""
+    from graspsense.cli.progress import ProgressLine
+
+    if is_csv(source) and not given["label"]:
+        from graspsense.sources.features_csv import read_table
+
+        return read_table(Path(source), model.names), None, ()
+    with ProgressLine() as progress:
+        labelled = trials_of(
+            source, progress, {**given, "features": given["features"] or ",".join(model.names)}
+        )
+    return labelled.table, labelled.aimed(model.target).labels, labelled.notes
+
+
+def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:
     header = ("TRIAL", "ANSWER", "SURE", *(("TRUTH",) if labels else ()), "BECAUSE")
     rows = []
     for i, one in enumerate(predictions):
@@ -99,12 +110,10 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
         truth = (labels[i],) if labels else ()
         rows.append((str(i + 1), one.label, sure, *truth, "; ".join(one.because)))
     echo_table(header, rows)
-    if rate is not None:
-        click.echo(f"\nrate        {rate.words}   (an answer of unknown counts as wrong)")
 
 
 def _without_reasons(model: Model, table: FeatureTable) -> list[Prediction]:
-    """Return the answers to many trials, asked all at once."""
+    """Return the predictions of many trials in one call, without reasons."""
     from graspsense.core.features import Prediction
 
     labels, shares = model.answers(table)

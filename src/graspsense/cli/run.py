@@ -64,11 +64,7 @@ def run(
     settings = settings_of(pipeline, gripper, object_name, options, seed)
     if label is not None and not agrees(settings, label):
         if object_name is not None or any(one.startswith("gripper.object=") for one in options):
-            raise click.UsageError(
-                f"--label {label} is not what the gripper holds, which is {settings.values['gripper']['object']}: a "
-                "simulated gripper grasps what it is told, so label and object must agree. Leave --object out to grasp "
-                "what the label says"
-            )
+            raise _contradiction(settings, label)
         settings = settings_of(pipeline, gripper, label, options, seed)
     check(settings)
     if dry_run:
@@ -91,10 +87,7 @@ def run(
         echo_json(trial_as_json(trial) if kept is None else {**trial_as_json(trial), "kept": kept})
     else:
         print_trial(trial)
-        if "model" in trial.report:
-            print_model(trial.report["model"])
-            if "selection" in trial.report:
-                print_selection(trial.report["selection"])
+        _print_model(trial)
     if plot is not None:
         draw_grasp(trial, Path(plot))
     if kept is not None and kept["problem"]:
@@ -104,10 +97,19 @@ def run(
         raise click.exceptions.Exit(EXIT_ABORTED)
 
 
-def agrees(settings: Settings, label: str) -> bool:
-    """Return whether this label can be that of what the gripper holds, as far as the gripper can be told what that is.
+def _print_model(trial: Trial) -> None:
+    """Print what each term of the simulated object contributed, and the selection of terms, if the trial has them."""
+    if "model" in trial.report:
+        print_model(trial.report["model"])
+        if "selection" in trial.report:
+            print_selection(trial.report["selection"])
 
-    A file of an object can be labelled with any name, a real gripper holds what is really there.
+
+def agrees(settings: Settings, label: str) -> bool:
+    """Return whether an object with this label can be what the gripper holds.
+
+    A label contradicts the gripper only if the gripper holds a known object: an object from a file can have any label,
+    and nobody but the user knows what a real gripper holds.
     """
     held = str(settings.values["gripper"].get("object") or "").partition("#")[0]
     known = {name for kind in settings.gripper.create().objects() for name in kind.full_names}
@@ -115,8 +117,16 @@ def agrees(settings: Settings, label: str) -> bool:
     return held == named or not known & {held, named}
 
 
+def _contradiction(settings: Settings, label: str) -> click.UsageError:
+    return click.UsageError(
+        f"--label {label} is not what the gripper holds, which is {settings.values['gripper']['object']}: a simulated "
+        "gripper grasps what it is told, so label and object must agree. Leave --object out to grasp what the label "
+        "says"
+    )
+
+
 def draw_grasp(trial: Trial, path: Path) -> None:
-    """Draw the trial and say where the picture is. Raises PluginUnavailable, ConfigError."""
+    """Draw the trial and print the name of the picture. Raises PluginUnavailable, ConfigError."""
     from graspsense.report.grasp_picture import grasp_png
 
     grasp_png(trial, path)
@@ -126,7 +136,7 @@ def draw_grasp(trial: Trial, path: Path) -> None:
 def _kept(
     save: str, label: str | None, settings: Settings, sinks: Sequence[Sink]
 ) -> tuple[Trial, dict[str, Any]]:
-    """Grasp and keep the trial; return it with what is printed of its keeping."""
+    """Grasp and store the trial; return it, and what to print about the stored trial."""
     from graspsense.core.plugins import installed
     from graspsense.store.labels import labels_of
     from graspsense.store.record_grasp import record_grasp
@@ -148,7 +158,7 @@ def _kept(
 
 
 def print_trial(trial: Trial) -> None:
-    """Print outcome, features, prediction and what has to be said of them."""
+    """Print the outcome, the features, the prediction, and notes."""
     click.echo()
     reason = f": {trial.reason}" if trial.reason else ""
     click.echo(f"outcome     {trial.outcome.words}{reason}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,6 +16,9 @@ from graspsense.cli.sources import (
     source_options,
     trials_of,
 )
+
+if TYPE_CHECKING:
+    from graspsense.core.labelled import Labelled
 
 
 @click.command(
@@ -53,29 +56,19 @@ def train(
     as_json: bool,
     **given: Any,
 ) -> None:
-    """Train, write, and say what was made of what."""
+    """Train a model, write it, and print what it was trained on."""
     from graspsense.cli.progress import ProgressLine
     from graspsense.core.errors import ConfigError
-    from graspsense.core.labelled import class_of
     from graspsense.core.model import train as trained
     from graspsense.core.model import write_model
 
     path = Path(out)
     if path.suffix != ".json":
-        raise ConfigError(f"--out {out}: a model's file ends in .json")
+        raise ConfigError(f"--out {out}: the name of a model's file must end in .json")
     learner = learner_of(source, classifier, given)
     with ProgressLine() as progress:
         labelled = trials_of(source, progress, given)
-    if target == "state" and len({class_of(label) for label in labelled.labels}) > 1:
-        raise ConfigError(
-            "a model of states is one of a single class: name it with --only, one of "
-            + ", ".join(sorted({class_of(label) for label in labelled.labels}))
-        )
-    labelled = labelled.aimed(target)
-    if len(labelled.classes) < 2:
-        raise ConfigError(
-            f"every trial of {source} has the label {labelled.labels[0]!r}: nothing to tell apart"
-        )
+    labelled = _with_target(labelled, target)
     model = trained(
         learner.component,
         learner.config,
@@ -109,3 +102,21 @@ def train(
     click.echo(f"labels      {', '.join(model.classifier.classes())}")
     how_good = command_line(("out", "keep", "as_json"), "evaluate")
     click.echo(f"how good    {how_good}")
+
+
+def _with_target(labelled: Labelled, target: str) -> Labelled:
+    """Return the trials with the labels that the target asks for. Raises ConfigError if a model cannot learn them."""
+    from graspsense.core.errors import ConfigError
+    from graspsense.core.labelled import class_of
+
+    classes = sorted({class_of(label) for label in labelled.labels})
+    if target == "state" and len(classes) > 1:
+        raise ConfigError(
+            "a model of states is for a single class; select it with --only: " + ", ".join(classes)
+        )
+    labelled = labelled.aimed(target)
+    if len(labelled.classes) < 2:
+        raise ConfigError(
+            f"every trial of {labelled.source} has the label {labelled.labels[0]!r}: there is nothing to tell apart"
+        )
+    return labelled

@@ -1,4 +1,4 @@
-"""Running an experiment: the missing tasks are run, and each result is stored at once."""
+"""Running an experiment: every task without a result is run, and each result is stored immediately."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from graspsense.core.interrupts import Interrupts
 from graspsense.experiments.executors.base import Executor, ExecutorLost
 from graspsense.experiments.experiment import Planned
 from graspsense.experiments.results import Results
-from graspsense.experiments.task import TaskResult
+from graspsense.experiments.task import Task, TaskResult
 from graspsense.experiments.timing import TimeLeft
 from graspsense.experiments.versions import differences, versions
 from graspsense.recording.atomic_file import SaveFailed
 
 STORE_FILE = "store.sqlite"
-"""The file by which a folder is a store of trials; this room does not know the store itself."""
+"""A folder with this file is a store of trials. This room may not import the store itself."""
 
 
 @frozen(kw_only=True)
 class Account:
-    """What came of a run: of `total` tasks so many were `kept` from before, `done`, and `failed`; the rest is missing.
+    """The number of tasks in total, with a result from an earlier run (`kept`), `done` in this run, and `failed`.
 
-    `stopped` says why the run ended before its end, where it did.
+    `stopped` is the reason if the run ended early, and empty otherwise.
     """
 
     total: int
@@ -36,7 +36,7 @@ class Account:
 
     @property
     def missing(self) -> int:
-        """Tasks without a result."""
+        """Number of tasks without a result."""
         return self.total - self.kept - self.done - len(self.failed)
 
     @property
@@ -46,7 +46,7 @@ class Account:
 
     @property
     def words(self) -> str:
-        """The account in a sentence."""
+        """The numbers in one sentence."""
         parts = [f"{self.done} done now"]
         if self.kept:
             parts.append(f"{self.kept} kept from before")
@@ -69,9 +69,9 @@ def run_experiment(
 ) -> Account:
     """Run every task that has no result yet, and return the account of the run.
 
-    `executor` is asked for only where something is missing. Ctrl-C, the workers' end and a disk that takes no
-    further result stop the run; what was done until then is kept. Raises ConfigError where there are results
-    already and `resume` is not set, SaveFailed where nothing can be written to begin with.
+    `executor` is called only if a result is missing. Ctrl-C, the loss of the workers and a full disk stop the run; the
+    results until then are kept. Raises ConfigError if there are results already and `resume` is not set, SaveFailed if
+    nothing can be written at the start.
     """
     tasks = list({task.key: task for task in planned.tasks()}.values())
     if (results.folder / STORE_FILE).exists():
@@ -89,46 +89,59 @@ def run_experiment(
             key: one for key, one in results.of([task.key for task in tasks]).items() if one.state == "done"
         }
         results.begin(planned, command)
-        notes = _notes(list(known.values()))
         todo = [task for task in tasks if task.key not in known]
-        came: list[str] = []
-        failures = 0
-        stopped = ""
-        if todo:
-            running: Executor | None = None
-            left = TimeLeft(len(todo))
-            try:
-                with Interrupts():
-                    running = executor()
-                    left.workers = running.workers
-                    for done in running.run(todo):
-                        came.append(done.key)
-                        results.add(done)
-                        left.add(done.seconds)
-                        if done.state == "failed":
-                            failures += 1
-                            if said is not None:
-                                said(f"{done.name} failed: {done.reason}")
-                        if progress is not None:
-                            what = f"tasks, {left.words}" + (f", {failures} failed" if failures else "")
-                            progress(what, len(known) + len(came), len(tasks))
-            except KeyboardInterrupt:
-                stopped = "interrupted"
-            except (ExecutorLost, SaveFailed) as lost:
-                stopped = str(lost)
-            finally:
-                if running is not None:
-                    running.close()
-        # Counted on the disk: an interrupt may fall while a result is being kept.
-        new = results.of(came).values()
+        keys, stopped = _run_tasks(todo, len(tasks), results, executor, progress, said) if todo else ([], "")
+        # Counted on the disk: an interrupt can come while a result is being written.
+        new = results.of(keys).values()
     return Account(
         total=len(tasks),
         kept=len(known),
         done=sum(one.state == "done" for one in new),
         failed=tuple(one for one in new if one.state == "failed"),
         stopped=stopped,
-        notes=tuple(notes),
+        notes=tuple(_notes(list(known.values()))),
     )
+
+
+def _run_tasks(
+    todo: Sequence[Task],
+    total: int,
+    results: Results,
+    executor: Callable[[], Executor],
+    progress: Callable[[str, int, int], None] | None,
+    said: Callable[[str], None] | None,
+) -> tuple[list[str], str]:
+    """Run these of `total` tasks and add each result.
+
+    Return the keys of the tasks that ended, and the reason if the run ended early.
+    """
+    running: Executor | None = None
+    left = TimeLeft(len(todo))
+    keys: list[str] = []
+    failures = 0
+    try:
+        with Interrupts():
+            running = executor()
+            left.workers = running.workers
+            for result in running.run(todo):
+                keys.append(result.key)
+                results.add(result)
+                left.add(result.seconds)
+                if result.state == "failed":
+                    failures += 1
+                    if said is not None:
+                        said(f"{result.name} failed: {result.reason}")
+                if progress is not None:
+                    what = f"tasks, {left.words}" + (f", {failures} failed" if failures else "")
+                    progress(what, total - len(todo) + len(keys), total)
+    except KeyboardInterrupt:
+        return keys, "interrupted"
+    except (ExecutorLost, SaveFailed) as lost:
+        return keys, str(lost)
+    finally:
+        if running is not None:
+            running.close()
+    return keys, ""
 
 
 def _notes(known: Sequence[TaskResult]) -> list[str]:

@@ -1,4 +1,4 @@
-"""What a simulator's accuracy costs, as a table and as a picture; peers, measured on a scene of their own, beside."""
+"""The error of a simulator against its processor time, as a table and as a picture, beside that of other engines."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from graspsense.report.confusion import MATPLOTLIB_HINT
 HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
 PEAK: Final = "peak force"
 TRACE: Final = "force trace, rms"
-NOUGHT: Final = 1e-9
-"""What is smaller is drawn here: an error of nothing has no place on a logarithmic axis."""
+LEAST_ERROR: Final = 1e-9
+"""Smaller errors are drawn at this value, because a logarithmic axis has no 0."""
 
 
 @frozen(kw_only=True)
 class VariantPoint:
-    """One variant as measured: its errors and the processor time of one grasp, which are of the same runs.
+    """The errors of one variant and its processor time for one grasp, both measured on the same grasps.
 
-    `errors` are the greatest of all grasps, by quantity; infinite where a feature is missing that should be there.
-    `setup_s` is what the first grasps took beyond that: compiling, or loading what was compiled. `failure` says why
-    there are no figures, or that grasps ended otherwise than in the reference.
+    `errors` are the largest errors over all grasps, by quantity, and infinite if a feature is missing that the
+    reference has. `setup_s` is the additional time of the first grasps, for compiling or for loading compiled code.
+    `failure` is the reason why there are no errors, or why grasps ended otherwise than in the reference.
     """
 
     method: str
@@ -39,13 +39,13 @@ class VariantPoint:
 
     @property
     def curve(self) -> str:
-        """The curve that it lies on."""
+        """Name of the curve that the point belongs to."""
         return f"{self.method}, {self.fidelity}"
 
 
 @frozen(kw_only=True)
 class SimulationTrade:
-    """Every variant of a simulated gripper on the same grasps."""
+    """All variants of a simulated gripper, measured on the same grasps."""
 
     gripper: str
     scenes: tuple[str, ...]
@@ -55,19 +55,20 @@ class SimulationTrade:
     made: Mapping[str, str]
 
     def as_json(self) -> dict[str, Any]:
-        """Return all of it as values for JSON."""
+        """Return the trade-off as values for JSON."""
         return asdict(self)
 
 
 def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return the table's header and rows: time, set-up and the greatest error of each quantity."""
+    """Return the header and the rows of the table: time, set-up and the largest error of each quantity."""
     header = (*HEADER, *(name.upper() for name in trade.quantities), "")
     rows = []
     for one in trade.points:
         errors = [_short(one.errors.get(name, math.nan)) for name in trade.quantities]
-        note = one.failure or {"reference": "the reference", "floor": "what is left is the model's"}.get(
-            one.role, ""
-        )
+        note = one.failure or {
+            "reference": "the reference",
+            "floor": "the remaining error is that of the model",
+        }.get(one.role, "")
         seconds, setup = (f"{v:.3g}" if math.isfinite(v) else "-" for v in (1e3 * one.seconds, one.setup_s))
         rows.append((one.method, one.fidelity, one.step, seconds, setup, *errors, note))
     return header, rows
@@ -76,28 +77,28 @@ def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple
 def simulation_markdown(
     trade: SimulationTrade, peers: Mapping[str, Any] | None, picture: str | None = None
 ) -> str:
-    """Return the page of both tables, and of the picture where there is one."""
+    """Return the page: the table of variants, the picture if there is one, and the table of other engines."""
     made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
     lines = [
-        "# What the simulator's accuracy costs",
+        "# Accuracy and time of the simulator",
         "",
-        "Written by `graspsense tradeoff simulation`. Everything here is simulated.",
+        "Written by `graspsense tradeoff simulation`. All grasps are simulated.",
         "",
-        f"{len(trade.scenes)} scenes ({', '.join(trade.scenes)}), {len(trade.seeds)} seeds each, ideal sensor, one "
-        "thread, processor time of the very grasps that the errors are of. An error is the greatest of all grasps, "
-        "relative to the reference's value (to 1 mm, 1 N, 50 ms, 1 mm/s or 1 N/s where that is less).",
-        f"Made with: {made}.",
+        f"{len(trade.scenes)} scenes ({', '.join(trade.scenes)}), {len(trade.seeds)} seeds each, ideal sensors, one "
+        "thread. Errors and processor times are of the same grasps. An error is the largest over all grasps, relative "
+        "to the value of the reference, or to 1 mm, 1 N, 50 ms, 1 mm/s or 1 N/s if the value is smaller.",
+        f"Measured with: {made}.",
         "",
         *([f"![Error against time]({picture})", ""] if picture else []),
         *_markdown(*simulation_rows(trade)),
     ]
     if peers is not None:
-        lines += ["", "## Beside other engines", "", *peers_markdown(peers)]
+        lines += ["", "## Other engines", "", *peers_markdown(peers)]
     return "\n".join(lines) + "\n"
 
 
 def peers_markdown(peers: Mapping[str, Any]) -> list[str]:
-    """Return the tables of `benchmarks/simulation.py`: its runs, and whatever figures it has drawn from them."""
+    """Return the tables of `benchmarks/simulation.py`: its runs, and the figures that it derives from them."""
     made = ", ".join(f"{key} {value}" for key, value in peers.get("made", {}).items())
     rows = [
         (
@@ -119,7 +120,7 @@ def peers_markdown(peers: Mapping[str, Any]) -> list[str]:
 
 
 def _figures(peers: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
-    """Yield each figure by its name in the file, and what it is of; one that depends on how many, a row a number."""
+    """Yield the name, value and meaning of each figure; a figure that depends on a count gets a row for each count."""
     for name, value in peers.items():
         if isinstance(value, int | float):
             yield f"`{name}`", f"{value:.4g}", str(peers.get(f"{name}_is", ""))
@@ -135,7 +136,10 @@ def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]
 
 
 def simulation_png(trade: SimulationTrade, peers: Mapping[str, Any] | None, path: Path) -> None:
-    """Draw a panel a quantity. Raises PluginUnavailable without matplotlib, ConfigError for a path it cannot write."""
+    """Draw one panel for each quantity, and one for other engines.
+
+    Raises PluginUnavailable without matplotlib, ConfigError if the file cannot be written.
+    """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -148,39 +152,10 @@ def simulation_png(trade: SimulationTrade, peers: Mapping[str, Any] | None, path
     figure = Figure(figsize=(4.6 * columns, 3.5 * rows + 1.3), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     axes: Any = figure.subplots(rows, columns, squeeze=False).ravel()
-    curves = list(dict.fromkeys(p.curve for p in trade.points if p.role == "curve"))
-    floors = [p for p in trade.points if p.role == "floor"]
     handles: dict[str, Any] = {}
     for ax, name in zip(axes, names, strict=False):
-        for k, curve in enumerate(curves):
-            points = [p for p in trade.points if p.curve == curve and p.role == "curve" and p.seconds > 0.0]
-            good = [p for p in points if math.isfinite(p.errors.get(name, math.nan))]
-            (line,) = ax.plot(
-                [1e3 * p.seconds for p in good],
-                [max(p.errors[name], NOUGHT) for p in good],
-                marker="os^vDP*X"[k % 8],
-                color=f"C{k}",
-                ms=4,
-                lw=1.2,
-            )
-            handles[curve] = line
-            for p in points:
-                if p not in good:
-                    # On the upper edge: no error is large enough for a run that gave no number.
-                    ax.plot(
-                        1e3 * p.seconds,
-                        1.0,
-                        marker="x",
-                        color=f"C{k}",
-                        ms=9,
-                        transform=ax.get_xaxis_transform(),
-                    )
-        for k, floor in enumerate(floors):
-            level = floor.errors.get(name, math.nan)
-            if math.isfinite(level):
-                style = ("--", ":", "-.")[k % 3]
-                line = ax.axhline(max(level, NOUGHT), color="0.45", lw=1.0, ls=style)
-                handles[f"the model's own error, {floor.fidelity}"] = line
+        handles.update(_draw_curves(ax, trade, name))
+        handles.update(_draw_floors(ax, trade, name))
         _axes(ax, name, "error, relative")
     if peers is not None:
         _draw_peers(axes[len(names)], peers)
@@ -190,8 +165,8 @@ def simulation_png(trade: SimulationTrade, peers: Mapping[str, Any] | None, path
     setup = max((p.setup_s for p in trade.points if math.isfinite(p.setup_s)), default=0.0)
     figure.suptitle(
         f"Simulated grasps ({', '.join(trade.scenes)}): error against processor time, one thread\n"
-        f"set-up and compiling apart, at most {setup:.3g} s; {len(failed)} of {len(trade.points)} failed"
-        + (" (crosses)" if failed else ""),
+        f"without set-up and compilation, which took at most {setup:.3g} s; "
+        f"{len(failed)} of {len(trade.points)} failed" + (" (crosses)" if failed else ""),
         fontsize=10,
     )
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, fontsize=8)
@@ -201,13 +176,53 @@ def simulation_png(trade: SimulationTrade, peers: Mapping[str, Any] | None, path
         raise ConfigError(f"the picture cannot be written to {path}: {error.strerror}") from error
 
 
+def _draw_curves(ax: Any, trade: SimulationTrade, quantity: str) -> dict[str, Any]:
+    """Draw the error of one quantity against time, one curve for each method; return the lines for the legend."""
+    handles = {}
+    for k, curve in enumerate(dict.fromkeys(p.curve for p in trade.points if p.role == "curve")):
+        points = [p for p in trade.points if p.curve == curve and p.role == "curve" and p.seconds > 0.0]
+        good = [p for p in points if math.isfinite(p.errors.get(quantity, math.nan))]
+        (handles[curve],) = ax.plot(
+            [1e3 * p.seconds for p in good],
+            [max(p.errors[quantity], LEAST_ERROR) for p in good],
+            marker="os^vDP*X"[k % 8],
+            color=f"C{k}",
+            ms=4,
+            lw=1.2,
+        )
+        for p in points:
+            if p not in good:
+                # On the upper edge: the error of a run without a result is larger than any number.
+                ax.plot(
+                    1e3 * p.seconds,
+                    1.0,
+                    marker="x",
+                    color=f"C{k}",
+                    ms=9,
+                    transform=ax.get_xaxis_transform(),
+                )
+    return handles
+
+
+def _draw_floors(ax: Any, trade: SimulationTrade, quantity: str) -> dict[str, Any]:
+    """Draw a line at the error of each model that remains with exact integration; return the lines for the legend."""
+    handles = {}
+    for k, floor in enumerate(p for p in trade.points if p.role == "floor"):
+        level = floor.errors.get(quantity, math.nan)
+        if math.isfinite(level):
+            style = ("--", ":", "-.")[k % 3]
+            line = ax.axhline(max(level, LEAST_ERROR), color="0.45", lw=1.0, ls=style)
+            handles[f"error of the model itself, {floor.fidelity}"] = line
+    return handles
+
+
 def _draw_peers(ax: Any, peers: Mapping[str, Any]) -> None:
-    """Draw one curve an engine and method, each on the scene of the benchmark."""
+    """Draw one curve for each engine and method, on the scene of the benchmark."""
     groups: dict[str, list[tuple[float, float]]] = {}
     for run in peers["runs"]:
         rms = _number(run["rms"])
         if math.isfinite(rms):
-            groups.setdefault(str(run["engine"]), []).append((1e3 * run["seconds"], max(rms, NOUGHT)))
+            groups.setdefault(str(run["engine"]), []).append((1e3 * run["seconds"], max(rms, LEAST_ERROR)))
     for k, (engine, points) in enumerate(groups.items()):
         points.sort()
         style = (
@@ -216,7 +231,7 @@ def _draw_peers(ax: Any, peers: Mapping[str, Any]) -> None:
             else {"color": f"C{k}", "lw": 1.0}
         )
         ax.plot(*zip(*points, strict=True), marker="os^vDP*X"[k % 8], ms=3.5, label=engine, **style)
-    _axes(ax, "peers, on the benchmark's scene", "force trace, rms")
+    _axes(ax, "other engines, on the scene of the benchmark", "force trace, rms")
     ax.legend(fontsize=6)
 
 

@@ -1,10 +1,10 @@
-"""Somebody else's squeeze from a CSV: which columns are time, gap and force, its user says.
+"""One grasp from the CSV file of another program. The user says which columns are time, gap and force:
 
     FILE.csv?time=T&gap=POS*0.001&force=F1&force=F2&effort=I&velocity=V
 
-Each is the name of a column, with a factor behind `*` where it is not in SI units. `time`, `gap` and `force` there
-must be; one `force` is that of both pads, two are left and right. Without a velocity it is the gap's difference from
-line to line.
+Each value is the name of a column, followed by `*` and a factor if the column is not in SI units. `time`, `gap` and
+`force` are required. A single `force` stands for both pads; two are left and right. Without `velocity`, the velocity is
+the change of the gap from line to line.
 """
 
 from __future__ import annotations
@@ -21,48 +21,52 @@ from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.roles import Reading
 from graspsense.core.signals import NO_PADS, Frame
 from graspsense.recording.replayable import Recording
-from graspsense.sources.features_csv import CsvColumns
+from graspsense.sources.csv_columns import CsvColumns
 
-NEEDED: Final = ("time", "gap", "force")
-KNOWN: Final = (*NEEDED, "effort", "velocity")
-FARTHEST_M: Final = 1.0
-"""A gap that is wider is not in metres."""
+REQUIRED: Final = ("time", "gap", "force")
+QUANTITIES: Final = (*REQUIRED, "effort", "velocity")
+MAX_GAP_M: Final = 1.0
+"""A column with a larger gap is not in metres."""
 
 
 def named(path: str, columns: Mapping[str, Sequence[str]]) -> str:
-    """Return file and columns as one name, as `read_squeeze` takes it."""
-    pairs = [(what, one) for what, names in columns.items() for one in names]
+    """Return the file and its columns as one name, in the form that `read_squeeze` reads."""
+    pairs = [(quantity, column) for quantity, names in columns.items() for column in names]
     return f"{path}?{urlencode(pairs, safe='*')}"
 
 
 def read_squeeze(name: str) -> Recording:
-    """Return the squeeze that this name says. Raises ConfigError, DataDamaged with the line."""
+    """Return the grasp that this name describes. Raises ConfigError, or DataDamaged with the line."""
     file, mark, query = name.rpartition("?")
-    pairs = parse_qsl(query, keep_blank_values=True) if mark else []
-    given: dict[str, list[str]] = {}
-    for what, column in pairs:
-        if what not in KNOWN:
+    columns_of: dict[str, list[str]] = {}
+    for quantity, column in parse_qsl(query, keep_blank_values=True) if mark else []:
+        if quantity not in QUANTITIES:
             raise ConfigError(
-                f"{what!r} is no part of a squeeze. Known: {', '.join(KNOWN)}.{suggestion(what, KNOWN)}"
+                f"{quantity!r} is not a quantity of a grasp. Known: {', '.join(QUANTITIES)}."
+                + suggestion(quantity, QUANTITIES)
             )
-        given.setdefault(what, []).append(column)
-    lacking = [what for what in NEEDED if what not in given]
-    if lacking:
+        columns_of.setdefault(quantity, []).append(column)
+    missing = [quantity for quantity in REQUIRED if quantity not in columns_of]
+    if missing:
         raise ConfigError(
-            f"which column of {file or name} is {' and which '.join(lacking)}? Write FILE.csv?time=COLUMN&gap=COLUMN"
-            "&force=COLUMN, to `import` --time, --gap and --force; with a factor, as in POS*0.001, where it is not in "
-            "s, m, N"
+            f"which column of {file or name} is {' and which '.join(missing)}? Write FILE.csv?time=COLUMN&gap=COLUMN"
+            "&force=COLUMN, or give --time, --gap and --force to `import`. If a column is not in s, m or N, add a "
+            "factor, as in POS*0.001"
         )
-    for what, names in given.items():
-        most = 2 if what == "force" else 1
-        if len(names) > most:
-            raise ConfigError(f"{len(names)} columns are given for {what}: {most} at most")
+    for quantity, names in columns_of.items():
+        allowed = 2 if quantity == "force" else 1
+        if len(names) > allowed:
+            raise ConfigError(f"{len(names)} columns are given for {quantity}; at most {allowed} can be")
     columns = CsvColumns(Path(file).expanduser())
-    found = {what: [_column(columns, what, one) for one in names] for what, names in given.items()}
-    return _recording(columns, found)
+    values = {
+        quantity: [_column(columns, quantity, text) for text in names]
+        for quantity, names in columns_of.items()
+    }
+    return _recording(columns, values)
 
 
-def _column(columns: CsvColumns, what: str, text: str) -> list[float]:
+def _column(columns: CsvColumns, quantity: str, text: str) -> list[float]:
+    """Return the values of COLUMN or COLUMN*FACTOR. Raises ConfigError, DataDamaged."""
     name, star, factor_text = text.rpartition("*")
     factor = 1.0
     if star and text not in columns.cells:
@@ -70,52 +74,55 @@ def _column(columns: CsvColumns, what: str, text: str) -> list[float]:
             factor = float(factor_text)
         except ValueError:
             raise ConfigError(
-                f"{what}: {factor_text!r} in {text!r} is no factor: write COLUMN*0.001"
+                f"{quantity}: {factor_text!r} in {text!r} is not a factor: write COLUMN*0.001"
             ) from None
         if not math.isfinite(factor) or factor == 0.0:
-            raise ConfigError(f"{what}: {factor_text} is no factor")
+            raise ConfigError(f"{quantity}: the factor {factor_text} must be finite and not 0")
     else:
         name = text
-    columns.column(name, what)
+    columns.column(name, quantity)
     values = [factor * value for value in columns.numbers(name)]
     for line, value in zip(columns.lines, values, strict=True):
         if math.isnan(value):
-            raise DataDamaged(f"{columns.path}, line {line}: {name} ({what}) is missing")
+            raise DataDamaged(f"{columns.path}, line {line}: {name} ({quantity}) is missing")
     return values
 
 
-def _recording(columns: CsvColumns, found: Mapping[str, list[list[float]]]) -> Recording:
-    (times,), (gaps,), forces = found["time"], found["gap"], found["force"]
-    if len(times) < 2:
-        raise DataDamaged(f"{columns.path} has one line only: a squeeze needs more")
-    for line, (before, now) in zip(columns.lines[1:], pairwise(times), strict=True):
-        if now <= before:
-            raise DataDamaged(
-                f"{columns.path}, line {line}: the time goes from {before!r} to {now!r}: it must rise"
-            )
-    steps = [now - before for before, now in pairwise(times)]
-    steps.insert(0, steps[0])
-    if max(gaps) > FARTHEST_M:
+def _recording(columns: CsvColumns, values: Mapping[str, list[list[float]]]) -> Recording:
+    (times,), (gaps,), forces = values["time"], values["gap"], values["force"]
+    steps = _time_steps(columns, times)
+    if max(gaps) > MAX_GAP_M:
         raise DataDamaged(
-            f"{columns.path}: the gap goes up to {max(gaps):g} m, which no gripper has: where the column is in "
-            "mm, write COLUMN*0.001 for it"
+            f"{columns.path}: the gap reaches {max(gaps):g} m, which no gripper has. If the column is in mm, write "
+            "COLUMN*0.001"
         )
-    if "velocity" in found:
-        (speeds,) = found["velocity"]
+    if "velocity" in values:
+        (velocities,) = values["velocity"]
     else:
-        speeds = [0.0, *((b - a) / dt for (a, b), dt in zip(pairwise(gaps), steps[1:], strict=True))]
-    nothing = [math.nan] * len(times)
-    (efforts,) = found.get("effort", [nothing])
-    left, right = forces[0], forces[-1]
+        velocities = [0.0, *((b - a) / dt for (a, b), dt in zip(pairwise(gaps), steps[1:], strict=True))]
+    (efforts,) = values.get("effort", [[math.nan] * len(times)])
     readings = tuple(
-        Reading(Frame(t, dt, gap, speed, effort, one, other, math.nan, math.nan, 0), NO_PADS)
-        for t, dt, gap, speed, effort, one, other in zip(
-            times, steps, gaps, speeds, efforts, left, right, strict=True
+        Reading(Frame(t, dt, gap, velocity, effort, left, right, math.nan, math.nan, 0), NO_PADS)
+        for t, dt, gap, velocity, effort, left, right in zip(
+            times, steps, gaps, velocities, efforts, forces[0], forces[-1], strict=True
         )
     )
-    notes = [f"{len(times)} lines of {columns.path.name}: taken to be in s, m and N"]
+    notes = [f"{len(times)} lines of {columns.path.name}, read as s, m and N"]
     if len(forces) == 1:
-        notes.append("one force was recorded: it is taken for that of both pads")
+        notes.append("a single force was recorded; it is used for both pads")
     return Recording(
         name=f"CSV {columns.path.name}", readings=readings, rate_hz=1.0 / median(steps), notes=tuple(notes)
     )
+
+
+def _time_steps(columns: CsvColumns, times: Sequence[float]) -> list[float]:
+    """Return the time between lines (s), that of the first line equal to the second's. Raises DataDamaged."""
+    if len(times) < 2:
+        raise DataDamaged(f"{columns.path} has a single line; a grasp needs at least two")
+    for line, (before, after) in zip(columns.lines[1:], pairwise(times), strict=True):
+        if after <= before:
+            raise DataDamaged(
+                f"{columns.path}, line {line}: the time goes from {before!r} to {after!r}; it must increase"
+            )
+    steps = [after - before for before, after in pairwise(times)]
+    return [steps[0], *steps]

@@ -10,15 +10,17 @@ from graspsense_sim_gripper.terms.term import Limit, Rate, Term, WorkingPoint
 from graspsense_sim_gripper.terms.vent import conductance, vented
 
 LEAST_M3: Final = 1e-9
-"""A millilitre in a thousand is the least it holds."""
+"""Smallest volume of the gas: a microlitre, which keeps the divisions finite."""
 
 
 class Gas(NamedTuple):
-    """Gas behind a wall that gives: displaced volume A0 d + A1 d^2 / 2, wall bulge C_w beside it.
+    """Gas behind a compliant wall.
 
-    `exponent` is 1 where the gas stays at its walls' temperature during a grasp (a small head space), 1.4 where
-    it does not; with `heat_s` it falls from the one to the other in that time. The pressure it stood at before
-    the grasp is carried by the wall and pushes nothing, and drives nothing through the vent.
+    A compression d displaces the volume A0 d + A1 d^2 / 2 (`area_m2`, `area_slope_m`), and a pressure rise bulges the
+    wall outwards by `bulge_m3_pa` per pascal. `exponent` is the polytropic exponent: 1 if the gas keeps the temperature
+    of its walls during a grasp (a small head space), 1.4 if no heat is exchanged. With `heat_s` it changes from the
+    adiabatic to the isothermal value within that time. `pressure_pa` is the absolute pressure before the grasp; the
+    wall carries it, so that it exerts no force and drives no flow through the vent.
     """
 
     area_m2: float
@@ -28,31 +30,30 @@ class Gas(NamedTuple):
     exponent: float
     bulge_m3_pa: float
     vent_m2: float = 0.0
-    """Area of an opening, from a pinhole to an open neck; 0: sealed."""
+    """Area of an opening, from a pinhole to an open neck; 0 for a sealed container."""
     heat_s: float = math.inf
-    """Time constant with which the gas takes its walls' temperature."""
+    """Time constant of the heat exchange with the walls."""
 
 
 class GasState(NamedTuple):
-    """Pressure above that at rest (Pa), and temperature above the walls' as a share of it."""
+    """Pressure above that at rest (Pa), and temperature above that of the walls as a fraction of it."""
 
     rise_pa: float
     warmth: float = 0.0
     spent: int = 0
-    """1: it was pressed by more than it held, so that only the wall and the vent were left to give way."""
+    """1: the grasp displaced more than the volume of the gas; from then on only the wall and the vent yielded."""
 
 
 def gas(params: Gas, state: GasState, d0: float, d1: float, h: float, v1: float) -> tuple[float, GasState]:
-    """Return the force of the pressure rise, an exponential midpoint step of second order.
+    """Return the force of the pressure rise, by an exponential midpoint step of second order.
 
-    With V the volume and w = V' + q what it and the vent's flow q take from the gas,
+    An ideal gas exchanges heat with walls of constant temperature:
 
         p' = (A d' - q + (V / n)(1 / T - 1) / tau) / (V / (n p) + C_w),    T' = -(n - 1) T w / V - (T - 1) / tau,
 
-    n the exponent, T the temperature over the walls', tau the heat's time constant: the gas laws of an ideal gas
-    with heat to walls that stay as warm as they are. Vent and heat relax exactly, however fast they are; what
-    comes in through the vent is taken to be as warm as what is there. Pressed by more than it holds the gas is gone,
-    and what it was in no longer gives but by its wall and its vent.
+    where V is the volume, q the flow through the vent, w = V' + q, n the exponent, T the temperature relative to the
+    walls, tau the time constant of the heat. Flow and heat relax exactly, however fast they are. Gas that enters has
+    the temperature of the gas inside. If more than the volume is displaced, only wall and vent yield from then on.
     """
     area, slope, whole, pressure, exponent, bulge, opening, heat_s = params
     rise, warmth, spent = state
@@ -60,20 +61,19 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float, v1: float)
     swept1 = area * d1 + 0.5 * slope * d1 * d1
     lowest = -0.9 * pressure
     warm = heat_s < math.inf
-    kept, heat_share = 1.0, 1.0
+    kept = 1.0
     if warm:
         kept = math.exp(-h / heat_s)
-        heat_share = phi1(h / heat_s, kept)
-        exponent = 1.0 + (exponent - 1.0) * heat_share
+        exponent = 1.0 + (exponent - 1.0) * phi1(h / heat_s, kept)
 
-    # What the heat adds, as if it were swept volume.
+    # The effect of the heat is expressed as an equivalent swept volume.
     volume = max(whole - swept0 + bulge * rise, LEAST_M3)
     heated = _heated(volume, warmth, warmth, kept, exponent) if warm else 0.0
     own = _give(volume, pressure + rise, exponent)
     stiff = 1.0 / (own + bulge)
     middle, through = rise + 0.5 * (swept1 - swept0 + heated) * stiff, 0.0
     if opening > 0.0:
-        # By a backward step: it only says what the conductance and the volume are there.
+        # A backward step is enough here: it only determines the conductance and the volume at the middle.
         middle, through = vented(opening, middle, 0.5 * h * stiff)
     if middle < lowest:
         middle = lowest
@@ -91,7 +91,7 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float, v1: float)
     if opening > 0.0:
         x = h * through * stiff
         decay = math.exp(-x)
-        # What is swept faster at the end than in the mean the vent has had less time for.
+        # The vent has had less time for the volume that is swept at the end of the step.
         late = ((area + slope * d1) * v1 * h - (swept1 - swept0)) * phi_ramp(x, decay)
         rise = rise * decay + ((swept1 - swept0 + heated) * phi1(x, decay) + late) * stiff
     else:
@@ -107,28 +107,28 @@ def gas(params: Gas, state: GasState, d0: float, d1: float, h: float, v1: float)
 
 
 def _give(volume_m3: float, pressure_pa: float, exponent: float) -> float:
-    """Return how much volume (m3) the gas gives a pascal."""
+    """Return the compliance of the gas (m3/Pa): the change of its volume per change of its pressure."""
     return volume_m3 / (exponent * pressure_pa)
 
 
 def _heated(volume_m3: float, warmth: float, half: float, kept: float, exponent: float) -> float:
-    """Return what the heat exchanged in a piece is worth as swept volume (m3), negative while the gas cools.
+    """Return the swept volume (m3) with the same effect as the heat exchanged in a step, negative while the gas cools.
 
-    `exponent` is the one that holds over the piece, with the share of the heat that compression makes and loses
-    meanwhile in it already.
+    `exponent` is the effective exponent of the step; it already includes the heat that the compression in this step
+    produces and loses.
     """
     return volume_m3 * warmth * (kept - 1.0) / ((1.0 + half) * exponent)
 
 
 def rates(params: Gas, at: WorkingPoint) -> tuple[Rate, ...]:
-    """Return how fast the vent and the walls relax the gas, the vent at the pressure that builds up."""
+    """Return the rates at which the vent and the walls relax the gas; the vent's at the pressure that builds up."""
     sealed = params._replace(vent_m2=0.0, heat_s=math.inf)
     force, _ = gas(sealed, GasState(0.0), 0.0, at.compression_m, 1.0, 0.0)
     area = params.area_m2 + params.area_slope_m * at.compression_m
     rise = abs(force) / area if area > 0.0 else 0.0
     found = []
     if params.vent_m2 > 0.0:
-        # No more builds up than drives the swept volume out.
+        # The pressure is bounded by the one that drives the swept volume out.
         through = area * at.speed_m_s
         for _ in range(60):
             rise = min(rise, through / conductance(params.vent_m2, rise))
@@ -140,7 +140,7 @@ def rates(params: Gas, at: WorkingPoint) -> tuple[Rate, ...]:
 
 
 def limits(params: Gas, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return it as a spring, and without the vent, the heat or both, at its walls' temperature or with none of it."""
+    """Return the limits: a spring, or no vent, no heat exchange or neither, each isothermal or adiabatic."""
     found = []
     for name, exponent in (("isothermal", 1.0), ("adiabatic", params.exponent)):
         give = _give(params.volume_m3, params.pressure_pa, exponent) + params.bulge_m3_pa
@@ -154,8 +154,12 @@ def limits(params: Gas, at: WorkingPoint) -> tuple[Limit, ...]:
 
 
 def beyond(state: GasState) -> str:
-    """Return what happened where more was displaced than there was gas."""
-    return "pressed by more than it holds; from there on only wall and vent gave" if state.spent == 1 else ""
+    """Return what happened if more volume was displaced than the gas had."""
+    return (
+        "more than its volume was displaced; from then on only the wall and the vent yielded"
+        if state.spent == 1
+        else ""
+    )
 
 
 TERM = Term(

@@ -1,0 +1,178 @@
+"""A CSV file as named columns of text, with the line number of each row.
+
+Text is UTF-8. Columns are separated by the character among comma, semicolon and tab that occurs most often in the
+header. Numbers have a decimal point. A name can be followed by its unit: `p_first [m]`. Empty cells, `nan`, `NA`,
+`null` and `?` are missing values.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from graspsense.core.errors import ConfigError, DataDamaged, suggestion
+from graspsense.core.features import FeatureTable
+
+_MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "?"})
+_HEADING: Final = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]")
+_DECIMAL_COMMA: Final = re.compile(r"[-+]?\d+,\d+")
+
+
+class CsvColumns:
+    """The columns of a CSV file. Raises ConfigError or DataDamaged if the file cannot be read as a table.
+
+    `names` and `units` describe the columns, `cells` holds their text by name, `lines` the line number of each row.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        header, self.lines, rows = _rows(path, _text(path))
+        self.units: dict[str, str] = {}
+        self.names: list[str] = []
+        for heading in header:
+            match = _HEADING.fullmatch(heading)
+            name = match["name"] if match else heading
+            if not name:
+                raise DataDamaged(f"{path}: column {len(self.names) + 1} has no name in the header")
+            if name in self.units:
+                raise DataDamaged(f"{path}: two columns are named {name!r}: rename one")
+            self.names.append(name)
+            self.units[name] = match["unit"].strip() if match else ""
+        self.cells = {name: [row[k] for row in rows] for k, name in enumerate(self.names)}
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.lines)
+
+    def column(self, name: str, what: str) -> list[str]:
+        """Return the text of a column; `what` says what it is used for. Raises ConfigError if it does not exist."""
+        if name not in self.cells:
+            raise ConfigError(
+                f"{self.path} has no column {name!r} ({what}). Its columns: {', '.join(self.names)}."
+                + suggestion(name, self.names)
+            )
+        return self.cells[name]
+
+    def complete_column(self, name: str, what: str) -> list[str]:
+        """Return a column without missing values. Raises ConfigError, or DataDamaged with the line that has none."""
+        cells = self.column(name, what)
+        for line, cell in zip(self.lines, cells, strict=True):
+            if is_missing(cell):
+                raise DataDamaged(f"{self.path}, line {line}: {name} ({what}) is empty")
+        return cells
+
+    def numbers(self, name: str) -> list[float]:
+        """Return a column as numbers, NaN where missing. Raises DataDamaged with the line that has another text."""
+        values = []
+        for line, cell in zip(self.lines, self.column(name, "a feature"), strict=True):
+            if is_missing(cell):
+                values.append(math.nan)
+                continue
+            try:
+                value = float(cell.replace("_", "x"))  # Python would read 1_0 as 10
+            except ValueError:
+                hint = " (write a decimal point)" if _DECIMAL_COMMA.fullmatch(cell) else ""
+                raise DataDamaged(
+                    f"{self.path}, line {line}: {name} is {cell[:40]!r}, which is not a number{hint}"
+                ) from None
+            if math.isinf(value):
+                raise DataDamaged(
+                    f"{self.path}, line {line}: {name} is infinite; leave the cell empty if the value is missing"
+                )
+            values.append(value)
+        return values
+
+    def has_numbers(self, name: str) -> bool:
+        """Return whether any cell of a column is a finite number."""
+        return any(_is_number(cell) for cell in self.cells[name])
+
+    def rises(self, name: str) -> bool:
+        """Return whether the values increase from row to row, as a counter or a time does, over at least five rows."""
+        values = self.numbers(name)
+        return len(values) >= 5 and all(before < after for before, after in pairwise(values))
+
+    def is_blank(self, name: str) -> bool:
+        """Return whether every cell of a column is missing."""
+        return all(is_missing(cell) for cell in self.cells[name])
+
+    def keep(self, rows: Sequence[int]) -> None:
+        """Remove all rows but these."""
+        self.lines = [self.lines[i] for i in rows]
+        self.cells = {name: [cells[i] for i in rows] for name, cells in self.cells.items()}
+
+    def table(self, names: Sequence[str]) -> FeatureTable:
+        """Return these columns as a table of numbers. Raises ConfigError, DataDamaged."""
+        values = np.array([self.numbers(name) for name in names], dtype=np.float64).T
+        return FeatureTable(
+            names=tuple(names),
+            units=tuple(self.units[name] for name in names),
+            values=values.reshape(len(self), len(names)),
+        )
+
+
+def is_missing(cell: str) -> bool:
+    """Return whether the text of a cell stands for a missing value."""
+    return cell.lower() in _MISSING
+
+
+def _rows(path: Path, text: str) -> tuple[list[str], list[int], list[list[str]]]:
+    """Return the header, and the line number and the cells of each row that is not empty. Raises DataDamaged."""
+    header_line = text.lstrip("\r\n").splitlines()[0] if text.strip() else ""
+    if not header_line:
+        raise DataDamaged(f"{path} is empty: it needs a header line and one line per trial")
+    separator = max(",;\t", key=header_line.count)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
+    header: list[str] = []
+    lines: list[int] = []
+    rows: list[list[str]] = []
+    try:
+        for row in reader:
+            if not any(cell.strip() for cell in row):
+                continue
+            if not header:
+                header = [cell.strip() for cell in row]
+                continue
+            if len(row) != len(header):
+                raise DataDamaged(
+                    f"{path}, line {reader.line_num}: {len(row)} values, but the header names {len(header)} columns"
+                )
+            rows.append([cell.strip() for cell in row])
+            lines.append(reader.line_num)
+    except csv.Error as error:
+        raise DataDamaged(f"{path}, line {reader.line_num}: {error}") from None
+    if not rows:
+        raise DataDamaged(f"{path} has a header but no trials: it needs one line per trial")
+    return header, lines, rows
+
+
+def _text(path: Path) -> str:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be read: {error.strerror}") from error
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise DataDamaged(f"{path} is UTF-16: save it as UTF-8")
+    if b"\0" in data:
+        raise DataDamaged(f"{path} contains zero bytes: it is not a text file")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise DataDamaged(
+            f"{path}, line {line}: byte 0x{data[error.start]:02x} is not UTF-8: save the file as UTF-8"
+        ) from None
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return math.isfinite(float(cell))
+    except ValueError:
+        return False

@@ -1,0 +1,103 @@
+"""Limits of the length of functions, the number of parameters, and the fields of tuples; each exception has a reason.
+
+The length of a function counts every line from `def` to the end of its body, with the docstring. Parameters count
+without `self` and `cls`. The limits of parameters hold everywhere; that of the fields of a NamedTuple in the simulator,
+whose tuples are passed through compiled code.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+ROOT = Path(__file__).parents[1]
+SOURCES = (ROOT / "src", *sorted((ROOT / "plugins").glob("*/src")))
+SIMULATOR = "graspsense_sim_gripper"
+
+MAX_LINES: Final = 60
+MAX_PARAMETERS: Final = 7
+MAX_FIELDS: Final = 8
+
+OPTIONS: Final = "a click command: one parameter for each option"
+
+LONG_FUNCTIONS: dict[str, str] = {}
+"""Functions over `MAX_LINES` lines, as `path:name`, with the reason or the measured cost of a shorter form."""
+
+MANY_PARAMETERS = {
+    "graspsense/cli/collect.py:collect": OPTIONS,
+    "graspsense/cli/emulate.py:emulate": OPTIONS,
+    "graspsense/cli/experiment.py:experiment": OPTIONS,
+    "graspsense/cli/import_.py:import_": OPTIONS,
+    "graspsense/cli/report.py:report": OPTIONS,
+    "graspsense/cli/run.py:run": OPTIONS,
+    "graspsense/cli/tradeoff.py:simulation": OPTIONS,
+    "graspsense/core/transmission.py:screw_linkage": "the ten published constants of a linkage, by keyword only",
+    "graspsense/evaluation/crossval.py:cross_validate": "public; three optional ones are by keyword only",
+    "graspsense/evaluation/evaluate.py:evaluate": "public; all settings of an evaluation, by keyword only",
+    "graspsense_c45/classifier.py:__init__": "scikit-learn requires an explicit parameter for each setting",
+}
+"""Functions with more than `MAX_PARAMETERS` parameters, with the reason."""
+
+LARGE_TUPLES: dict[str, str] = {}
+"""NamedTuples of the simulator with more than `MAX_FIELDS` fields, with the reason or the measured cost."""
+
+
+def modules() -> Iterator[tuple[str, ast.Module]]:
+    for source in SOURCES:
+        for path in sorted(source.rglob("*.py")):
+            yield path.relative_to(source).as_posix(), ast.parse(path.read_text())
+
+
+def functions() -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
+    for name, tree in modules():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                yield f"{name}:{node.name}", node
+
+
+def lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    assert function.end_lineno is not None
+    return function.end_lineno - function.lineno + 1
+
+
+def parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    arguments = function.args
+    names = [one.arg for one in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)]
+    return len(names) - (names[:1] in (["self"], ["cls"]))
+
+
+def fields(node: ast.ClassDef) -> int:
+    return sum(isinstance(one, ast.AnnAssign) for one in node.body)
+
+
+def compare(over: dict[str, int], exceptions: dict[str, str], limit: str) -> None:
+    new = {name: count for name, count in over.items() if name not in exceptions}
+    assert not new, f"more than {limit}: divide them, or add an exception with its reason"
+    stale = sorted(set(exceptions) - set(over))
+    assert not stale, f"no longer over {limit}: remove these exceptions"
+    assert all(exceptions.values())
+
+
+def test_no_function_is_too_long():
+    over = {name: lines(node) for name, node in functions() if lines(node) > MAX_LINES}
+    compare(over, LONG_FUNCTIONS, f"{MAX_LINES} lines")
+
+
+def test_no_function_has_too_many_parameters():
+    over = {name: parameters(node) for name, node in functions() if parameters(node) > MAX_PARAMETERS}
+    compare(over, MANY_PARAMETERS, f"{MAX_PARAMETERS} parameters")
+
+
+def test_no_tuple_of_the_simulator_has_too_many_fields():
+    over = {
+        f"{name}:{node.name}": fields(node)
+        for name, tree in modules()
+        if name.startswith(SIMULATOR)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ClassDef)
+        and any(isinstance(base, ast.Name) and base.id == "NamedTuple" for base in node.bases)
+        and fields(node) > MAX_FIELDS
+    }
+    compare(over, LARGE_TUPLES, f"{MAX_FIELDS} fields")
