@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from graspsense.cli.options import pipeline_options, settings_of
-from graspsense.cli.output import echo_json, echo_table, talk
+from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import echo_table, talk
 
 if TYPE_CHECKING:
     from graspsense.core.calibrating import Rig

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import click
 
 from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
-from graspsense.cli.output import echo_json, talk
+from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import talk
 
 if TYPE_CHECKING:
     from types import FrameType

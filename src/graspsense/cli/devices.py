@@ -5,7 +5,8 @@ from __future__ import annotations
 import attrs
 import click
 
-from graspsense.cli.output import echo_json, echo_table, talk
+from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import echo_table, talk
 
 
 @click.command()

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import echo_json, echo_table, file_to_write, talk
+from graspsense.cli.output import echo_json, file_to_write
 from graspsense.cli.sources import SOURCES, classifier_option, learner_of, source_options, trials_of
+from graspsense.cli.terminal import echo_table, talk
 
 if TYPE_CHECKING:
     from graspsense.evaluation.results import Evaluation, Measurement

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from graspsense.cli.output import echo_json, echo_table, talk
+from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import echo_table, talk
 
 if TYPE_CHECKING:
     from graspsense.experiments.findings import Findings

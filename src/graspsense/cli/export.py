@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from graspsense.cli.output import echo_json, talk
+from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import talk
 
 
 @click.command(short_help="Export trials or a recording.")

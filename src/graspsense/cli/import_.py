@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import click
 
-from graspsense.cli.output import echo_json, talk
+from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import talk
 
 
 @click.command("import", short_help="Import recordings of other programs.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from graspsense.cli.output import talk
+from graspsense.cli.terminal import talk
 
 if TYPE_CHECKING:
     from graspsense.core.signals import Command, Frame, Pads

@@ -16,6 +16,7 @@ from typing import Any, Final, NoReturn
 import click
 
 from graspsense import __version__
+from graspsense.cli.terminal import Style, echo, has_colour
 from graspsense.core.errors import GraspsenseError, PluginUnavailable, UnknownName, suggestion
 
 PROGRAM: Final = "graspsense"
@@ -135,8 +136,8 @@ def _exit_code(arguments: list[str]) -> int:
         return shell_complete(cli, {}, PROGRAM, COMPLETION_VARIABLE, instruction)
     try:
         with cli.make_context(PROGRAM, arguments) as ctx:
-            if os.environ.get("NO_COLOR"):
-                ctx.color = False
+            if not has_colour(sys.stdout):
+                ctx.color = False  # for the commands of plugins, which print through click
             cli.invoke(ctx)
         if sys.stdout is None:
             click.echo(
@@ -182,7 +183,10 @@ def _report(error: Exception, as_json: bool) -> int:
             talk += f" Run it again with {TRACEBACK_VARIABLE}=1 to see where it happened."
     if os.environ.get(TRACEBACK_VARIABLE) == "1":
         talk = "".join(traceback.format_exception(error)) + talk
-    click.echo(f"{PROGRAM}: {talk}" if not talk.startswith("Traceback") else talk, err=True)
+    if talk.startswith("Traceback"):
+        click.echo(talk, err=True)
+    else:
+        echo(f"{PROGRAM}: {talk}", Style.BAD, indent=2, err=True)
     if as_json:
         from graspsense.cli.output import echo_json
 

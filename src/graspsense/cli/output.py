@@ -1,9 +1,8 @@
-"""Printing: JSON and text for programs and people on stdout, talk on stderr."""
+"""JSON on stdout, and options that name a file to write."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -29,16 +28,3 @@ def file_to_write(ctx: click.Context, param: click.Parameter, value: str | None)
             f"{value} cannot be written: there is no folder {Path(value).parent}", ctx, param
         )
     return value
-
-
-def talk(text: str) -> None:
-    """Say something that is no result, on stderr."""
-    click.echo(text, err=True)
-
-
-def echo_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print rows of text in columns."""
-    widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
-    for row in (header, *rows):
-        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        click.echo(line.rstrip())

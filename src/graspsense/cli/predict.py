@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from graspsense.cli.output import echo_json, echo_table, talk
+from graspsense.cli.output import echo_json
 from graspsense.cli.sources import SOURCES, is_csv, source_options, trials_of
+from graspsense.cli.terminal import echo_table, talk
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -10,7 +10,8 @@ import click
 from graspsense.cli.live_rows import LiveRows
 from graspsense.cli.model_table import print_model, print_selection
 from graspsense.cli.options import pipeline_options, settings_of
-from graspsense.cli.output import echo_json, echo_table, talk
+from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import echo_table, talk
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

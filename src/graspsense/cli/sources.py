@@ -107,7 +107,7 @@ def trials_of(source: str, progress: ProgressLine, given: Mapping[str, Any]) -> 
 
     Raises ConfigError, DataDamaged.
     """
-    from graspsense.cli.output import talk
+    from graspsense.cli.terminal import talk
     from graspsense.core.errors import ConfigError
     from graspsense.core.strict import ValidationFailed, structured
     from graspsense.sources.trial_source import TrialSource, kind_of, labelled_trials

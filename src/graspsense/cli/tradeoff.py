@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from graspsense.cli.options import pipeline_options, settings_of
-from graspsense.cli.output import echo_json, echo_table, file_to_write, talk
+from graspsense.cli.output import echo_json, file_to_write
+from graspsense.cli.terminal import echo_table, talk
 from graspsense.cli.tradeoff_recognition import commands
 
 if TYPE_CHECKING:

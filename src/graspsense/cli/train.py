@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import echo_json, file_to_write, talk
+from graspsense.cli.output import echo_json, file_to_write
 from graspsense.cli.sources import (
     SOURCES,
     classifier_option,
@@ -16,6 +16,7 @@ from graspsense.cli.sources import (
     source_options,
     trials_of,
 )
+from graspsense.cli.terminal import talk
 
 if TYPE_CHECKING:
     from graspsense.core.labelled import Labelled

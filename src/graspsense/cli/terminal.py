@@ -1,0 +1,250 @@
+"""Text for people: tables, paragraphs and colour, fitted to the terminal that they are printed on.
+
+Where the output is not a terminal (a pipe, a file), nothing is coloured, wrapped or cut, so that programs can read it.
+`NO_COLOR` and `TERM=dumb` switch the colour off, and `COLUMNS` overrides the width of the terminal.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from enum import Enum
+from typing import IO, Any, Final
+
+import click
+
+
+class Style(Enum):
+    """What a piece of text means to the reader, with the colour for it."""
+
+    GOOD = "green"
+    CAUTION = "yellow"
+    BAD = "red"
+    RESULT = "cyan"
+    HEADING = ""
+
+    @property
+    def bold(self) -> bool:
+        """Whether the text is bold as well."""
+        return self in (Style.BAD, Style.RESULT, Style.HEADING)
+
+
+LABEL_WIDTH: Final = 12
+"""Width of the labels in front of the entries of an output, such as `outcome     steady`."""
+
+_GAP: Final = 2
+_SHORT: Final = 24
+"""Cells up to this width are not broken into lines as long as there is another way."""
+_DEFAULT_WIDTH: Final = 80
+_NUMBER: Final = re.compile(r"[+−-]?[0-9]+([.][0-9]+)?( ?[%\w/]{1,4})?")
+
+StyleOf = Callable[[str], Style | None]
+"""Returns the style of a cell with this text."""
+
+
+def terminal_width(stream: IO[str] | None) -> int | None:
+    """Return the number of columns of the terminal that a stream writes to, None if it is not a terminal."""
+    if stream is None or stream.closed or not stream.isatty():
+        return None
+    asked = os.environ.get("COLUMNS", "")
+    if asked.isdecimal() and int(asked) > 0:
+        return int(asked)
+    try:
+        return os.get_terminal_size(stream.fileno()).columns or _DEFAULT_WIDTH
+    except (OSError, ValueError):
+        return _DEFAULT_WIDTH
+
+
+def can_redraw(stream: IO[str] | None) -> bool:
+    """Return whether the stream is a terminal that understands control sequences."""
+    return terminal_width(stream) is not None and os.environ.get("TERM") != "dumb"
+
+
+def has_colour(stream: IO[str] | None) -> bool:
+    """Return whether text on this stream is coloured."""
+    return can_redraw(stream) and not os.environ.get("NO_COLOR")
+
+
+def echo(text: str = "", style: Style | None = None, *, indent: int = 0, err: bool = False) -> None:
+    """Print lines of text; each is wrapped to the terminal, with `indent` more spaces from its second line on.
+
+    A line that already begins with spaces keeps them on all its lines. Words are never broken, so that paths and
+    commands can be copied.
+    """
+    stream = sys.stderr if err else sys.stdout
+    width = terminal_width(stream)
+    lines = text.split("\n")
+    if width is not None:
+        lines = [part for line in lines for part in _wrapped(line, width, indent)]
+    _write(lines, style, err)
+
+
+def echo_entry(
+    label: str, text: str, style: Style | None = None, *, width: int = LABEL_WIDTH, err: bool = False
+) -> None:
+    """Print a label and its text, as in `outcome     steady`; lines that follow stand below the text."""
+    stream = sys.stderr if err else sys.stdout
+    columns = terminal_width(stream)
+    head = f"{label:<{width}}" if len(label) < width else f"{label} "
+    lines = text.split("\n")
+    if columns is not None:
+        room = max(columns - len(head), 20)
+        lines = [part for line in lines for part in _wrapped(line, room, 0)]
+    if style is not None and has_colour(stream):
+        lines = [_coloured(line, style) for line in lines]
+    _write([head + lines[0], *(" " * len(head) + line for line in lines[1:])], None, err)
+
+
+def talk(text: str) -> None:
+    """Print a message about the work, which is not a result, on stderr."""
+    echo(text, indent=2, err=True)
+
+
+def warn(text: str) -> None:
+    """Print a warning about the work on stderr."""
+    echo(f"warning: {text}", Style.CAUTION, indent=2, err=True)
+
+
+def echo_table(
+    header: Sequence[str], rows: Sequence[Sequence[str]], styles: Mapping[str, StyleOf] | None = None
+) -> None:
+    """Print rows of text in columns; `styles` has the style of the cells of a column, by its header.
+
+    On a terminal that is too narrow, texts are wrapped within their columns. If even single words do not fit beside
+    each other, every row becomes a block with one line for each column.
+    """
+    if not rows:
+        return
+    columns = terminal_width(sys.stdout)
+    right = [_all_numbers([row[k] for row in rows]) for k in range(len(header))]
+    natural = [max(len(row[k]) for row in (header, *rows)) for k in range(len(header))]
+    if columns is None:
+        for row in (header, *rows):
+            cells = zip(row, natural, right, strict=True)
+            line = (" " * _GAP).join(
+                cell.rjust(width) if number else cell.ljust(width) for cell, width, number in cells
+            )
+            click.echo(line.rstrip())
+        return
+    room = columns - _GAP * (len(header) - 1)
+    widths = _fitted(header, rows, natural, room)
+    if widths is None:
+        _echo_blocks(header, rows, styles or {})
+    else:
+        _echo_rich(header, rows, widths, right, styles or {}, columns)
+
+
+def _wrapped(line: str, width: int, indent: int) -> list[str]:
+    margin = " " * (len(line) - len(line.lstrip(" ")))
+    if len(line) <= width:
+        return [line]
+    return textwrap.wrap(
+        line.lstrip(" "),
+        max(width, 20),
+        initial_indent=margin,
+        subsequent_indent=margin + " " * indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    ) or [""]
+
+
+def _coloured(text: str, style: Style) -> str:
+    return click.style(text, fg=style.value or None, bold=style.bold or None)
+
+
+def _write(lines: Sequence[str], style: Style | None, err: bool) -> None:
+    coloured = has_colour(sys.stderr if err else sys.stdout)
+    for line in lines:
+        click.echo(
+            _coloured(line, style) if style is not None and coloured and line else line,
+            err=err,
+            color=coloured,
+        )
+
+
+def _all_numbers(cells: Sequence[str]) -> bool:
+    """Whether the cells of a column are quantities, with decimals or a unit; whole numbers may be names, as serials."""
+    full = [cell for cell in cells if cell not in ("", "-")]
+    return all(_NUMBER.fullmatch(cell) for cell in full) and not all(cell.isdigit() for cell in full)
+
+
+def _fitted(
+    header: Sequence[str], rows: Sequence[Sequence[str]], natural: Sequence[int], room: int
+) -> list[int] | None:
+    """Return the widths of the columns within `room`, None where single words do not fit beside each other."""
+    if sum(natural) <= room:
+        return list(natural)
+    words = [max(len(word) for row in (header, *rows) for word in (row[k].split() or [""]))
+             for k in range(len(header))]  # fmt: skip
+    for least in (
+        [width if width <= _SHORT else max(word, _SHORT) for width, word in zip(natural, words, strict=True)],
+        words,
+    ):
+        spare = room - sum(least)
+        if spare < 0:
+            continue
+        widths = list(least)
+        # Short columns become as wide as they want first, so that the longest texts are wrapped.
+        order = sorted(range(len(widths)), key=lambda k: natural[k] - widths[k])
+        for done, k in enumerate(order):
+            more = min(natural[k] - widths[k], spare // (len(order) - done))
+            widths[k] += more
+            spare -= more
+        return widths
+    return None
+
+
+def _echo_blocks(header: Sequence[str], rows: Sequence[Sequence[str]], styles: Mapping[str, StyleOf]) -> None:
+    wide = max(map(len, header)) + 2 + _GAP
+    for row in rows:
+        echo(row[0] or "-", Style.HEADING)
+        for name, cell in zip(header[1:], row[1:], strict=True):
+            if cell:
+                echo_entry(f"  {name.lower()}", cell, _style(styles, name, cell), width=wide)
+
+
+def _echo_rich(
+    header: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    widths: Sequence[int],
+    right: Sequence[bool],
+    styles: Mapping[str, StyleOf],
+    columns: int,
+) -> None:
+    # Imported here: rich takes longer to import than the rest of a short command.
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    coloured = has_colour(sys.stdout)
+    console = Console(
+        width=columns,
+        color_system="standard" if coloured else None,
+        no_color=not coloured,
+        highlight=False,
+        force_terminal=coloured,
+        legacy_windows=False,
+    )
+    table = Table(box=None, padding=(0, _GAP, 0, 0), pad_edge=False, collapse_padding=False, expand=False)
+    table.header_style = "bold" if coloured else ""
+    for name, width, number in zip(header, widths, right, strict=True):
+        table.add_column(Text(name), width=width, justify="right" if number else "left", overflow="fold")
+    for row in rows:
+        cells: list[Any] = []
+        for name, cell in zip(header, row, strict=True):
+            style = _style(styles, name, cell)
+            look = (
+                "" if style is None else " ".join(filter(None, ("bold" if style.bold else "", style.value)))
+            )
+            cells.append(Text(cell, style=look))
+        table.add_row(*cells)
+    with console.capture() as captured:
+        console.print(table)
+    _write([line.rstrip() for line in captured.get().rstrip("\n").split("\n")], None, err=False)
+
+
+def _style(styles: Mapping[str, StyleOf], name: str, cell: str) -> Style | None:
+    return styles[name](cell) if name in styles else None
