@@ -218,34 +218,15 @@ def test_listing_plugins_loads_no_driver_and_nothing_heavy(arguments):
     assert not loaded_after(COMMAND, *arguments) & HEAVY
 
 
-def test_what_the_users_door_offers_is_what_type_checkers_see_there():
-    (block,) = [
-        node
-        for node in ast.parse((SOURCE / "__init__.py").read_text()).body
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-    ]
-    seen = {
-        alias.asname: node.module
-        for node in block.body
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-    }
-
-    assert seen == {name: f"graspsense.core.{home}" for name, home in graspsense._HOME_OF.items()}
+def test_type_checkers_see_the_names_of_the_tables():
+    for public, stub in ((graspsense.PUBLIC, "__init__.pyi"), (plugin_api.PUBLIC, "plugin_api.pyi")):
+        assert (SOURCE / stub).read_text() == public.stub() + "\n"
 
 
-def test_the_type_stub_of_plugin_api_is_the_one_its_table_gives():
-    made = subprocess.run(
-        [sys.executable, "-m", "graspsense.plugin_api"], capture_output=True, text=True, check=True
-    )
-
-    assert (SOURCE / "plugin_api.pyi").read_text() == made.stdout
-
-
-def test_plugin_api_lists_each_name_once():
-    names = [name for modules in plugin_api._TABLE.values() for part in modules.values() for name in part]
-
-    assert sorted(names) == plugin_api.__all__ == sorted(set(names))
+def test_each_public_module_lists_a_name_once():
+    for public in (graspsense.PUBLIC, plugin_api.PUBLIC):
+        names = [name for homes in public.table.values() for part in homes.values() for name in part]
+        assert sorted(names) == public.names == sorted(set(names))
 
 
 @pytest.mark.parametrize("door", [graspsense, plugin_api], ids=["graspsense", "plugin_api"])

@@ -18,7 +18,7 @@ ROLES = tuple(parts.ENTRIES)
 
 def subject(role, entry, keys=None):
     given = {"unplugged": parts.HAND_LOST, "absent": parts.HAND_ABSENT} if role == "sensor-backend" else {}
-    return Subject(component=Component(role, entry, "graspsense-test", "0.1"), keys=keys or {}, **given)
+    return Subject(component=Component(entry, "graspsense-test", "0.1", role), keys=keys or {}, **given)
 
 
 SLOW_CHECKS = {"ends-every-grasp", "read-keeps-its-timeout", "two-runs-do-not-meet"}

@@ -1,45 +1,34 @@
-"""graspsense: feel what a thing is and what state it is in while a gripper closes on it.
+"""graspsense: recognise an object and its state from the forces while a gripper closes on it.
 
-This is the door for users. Names are imported when they are first used; plugins are never loaded at import.
+These are the names for users. A name is imported when it is first used; importing graspsense loads no plugin.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-if TYPE_CHECKING:
-    from graspsense.core.errors import GraspsenseError as GraspsenseError
-    from graspsense.core.features import Features as Features
-    from graspsense.core.features import FeatureTable as FeatureTable
-    from graspsense.core.features import Prediction as Prediction
-    from graspsense.core.pipeline import load_pipeline as load_pipeline
-    from graspsense.core.signals import Outcome as Outcome
-    from graspsense.core.signals import Phase as Phase
-    from graspsense.core.trace import Trace as Trace
-    from graspsense.core.trial import Trial as Trial
+from graspsense.core.lazy_names import LazyNames
 
 __version__: Final = "0.1.0"
 
-_HOME_OF: Final = {
-    "FeatureTable": "features",
-    "Features": "features",
-    "GraspsenseError": "errors",
-    "Outcome": "signals",
-    "Phase": "signals",
-    "Prediction": "features",
-    "Trace": "trace",
-    "Trial": "trial",
-    "load_pipeline": "pipeline",
-}
+PUBLIC: Final = LazyNames(
+    __name__,
+    {
+        "Running a grasp": {"pipeline": ("load_pipeline",), "trial": ("Trial",)},
+        "What a grasp returns": {
+            "signals": ("Outcome", "Phase"),
+            "trace": ("Trace",),
+            "features": ("FeatureTable", "Features", "Prediction"),
+        },
+        "Errors": {"errors": ("GraspsenseError",)},
+    },
+)
 
-__all__ = ["__version__", *_HOME_OF]
+__all__ = ["__version__", *PUBLIC.names]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"graspsense.core.{_HOME_OF[name]}"), name)
+    return PUBLIC.load(name)
 
 
 def __dir__() -> list[str]:

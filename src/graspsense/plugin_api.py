@@ -1,21 +1,17 @@
 """Everything that a plugin may import from graspsense, grouped by what it is for.
 
 A name is imported when it is first used. The entry module of a plugin, which is all that listing plugins imports,
-therefore loads neither numpy nor a driver. Type checkers read `plugin_api.pyi`, which is generated from the table
-below:
-
-    python -m graspsense.plugin_api > src/graspsense/plugin_api.pyi
-
-A test compares the two.
+therefore loads neither numpy nor a driver. Type checkers read `plugin_api.pyi`, which `graspsense.core.lazy_names`
+generates from the table below.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from importlib import import_module
 from typing import Any, Final
 
-_TABLE: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
+from graspsense.core.lazy_names import LazyNames, Table
+
+_TABLE: Final[Table] = {
     "Declaring what a plugin brings": {
         "hookspecs": ("hookimpl",),
         "entries": (
@@ -163,38 +159,15 @@ _TABLE: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
         ),
     },
 }
-"""What a name is for, the module of `graspsense.core` that defines it, and the name."""
 
-_MODULE_OF: Final = {
-    name: module for modules in _TABLE.values() for module, names in modules.items() for name in names
-}
+PUBLIC: Final = LazyNames("graspsense.plugin_api", _TABLE)
 
-__all__ = sorted(_MODULE_OF)
+__all__ = PUBLIC.names
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _MODULE_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"graspsense.core.{_MODULE_OF[name]}"), name)
-    globals()[name] = value
-    return value
+    return PUBLIC.load(name)
 
 
 def __dir__() -> list[str]:
     return __all__
-
-
-def _stub() -> str:
-    """Return the text of `plugin_api.pyi`: an import of each name, in the groups of the table."""
-    lines = [
-        '"""Generated from the table in plugin_api.py by `python -m graspsense.plugin_api`: change that."""'
-    ]
-    for purpose, modules in _TABLE.items():
-        lines += ["", f"# {purpose}"]
-        for module, names in modules.items():
-            lines += [f"from graspsense.core.{module} import {name} as {name}" for name in names]
-    return "\n".join(lines) + "\n"
-
-
-if __name__ == "__main__":
-    print(_stub(), end="")  # noqa: T201

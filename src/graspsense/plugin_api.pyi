@@ -1,4 +1,4 @@
-"""Generated from the table in plugin_api.py by `python -m graspsense.plugin_api`: change that."""
+"""Generated from the table of graspsense.plugin_api by `graspsense.core.lazy_names`: change the table."""
 
 # Declaring what a plugin brings
 from graspsense.core.hookspecs import hookimpl as hookimpl

@@ -120,7 +120,7 @@ def resolve(
     typed, complaints = option_layers(options)
     layers += typed
     layers += [flag.layer() for flag in flags]
-    return _laid(pipeline, layers, complaints, plugins)
+    return _resolved_layers(pipeline, layers, complaints, plugins)
 
 
 def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | None = None) -> Settings:
@@ -131,10 +131,14 @@ def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | Non
     given = {
         table: {key: one for key, one in keys.items() if one is not None} for table, keys in values.items()
     }
-    return _laid(called, [Layer.of(given, called)], [], installed() if plugins is None else plugins)
+    return _resolved_layers(
+        called, [Layer.of(given, called)], [], installed() if plugins is None else plugins
+    )
 
 
-def _laid(pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins: Plugins) -> Settings:
+def _resolved_layers(
+    pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins: Plugins
+) -> Settings:
     """Return the settings of these layers, of which each overrides those before. Raises ConfigError."""
     layers = [_tables_only(layer, complaints) for layer in layers]
 

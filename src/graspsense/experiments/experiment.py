@@ -304,7 +304,10 @@ class _Plan:
         at: dict[str, Any],
     ) -> ExperimentCase:
         one = self.experiment
-        values = _laid(_tables(one), _tables(variant))
+        merged = Merged()
+        merged.add((), _tables(one), self.layer)
+        merged.add((), _tables(variant), self.layer)
+        values = merged.values
         for path, value in point:
             _put(values, path, value)
         over = {table: values[table] for table in PIPELINE_TABLES if values.get(table)}
@@ -439,17 +442,6 @@ def _fresh(config: Any) -> dict[str, Any]:
 
 def _tables(one: Experiment | Variant) -> dict[str, Mapping[str, Any]]:
     return {table: dict(getattr(one, table)) for table in SWEPT_TABLES if getattr(one, table, None)}
-
-
-def _laid(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    """Return tables laid over others: keys replace keys, tables merge."""
-    both = dict(below)
-    for key, value in above.items():
-        inner = both.get(key)
-        both[key] = (
-            _laid(inner, value) if isinstance(value, Mapping) and isinstance(inner, Mapping) else value
-        )
-    return both
 
 
 def _points(

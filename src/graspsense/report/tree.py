@@ -1,4 +1,4 @@
-"""A decision tree as a nested list: it reads aloud, prints, and fits a telephone."""
+"""A decision tree as a nested HTML list, which screen readers, printers and narrow screens can show."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ if TYPE_CHECKING:
     from graspsense.core.tree import TreeNode
 
 MOST: Final = 400
-"""Nodes drawn; a larger tree is cut, and says so."""
+"""Largest number of nodes that are shown; the page says so if a tree has more."""
 
 
 def tree_list(nodes: Sequence[TreeNode]) -> str:
     """Return the tree, from the root on."""
-    sons: dict[int | None, list[int]] = {}
+    children: dict[int | None, list[int]] = {}
     for k, node in enumerate(nodes[:MOST]):
-        sons.setdefault(node.parent, []).append(k)
+        children.setdefault(node.parent, []).append(k)
 
     def item(k: int) -> str:
         node = nodes[k]
-        below = sons.get(k, [])
+        below = children.get(k, [])
         branch = f"{escape(node.branch)} " if node.branch else ""
         if not below:
             wrong = f", {node.wrong:.3g} of them wrong" if node.wrong else ""
@@ -35,4 +35,4 @@ def tree_list(nodes: Sequence[TreeNode]) -> str:
         return f"<li>{branch or 'all trials '}<ul>{inner}</ul></li>"
 
     cut = f"<p>Only the first {MOST} of {len(nodes)} nodes are shown.</p>" if len(nodes) > MOST else ""
-    return wide("Decision tree", f'<ul class="tree">{"".join(map(item, sons.get(None, [])))}</ul>') + cut
+    return wide("Decision tree", f'<ul class="tree">{"".join(map(item, children.get(None, [])))}</ul>') + cut

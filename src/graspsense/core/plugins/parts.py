@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import re
+from abc import ABC, abstractmethod
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final, Generic, Literal, TypeVar
 
@@ -33,7 +34,14 @@ if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
 EntryT = TypeVar(
-    "EntryT", PipelineEntry, ModelEntry, DatasetEntry, CommandEntry, EmulatorEntry, ConformanceCheckEntry
+    "EntryT",
+    ComponentEntry,
+    PipelineEntry,
+    ModelEntry,
+    DatasetEntry,
+    CommandEntry,
+    EmulatorEntry,
+    ConformanceCheckEntry,
 )
 
 
@@ -72,70 +80,8 @@ class PluginStatus:
 
 
 @frozen
-class Component:
-    """A component that a plugin declares."""
-
-    role: Role
-    entry: ComponentEntry
-    distribution: str
-    version: str
-
-    @property
-    def name(self) -> str:
-        """The short name, which another distribution may use too."""
-        return self.entry.name
-
-    @property
-    def qualified(self) -> str:
-        """The unique name, `distribution/name`."""
-        return f"{self.distribution}/{self.entry.name}"
-
-    @property
-    def kind(self) -> str:
-        """The role in words: `sensor backend`."""
-        return self.role.replace("-", " ")
-
-    @property
-    def table(self) -> str:
-        """The table of a pipeline file in which it is selected."""
-        return TABLE_OF_ROLE[self.role]
-
-    def config_class(self) -> type:
-        """Import and return the attrs class of its config. Raises PluginUnavailable."""
-        config_class = _imported(self, self.entry.config)
-        if not (isinstance(config_class, type) and attrs.has(config_class)):
-            raise _unavailable(self, f"{self.entry.config} is not an attrs class")
-        return config_class
-
-    def component_class(self) -> type:
-        """Import and return its class, a concrete subclass of the base class of its role. Raises PluginUnavailable."""
-        from graspsense.core import roles
-
-        component_class = _imported(self, self.entry.target)
-        base = {
-            "sensor-backend": roles.SensorBackend,
-            "controller": roles.Controller,
-            "feature-set": roles.FeatureSet,
-            "classifier": roles.Classifier,
-        }[self.role]
-        if not (isinstance(component_class, type) and issubclass(component_class, base)):
-            raise _unavailable(self, f"{self.entry.target} is not a subclass of {base.__name__}")
-        if inspect.isabstract(component_class):
-            lacking = ", ".join(sorted(component_class.__abstractmethods__))
-            raise _unavailable(
-                self,
-                f"{self.entry.target} does not implement {lacking}, which {base.__name__} of plugin_api requires",
-            )
-        return component_class
-
-    def create(self, config: object) -> Any:
-        """Return the component built from an instance of its config class."""
-        return self.component_class()(config)
-
-
-@frozen
-class Resource(Generic[EntryT]):
-    """A pipeline, model, data set, command, emulator or conformance check that a plugin declares."""
+class Declared(ABC, Generic[EntryT]):
+    """Something that a plugin declares by an entry."""
 
     entry: EntryT
     distribution: str
@@ -152,14 +98,87 @@ class Resource(Generic[EntryT]):
         return f"{self.distribution}/{self.entry.name}"
 
     @property
+    @abstractmethod
     def kind(self) -> str:
-        """What it is, in words: `data set`."""
+        """What it is, in words: `sensor backend`, `data set`."""
+
+    def _import(self, target: str) -> Any:
+        """Return what an import string names. Raises PluginUnavailable."""
+        module, _, name = target.partition(":")
+        try:
+            return getattr(importlib.import_module(module), name)
+        except Exception as error:  # the import of a third party's module can raise anything
+            raise self._unavailable(f"{type(error).__name__}: {error}") from error
+
+    def _unavailable(self, why: str) -> PluginUnavailable:
+        needs = getattr(self.entry, "needs", "")
+        return PluginUnavailable(
+            f"{self.kind} {self.name!r} of {self.distribution} {self.version} cannot be used here: {why}"
+            + (f"\n  needs: {needs}" if needs else "")
+        )
+
+
+@frozen
+class Component(Declared[ComponentEntry]):
+    """A component that a plugin declares."""
+
+    role: Role
+
+    @property
+    def kind(self) -> str:
+        """The role in words."""
+        return self.role.replace("-", " ")
+
+    @property
+    def table(self) -> str:
+        """The table of a pipeline file in which it is selected."""
+        return TABLE_OF_ROLE[self.role]
+
+    def config_class(self) -> type:
+        """Import and return the attrs class of its config. Raises PluginUnavailable."""
+        config_class = self._import(self.entry.config)
+        if not (isinstance(config_class, type) and attrs.has(config_class)):
+            raise self._unavailable(f"{self.entry.config} is not an attrs class")
+        return config_class
+
+    def component_class(self) -> type:
+        """Import and return its class, a concrete subclass of the base class of its role. Raises PluginUnavailable."""
+        from graspsense.core import roles
+
+        component_class = self._import(self.entry.target)
+        base = {
+            "sensor-backend": roles.SensorBackend,
+            "controller": roles.Controller,
+            "feature-set": roles.FeatureSet,
+            "classifier": roles.Classifier,
+        }[self.role]
+        if not (isinstance(component_class, type) and issubclass(component_class, base)):
+            raise self._unavailable(f"{self.entry.target} is not a subclass of {base.__name__}")
+        if inspect.isabstract(component_class):
+            lacking = ", ".join(sorted(component_class.__abstractmethods__))
+            raise self._unavailable(
+                f"{self.entry.target} does not implement {lacking}, which {base.__name__} of plugin_api requires",
+            )
+        return component_class
+
+    def create(self, config: object) -> Any:
+        """Return the component built from an instance of its config class."""
+        return self.component_class()(config)
+
+
+@frozen
+class Resource(Declared[EntryT]):
+    """A pipeline, model, data set, command, emulator or conformance check that a plugin declares."""
+
+    @property
+    def kind(self) -> str:
+        """The kind of its entry in words."""
         return _KIND_OF_ENTRY[type(self.entry)]
 
     def load(self) -> Any:
         """Import and return the target of an entry that is code. Raises PluginUnavailable."""
         assert not isinstance(self.entry, PipelineEntry | ModelEntry), "pipelines and models are files"
-        return _imported(self, self.entry.target)
+        return self._import(self.entry.target)
 
     def file(self) -> Traversable:
         """Return the file of a pipeline or model. Raises PluginUnavailable if its package does not contain it."""
@@ -168,9 +187,9 @@ class Resource(Generic[EntryT]):
         try:
             file = files(package).joinpath(path)
         except Exception as error:
-            raise _unavailable(self, f"{type(error).__name__}: {error}") from error
+            raise self._unavailable(f"{type(error).__name__}: {error}") from error
         if not file.is_file():
-            raise _unavailable(self, f"there is no file {path!r} in the package {package!r}")
+            raise self._unavailable(f"there is no file {path!r} in the package {package!r}")
         return file
 
 
@@ -200,19 +219,3 @@ class Diagnosis:
     distribution: str
     findings: tuple[Finding, ...] = ()
     error: str = ""
-
-
-def _unavailable(part: Component | Resource[Any], why: str) -> PluginUnavailable:
-    needs = getattr(part.entry, "needs", "")
-    return PluginUnavailable(
-        f"{part.kind} {part.name!r} of {part.distribution} {part.version} cannot be used here: {why}"
-        + (f"\n  needs: {needs}" if needs else "")
-    )
-
-
-def _imported(part: Component | Resource[Any], target: str) -> Any:
-    module, _, name = target.partition(":")
-    try:
-        return getattr(importlib.import_module(module), name)
-    except Exception as error:  # the import of a third party's module can raise anything
-        raise _unavailable(part, f"{type(error).__name__}: {error}") from error

@@ -298,7 +298,7 @@ class Plugins:
         try:
             hooks = self._hooks.register(plugin, source)
             components = [
-                Component(role, entry, source.distribution, source.version)
+                Component(entry, source.distribution, source.version, role)
                 for hook, role in COMPONENT_HOOKS.items()
                 if hook in hooks
                 for entry in self._hooks.entries(plugin, hook, ENTRY_OF_ROLE[role])
