@@ -24,7 +24,7 @@ from graspsense.core.entries import TABLE_OF_ROLE
 from graspsense.core.features import Features, FeatureTable, Prediction
 from graspsense.core.trace import Trace
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
-from graspsense.scaffold.make import KINDS
+from graspsense.scaffold.make import KINDS, plugin_module, words_of
 from graspsense.testing import CHECKS, FLOOR
 
 FOLDER = Path(__file__).parent / "roles"
@@ -46,13 +46,6 @@ HOOKS = {
     "controller": "graspsense_controllers",
     "feature-set": "graspsense_feature_sets",
     "classifier": "graspsense_classifiers",
-}
-WORDS = {
-    "name": "lab-thing",
-    "part": "lab-thing",
-    "package": "lab_thing",
-    "api": "(1, 0)",
-    "term": "lab_thing",
 }
 FLOWING: tuple[Any, ...] = (
     *(signals.Frame, signals.Pads, signals.Command, roles.Reading, roles.DeviceInfo),
@@ -214,23 +207,12 @@ def _entry(cls: Any) -> list[str]:
 
 
 def _example(role: str) -> list[str]:
-    kind = KINDS[role]
-    words = {**WORDS, "Class": "LabThing" + kind.suffix}
+    kind, words = KINDS[role], words_of("lab-thing", [role])
+    template = files("graspsense.scaffold").joinpath(f"templates/{role}/{kind.module}.py.txt")
+    module = Template(template.read_text(encoding="utf-8")).substitute(words)
     lines = []
-    for name in ("plugin", kind.module):
-        text = (
-            files("graspsense.scaffold")
-            .joinpath(f"templates/{role}/{name}.py.txt")
-            .read_text(encoding="utf-8")
-        )
-        lines += [
-            f"`src/lab_thing/{name}.py`:",
-            "",
-            "```python",
-            Template(text).substitute(words).rstrip(),
-            "```",
-            "",
-        ]
+    for name, text in (("plugin", plugin_module([role], words)), (kind.module, module)):
+        lines += [f"`src/lab_thing/{name}.py`:", "", "```python", text.rstrip(), "```", ""]
     return lines
 
 

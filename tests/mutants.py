@@ -21,6 +21,7 @@ from graspsense.plugin_api import (
     POSITION,
     SQUEEZE,
     STEADY,
+    Channel,
     ClassifierConfig,
     Command,
     Features,
@@ -70,6 +71,14 @@ mutant("feature-set", "classes-can-be-imported", "No module named 'nowhere'", ta
 @mutant("feature-set", "classes-can-be-imported", "does not implement extract")
 class Methodless(Peak.__mro__[1]):
     pass
+
+
+mutant("feature-set", "classes-can-be-imported", "does not declare `features`: write", features=None)(Peak)
+
+
+@mutant("feature-set", "declared-once", "requires stand both in the entry and in")
+class Twice(Peak):
+    requires = ENTRIES["feature-set"].requires
 
 
 @attrs.frozen
@@ -131,7 +140,7 @@ def featuring(check, says, **changes):
     return keep
 
 
-@featuring("gives-what-it-declares", "make `features` of the entry")
+@featuring("gives-what-it-declares", "make `features` and what extract returns the same")
 def _(features, trace):
     return evolve(features, names=("summit",), reasons={"summit": "none"})
 
@@ -394,6 +403,28 @@ def _(reading):
 @giving("frames-are-numbers", "a tuple of 22 floats")
 def _(reading):
     return Reading(reading.frame, reading.pads._replace(left=(0.0,) * 15))
+
+
+mutant(
+    "sensor-backend",
+    "channels-are-those-declared",
+    "no frame can carry the declared motor_temperature",
+    channels=(*ENTRIES["sensor-backend"].channels, Channel("motor_temperature", "K", 1.0)),
+)(Hand)
+
+
+@mutant("sensor-backend", "channels-follow-from-the-settings", "once it is open", channels=None)
+class Discovering(Hand):
+    @property
+    def channels(self):
+        return ENTRIES["sensor-backend"].channels[: 8 if self._bench else 4]
+
+
+@mutant("sensor-backend", "channels-follow-from-the-settings", "return a tuple of Channel", channels=None)
+class Listing(Hand):
+    @property
+    def channels(self):
+        return list(ENTRIES["sensor-backend"].channels)
 
 
 @giving("channels-are-those-declared", "NaN in all")

@@ -306,7 +306,7 @@ class TestPluginsShow:
             GRASPSENSE_API = (1, 0)
             @hookimpl
             def graspsense_classifiers():
-                yield ClassifierEntry("odd", "no_lab:A", "no_lab:B", "odd", needs="pip install lab")
+                yield ClassifierEntry("odd", "no_lab:A", "odd", "pip install lab")
             """
         site.install("lab-odd", plugin)
         monkeypatch.setattr(loader, "_current", site.discover())
@@ -362,7 +362,9 @@ class TestConfig:
             class Config: pass
             @hookimpl
             def graspsense_sensor_backends():
-                yield SensorBackendEntry("deaf", "x:Y", "lab_deaf_plugin:Config", "", (), ("effort",))
+                yield SensorBackendEntry(
+                    "deaf", "x:Y", "", config="lab_deaf_plugin:Config", channels=(), accepts=("effort",)
+                )
             """
         site.install("lab-deaf", plugin)
         monkeypatch.setattr(loader, "_current", site.discover())

@@ -19,7 +19,7 @@ FEATURES = """
     @hookimpl
     def graspsense_feature_sets():
         peak = Feature("peak", "N", "largest force")
-        yield FeatureSetEntry("{name}", "lab:Peak", "lab:PeakConfig", "peak", (), (peak,))
+        yield FeatureSetEntry("{name}", "lab:Peak", "peak", requires=(), features=(peak,))
 """
 
 

@@ -92,21 +92,35 @@ def test_a_component_hook_gives_components_of_its_role(role, hook, name):
 def test_hook_graspsense_sensor_backends():
     entry = IsolatedPlugins(example("graspsense_sensor_backends")).find("sensor-backend", "lab-hand").entry
 
-    assert entry.accepts == ("position", "effort")
-    assert [one.name for one in entry.channels][-1] == "motor_temperature"
+    assert (entry.target, entry.needs) == ("lab_hand.backend:LabHand", "pip install pyserial")
+
+
+def test_the_documented_hand_has_the_channels_of_its_fingers():
+    (code,) = re.findall(r"```python\n(from attrs .*?)```", DOCS, re.DOTALL)
+    names: dict = {}
+    exec(code, names)
+
+    class Hand(names["LabHand"]):
+        open = read = apply = tare = close = None
+
+    config = names["LabHandConfig"]
+    assert [one.name for one in Hand(config()).channels] == ["gap", "velocity"]
+    assert [one.name for one in Hand(config(fingers="force-sensing")).channels][2:] == [
+        "force_left",
+        "force_right",
+    ]
 
 
 def test_hook_graspsense_controllers():
     entry = IsolatedPlugins(example("graspsense_controllers")).find("controller", "gentle").entry
 
-    assert entry.requires[0].rate_hz == 50.0
-    assert entry.commands == ("velocity",)
+    assert entry.target == "lab_hand.gentle:GentleController"
 
 
 def test_hook_graspsense_feature_sets():
     entry = IsolatedPlugins(example("graspsense_feature_sets")).find("feature-set", "stiffness").entry
 
-    assert [(feature.name, feature.unit) for feature in entry.features] == [("stiffness", "N/m")]
+    assert entry.target == "lab_hand.stiffness:Stiffness"
 
 
 def test_hook_graspsense_classifiers():

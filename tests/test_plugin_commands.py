@@ -107,11 +107,23 @@ def test_a_group_without_a_command_prints_its_help_once(graspsense):
     assert "shows what there is" not in err
 
 
-def test_a_package_is_made_for_one_role(tmp_path, monkeypatch, capsys):
+def test_a_package_is_made_for_several_roles(graspsense, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as ended:
-        main(["plugins", "new", "lab-hand", "--role", "controller", "--role", "feature-set"])
+    code, out, _ = graspsense("new", "lab-hand", "--role", "controller", "--role", "sensor-backend")
 
-    assert ended.value.code == 2
-    assert "--role is given 2 times (controller, feature-set)" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
+    assert code == 0
+    assert "graspsense run --pipeline lab-hand" in out
+    assert sorted(path.name for path in (tmp_path / "lab-hand/src/lab_hand").glob("*.py")) == [
+        "__init__.py",
+        "backend.py",
+        "law.py",
+        "plugin.py",
+    ]
+
+
+def test_a_role_is_given_once(graspsense, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = graspsense("new", "lab-hand", "--role", "controller", "--role", "controller")
+
+    assert (code, list(tmp_path.iterdir())) == (2, [])
+    assert "--role controller is given 2 times: give each role once" in err

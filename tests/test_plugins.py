@@ -77,7 +77,7 @@ def test_built_in_parts_need_no_metadata(site):
         "graspsense/hybrid",
         "graspsense/velocity",
     ]
-    entry = plugins.find("feature-set", "chitta").entry
+    entry = plugins.find("feature-set", "chitta").declared()
     assert [(feature.name, feature.unit) for feature in entry.features] == [
         ("p_first", "m"),
         ("p_steady", "m"),

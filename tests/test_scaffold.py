@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import importlib
+import itertools
 import re
+import sys
 import tomllib
 
 import pytest
 
+import graspsense_sim_gripper.plugin
 from graspsense.core.errors import ConfigError, WiringError
 from graspsense.core.pipeline import load_pipeline
 from graspsense.core.plugins import IsolatedPlugins
 from graspsense.scaffold.make import KINDS, make
 
+COMBINATIONS = [roles for count in range(1, len(KINDS) + 1) for roles in itertools.combinations(KINDS, count)]
 
-@pytest.mark.parametrize("role", KINDS)
-def test_a_package_is_whole(role, tmp_path):
-    make("lab-thing", role, tmp_path / "lab-thing")
+
+@pytest.mark.parametrize("roles", COMBINATIONS, ids="+".join)
+def test_a_package_is_whole(roles, tmp_path):
+    make("lab-thing", roles, tmp_path / "lab-thing")
 
     folder = tmp_path / "lab-thing"
     for path in folder.rglob("*"):
@@ -52,19 +58,45 @@ def test_a_package_is_whole(role, tmp_path):
 )
 def test_what_it_refuses(name, role, says, tmp_path):
     with pytest.raises(ConfigError, match=re.compile(says, re.DOTALL)):
-        make(name, role, tmp_path / name)
+        make(name, [role], tmp_path / name)
     assert not list(tmp_path.iterdir())
 
 
+def test_a_role_is_given_once(tmp_path):
+    with pytest.raises(ConfigError, match="--role observer is given 2 times: give each role once"):
+        make("lab-thing", ["observer", "controller", "observer"], tmp_path / "lab-thing")
+
+
+@pytest.mark.parametrize("roles", COMBINATIONS, ids="+".join)
+def test_the_components_of_a_package_fit_together(roles, tmp_path, monkeypatch):
+    make("lab-thing", roles, tmp_path / "lab-thing")
+    monkeypatch.syspath_prepend(tmp_path / "lab-thing" / "src")
+    for name in [name for name in sys.modules if name.partition(".")[0] == "lab_thing"]:
+        monkeypatch.delitem(sys.modules, name)
+    plugin = importlib.import_module("lab_thing.plugin")
+    selected = [role for role in roles if KINDS[role].role is not None]
+
+    with IsolatedPlugins() as plugins:
+        plugins.add(graspsense_sim_gripper.plugin, "graspsense-sim-gripper")
+        plugins.add(plugin, "lab-thing")
+
+        assert [one.role for one in plugins.components() if one.distribution == "lab-thing"] == selected
+        if len(selected) > 1:
+            trial = load_pipeline("lab-thing", plugins=plugins).grasp()
+            assert (trial.outcome.words, dict(trial.features.reasons)) == ("steady", {})
+        else:
+            assert not any(one.distribution == "lab-thing" for one in plugins.pipelines())
+
+
 def test_nothing_is_written_over(tmp_path):
-    make("lab-thing", "observer", tmp_path / "lab-thing")
+    make("lab-thing", ["observer"], tmp_path / "lab-thing")
 
     with pytest.raises(ConfigError, match="is there already: give another name, or --folder"):
-        make("lab-thing", "observer", tmp_path / "lab-thing")
+        make("lab-thing", ["observer"], tmp_path / "lab-thing")
 
 
 def test_a_new_gripper_grasps_with_the_default_pipeline_at_once(tmp_path, monkeypatch):
-    make("lab-hand", "sensor-backend", tmp_path / "lab-hand")
+    make("lab-hand", ["sensor-backend"], tmp_path / "lab-hand")
     monkeypatch.syspath_prepend(tmp_path / "lab-hand" / "src")
     from lab_hand import plugin
 

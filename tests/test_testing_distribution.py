@@ -23,7 +23,7 @@ SOUND = (
     @hookimpl
     def graspsense_feature_sets():
         peak = Feature("peak", "N", "largest force")
-        yield FeatureSetEntry("summit", "parts:Peak", "parts:PeakConfig", "peak", (), (peak,))
+        yield FeatureSetEntry("summit", "parts:Peak", "peak", requires=(), features=(peak,))
 
     @hookimpl
     def graspsense_run_finished(run, trial):
@@ -196,7 +196,7 @@ GRASPSENSE_API = (1, 0)
 def graspsense_feature_sets():
     peak = Feature("peak", "N", "largest force")
     yield FeatureSetEntry(
-        "summit", "lab_thing.features:Peak", "lab_thing.features:PeakConfig", "peak", (), (peak,)
+        "summit", "lab_thing.features:Peak", "peak", requires=(), features=(peak,)
     )
 @hookimpl
 def graspsense_pipelines():

@@ -143,19 +143,14 @@ def check(
     required=True,
     multiple=True,
     metavar="ROLE",
-    help="Role of the plugin; an unknown role lists all of them.",
+    help="Role of a component; give it several times for several. An unknown role lists all of them.",
 )
 @click.option("--folder", type=click.Path(path_type=Path), help="Folder of the package.  [default: ./NAME]")
 def new(name: str, roles: tuple[str, ...], folder: Path | None) -> None:
-    """Create the package of a new plugin, with tests."""
+    """Create the package of a new plugin, with tests, for one role or for several that fit together."""
     from graspsense.scaffold.make import make
 
-    if len(roles) > 1:
-        raise click.UsageError(
-            f"--role is given {len(roles)} times ({', '.join(roles)}): a package is made for one role. Make one, and "
-            "add the other parts to its plugin.py"
-        )
-    for line in make(name, roles[0], folder if folder is not None else Path(name)):
+    for line in make(name, roles, folder if folder is not None else Path(name)):
         click.echo(line)
 
 
@@ -325,17 +320,17 @@ def _described(component: Component) -> dict[str, Any]:
         "qualified": component.qualified,
         "distribution": component.distribution,
         "version": component.version,
-        "entry": attrs.asdict(component.entry),
+        "entry": attrs.asdict(_declared(component)),
         "keys": keys,
         "reason": reason,
     }
 
 
 def _component_text(component: Component) -> str:
-    entry = attrs.asdict(component.entry, recurse=False)
+    declared = attrs.asdict(_declared(component), recurse=False)
+    entry = {key: value for key, value in declared.items() if value is not None}
     lines = [f"{component.role} {component.qualified} {component.version}", f"  {entry['summary']}"]
-    for key in ("target", "config"):
-        lines.append(f"  {key:<11}  {entry[key]}")
+    lines.append(f"  target       {entry['target']}")
     for key in ("channels", "requires"):
         if key in entry:
             names = [
@@ -356,6 +351,16 @@ def _component_text(component: Component) -> str:
         lines.append(f"  keys of [{component.table}], with their types and defaults:")
         lines += [f"    {key}: {one['type']}" + _default_text(one) for key, one in keys.items()]
     return "\n".join(lines)
+
+
+def _declared(component: Component) -> Any:
+    """Return the entry with what the class declares; the entry alone where the class cannot be used here."""
+    from graspsense.core.errors import PluginUnavailable
+
+    try:
+        return component.declared()
+    except PluginUnavailable:
+        return component.entry
 
 
 def _default_text(key: dict[str, Any]) -> str:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 from attrs import frozen
 
 from graspsense import __version__
-from graspsense.core.entries import TABLE_OF_ROLE, ControllerEntry, Role
+from graspsense.core.entries import TABLE_OF_ROLE, Role
 from graspsense.core.errors import ConfigError, PluginUnavailable, UnknownName, suggestion
 from graspsense.core.layers import (
     Flag,
@@ -65,6 +65,11 @@ class SelectedComponent:
     def create(self) -> Any:
         """Return the component built from its config. Raises PluginUnavailable."""
         return self.component.create(self.config)
+
+    @property
+    def declared(self) -> Any:
+        """Its entry with all that its class declares under this config. Raises PluginUnavailable."""
+        return self.component.declared(self.config)
 
 
 @frozen(eq=False, kw_only=True)
@@ -161,7 +166,7 @@ def _resolved_layers(
             called = component.qualified
             merged = _merged(layers, table, component)
             if table == "controller" and "gripper" in chosen:
-                _choose_sent_kind(merged, component, chosen["gripper"].component)
+                _choose_sent_kind(merged, component, chosen["gripper"])
         config: Any
         try:
             config = structured({k: v for k, v in merged.values.items() if k != "type"}, cls, called)
@@ -195,15 +200,20 @@ def _resolved_layers(
     )
 
 
-def _choose_sent_kind(merged: Merged, controller: Component, gripper: Component) -> None:
+def _choose_sent_kind(merged: Merged, controller: Component, gripper: SelectedComponent) -> None:
     """Set the key `sends` of a controller with several kinds of command, where nothing sets it."""
-    entry, accepted = controller.entry, getattr(gripper.entry, "accepts", ())
-    if not isinstance(entry, ControllerEntry) or not entry.alternatives or "sends" in merged.values:
+    try:
+        entry, accepted = controller.declared(), gripper.declared.accepts
+    except PluginUnavailable:
+        return  # The wiring check reports it.
+    if not entry.alternatives or "sends" in merged.values:
         return
     kind = next((one for one in (*entry.commands, *entry.alternatives) if one in accepted), None)
     if kind is not None and kind not in entry.commands:
         merged.values["sends"] = kind
-        merged.owner[controller.table, "sends"] = Layer.of({}, f"{gripper.qualified} accepts {kind}")
+        merged.owner[controller.table, "sends"] = Layer.of(
+            {}, f"{gripper.component.qualified} accepts {kind}"
+        )
 
 
 def build(component: Component, values: Mapping[str, Any]) -> Any:

@@ -2,6 +2,10 @@
 
 Classes are named by import strings (`"package.module:Class"`), which are resolved at first use. Listing plugins
 therefore imports the entry modules only, and no driver.
+
+The entry of a component needs a name, a target and a summary. Everything else is declared by the class: its channels,
+units and kinds of command as class attributes, its config class as the parameter of its base class. An entry repeats
+none of that; a field that is given here is for a class that does not declare it.
 """
 
 from __future__ import annotations
@@ -10,7 +14,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import field, frozen
-from attrs.validators import and_, deep_iterable, ge, instance_of, matches_re, min_len
+from attrs.validators import and_, deep_iterable, ge, instance_of, matches_re, min_len, optional
 
 from graspsense.core.errors import suggestion
 from graspsense.core.signals import CHANNELS, CommandKind
@@ -53,8 +57,9 @@ def _distinct_channels(entry: object, attribute: Attribute[Any], channels: tuple
 
 _IS_NAME: Final = [instance_of(str), matches_re(r"[a-z][a-z0-9_-]*")]
 _IS_TARGET: Final = [instance_of(str), matches_re(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")]
+_IS_TARGET_OR_EMPTY: Final = [instance_of(str), matches_re(r"([A-Za-z_][\w.]*:[A-Za-z_]\w*)?")]
 _IS_RESOURCE: Final = [instance_of(str), matches_re(r"[A-Za-z_][\w.]*:[^/:][^:]*")]
-_ARE_KINDS: Final = [instance_of(tuple), _known_kinds]
+_ARE_KINDS: Final = optional(and_(instance_of(tuple), _known_kinds))
 
 
 @frozen
@@ -80,42 +85,44 @@ class Channel:
             raise ValueError(f"channel {self.name!r} is not one of {', '.join(CHANNELS)}: give it a unit")
 
 
-_ARE_CHANNELS: Final = [deep_iterable(instance_of(Channel), instance_of(tuple)), _distinct_channels]
+_ARE_CHANNELS: Final = optional(
+    and_(deep_iterable(instance_of(Channel), instance_of(tuple)), _distinct_channels)
+)
 
 
 @frozen
 class SensorBackendEntry:
-    """A gripper with its sensors: its class, its channels, and the kinds of command that it accepts."""
+    """A gripper with its sensors. Its class declares its `channels`, and the kinds of command that it `accepts`."""
 
     name: str = field(validator=_IS_NAME)
     target: str = field(validator=_IS_TARGET)
-    config: str = field(validator=_IS_TARGET)
     summary: str = field(validator=instance_of(str))
-    channels: tuple[Channel, ...] = field(validator=_ARE_CHANNELS)
-    accepts: tuple[str, ...] = field(validator=_ARE_KINDS)
-    """The kinds of command that it accepts: any of effort, velocity, position, force."""
     needs: str = ""
     """What to install or do if the target cannot be imported."""
+    config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
+    channels: tuple[Channel, ...] | None = field(default=None, validator=_ARE_CHANNELS, kw_only=True)
+    accepts: tuple[str, ...] | None = field(default=None, validator=_ARE_KINDS, kw_only=True)
+    """The kinds of command that it accepts: any of effort, velocity, position, force."""
 
 
 @frozen
 class ControllerEntry:
-    """A control law: its class, the channels that it requires, and the kinds of command that it sends."""
+    """A control law. Its class declares the channels that it `requires`, and the kinds of `commands` that it sends."""
 
     name: str = field(validator=_IS_NAME)
     target: str = field(validator=_IS_TARGET)
-    config: str = field(validator=_IS_TARGET)
     summary: str = field(validator=instance_of(str))
-    requires: tuple[Channel, ...] = field(validator=_ARE_CHANNELS)
-    commands: tuple[str, ...] = field(validator=_ARE_KINDS)
+    needs: str = ""
+    config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
+    requires: tuple[Channel, ...] | None = field(default=None, validator=_ARE_CHANNELS, kw_only=True)
+    commands: tuple[str, ...] | None = field(default=None, validator=_ARE_KINDS, kw_only=True)
     """Command kinds it may send, unless its config says otherwise by the key `sends`."""
-    alternatives: tuple[str, ...] = field(default=(), validator=_ARE_KINDS)
+    alternatives: tuple[str, ...] | None = field(default=None, validator=_ARE_KINDS, kw_only=True)
     """Command kinds that it can send instead, each alone.
 
     Its config then has a key `sends` that names one kind of `commands` or `alternatives`. Where nothing sets the
     key, it is the first of them that the gripper accepts.
     """
-    needs: str = ""
 
 
 @frozen
@@ -143,23 +150,25 @@ def _distinct_features(entry: object, attribute: Attribute[Any], features: tuple
 
 @frozen
 class FeatureSetEntry:
-    """A set of features: the channels that it reads, and the features that it returns."""
+    """A set of features. Its class declares the channels that it `requires`, and the `features` that it returns."""
 
     name: str = field(validator=_IS_NAME)
     target: str = field(validator=_IS_TARGET)
-    config: str = field(validator=_IS_TARGET)
     summary: str = field(validator=instance_of(str))
-    requires: tuple[Channel, ...] = field(validator=_ARE_CHANNELS)
-    features: tuple[Feature, ...] = field(
-        validator=[deep_iterable(instance_of(Feature), instance_of(tuple)), _distinct_features]
+    needs: str = ""
+    config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
+    requires: tuple[Channel, ...] | None = field(default=None, validator=_ARE_CHANNELS, kw_only=True)
+    features: tuple[Feature, ...] | None = field(
+        default=None,
+        validator=optional(and_(deep_iterable(instance_of(Feature), instance_of(tuple)), _distinct_features)),
+        kw_only=True,
     )
     """The features in the order in which they are returned."""
-    needs: str = ""
 
     @property
     def width(self) -> str | None:
         """The name of the feature that is the width of the object; None where the set has none."""
-        return next((feature.name for feature in self.features if feature.width), None)
+        return next((feature.name for feature in self.features or () if feature.width), None)
 
 
 @frozen
@@ -168,9 +177,9 @@ class ClassifierEntry:
 
     name: str = field(validator=_IS_NAME)
     target: str = field(validator=_IS_TARGET)
-    config: str = field(validator=_IS_TARGET)
     summary: str = field(validator=instance_of(str))
     needs: str = ""
+    config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
 
 
 @frozen
@@ -284,3 +293,11 @@ ENTRY_OF_ROLE: dict[Role, type] = {
     "feature-set": FeatureSetEntry,
     "classifier": ClassifierEntry,
 }
+
+DECLARED: Final[Mapping[Role, tuple[str, ...]]] = {
+    "sensor-backend": ("channels", "accepts"),
+    "controller": ("requires", "commands", "alternatives"),
+    "feature-set": ("requires", "features"),
+    "classifier": (),
+}
+"""What the class of a component declares by attributes, unless the entry has it."""

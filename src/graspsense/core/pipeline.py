@@ -9,7 +9,6 @@ from pathlib import Path
 from attrs import frozen
 
 from graspsense.core.config import Flag, Settings, resolve
-from graspsense.core.entries import FeatureSetEntry
 from graspsense.core.errors import named
 from graspsense.core.features import UNKNOWN, Features, Prediction, missing
 from graspsense.core.model import model_for
@@ -128,8 +127,7 @@ def grasp_with(
 
 def _undefined(settings: Settings, why: str) -> Features:
     """Return the declared features of the feature set, all missing for this reason."""
-    entry = settings.features.component.entry
-    assert isinstance(entry, FeatureSetEntry)
-    names = tuple(feature.name for feature in entry.features)
-    units = tuple(feature.unit for feature in entry.features)
+    features = settings.features.declared.features
+    names = tuple(feature.name for feature in features)
+    units = tuple(feature.unit for feature in features)
     return Features(names=names, values=(nan,) * len(names), units=units, reasons=missing(names, why))

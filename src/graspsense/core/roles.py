@@ -8,18 +8,32 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypedDict, TypeVar, Unpack
+from math import nan
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Generic,
+    Literal,
+    NamedTuple,
+    Protocol,
+    TypedDict,
+    TypeVar,
+    Unpack,
+)
 
 from attrs import field, frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.core.setting_meaning import NAMES_INPUT
 from graspsense.core.signals import Command, Frame, Outcome, Pads
+from graspsense.core.step_params import params_of
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from graspsense.core.entries import Channel, Feature
     from graspsense.core.features import Features, FeatureTable, Prediction
     from graspsense.core.run_config import RunConfig
     from graspsense.core.trace import Trace
@@ -90,8 +104,21 @@ class SensorBackend(ABC, Generic[ConfigT]):
     """A gripper with its sensors, real, simulated, emulated or recorded.
 
     The methods are called in the order `expect` (optional), `open`, `read` and `apply` in turn, `close`. The config is
-    `self.config`.
+    `self.config`. The class declares its `channels` and what it `accepts`.
     """
+
+    accepts: ClassVar[tuple[str, ...]]
+    """The kinds of command that it accepts: any of effort, velocity, position, force."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The channels that `read` delivers, each with its unit and rate.
+
+        A class attribute where they are always the same: `channels = (Channel("gap", "m", 100.0),)`. A property of
+        `self.config` where they depend on the settings, for example on which fingers are mounted. They are read before
+        the gripper is opened, so a property opens nothing.
+        """
+        raise NotImplementedError(f"{type(self).__name__} does not declare `channels`")
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config
@@ -252,8 +279,16 @@ class Controller(ABC, Generic[ConfigT]):
 
     Write `step` as a module function and assign it: `step = staticmethod(step)`. It must not use a clock, input, output
     or objects, and must stay within the subset of Python that numba compiles. The same function then drives a gripper,
-    runs in a debugger, and is compiled together with a simulated plant.
+    runs in a debugger, and is compiled together with a simulated plant. The class declares what it `requires` and its
+    `commands`.
     """
+
+    requires: ClassVar[tuple[Channel, ...]]
+    """The channels that `step` reads, each with the least rate that it needs (0: any rate)."""
+    commands: ClassVar[tuple[str, ...]]
+    """The kinds of command that `step` may return: any of effort, velocity, position, force."""
+    alternatives: ClassVar[tuple[str, ...]] = ()
+    """The kinds that it can send instead, each alone; the key `sends` of its config then names one kind."""
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config
@@ -263,9 +298,12 @@ class Controller(ABC, Generic[ConfigT]):
     def step(params: Any, state: Any, frame: Frame, pads: Pads) -> tuple[Command, Any]:
         """Return the command for this tick, and the state after it."""
 
-    @abstractmethod
     def params(self) -> Any:
-        """Return the parameters of `step`, a named tuple of floats and integers."""
+        """Return the parameters of `step`, a named tuple of floats and integers.
+
+        By default these are the numbers of the config, under the names that they have there.
+        """
+        return params_of(self.config)
 
     @abstractmethod
     def init(self) -> ControllerState:
@@ -273,7 +311,12 @@ class Controller(ABC, Generic[ConfigT]):
 
 
 class FeatureSet(ABC, Generic[ConfigT]):
-    """Extracts features from a trace."""
+    """Extracts features from a trace. The class declares what it `requires`, and its `features`."""
+
+    requires: ClassVar[tuple[Channel, ...]]
+    """The channels that `extract` reads."""
+    features: ClassVar[tuple[Feature, ...]]
+    """The features with their units and meanings, in the order in which they are returned."""
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config
@@ -281,6 +324,31 @@ class FeatureSet(ABC, Generic[ConfigT]):
     @abstractmethod
     def extract(self, trace: Trace) -> Features:
         """Return the features of this trace. Any trace is allowed: an undefined feature is NaN with a reason."""
+
+    def result(self, values: Mapping[str, float], reasons: Mapping[str, str] | None = None) -> Features:
+        """Return the declared features with these values, for `extract` to return.
+
+        A feature without a value is NaN, and `reasons` says why. Raises ValueError for a name that the class does not
+        declare, for an infinite value, and for a NaN without a reason.
+        """
+        from graspsense.core.features import Features
+
+        names = tuple(feature.name for feature in self.features)
+        for name in values:
+            if name not in names:
+                raise ValueError(
+                    f"{type(self).__name__} declares no feature {name!r}; it has {', '.join(names)}"
+                )
+        return Features(
+            names=names,
+            values=tuple(float(values.get(name, nan)) for name in names),
+            units=tuple(feature.unit for feature in self.features),
+            reasons=dict(reasons or {}),
+        )
+
+    def undefined(self, reason: str) -> Features:
+        """Return the declared features, all of them NaN for this reason."""
+        return self.result({}, {feature.name: reason for feature in self.features})
 
 
 @frozen(kw_only=True)

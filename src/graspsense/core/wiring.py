@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from graspsense.core.config import SelectedComponent, Settings
-from graspsense.core.entries import Channel, ControllerEntry, FeatureSetEntry, SensorBackendEntry
+from graspsense.core.entries import Channel
 from graspsense.core.errors import WiringError
 from graspsense.core.plugins import Component
 
@@ -13,13 +13,13 @@ from graspsense.core.plugins import Component
 def check(settings: Settings) -> None:
     """Check channels, units, rates and command kinds.
 
-    Raises WiringError that lists every mismatch, with both components, what one provides and what the other requires.
+    Raises WiringError that lists every mismatch, with both components, what one provides and what the other requires,
+    and PluginUnavailable if a component does not declare what it provides or requires.
     """
-    gripper = settings.gripper.component
     misfits = [
-        *_channel_misfits(gripper, settings.controller.component),
-        *_channel_misfits(gripper, settings.features.component),
-        *_command_misfits(gripper, settings.controller),
+        *_channel_misfits(settings.gripper, settings.controller),
+        *_channel_misfits(settings.gripper, settings.features),
+        *_command_misfits(settings.gripper, settings.controller),
     ]
     if misfits:
         head = (
@@ -28,34 +28,35 @@ def check(settings: Settings) -> None:
         raise WiringError("\n".join([f"{head}:", *(f"  {one}" for one in misfits)]))
 
 
-def _channel_misfits(gripper: Component, user: Component) -> Iterator[str]:
-    assert isinstance(gripper.entry, SensorBackendEntry)
-    assert isinstance(user.entry, ControllerEntry | FeatureSetEntry)
-    given = {channel.name: channel for channel in gripper.entry.channels}
-    for wanted in user.entry.requires:
-        needs = f"{_named(user)} needs the channel {_described(wanted)}"
+def _channel_misfits(gripper: SelectedComponent, user: SelectedComponent) -> Iterator[str]:
+    given: dict[str, Channel] = {channel.name: channel for channel in gripper.declared.channels}
+    provider, choose = _named(gripper.component), _choose(gripper.component, user.component)
+    for wanted in user.declared.requires:
+        needs = f"{_named(user.component)} needs the channel {_described(wanted)}"
         have = given.get(wanted.name)
         if have is None:
-            lacks = f"which {_named(gripper)} does not have (it has: {', '.join(given) or 'none'})"
-            yield f"{needs}, {lacks}. {_choose(gripper, user)}"
+            lacks = f"which {provider} does not have{_settings_hint(gripper)} (it has: {', '.join(given) or 'none'})"
+            yield f"{needs}, {lacks}. {choose}"
         elif have.unit != wanted.unit:
-            yield f"{needs}, but {_named(gripper)} gives it in {have.unit}. {_choose(gripper, user)}"
+            yield f"{needs}, but {provider} gives it in {have.unit}. {choose}"
         elif have.rate_hz < wanted.rate_hz:
             rate = f"at {have.rate_hz:g} Hz" if have.rate_hz else "at no promised rate"
-            yield f"{needs}, but {_named(gripper)} gives it {rate}. {_choose(gripper, user)}"
+            yield f"{needs}, but {provider} gives it {rate}. {choose}"
 
 
-def _command_misfits(gripper: Component, chosen: SelectedComponent) -> Iterator[str]:
-    controller = chosen.component
-    assert isinstance(gripper.entry, SensorBackendEntry)
-    assert isinstance(controller.entry, ControllerEntry)
-    sent = (chosen.config.sends,) if controller.entry.alternatives else controller.entry.commands
+def _settings_hint(gripper: SelectedComponent) -> str:
+    return " with these settings" if gripper.component.channels_vary() else ""
+
+
+def _command_misfits(gripper: SelectedComponent, controller: SelectedComponent) -> Iterator[str]:
+    law, accepted = controller.declared, gripper.declared.accepts
+    sent = (controller.config.sends,) if law.alternatives else law.commands
     for kind in sent:
-        if kind not in gripper.entry.accepts:
-            kinds = ", ".join(gripper.entry.accepts) or "none"
+        if kind not in accepted:
+            kinds = ", ".join(accepted) or "none"
             yield (
-                f"{_named(controller)} commands {kind}, which {_named(gripper)} does not take "
-                f"(it takes: {kinds}). {_choose(gripper, controller)}"
+                f"{_named(controller.component)} commands {kind}, which {_named(gripper.component)} does not take "
+                f"(it takes: {kinds}). {_choose(gripper.component, controller.component)}"
             )
 
 

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final
 
 from graspsense.plugin_api import (
-    CHANNELS,
-    Channel,
     ClassifierEntry,
     ControllerEntry,
     DatasetEntry,
-    Feature,
     FeatureSetEntry,
     PipelineEntry,
     SensorBackendEntry,
@@ -19,8 +15,6 @@ from graspsense.plugin_api import (
 )
 
 GRASPSENSE_API = (1, 0)
-
-_PAD_FORCES: Final = (Channel("force_left", "N"), Channel("force_right", "N"))
 
 
 @hookimpl
@@ -34,11 +28,7 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:
         yield ControllerEntry(
             name=name,
             target=f"graspsense.plugins.controllers.{name}:{name.capitalize()}Controller",
-            config=f"graspsense.plugins.controllers.{name}:{name.capitalize()}Config",
             summary=summary,
-            requires=(Channel("gap", "m"), Channel("velocity", "m/s"), *_PAD_FORCES),
-            commands=("effort",),
-            alternatives=() if name == "force" else ("velocity",),
         )
 
 
@@ -48,17 +38,7 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
     yield FeatureSetEntry(
         name="chitta",
         target="graspsense.plugins.features.chitta:ChittaFeatures",
-        config="graspsense.plugins.features.chitta:ChittaConfig",
         summary="the six features of Table I (Chitta, Piccoli, Sturm 2010)",
-        requires=(Channel("gap", "m"), *_PAD_FORCES),
-        features=(
-            Feature("p_first", "m", "gap at the first contact of both fingers", width=True),
-            Feature("p_steady", "m", "gap when the fingers have come to rest"),
-            Feature("f_steady", "N", "force on the pads when the fingers have come to rest"),
-            Feature("delta_t", "s", "time from the first contact to rest"),
-            Feature("dp_dt", "m/s", "mean rate of the gap from the first contact to rest"),
-            Feature("df_dt", "N/s", "mean rate of the pad force from the first contact to rest"),
-        ),
     )
 
 
@@ -68,17 +48,14 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
     yield SensorBackendEntry(
         name="replay",
         target="graspsense.sources.replay:ReplayBackend",
-        config="graspsense.sources.replay:ReplayConfig",
         summary="a recording instead of a gripper; a channel it lacks is NaN",
-        channels=tuple(Channel(name, unit) for name, unit in CHANNELS.items()),
-        accepts=("effort", "velocity", "position", "force"),
     )
 
 
 @hookimpl
 def graspsense_classifiers() -> Iterable[ClassifierEntry]:
     """Return classifiers of scikit-learn. C4.5, which the paper uses, is in another distribution."""
-    for name, config, summary in (
+    for name, cls, summary in (
         ("svm", "Svm", "support vector machine with a radial kernel (scikit-learn)"),
         ("mlp", "Mlp", "neural network with one hidden layer (scikit-learn)"),
         ("forest", "Forest", "random forest (scikit-learn)"),
@@ -87,8 +64,7 @@ def graspsense_classifiers() -> Iterable[ClassifierEntry]:
     ):
         yield ClassifierEntry(
             name=name,
-            target=f"graspsense.plugins.classifiers.{name}:{config}",
-            config=f"graspsense.plugins.classifiers.{name}:{config}Config",
+            target=f"graspsense.plugins.classifiers.{name}:{cls}",
             summary=summary,
         )
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, TypedDict
 
-from graspsense.core.entries import FeatureSetEntry
 from graspsense.core.labelled import ControlFeatures
 from graspsense.core.plugins import installed
 from graspsense.recording.before_contact import SPAN_S
@@ -59,6 +58,5 @@ def controls(
 
 def width_feature(names: Sequence[str]) -> str | None:
     """Return the feature that an installed feature set declares as the width of the object, None if there is none."""
-    entries = (component.entry for component in installed().components("feature-set"))
-    widths = {entry.width for entry in entries if isinstance(entry, FeatureSetEntry)}
+    widths = {entry.width for entry in installed().feature_sets()}
     return next((name for name in names if name in widths), None)

@@ -8,7 +8,6 @@ from typing import Final
 
 from attrs import frozen
 
-from graspsense.core.entries import FeatureSetEntry
 from graspsense.core.labelled import class_of
 from graspsense.core.plugins import installed
 from graspsense.report.grasp_curve import GraspCurve
@@ -168,12 +167,10 @@ def features_by_class(
 
 def feature_meanings() -> dict[str, str]:
     """Return what each feature of the installed feature sets means, in a few words."""
-    entries = (component.entry for component in installed().components("feature-set"))
     return {
         feature.name: feature.meaning
-        for entry in entries
-        if isinstance(entry, FeatureSetEntry)
-        for feature in entry.features
+        for entry in installed().feature_sets()
+        for feature in entry.features or ()
     }
 
 

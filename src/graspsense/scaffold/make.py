@@ -5,7 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import packages_distributions
 from importlib.resources import files
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import Final
 from attrs import frozen
 
 from graspsense import __version__
-from graspsense.core.entries import Role
+from graspsense.core.entries import TABLE_OF_ROLE, Role
 from graspsense.core.errors import ConfigError, suggestion
 from graspsense.core.hookspecs import API
 from graspsense.core.plugins import canonical, installed, installed_sources
@@ -23,13 +23,13 @@ from graspsense.core.plugins import canonical, installed, installed_sources
 
 @frozen
 class ScaffoldKind:
-    """The package for one role: the module of the component, and the first command to try."""
+    """What a package has for one role: the module of the component, and the first command to try."""
 
     role: Role | None
     module: str
     does: str
-    suffix: str
-    """Ending of the name of the class."""
+    entry: str
+    """The entry that its hook returns; empty for a hook that returns none."""
     needs: tuple[str, ...]
     first: str
 
@@ -39,7 +39,7 @@ KINDS: Final[Mapping[str, ScaffoldKind]] = {
         "sensor-backend",
         "backend",
         "a gripper, here a fake one behind the place where its driver goes",
-        "Gripper",
+        "SensorBackendEntry",
         (),
         "graspsense run --gripper $part",
     ),
@@ -47,7 +47,7 @@ KINDS: Final[Mapping[str, ScaffoldKind]] = {
         "controller",
         "law",
         "a control law that closes until the fingers rest",
-        "Controller",
+        "ControllerEntry",
         (),
         "graspsense run -o controller.type=$part",
     ),
@@ -55,7 +55,7 @@ KINDS: Final[Mapping[str, ScaffoldKind]] = {
         "feature-set",
         "features",
         "features of a grasp",
-        "Features",
+        "FeatureSetEntry",
         ("numpy>=1.26",),
         "graspsense run -o features.type=$part -o classifier.type=none",
     ),
@@ -63,7 +63,7 @@ KINDS: Final[Mapping[str, ScaffoldKind]] = {
         "classifier",
         "classifier",
         "a classifier",
-        "Classifier",
+        "ClassifierEntry",
         ("numpy>=1.26",),
         "graspsense evaluate simulated --classifier $part",
     ),
@@ -85,70 +85,165 @@ COMMON: Final = ("pyproject.toml", "README.md", ".gitignore", "tests/test_confor
 NAME: Final = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 
-def make(name: str, role: str, folder: Path) -> list[str]:
-    """Write the package `name` to `folder` and return the next steps, one in each line.
+def make(name: str, roles: Sequence[str], folder: Path) -> list[str]:
+    """Write the package `name` with a component for each role to `folder`; return the next steps, one in each line.
 
-    Raises ConfigError for an unknown role, an invalid name, or a folder that is not empty.
+    Components of one package fit together: with several, it ships a pipeline of them. Raises ConfigError for an unknown
+    or repeated role, an invalid name, or a folder that is not empty.
     """
-    kind = KINDS.get(role)
-    if kind is None:
-        raise ConfigError(
-            f"no role {role!r}. There are:\n"
-            + "\n".join(f"  {one:<15} {what.does}" for one, what in KINDS.items())
-            + suggestion(role, KINDS)
-        )
+    kinds = _kinds(roles)
     if not NAME.fullmatch(name):
         raise ConfigError(
             f"the name {name!r} will not do: small letters, digits and single hyphens, a letter first, as in lab-hand"
         )
     part = name.removeprefix("graspsense-")
     _check_importable(name)
-    _check_free(kind, part, name)
+    for kind in kinds.values():
+        _check_free(kind, part, name)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ConfigError(f"{folder} is there already: give another name, or --folder")
+    words = words_of(name, roles)
+    for target, text in _texts(kinds, words).items():
+        path = folder / target
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    (folder / "src" / words["package"] / "py.typed").touch()
+    return [
+        *(f"{folder} has {kind.does}: src/{words['package']}/{kind.module}.py" for kind in kinds.values()),
+        f"  pip install -e {folder if folder.is_absolute() else f'./{folder}'} pytest",
+        "  graspsense plugins list",
+        f"  graspsense plugins check {name}",
+        f"  pytest {folder}",
+        *(f"  {command}" for command in _first(kinds, words)),
+    ]
+
+
+def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
+    """Return what the places in the templates are filled with."""
+    kinds = _kinds(roles)
+    part, together = name.removeprefix("graspsense-"), _together(kinds)
+    # A law for the gripper of this package sends what that accepts, one alone what the simulated gripper accepts.
+    kind, command = ("effort", "EFFORT, effort, inf, 0.03")
+    if "sensor-backend" in kinds:
+        kind, command = ("velocity", "VELOCITY, -0.03, effort, inf")
+    entries = [one.entry for one in kinds.values() if one.entry] + ["PipelineEntry"] * together
+    needs = dict.fromkeys(need for one in kinds.values() for need in one.needs)
+    simulator = KINDS["sim-term"].needs
+    tests = ["pytest>=8", *(simulator if together and "sensor-backend" not in kinds else ())]
     words = {
         "name": name,
         "part": part,
         "package": name.replace("-", "_"),
         "term": part.replace("-", "_"),
-        "Class": "".join(word.capitalize() for word in part.split("-")) + kind.suffix,
-        "does": kind.does,
+        "Class": "".join(word.capitalize() for word in part.split("-")),
+        "does": _does(kinds),
         "api": f"({API[0]}, {API[1]})",
-        "role": role,
-        "needs": "".join(f', "{one}"' for one in kind.needs),
+        "kind": kind,
+        "KIND": kind.upper(),
+        "command": command,
+        "needs": "".join(f', "{one}"' for one in needs),
+        "tests": ", ".join(f'"{one}"' for one in tests),
         "core": _compatible(__version__),
+        "imports": _imports([*sorted(entries), "hookimpl"]),
     }
-    words["first"] = Template(kind.first).substitute(words)
-    templates = files("graspsense.scaffold").joinpath("templates")
-    for target, source in _files(kind, role, words).items():
-        text = templates.joinpath(source).read_text(encoding="utf-8")
-        path = folder / target
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(Template(text).substitute(words), encoding="utf-8")
-    (folder / "src" / words["package"] / "py.typed").touch()
-    return [
-        f"{folder} is {kind.does}: src/{words['package']}/{kind.module}.py",
-        f"  pip install -e {folder if folder.is_absolute() else f'./{folder}'} pytest",
-        "  graspsense plugins list",
-        f"  graspsense plugins check {name}",
-        f"  pytest {folder}",
-        f"  {words['first']}",
+    words["first"] = "\n    ".join(_first(kinds, words))
+    return words
+
+
+def plugin_module(roles: Sequence[str], words: Mapping[str, str]) -> str:
+    """Return the text of `plugin.py`: the hooks of these roles."""
+    kinds = _kinds(roles)
+    hooks = [_filled(f"{role}/hook.py.txt", words) for role in kinds]
+    if _together(kinds):
+        hooks.append(_filled("pipeline_hook.py.txt", words))
+    return _filled("plugin.py.txt", {**words, "hooks": "".join(hooks).rstrip()})
+
+
+def _kinds(roles: Sequence[str]) -> dict[str, ScaffoldKind]:
+    """Return the kinds of these roles, in the order of `KINDS`. Raises ConfigError."""
+    for role in roles:
+        if role not in KINDS:
+            raise ConfigError(
+                f"no role {role!r}. There are:\n"
+                + "\n".join(f"  {known:<15} {kind.does}" for known, kind in KINDS.items())
+                + suggestion(role, KINDS)
+            )
+        if roles.count(role) > 1:
+            raise ConfigError(f"--role {role} is given {roles.count(role)} times: give each role once")
+    return {role: kind for role, kind in KINDS.items() if role in roles}
+
+
+def _together(kinds: Mapping[str, ScaffoldKind]) -> bool:
+    """Return whether the package ships a pipeline: whether a pipeline selects several of its components."""
+    return sum(kind.role is not None for kind in kinds.values()) > 1
+
+
+def _does(kinds: Mapping[str, ScaffoldKind]) -> str:
+    """Return what the package is, in words."""
+    if len(kinds) == 1:
+        return next(iter(kinds.values())).does
+    return f"components for {', '.join(kinds)}, which fit together"
+
+
+def _imports(names: Sequence[str]) -> str:
+    line = f"from graspsense.plugin_api import {', '.join(names)}"
+    if len(line) <= 100:
+        return line
+    return "\n".join(["from graspsense.plugin_api import (", *(f"    {name}," for name in names), ")"])
+
+
+def _first(kinds: Mapping[str, ScaffoldKind], words: Mapping[str, str]) -> list[str]:
+    """Return the first commands to try."""
+    apart = [kind for kind in kinds.values() if kind.role is None or not _together(kinds)]
+    commands = [Template(kind.first).substitute(words) for kind in apart]
+    if _together(kinds):
+        commands.insert(0, f"graspsense run --pipeline {words['part']}")
+    return list(dict.fromkeys(commands))
+
+
+def _pipeline(kinds: Mapping[str, ScaffoldKind], words: Mapping[str, str]) -> str:
+    """Return the pipeline that selects every component of the package."""
+    lines = [
+        f"# The parts of {words['name']} together; what is not given here is as in the default pipeline."
     ]
+    lines.append('extends = "default"')
+    for kind in kinds.values():
+        if kind.role is not None and kind.role != "classifier":
+            lines += ["", f"[{TABLE_OF_ROLE[kind.role]}]", f'type = "{words["name"]}/{words["part"]}"']
+    lines += ["", "[classifier]"]
+    if "classifier" in kinds:
+        lines.append(
+            f'# type = "{words["name"]}/{words["part"]}" and model = "model.json", once one is trained:'
+        )
+        lines.append(f"# graspsense train SOURCE --classifier {words['part']} --out model.json")
+    else:
+        lines.append("# The model of the default pipeline was trained with other grippers and features.")
+    return "\n".join([*lines, 'type = "none"', ""])
 
 
-def _files(kind: ScaffoldKind, role: str, words: Mapping[str, str]) -> dict[str, str]:
-    """Return the path of each file to be made and the template it is made from."""
+def _texts(kinds: Mapping[str, ScaffoldKind], words: Mapping[str, str]) -> dict[str, str]:
+    """Return the path of each file to be made, and its text."""
     package = f"src/{words['package']}"
-    found = {name: f"{name.rpartition('/')[2].lstrip('.')}.txt" for name in COMMON}
-    found[f"{package}/__init__.py"] = "init.py.txt"
-    found[f"{package}/plugin.py"] = f"{role}/plugin.py.txt"
-    found[f"{package}/{kind.module}.py"] = f"{role}/{kind.module}.py.txt"
-    found[f"tests/test_{kind.module}.py"] = f"{role}/test_{kind.module}.py.txt"
-    if role == "sensor-backend":
-        found["tests/test_conformance.py"] = f"{role}/test_conformance.py.txt"
-    if role == "sim-term":
-        found["scene.toml"] = f"{role}/scene.toml.txt"
-    return found
+    texts = {name: _filled(f"{name.rpartition('/')[2].lstrip('.')}.txt", words) for name in COMMON}
+    texts[f"{package}/__init__.py"] = _filled("init.py.txt", words)
+    texts[f"{package}/plugin.py"] = plugin_module(tuple(kinds), words)
+    for role, kind in kinds.items():
+        texts[f"{package}/{kind.module}.py"] = _filled(f"{role}/{kind.module}.py.txt", words)
+        texts[f"tests/test_{kind.module}.py"] = _filled(f"{role}/test_{kind.module}.py.txt", words)
+    if _together(kinds):
+        texts[f"{package}/pipelines/{words['part']}.toml"] = _pipeline(kinds, words)
+        texts["tests/test_pipeline.py"] = _filled("test_pipeline.py.txt", words)
+    if "sensor-backend" in kinds:
+        texts["tests/test_conformance.py"] = _filled("sensor-backend/test_conformance.py.txt", words)
+    if "sim-term" in kinds:
+        texts["scene.toml"] = _filled("sim-term/scene.toml.txt", words)
+    return texts
+
+
+def _filled(template: str, words: Mapping[str, str]) -> str:
+    """Return a template with its places filled."""
+    text = files("graspsense.scaffold").joinpath("templates").joinpath(template).read_text(encoding="utf-8")
+    return Template(text).substitute(words)
 
 
 def _check_importable(name: str) -> None:

@@ -9,10 +9,12 @@ from typing import Final, final
 from attrs import Attribute, field, frozen
 from attrs.validators import instance_of
 
+from graspsense.core.entries import KINDS as COMMAND_KINDS
+from graspsense.core.entries import Channel
 from graspsense.core.errors import DeviceLost, RecordingEnded, suggestion
 from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
 from graspsense.core.setting_meaning import NAMES_INPUT
-from graspsense.core.signals import EFFORT, Command, Pads
+from graspsense.core.signals import CHANNELS, EFFORT, Command, Pads
 from graspsense.recording.replayable import Recording
 from graspsense.sources.icub import read_recording
 
@@ -86,6 +88,9 @@ class ReplayConfig:
 @final
 class ReplayBackend(SensorBackend[ReplayConfig]):
     """Gives the frames of a recording, one a read; commands have no effect on what has happened."""
+
+    channels = tuple(Channel(name, unit) for name, unit in CHANNELS.items())
+    accepts = COMMAND_KINDS
 
     _recording: Recording | None = None
     _commands: tuple[float, ...] | None = None

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Sequence
 from itertools import pairwise
 from math import inf, isfinite, isnan, nan
 from statistics import fmean, median
 from typing import Any, Final
 
-from graspsense.core.entries import KINDS
+from graspsense.core.entries import KINDS, Channel
 from graspsense.core.errors import DeviceLost, NoDevice, RecordingEnded, TareRefused, named
 from graspsense.core.guard import GuardState, guard
 from graspsense.core.roles import SensorBackend
@@ -75,7 +76,7 @@ def opens_and_relaxes_by_kinds_it_takes(subject: Subject) -> None:
             demand(
                 kind in subject.entry.accepts,
                 f"its {name} command is of kind {kind}; it accepts {', '.join(subject.entry.accepts) or 'none'}: use "
-                "one of those, or add it to `accepts` of the entry",
+                "one of those, or add it to `accepts`",
             )
 
 
@@ -109,32 +110,64 @@ def channels_are_those_declared(subject: Subject) -> None:
     session = subject.session
     declared = {one.name for one in subject.entry.channels}
     recording = session.info.opening is None
+    unknown = ", ".join(sorted(declared - CHANNELS.keys()))
+    demand(
+        not unknown,
+        f"no frame can carry the declared {unknown}: take it out of `channels`, and give slow values in `report`. The "
+        f"channels of a frame are {', '.join(CHANNELS)}",
+    )
     for name, channel in CHANNELS_OF_FIELD.items():
         values = [getattr(frame, name) for frame in session.frames]
         if channel not in declared:
             demand(
                 all(map(isnan, values)),
-                f"{name} has numbers ({next((one for one in values if not isnan(one)), nan):g}), and "
-                "the entry declares "
-                f"no channel {channel!r}: declare Channel({channel!r}, {CHANNELS[channel]!r}, rate), or give NaN",
+                f"{name} has numbers ({next((one for one in values if not isnan(one)), nan):g}), and no channel "
+                f"{channel!r} is declared: declare Channel({channel!r}, {CHANNELS[channel]!r}, rate), or give NaN",
             )
         elif not recording:
             demand(
                 not all(map(isnan, values)),
-                f"{name} is NaN in all {len(values)} frames, and the entry declares the channel "
-                f"{channel!r}: fill it, or "
+                f"{name} is NaN in all {len(values)} frames, and the channel {channel!r} is declared: fill it, or "
                 "take it out of `channels`",
             )
         demand(
             not any(map(_infinite, values)), f"{name} is infinite in a frame: give NaN for what is not known"
         )
     if "pads" not in declared:
-        demand(not session.images, "cell images come, and the entry declares no channel 'pads': declare it")
+        demand(not session.images, "cell images come, and no channel 'pads' is declared: declare it")
     elif not recording:
         demand(
             bool(session.images),
-            "no cell image came, and the entry declares the channel 'pads': count images from 1 on, or take it out",
+            "no cell image came, and the channel 'pads' is declared: count images from 1 on, or take it out",
         )
+
+
+def channels_follow_from_the_settings(subject: Subject) -> None:
+    """The declared channels follow from the settings alone, and opening the gripper does not change them."""
+    if not subject.component.channels_vary():
+        return
+    backend, again = subject.create(), subject.create()
+    before = backend.channels
+    demand(
+        isinstance(before, tuple) and all(isinstance(one, Channel) for one in before),
+        f"`channels` returns {before!r:.80}: return a tuple of Channel",
+    )
+    try:
+        backend.open(0)
+        for other, when in (
+            (again.channels, "with the same settings"),
+            (backend.channels, "once it is open"),
+        ):
+            demand(
+                other == before,
+                f"`channels` are {_named(before)}, and {_named(other)} {when}: make them depend on self.config only",
+            )
+    finally:
+        backend.close()
+
+
+def _named(channels: Sequence[Channel]) -> str:
+    return ", ".join(f"{one.name} at {one.rate_hz:g} Hz" for one in channels) or "none"
 
 
 def _infinite(value: float) -> bool:
@@ -318,8 +351,8 @@ def takes_every_kind_it_declares(subject: Subject) -> None:
                 backend.apply(Command(kind, value, min(EFFORT_N, info.effort_limit_n), 0.01))
             except Exception as error:
                 raise CheckFailed(
-                    f"apply raised {named(error)} on a {name} command, which the entry says it "
-                    "accepts: take it, or take "
+                    f"apply raised {named(error)} on a {name} command, which `accepts` "
+                    "says it takes: take it, or take "
                     f"{name!r} out of `accepts`"
                 ) from error
             demand(
@@ -611,6 +644,7 @@ CHECKS: Final = (
         describes_itself,
         opens_and_relaxes_by_kinds_it_takes,
         frames_are_numbers,
+        channels_follow_from_the_settings,
         channels_are_those_declared,
         time_runs_forward,
         rate_is_what_it_says,

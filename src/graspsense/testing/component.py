@@ -23,14 +23,31 @@ ADVICE_ON_IMPORTS: Final = (
 
 
 def classes_can_be_imported(subject: Subject) -> None:
-    """The class and its config class can be imported, and the class implements every method of its role."""
+    """The class and its config class can be imported, and the class has every method and declaration of its role."""
     try:
         subject.component.config_class()
         subject.component.component_class()
+        subject.component.declared()
     except PluginUnavailable as error:
-        if isinstance(error.__cause__, ImportError) and not subject.entry.needs:
+        if isinstance(error.__cause__, ImportError) and not subject.component.entry.needs:
             raise CheckFailed(f"{error}\n    {ADVICE_ON_IMPORTS}") from error
         raise
+
+
+def declared_once(subject: Subject) -> None:
+    """What the class declares is not declared by the entry once more."""
+    twice = subject.component.declared_twice()
+    demand(
+        not twice,
+        f"{', '.join(twice)} stand both in the entry and in {subject.component.entry.target}, and only the entry "
+        "counts: leave them out of the entry",
+    )
+
+
+def config_name(subject: Subject) -> str:
+    """Return the import string of its config class."""
+    cls = subject.component.config_class()
+    return f"{cls.__module__}:{cls.__qualname__}"
 
 
 def settings_have_types(subject: Subject) -> None:
@@ -39,7 +56,7 @@ def settings_have_types(subject: Subject) -> None:
     bare = [one.alias for one in attrs.fields(cls) if one.init and one.type is None]
     demand(
         not bare,
-        f"{subject.entry.config} has keys without a type: {', '.join(bare)}. Annotate them, as in "
+        f"{config_name(subject)} has keys without a type: {', '.join(bare)}. Annotate them, as in "
         f"`{(bare or ['key'])[0]}: float = 1.0`",
     )
 
@@ -51,12 +68,12 @@ def defaults_are_what_their_types_say(subject: Subject) -> None:
     for one in attrs.fields(cls):
         default = one.default
         if one.type is float and type(default) is int:
-            where = f"key {one.alias!r} of {subject.entry.config}"
+            where = f"key {one.alias!r} of {config_name(subject)}"
             demand(False, f"{where} is a float, its default {default!r} is an int: write {float(default)!r}")
         if one.type is int and type(default) in (float, bool):
             demand(
                 False,
-                f"key {one.alias!r} of {subject.entry.config} is an int, its default is {default!r}: write an int, "
+                f"key {one.alias!r} of {config_name(subject)} is an int, its default is {default!r}: write an int, "
                 "or annotate it with what it is",
             )
 
@@ -69,7 +86,7 @@ def settings_survive_a_file(subject: Subject) -> None:
     again = build(subject.component, tomllib.loads(text))
     demand(
         plain(again) == plain(config),
-        f"{subject.entry.config} read back from its own TOML is another: {plain(config)} became {plain(again)}. A "
+        f"{config_name(subject)} read back from its own TOML is another: {plain(config)} became {plain(again)}. A "
         "converter or __attrs_post_init__ changes what was given: let it leave alone what it has made",
     )
 
@@ -82,7 +99,7 @@ def settings_cannot_be_changed(subject: Subject) -> None:
         params = getattr(cls, "__attrs_props__", None)
         demand(
             params is None or params.is_frozen,
-            f"{subject.entry.config} can be changed: decorate it with @frozen",
+            f"{config_name(subject)} can be changed: decorate it with @frozen",
         )
         return
     try:
@@ -91,7 +108,7 @@ def settings_cannot_be_changed(subject: Subject) -> None:
         return
     demand(
         False,
-        f"{subject.entry.config} can be changed after it was made: decorate it with @frozen(kw_only=True) of attrs",
+        f"{config_name(subject)} can be changed after it was made: decorate it with @frozen(kw_only=True) of attrs",
     )
 
 
@@ -100,7 +117,7 @@ def a_classifier_has_a_model_key(subject: Subject) -> None:
     cls = subject.component.config_class()
     demand(
         issubclass(cls, ClassifierConfig),
-        f"{subject.entry.config} has no key 'model': let it extend graspsense.plugin_api.ClassifierConfig",
+        f"{config_name(subject)} has no key 'model': let it extend graspsense.plugin_api.ClassifierConfig",
     )
 
 
@@ -112,7 +129,7 @@ def making_one_does_nothing(subject: Subject) -> None:
         subject.component.create(config)
     demand(
         not seen,
-        f"the constructor of {subject.entry.target} does {', '.join(dict.fromkeys(seen))}: keep the "
+        f"the constructor of {subject.component.entry.target} does {', '.join(dict.fromkeys(seen))}: keep the "
         "config only, and do "
         "that where it is first needed (a gripper in `open`)",
     )
@@ -120,7 +137,7 @@ def making_one_does_nothing(subject: Subject) -> None:
 
 def summary_is_one_line(subject: Subject) -> None:
     """The summary is one line of text."""
-    summary = subject.entry.summary
+    summary = subject.component.entry.summary
     demand(
         bool(summary.strip()) and "\n" not in summary and len(summary) <= 120,
         f"the summary is {summary!r}: say in one line of at most 120 characters what it is",
@@ -168,6 +185,7 @@ _DEEDS: Final = {
 
 CHECKS: Final = checks_of(
     classes_can_be_imported,
+    declared_once,
     settings_have_types,
     defaults_are_what_their_types_say,
     settings_survive_a_file,

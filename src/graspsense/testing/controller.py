@@ -208,7 +208,7 @@ def commands_are_numbers(subject: Subject) -> None:
 
 
 def commands_are_of_declared_kinds(subject: Subject) -> None:
-    """Every command is of a kind that the entry lists under `commands`."""
+    """Every command is of a kind that `commands` lists."""
     for thing in THINGS:
         for tick in ticks_of(subject, thing):
             kind = tick.command.kind

@@ -49,14 +49,14 @@ def _same(a: Features, b: Features) -> bool:
 
 
 def gives_what_it_declares(subject: Subject) -> None:
-    """Names and units are those of the entry, in its order, for every trace."""
+    """Names and units are those of the declared features, in their order, for every trace."""
     declared = tuple((feature.name, feature.unit) for feature in subject.entry.features)
     for of, trace in {"a whole grasp": squeeze(), **odd_traces()}.items():
         features = _features(subject, trace, of)
         given = tuple(zip(features.names, features.units, strict=True))
         demand(
             given == declared,
-            f"on {of} it gives {_listed(given)}; its entry declares {_listed(declared)}: make `features` of the entry "
+            f"on {of} it gives {_listed(given)}; `features` declares {_listed(declared)}: make `features` "
             "and what extract returns the same",
         )
 

@@ -230,8 +230,8 @@ def _modules_of(package: Package) -> Iterator[str]:
     for status in package.statuses:
         yield status.module.partition(":")[0]
     for component in package.components:
-        yield component.entry.target.partition(":")[0]
-        yield component.entry.config.partition(":")[0]
+        targets = (component.entry.target, component.entry.config)
+        yield from (target.partition(":")[0] for target in targets if target)
     for resource in package.resources:
         if isinstance(resource.entry, DatasetEntry | CommandEntry):
             yield resource.entry.target.partition(":")[0]

@@ -43,8 +43,8 @@ class Subject:
 
     @property
     def entry(self) -> Any:
-        """The entry by which its plugin declares it."""
-        return self.component.entry
+        """The entry by which its plugin declares it, with what its class declares under these settings."""
+        return self.component.declared(self.config())
 
     def config(self, **keys: Any) -> Any:
         """Return its config, checked as strictly as one from a file."""

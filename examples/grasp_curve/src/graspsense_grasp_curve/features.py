@@ -28,12 +28,13 @@ from graspsense.plugin_api import (
     FIRST_PAD_CELL,
     HOLD,
     RELEASE,
+    Channel,
+    Feature,
     Features,
     FeatureSet,
     create,
     missing,
 )
-from graspsense_grasp_curve.plugin import CURVE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,8 +43,35 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+SIX: Final = (
+    Feature("p_first", "m", "gap at the first contact of both fingers", width=True),
+    Feature("p_steady", "m", "gap when the fingers have come to rest"),
+    Feature("f_steady", "N", "force on the pads when the fingers have come to rest"),
+    Feature("delta_t", "s", "time from the first contact to rest"),
+    Feature("dp_dt", "m/s", "mean rate of the gap from the first contact to rest"),
+    Feature("df_dt", "N/s", "mean rate of the pad force from the first contact to rest"),
+)
+CURVE: Final = (
+    Feature("peak_force", "N", "largest mean force of the pads, from contact to the end of the hold"),
+    Feature("gap_at_peak", "m", "gap at the largest force"),
+    Feature(
+        "stiffness_ratio",
+        "1",
+        "slope of force over gap in the second half of the squeeze, over that in the first",
+    ),
+    Feature("hysteresis", "1", "share of the work of the squeeze that the release does not give back"),
+    Feature("relaxation_time", "s", "time from the peak until 63 % of the relaxation of the hold has passed"),
+    Feature("contact_area", "cells", "cells of a pad above a tenth of the fullest cell, at the peak"),
+    Feature("contact_row", "rows", "centre of the contact along the pad, at the peak"),
+    Feature("contact_spread", "rows", "standard deviation of the contact along the pad, at the peak"),
+)
+CHANNELS: Final = (
+    Channel("gap", "m"),
+    Channel("force_left", "N"),
+    Channel("force_right", "N"),
+    Channel("pads", "counts"),
+)
 NAMES: Final = tuple(feature.name for feature in CURVE)
-UNITS: Final = tuple(feature.unit for feature in CURVE)
 IMAGE: Final = NAMES[5:]
 LEAST_TRAVEL_M: Final = 2e-4
 LEAST_LOSS: Final = 0.02
@@ -61,19 +89,19 @@ class GraspCurveConfig:
 class GraspCurveFeatures(FeatureSet[GraspCurveConfig]):
     """Extracts the eight features of the table above."""
 
+    requires = CHANNELS
+    features = CURVE
+
     def extract(self, trace: Trace) -> Features:
         """Return the features; an undefined one is NaN with its reason."""
-        values, reasons = _curve(trace, self.config.contact_force_n)
-        return Features(
-            names=NAMES,
-            values=tuple(values.get(one, math.nan) for one in NAMES),
-            units=UNITS,
-            reasons=reasons,
-        )
+        return self.result(*_curve(trace, self.config.contact_force_n))
 
 
 class ChittaAndCurve(FeatureSet[GraspCurveConfig]):
     """The six features of Table I, then the eight."""
+
+    requires = CHANNELS
+    features = (*SIX, *CURVE)
 
     def extract(self, trace: Trace) -> Features:
         """Return the fourteen features."""

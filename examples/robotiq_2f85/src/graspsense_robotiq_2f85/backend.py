@@ -17,6 +17,7 @@ from graspsense.plugin_api import (
     NO_PADS,
     POSITION,
     VELOCITY,
+    Channel,
     Command,
     DeviceInfo,
     DeviceLost,
@@ -28,7 +29,6 @@ from graspsense.plugin_api import (
 )
 from graspsense_robotiq_2f85.fake import Fake
 from graspsense_robotiq_2f85.modbus import Client, NoReply, opened
-from graspsense_robotiq_2f85.plugin import RATE_HZ
 from graspsense_robotiq_2f85.registers import (
     ACTIVE,
     AMPERES_A_STEP,
@@ -46,6 +46,7 @@ from graspsense_robotiq_2f85.registers import (
     status_of,
 )
 
+RATE_HZ: Final = 100.0
 ACTIVATION_S: Final = 5.0
 ATTEMPTS: Final = 3
 SLOPE_FRAMES: Final = 6
@@ -70,6 +71,12 @@ class Robotiq2F85Config:
 class Robotiq2F85(SensorBackend[Robotiq2F85Config]):
     """Turns commands into a moving target position with a speed and a force; each read is one exchange."""
 
+    channels = (
+        Channel("gap", "m", RATE_HZ),
+        Channel("velocity", "m/s", RATE_HZ),
+        Channel("effort", "N", RATE_HZ),
+    )
+    accepts = ("velocity", "position", "force")
     _client: Client | None = None
     _fake: Fake | None = None
 

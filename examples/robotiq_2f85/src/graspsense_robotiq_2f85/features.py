@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from attrs import evolve, field, frozen
 from attrs.validators import gt
 
-from graspsense.plugin_api import Features, FeatureSet, create
-from graspsense_robotiq_2f85.plugin import FEATURES
+from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, create
 
 if TYPE_CHECKING:
     from graspsense.plugin_api import Trace
@@ -25,7 +24,15 @@ class WithoutPadsConfig:
 
 
 class WithoutPads(FeatureSet[WithoutPadsConfig]):
-    """Extracts p_first, p_steady, delta_t and dp_dt."""
+    """Four of the six features of Table I; f_steady and df_dt need a force, which the 2F-85 does not measure."""
+
+    requires = (Channel("gap", "m"), Channel("effort", "N"))
+    features = (
+        Feature("p_first", "m", "gap at contact", width=True),
+        Feature("p_steady", "m", "gap when the fingers have come to rest"),
+        Feature("delta_t", "s", "time from contact to rest"),
+        Feature("dp_dt", "m/s", "mean rate of the gap from contact to rest"),
+    )
 
     def extract(self, trace: Trace) -> Features:
         """Return the four features; in the reasons, the force of a pad stands for the effort."""
@@ -37,10 +44,8 @@ class WithoutPads(FeatureSet[WithoutPadsConfig]):
             rest_speed_m_s=config.rest_speed_m_s,
             rest_window_s=config.rest_window_s,
         ).extract(evolve(trace, force_left_n=trace.effort_n, force_right_n=trace.effort_n))
-        names = tuple(feature.name for feature in FEATURES)
-        return Features(
-            names=names,
-            values=tuple(six[name] for name in names),
-            units=tuple(six.units[six.names.index(name)] for name in names),
-            reasons={name: six.reasons[name] for name in names if name in six.reasons},
+        names = [feature.name for feature in self.features]
+        return self.result(
+            {name: six[name] for name in names},
+            {name: six.reasons[name] for name in names if name in six.reasons},
         )

@@ -17,6 +17,7 @@ from graspsense.plugin_api import (
     SQUEEZE,
     STEADY,
     VELOCITY,
+    Channel,
     Command,
     Controller,
     Frame,
@@ -41,18 +42,6 @@ class CloseUntilStoppedConfig:
     timeout_s: float = field(default=15.0, validator=gt(0.0))
 
 
-class Numbers(NamedTuple):
-    """The parameters of `CloseUntilStoppedConfig`."""
-
-    closing_speed_m_s: float
-    grip_force_n: float
-    contact_effort_n: float
-    rest_speed_m_s: float
-    rest_window_s: float
-    closed_gap_m: float
-    timeout_s: float
-
-
 class State(NamedTuple):
     """State of the law."""
 
@@ -62,7 +51,7 @@ class State(NamedTuple):
     still: Stillness
 
 
-def step(params: Numbers, state: State, frame: Frame, pads: Pads) -> tuple[Command, State]:
+def step(params: CloseUntilStoppedConfig, state: State, frame: Frame, pads: Pads) -> tuple[Command, State]:
     """Close; squeeze from contact on; hold when the fingers are at rest."""
     phase, outcome, seconds = state.phase, state.outcome, state.seconds + frame.dt_s
     still = watch(state.still, frame.t_s, frame.gap_m, params.rest_speed_m_s, params.rest_window_s)
@@ -82,11 +71,9 @@ def step(params: Numbers, state: State, frame: Frame, pads: Pads) -> tuple[Comma
 class CloseUntilStopped(Controller[CloseUntilStoppedConfig]):
     """Closes at a given speed with a given force until the fingers are at rest."""
 
+    requires = (Channel("gap", "m"), Channel("effort", "N"))
+    commands = ("velocity",)
     step = staticmethod(step)
-
-    def params(self) -> Numbers:
-        """Return the parameters of the law."""
-        return Numbers(*(float(getattr(self.config, name)) for name in Numbers._fields))
 
     def init(self) -> State:
         """Return the state before the first tick."""

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from graspsense.plugin_api import (
-    Channel,
     ControllerEntry,
-    Feature,
     FeatureSetEntry,
     PipelineEntry,
     SensorBackendEntry,
@@ -16,15 +14,6 @@ from graspsense.plugin_api import (
 
 GRASPSENSE_API = (1, 0)
 
-RATE_HZ = 100.0
-FEATURES = (
-    Feature("p_first", "m", "gap at contact", width=True),
-    Feature("p_steady", "m", "gap when the fingers have come to rest"),
-    Feature("delta_t", "s", "time from contact to rest"),
-    Feature("dp_dt", "m/s", "mean rate of the gap from contact to rest"),
-)
-"""Four of the six features of Table I; f_steady and df_dt need a force, which the 2F-85 does not measure."""
-
 
 @hookimpl
 def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
@@ -32,14 +21,7 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
     yield SensorBackendEntry(
         name="robotiq-2f85",
         target="graspsense_robotiq_2f85.backend:Robotiq2F85",
-        config="graspsense_robotiq_2f85.backend:Robotiq2F85Config",
         summary="Robotiq 2F-85 over Modbus (RTU on a serial line or TCP, or TCP); position and motor current",
-        channels=(
-            Channel("gap", "m", RATE_HZ),
-            Channel("velocity", "m/s", RATE_HZ),
-            Channel("effort", "N", RATE_HZ),
-        ),
-        accepts=("velocity", "position", "force"),
         needs="pip install graspsense-robotiq-2f85; on Linux your user in the group dialout",
     )
 
@@ -50,10 +32,7 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:
     yield ControllerEntry(
         name="close-until-stopped",
         target="graspsense_robotiq_2f85.law:CloseUntilStopped",
-        config="graspsense_robotiq_2f85.law:CloseUntilStoppedConfig",
         summary="closes at a set speed with a set force until it has stood still",
-        requires=(Channel("gap", "m"), Channel("effort", "N")),
-        commands=("velocity",),
     )
 
 
@@ -63,10 +42,7 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
     yield FeatureSetEntry(
         name="chitta-without-pads",
         target="graspsense_robotiq_2f85.features:WithoutPads",
-        config="graspsense_robotiq_2f85.features:WithoutPadsConfig",
         summary="the four features of Table I that need no force, with contact from the effort",
-        requires=(Channel("gap", "m"), Channel("effort", "N")),
-        features=FEATURES,
     )
 
 

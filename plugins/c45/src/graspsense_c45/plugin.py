@@ -36,7 +36,6 @@ def graspsense_classifiers() -> Iterable[ClassifierEntry]:
     yield ClassifierEntry(
         name="c45",
         target="graspsense_c45.plugin:C45",
-        config="graspsense_c45.plugin:C45Config",
         summary="C4.5, equal to Weka's J48: the paper's classifier, and a tree that can be read",
     )
 

@@ -11,6 +11,7 @@ from attrs import asdict, evolve
 
 from graspsense.plugin_api import (
     EFFORT,
+    Channel,
     Command,
     DeviceInfo,
     DeviceLost,
@@ -39,6 +40,8 @@ from graspsense_pr2_gripper.protocol import (
     micro,
 )
 
+_RATE_HZ: Final = 1000.0
+_PADS_RATE_HZ: Final = 24.39
 OPENING_N: Final = -20.0
 """Effort that opens the fingers. The authors' recordings show 17 and 20 N, opening, between squeezes."""
 TARE_IMAGES: Final = 6
@@ -52,6 +55,18 @@ TEST_NUMBER: Final = (0x1209, 0x0001)
 @final
 class Pr2Backend(SensorBackend[Pr2Config]):
     """Reads and commands one gripper over the transport in the settings."""
+
+    channels = (
+        Channel("gap", "m", _RATE_HZ),
+        Channel("velocity", "m/s", _RATE_HZ),
+        Channel("effort", "N", _RATE_HZ),
+        Channel("force_left", "N", _PADS_RATE_HZ),
+        Channel("force_right", "N", _PADS_RATE_HZ),
+        Channel("edge_left", "N", _PADS_RATE_HZ),
+        Channel("edge_right", "N", _PADS_RATE_HZ),
+        Channel("pads", "counts", _PADS_RATE_HZ),
+    )
+    accepts = ("effort",)
 
     _opened: Opened | None = None
     _report: dict[str, float | int | str | bool] | None = None

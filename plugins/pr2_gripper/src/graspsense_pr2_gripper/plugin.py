@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.plugin_api import Channel, EmulatorEntry, Finding, FoundDevice, SensorBackendEntry, hookimpl
+from graspsense.plugin_api import EmulatorEntry, Finding, FoundDevice, SensorBackendEntry, hookimpl
 
 GRASPSENSE_API = (1, 0)
-
-_RATE_HZ = 1000.0
-_PADS_RATE_HZ = 24.39
 
 
 @hookimpl
@@ -18,19 +15,7 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
     yield SensorBackendEntry(
         name="pr2",
         target="graspsense_pr2_gripper.backend:Pr2Backend",
-        config="graspsense_pr2_gripper.config:Pr2Config",
         summary="PR2 gripper with fingertip pressure arrays, over USB HID",
-        channels=(
-            Channel("gap", "m", _RATE_HZ),
-            Channel("velocity", "m/s", _RATE_HZ),
-            Channel("effort", "N", _RATE_HZ),
-            Channel("force_left", "N", _PADS_RATE_HZ),
-            Channel("force_right", "N", _PADS_RATE_HZ),
-            Channel("edge_left", "N", _PADS_RATE_HZ),
-            Channel("edge_right", "N", _PADS_RATE_HZ),
-            Channel("pads", "counts", _PADS_RATE_HZ),
-        ),
-        accepts=("effort",),
         needs='pip install "graspsense[pr2]"; on Linux also a udev rule (graspsense doctor)',
     )
 

@@ -12,6 +12,7 @@ from graspsense.plugin_api import (
     NO_PADS,
     BatchBackend,
     BatchOptions,
+    Channel,
     Command,
     Controller,
     DeviceInfo,
@@ -40,6 +41,8 @@ from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N, PadBuffers, apply_t
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.terms.registry import find_term
 
+SIDES: Final = ("left", "right")
+
 _sense = bind_reachable(sense, {}, INTERPRETED)
 _reading = maker(Reading)
 _COMPILED: Final[Mapping[str, bool | None]] = {"worth": None, "always": True, "never": False}
@@ -59,9 +62,27 @@ def default_controller(config: SimConfig) -> GraspController:
 class SimBackend(BatchBackend[SimConfig]):
     """A model of a PR2 gripper, its fingertips and an object."""
 
+    accepts = ("effort",)
+
     def __init__(self, config: SimConfig) -> None:
         super().__init__(config)
         self._controller: GraspController | None = None
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The channels of a PR2 gripper; those of the fingertips come with each cell image."""
+        frames_hz = self.config.rate_hz
+        pads_hz = min(1.0 / self.config.pad_period_s, frames_hz)
+        forces = tuple(
+            Channel(f"{what}_{side}", "N", pads_hz) for what in ("force", "edge") for side in SIDES
+        )
+        return (
+            Channel("gap", "m", frames_hz),
+            Channel("velocity", "m/s", frames_hz),
+            Channel("effort", "N", frames_hz),
+            *forces,
+            Channel("pads", "counts", pads_hz),
+        )
 
     def objects(self) -> tuple[ObjectKind, ...]:
         """Return the objects of the catalogue and of the shipped scenes."""

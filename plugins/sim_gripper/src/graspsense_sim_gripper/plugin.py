@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from graspsense.plugin_api import Channel, ConformanceCheckEntry, ModelEntry, SensorBackendEntry, hookimpl
+from graspsense.plugin_api import ConformanceCheckEntry, ModelEntry, SensorBackendEntry, hookimpl
 
 GRASPSENSE_API = (1, 0)
-
-PAD_RATE_HZ = 1.0 / 0.041
 
 
 @hookimpl
@@ -17,19 +15,7 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
     yield SensorBackendEntry(
         name="sim",
         target="graspsense_sim_gripper.backend:SimBackend",
-        config="graspsense_sim_gripper.config:SimConfig",
         summary="A simulated PR2 gripper with fingertip arrays, squeezing an object from a catalogue",
-        channels=(
-            Channel("gap", "m", 1000.0),
-            Channel("velocity", "m/s", 1000.0),
-            Channel("effort", "N", 1000.0),
-            Channel("force_left", "N", PAD_RATE_HZ),
-            Channel("force_right", "N", PAD_RATE_HZ),
-            Channel("edge_left", "N", PAD_RATE_HZ),
-            Channel("edge_right", "N", PAD_RATE_HZ),
-            Channel("pads", "counts", PAD_RATE_HZ),
-        ),
-        accepts=("effort",),
     )
 
 

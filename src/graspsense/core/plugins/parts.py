@@ -5,6 +5,7 @@ The code behind a component or resource is imported when a method asks for it, n
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
 import re
@@ -29,6 +30,7 @@ from graspsense.core.entries import (
     Role,
 )
 from graspsense.core.errors import PluginUnavailable
+from graspsense.core.plugins.declaration import NotDeclared, completed, config_of, declared_by, left_out
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -136,24 +138,23 @@ class Component(Declared[ComponentEntry]):
 
     def config_class(self) -> type:
         """Import and return the attrs class of its config. Raises PluginUnavailable."""
-        config_class = self._import(self.entry.config)
+        config_class: Any
+        if self.entry.config:
+            config_class, name = self._import(self.entry.config), self.entry.config
+        else:
+            cls = self._any_class()
+            try:
+                config_class = config_of(cls, self._base())
+            except NotDeclared as error:
+                raise self._unavailable(str(error)) from error
+            name = f"{config_class.__module__}:{config_class.__qualname__}"
         if not (isinstance(config_class, type) and attrs.has(config_class)):
-            raise self._unavailable(f"{self.entry.config} is not an attrs class")
+            raise self._unavailable(f"{name} is not an attrs class")
         return config_class
 
     def component_class(self) -> type:
         """Import and return its class, a concrete subclass of the base class of its role. Raises PluginUnavailable."""
-        from graspsense.core import roles
-
-        component_class = self._import(self.entry.target)
-        base = {
-            "sensor-backend": roles.SensorBackend,
-            "controller": roles.Controller,
-            "feature-set": roles.FeatureSet,
-            "classifier": roles.Classifier,
-        }[self.role]
-        if not (isinstance(component_class, type) and issubclass(component_class, base)):
-            raise self._unavailable(f"{self.entry.target} is not a subclass of {base.__name__}")
+        component_class, base = self._any_class(), self._base()
         if inspect.isabstract(component_class):
             lacking = ", ".join(sorted(component_class.__abstractmethods__))
             raise self._unavailable(
@@ -164,6 +165,56 @@ class Component(Declared[ComponentEntry]):
     def create(self, config: object) -> Any:
         """Return the component built from an instance of its config class."""
         return self.component_class()(config)
+
+    def declared(self, config: object = None) -> Any:
+        """Return its entry with all that its class declares.
+
+        `config` is an instance of its config class, by default that of its defaults; the channels of a gripper may
+        depend on it. Raises PluginUnavailable if the class cannot be imported, or does not declare something.
+        """
+        if not left_out(self.entry, self.role):
+            return self.entry
+        cls = self.component_class()
+        part: Any = cls
+        if self.channels_vary():
+            if config is None:
+                with contextlib.suppress(TypeError, ValueError):
+                    config = self.config_class()()
+            part = cls if config is None else cls(config)
+        try:
+            return completed(self.entry, self.role, cls, self._base(), part)
+        except NotDeclared as error:
+            raise self._unavailable(str(error)) from error
+        except Exception as error:
+            raise self._unavailable(f"its channels raised {type(error).__name__}: {error}") from error
+
+    def channels_vary(self) -> bool:
+        """Return whether its channels depend on its settings. Raises PluginUnavailable."""
+        if self.role != "sensor-backend" or getattr(self.entry, "channels", None) is not None:
+            return False
+        return isinstance(inspect.getattr_static(self.component_class(), "channels"), property)
+
+    def declared_twice(self) -> tuple[str, ...]:
+        """Return what both its entry and its class declare. Raises PluginUnavailable."""
+        names = declared_by(self.component_class(), self._base(), self.role)
+        return tuple(name for name in names if getattr(self.entry, name) is not None)
+
+    def _base(self) -> type:
+        from graspsense.core import roles
+
+        return {
+            "sensor-backend": roles.SensorBackend,
+            "controller": roles.Controller,
+            "feature-set": roles.FeatureSet,
+            "classifier": roles.Classifier,
+        }[self.role]
+
+    def _any_class(self) -> Any:
+        """Import and return its class, which may lack methods."""
+        cls, base = self._import(self.entry.target), self._base()
+        if not (isinstance(cls, type) and issubclass(cls, base)):
+            raise self._unavailable(f"{self.entry.target} is not a subclass of {base.__name__}")
+        return cls
 
 
 @frozen

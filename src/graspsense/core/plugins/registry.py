@@ -24,13 +24,14 @@ from graspsense.core.entries import (
     ConformanceCheckEntry,
     DatasetEntry,
     EmulatorEntry,
+    FeatureSetEntry,
     Finding,
     FoundDevice,
     ModelEntry,
     PipelineEntry,
     Role,
 )
-from graspsense.core.errors import UnknownName, suggestion
+from graspsense.core.errors import PluginUnavailable, UnknownName, suggestion
 from graspsense.core.firstparty import SHIPPED
 from graspsense.core.plugins.discovery import (
     PluginSource,
@@ -127,6 +128,14 @@ class Plugins:
         order = list(ENTRY_OF_ROLE)
         of_role = (part for part in self._components if role in (None, part.role))
         return tuple(sorted(of_role, key=lambda part: (order.index(part.role), part.name, part.distribution)))
+
+    def feature_sets(self) -> tuple[FeatureSetEntry, ...]:
+        """Return what each feature set declares; one whose class cannot be imported is left out."""
+        entries = []
+        for component in self.components("feature-set"):
+            with contextlib.suppress(PluginUnavailable):
+                entries.append(component.declared())
+        return tuple(entries)
 
     def find(self, role: Role, name: str) -> Component:
         """Return the component called `name` or `distribution/name`.

@@ -13,6 +13,7 @@ from attrs.validators import in_
 
 from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, Pads
 from graspsense.plugins.controllers.supervision import (
+    LAW_CHANNELS,
     NOT_NEGATIVE,
     POSITIVE,
     GraspProgress,
@@ -108,6 +109,8 @@ def step(params: ForceParams, state: ForceState, frame: Frame, pads: Pads) -> tu
 class ForceController(Controller[ForceConfig]):
     """Closes with a constant effort, or squeezes to a given force."""
 
+    requires = LAW_CHANNELS
+    commands = ("effort",)
     step = staticmethod(step)
 
     def params(self) -> ForceParams:

@@ -20,6 +20,7 @@ from graspsense.plugins.controllers.force import (
     squeezing_effort,
 )
 from graspsense.plugins.controllers.supervision import (
+    LAW_CHANNELS,
     NOT_NEGATIVE,
     GraspProgress,
     Supervision,
@@ -95,6 +96,9 @@ def step(params: HybridParams, state: HybridState, frame: Frame, pads: Pads) -> 
 class HybridController(Controller[HybridConfig]):
     """The controller of the paper, and the default."""
 
+    requires = LAW_CHANNELS
+    commands = ("effort",)
+    alternatives = ("velocity",)
     step = staticmethod(step)
 
     def params(self) -> HybridParams:

@@ -8,7 +8,7 @@ result codes of `GraspClosedLoop.srv`.
 from __future__ import annotations
 
 from math import inf
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from attrs import field, frozen
 from attrs.validators import and_, ge, gt, lt
@@ -29,6 +29,7 @@ from graspsense.plugin_api import (
     SQUEEZE,
     STEADY,
     TOO_WIDE,
+    Channel,
     Frame,
     Stillness,
     at_rest,
@@ -36,6 +37,13 @@ from graspsense.plugin_api import (
     watch,
 )
 
+LAW_CHANNELS: Final = (
+    Channel("gap", "m"),
+    Channel("velocity", "m/s"),
+    Channel("force_left", "N"),
+    Channel("force_right", "N"),
+)
+"""The channels that every control law of this package reads."""
 POSITIVE = and_(gt(0.0), lt(inf))
 NOT_NEGATIVE = and_(ge(0.0), lt(inf))
 """Validators of settings of control laws."""

@@ -14,6 +14,7 @@ from attrs.validators import in_
 
 from graspsense.plugin_api import EFFORT, VELOCITY, Command, Controller, Frame, Pads
 from graspsense.plugins.controllers.supervision import (
+    LAW_CHANNELS,
     NOT_NEGATIVE,
     POSITIVE,
     GraspProgress,
@@ -119,6 +120,9 @@ def step(
 class VelocityController(Controller[VelocityConfig]):
     """Closes at a given speed."""
 
+    requires = LAW_CHANNELS
+    commands = ("effort",)
+    alternatives = ("velocity",)
     step = staticmethod(step)
 
     def params(self) -> VelocityParams:

@@ -24,6 +24,8 @@ from graspsense.plugin_api import (
     HOLD,
     REST_SPEED_M_S,
     REST_WINDOW_S,
+    Channel,
+    Feature,
     Features,
     FeatureSet,
     first_rest,
@@ -58,6 +60,16 @@ class ChittaConfig:
 
 class ChittaFeatures(FeatureSet[ChittaConfig]):
     """Extracts the six features of Table I."""
+
+    requires = (Channel("gap", "m"), Channel("force_left", "N"), Channel("force_right", "N"))
+    features = (
+        Feature("p_first", "m", "gap at the first contact of both fingers", width=True),
+        Feature("p_steady", "m", "gap when the fingers have come to rest"),
+        Feature("f_steady", "N", "force on the pads when the fingers have come to rest"),
+        Feature("delta_t", "s", "time from the first contact to rest"),
+        Feature("dp_dt", "m/s", "mean rate of the gap from the first contact to rest"),
+        Feature("df_dt", "N/s", "mean rate of the pad force from the first contact to rest"),
+    )
 
     def extract(self, trace: Trace) -> Features:
         """Return the six features.

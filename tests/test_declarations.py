@@ -1,0 +1,240 @@
+"""What the class of a component declares, and what its entry need not repeat."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from math import nan
+from typing import Literal
+
+import parts
+import pytest
+from attrs import field, frozen
+from parts import GentleState, Hand, HandConfig, Peak, PeakConfig
+
+from graspsense.core.config import settings_from
+from graspsense.core.errors import PluginUnavailable, WiringError
+from graspsense.core.plugins import Component, IsolatedPlugins
+from graspsense.core.plugins.declaration import config_of
+from graspsense.core.step_params import params_of
+from graspsense.core.wiring import check
+from graspsense.plugin_api import (
+    Channel,
+    Classifier,
+    Controller,
+    ControllerEntry,
+    Feature,
+    FeatureSet,
+    FeatureSetEntry,
+    SensorBackendEntry,
+    hookimpl,
+)
+
+HERE = sys.modules[__name__]
+
+
+class Summit(Peak):
+    requires = (Channel("force_left", "N"),)
+    features = (
+        Feature("summit", "N", "largest force of the left pad"),
+        Feature("width", "m", "gap", width=True),
+    )
+
+    def extract(self, trace):
+        return self.result({"summit": 3}, {"width": "no gap"})
+
+
+@frozen(kw_only=True)
+class FingersConfig(HandConfig):
+    fingers: Literal["plain", "force"] = "plain"
+
+
+class Fingers(Hand, parts.SensorBackend[FingersConfig]):
+    accepts = ("effort",)
+
+    @property
+    def channels(self):
+        forces = (Channel("force_left", "N", 100.0), Channel("force_right", "N", 100.0))
+        motion = (Channel("gap", "m", 100.0), Channel("velocity", "m/s", 100.0))
+        return motion + (forces if self.config.fingers == "force" else ())
+
+
+@frozen(kw_only=True)
+class LawConfig:
+    speed_m_s: float = 0.02
+    label: str = "slow"
+    ticks: int = 3
+    careful: bool = True
+    limits: dict[str, float] = field(factory=dict)
+
+
+class Law(Controller[LawConfig]):
+    requires = (Channel("gap", "m", 50.0), Channel("force_left", "N"))
+    commands = ("effort",)
+    step = staticmethod(parts.step)
+
+    def init(self):
+        return GentleState(2, 0, 0.0, 0)
+
+
+def component(role, entry):
+    return Component(role, entry, "lab", "0.1")
+
+
+def of(cls, role="feature-set", entry=FeatureSetEntry, **given):
+    return component(role, entry("a", f"{__name__}:{cls.__name__}", "a thing", **given))
+
+
+@pytest.fixture(autouse=True)
+def importable(monkeypatch):
+    monkeypatch.setitem(sys.modules, __name__, HERE)
+
+
+def test_an_entry_is_completed_by_the_class():
+    peak = of(Summit)
+
+    assert peak.config_class() is PeakConfig
+    assert peak.declared().requires == (Channel("force_left", "N"),)
+    assert peak.declared().width == "width"
+    assert peak.entry.features is None
+    assert peak.declared_twice() == ()
+
+
+def test_the_config_class_is_that_of_the_nearest_base():
+    hand = of(Fingers, "sensor-backend", SensorBackendEntry)
+
+    assert hand.config_class() is FingersConfig
+
+
+def test_a_class_that_does_not_say_what_its_settings_are(monkeypatch):
+    class Bare(FeatureSet):
+        def extract(self, trace):
+            raise NotImplementedError
+
+    monkeypatch.setattr(HERE, "Bare", Bare, raising=False)
+
+    with pytest.raises(PluginUnavailable, match=r"write class Bare\(FeatureSet\[Config\]\), where Config"):
+        of(Bare).config_class()
+
+
+def test_a_class_that_does_not_declare_what_is_missing(monkeypatch):
+    class Mute(Peak):
+        requires = ()
+
+    class Wrong(Summit):
+        requires = (Channel("force_left", "N"), "gap")
+
+    monkeypatch.setattr(HERE, "Mute", Mute, raising=False)
+    monkeypatch.setattr(HERE, "Wrong", Wrong, raising=False)
+
+    with pytest.raises(
+        PluginUnavailable, match=r"Mute does not declare `features`: write features = \(Feature"
+    ):
+        of(Mute).declared()
+    with pytest.raises(PluginUnavailable, match=r"Wrong: 'requires' must be <class '.*Channel'>"):
+        of(Wrong).declared()
+
+
+def test_what_entry_and_class_declare_is_told():
+    assert of(Summit, requires=()).declared_twice() == ("requires",)
+
+
+def test_the_result_has_the_declared_names_and_units():
+    features = Summit(PeakConfig()).extract(None)
+
+    assert features.as_dict() == {"summit": 3.0, "width": None}
+    assert features.units == ("N", "m")
+    assert type(features.values[0]) is float
+    with pytest.raises(ValueError, match="Summit declares no feature 'summits'; it has summit, width"):
+        Summit(PeakConfig()).result({"summits": 1.0})
+    with pytest.raises(ValueError, match="feature 'width' is NaN without a reason"):
+        Summit(PeakConfig()).result({"summit": 1.0, "width": nan})
+    undefined = Summit(PeakConfig()).undefined("the trace is empty")
+    assert dict(undefined.reasons) == {"summit": "the trace is empty", "width": "the trace is empty"}
+
+
+def test_the_parameters_of_a_law_are_the_numbers_of_its_config():
+    params = Law(LawConfig(speed_m_s=0.03, careful=False)).params()
+
+    assert params._asdict() == {"speed_m_s": 0.03, "ticks": 3, "careful": 0}
+    assert [type(one) for one in params] == [float, int, int]
+    assert type(params_of(LawConfig())) is type(params)
+
+
+def settings(plugins, fingers):
+    return settings_from(
+        {
+            "gripper": {"type": "fingers", "fingers": fingers},
+            "controller": {"type": "law"},
+            "features": {"type": "summit"},
+        },
+        "test",
+        plugins,
+    )
+
+
+def test_the_wiring_knows_the_channels_of_the_fitted_fingers():
+    class Lab:
+        GRASPSENSE_API = (1, 0)
+
+        @hookimpl
+        def graspsense_sensor_backends(self):
+            yield SensorBackendEntry("fingers", f"{__name__}:Fingers", "a hand")
+
+        @hookimpl
+        def graspsense_controllers(self):
+            yield ControllerEntry("law", f"{__name__}:Law", "a law")
+
+        @hookimpl
+        def graspsense_feature_sets(self):
+            yield FeatureSetEntry("summit", f"{__name__}:Summit", "a peak")
+
+    plugins = IsolatedPlugins(Lab(), builtins=False)
+
+    check(settings(plugins, "force"))
+    with pytest.raises(WiringError) as error:
+        check(settings(plugins, "plain"))
+    assert str(error.value).startswith(
+        "the components do not fit together:\n"
+        "  controller graspsense-test/law needs the channel 'force_left' in N, which gripper "
+        "graspsense-test/fingers does not have with these settings (it has: gap, velocity). Choose another"
+    )
+    hand = plugins.find("sensor-backend", "fingers")
+    assert hand.channels_vary()
+    assert [one.name for one in hand.declared().channels] == ["gap", "velocity"]
+
+
+def test_a_law_with_the_numbers_of_its_config_is_compiled_once_and_then_loaded(tmp_path):
+    """Another process finds the machine code, although no module defines the type of the parameters."""
+    (tmp_path / "lab_slow.py").write_text(
+        "from attrs import frozen\n"
+        "from graspsense.core.step_params import params_of\n"
+        "from graspsense.plugin_api import compile_function, first_call\n"
+        "@frozen\n"
+        "class SlowConfig:\n"
+        "    speed_m_s: float = 0.5\n"
+        "    ticks: int = 3\n"
+        "def law(params):\n"
+        "    return params.speed_m_s * params.ticks\n"
+        "if __name__ == '__main__':\n"
+        "    compiled = compile_function(law)\n"
+        "    with first_call():\n"
+        "        print(compiled(params_of(SlowConfig())), sum(compiled.stats.cache_hits.values()))\n"
+    )
+    said = [
+        subprocess.run(
+            [sys.executable, "lab_slow.py"],
+            cwd=tmp_path,
+            env={"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for _ in range(2)
+    ]
+
+    assert said == ["1.5 0\n", "1.5 1\n"]
+
+
+def test_the_config_class_of_a_classifier_is_the_parameter_of_its_base():
+    assert config_of(parts.Nearest, Classifier) is parts.ClassifierConfig
