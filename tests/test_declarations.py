@@ -78,7 +78,7 @@ class Law(Controller[LawConfig]):
 
 
 def component(role, entry):
-    return Component(role, entry, "lab", "0.1")
+    return Component(entry, "lab", "0.1", role)
 
 
 def of(cls, role="feature-set", entry=FeatureSetEntry, **given):

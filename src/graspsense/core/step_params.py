@@ -35,8 +35,8 @@ def params_of(config: Any) -> Any:
 def _type_of(name: str) -> Any:
     """Return the named tuple that is called `Config(first_key,second_key)`."""
     config, _, keys = name.rstrip(")").partition("(")
-    made: Any = namedtuple(config, keys.split(",") if keys else ())
-    made.__module__, made.__qualname__ = __name__, name
+    made: Any = namedtuple("made", keys.split(",") if keys else ())  # type: ignore[misc]
+    made.__name__, made.__module__, made.__qualname__ = config, __name__, name
     return made
 
 

@@ -154,7 +154,8 @@ class Component(Declared[ComponentEntry]):
 
     def component_class(self) -> type:
         """Import and return its class, a concrete subclass of the base class of its role. Raises PluginUnavailable."""
-        component_class, base = self._any_class(), self._base()
+        component_class: type[Any] = self._any_class()
+        base = self._base()
         if inspect.isabstract(component_class):
             lacking = ", ".join(sorted(component_class.__abstractmethods__))
             raise self._unavailable(
