@@ -106,14 +106,6 @@ class PadForces(NamedTuple):
     right_edge_n: float
 
 
-class Encoder(NamedTuple):
-    """The last reading of the encoder, with the gap and the filtered rate that follow from it."""
-
-    ticks: float
-    gap_m: float
-    velocity_m_s: float
-
-
 class Pending(NamedTuple):
     """The cell image that was taken and has not arrived: whether there is one, and the forces on the pads then."""
 
@@ -123,9 +115,11 @@ class Pending(NamedTuple):
 
 
 class SensorState(NamedTuple):
-    """What was read last."""
+    """What was read last: the encoder, with the gap and the filtered rate that follow from it, and the cells."""
 
-    encoder: Encoder
+    encoder_ticks: float
+    gap_m: float
+    velocity_m_s: float
     images: int
     """Number of cell images so far."""
     image_t_s: float
@@ -139,7 +133,7 @@ def initial_sensor(params: SensorParams, plant: PlantState) -> SensorState:
     """Return the sensor's state before the first tick; the velocity filter starts at rest."""
     ticks = float(math.floor(plant.motion.revolutions * ENCODER_TICKS))
     gap, _ = gap_and_rate(params.link, ticks / ENCODER_TICKS)
-    return SensorState(Encoder(ticks, gap, 0.0), 0, 0.0, PadForces(0.0, 0.0, 0.0, 0.0), Pending(0, 0.0, 0.0))
+    return SensorState(ticks, gap, 0.0, 0, 0.0, PadForces(0.0, 0.0, 0.0, 0.0), Pending(0, 0.0, 0.0))
 
 
 def sense(
@@ -162,8 +156,15 @@ def sense(
             right_n += force_error_n if right_n > 0.0 else 0.0
         return Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, 0.0, 0.0, 0), state
 
-    encoder = _read_encoder(state.encoder, plant, dt_s)
-    count, image_t, forces, pending = state.images, state.image_t_s, state.forces, state.pending
+    encoder_ticks, gap, velocity, count, image_t, forces, pending = state
+    motion, moved = plant.motion, 0.0
+    ticks = float(math.floor(motion.revolutions * ENCODER_TICKS))
+    if ticks != encoder_ticks:
+        # Within an encoder tick the linkage is linear to a tenth of a picometre.
+        moved = -gap
+        gap = motion.gap_m - motion.jacobian_m_rev * (motion.revolutions - ticks / ENCODER_TICKS)
+        moved += gap
+    velocity += dt_s / (VELOCITY_FILTER_S + dt_s) * (moved / dt_s - velocity)
     due_s = params.clock.phase_s + count * params.clock.period_s - CLOCK_TOLERANCE_S
     if pending.waiting == 0 and t_s >= due_s:
         pending = Pending(1, plant.contact.left_n, plant.contact.right_n)
@@ -174,34 +175,9 @@ def sense(
         forces = image_forces(image[0], image[1], pads)
         count, image_t = count + 1, t_s - params.clock.delay_s
         pending = Pending(0, pending.left_n, pending.right_n)
-    frame = Frame(
-        t_s,
-        dt_s,
-        encoder.gap_m,
-        encoder.velocity_m_s,
-        effort_n,
-        forces.left_n,
-        forces.right_n,
-        forces.left_edge_n,
-        forces.right_edge_n,
-        0,
-    )
-    return frame, SensorState(encoder, count, image_t, forces, pending)
-
-
-def _read_encoder(last: Encoder, plant: PlantState, dt_s: float) -> Encoder:
-    ticks, gap, velocity = last
-    now = float(math.floor(plant.motion.revolutions * ENCODER_TICKS))
-    moved = 0.0
-    if now != ticks:
-        ticks = now
-        before = gap
-        # Within an encoder tick the linkage is linear to a tenth of a picometre.
-        motion = plant.motion
-        gap = motion.gap_m - motion.jacobian_m_rev * (motion.revolutions - ticks / ENCODER_TICKS)
-        moved = gap - before
-    velocity += dt_s / (VELOCITY_FILTER_S + dt_s) * (moved / dt_s - velocity)
-    return Encoder(ticks, gap, velocity)
+    left_n, right_n, left_edge_n, right_edge_n = forces
+    frame = Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, left_edge_n, right_edge_n, 0)
+    return frame, SensorState(ticks, gap, velocity, count, image_t, forces, pending)
 
 
 def image_forces(left: CellColumn, right: CellColumn, pads: PadBuffers) -> PadForces:
@@ -217,8 +193,8 @@ def image_forces(left: CellColumn, right: CellColumn, pads: PadBuffers) -> PadFo
 def apply_tare(state: SensorState, pads: PadBuffers) -> SensorState:
     """Return the sensor's state with the forces of the last image relative to the present zeros."""
     last = pads.images[state.images - 1]
-    forces = image_forces(last[0], last[1], pads)
-    return SensorState(state.encoder, state.images, state.image_t_s, forces, state.pending)
+    ticks, gap, velocity, count, image_t, _, pending = state
+    return SensorState(ticks, gap, velocity, count, image_t, image_forces(last[0], last[1], pads), pending)
 
 
 def _write_image(

@@ -20,7 +20,7 @@ from graspsense_sim_gripper.exact.modes import Shape
 from graspsense_sim_gripper.exact.propagate import bind_move
 from graspsense_sim_gripper.loop import SimulationState, grasp
 from graspsense_sim_gripper.problem import ControllerStep
-from graspsense_sim_gripper.sensing import Encoder, SensorState
+from graspsense_sim_gripper.sensing import SensorState
 from graspsense_sim_gripper.stepping.advance import advance, move
 from graspsense_sim_gripper.stepping.converge import refine_until_converged
 from graspsense_sim_gripper.stepping.implicit import SpeedSearch
@@ -46,7 +46,7 @@ ContactSolver = Callable[[ObjectModel, ContactState, float, float, float], Conta
 INTERPRETED: Final[Constructors] = {
     kind: maker(kind)
     for kind in (
-        *(PlantState, Motion, Contact, ContactState, StepState, SensorState, Encoder, Frame),
+        *(PlantState, Motion, Contact, ContactState, StepState, SensorState, Frame),
         *(Start, Attempt, SpeedSearch, Stage, PadLoad, BalanceSearch),
     )
 }

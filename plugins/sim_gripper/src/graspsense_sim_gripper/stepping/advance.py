@@ -62,9 +62,10 @@ def move(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> 
 
 def advance(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
     """Return the plant after `dt` under a constant force."""
-    if rests(params.drive, state, effort_n):
-        return state
-    if may_coast(params, state, dt):
+    if state.motion.speed_rev_s == 0.0:
+        if rests(params.drive, state, effort_n):
+            return state
+    elif params.steps.longest_s >= dt <= state.step.next_s:
         coasts, after = coast(params, state, effort_n, dt)
         if coasts:
             return after
@@ -121,13 +122,8 @@ def take_step(
 
 
 def rests(drive: Drive, state: PlantState, effort_n: float) -> bool:
-    """Return whether nothing moves: the drive is held, and nothing relaxes between the fingers."""
-    return state.contact.touched == 0 and state.motion.speed_rev_s == 0.0 and is_held(drive, state, effort_n)
-
-
-def may_coast(params: PlantParams, state: PlantState, dt: float) -> bool:
-    """Return whether the fingers move and the step control allows one step for the whole tick."""
-    return state.motion.speed_rev_s != 0.0 and params.steps.longest_s >= dt <= state.step.next_s
+    """Return whether fingers that stand still go on doing so, and nothing relaxes between them."""
+    return state.contact.touched == 0 and is_held(drive, state, effort_n)
 
 
 def _standing(start: Start) -> Attempt:
@@ -161,19 +157,20 @@ def _completed(
 ) -> PlantState:
     """Return the plant after an accepted step, with the contact, the peak and the ends of travel brought up to date."""
     drive, peak = params.drive, state.peak_n
-    revolutions, speed, gap, jacobian = attempt.motion
-    left_n, right_n, offset, touched, left, right, pending = attempt.contact
+    motion, contact = attempt.motion, attempt.contact
+    revolutions, speed, gap, _ = motion
+    left, right, touched = contact.left, contact.right, contact.touched
     if touched == 1 or gap <= start.reach_m:
         # Released and recovered, the object is as it was before the first contact.
         shape = abs(left.compression_m) + abs(left.pad_m) + abs(right.compression_m)
-        touched = 0 if gap > start.reach_m and left_n + right_n == 0.0 and shape <= RECOVERED_M else 1
+        separated = gap > start.reach_m and contact.left_n + contact.right_n == 0.0
+        touched = 0 if separated and shape <= RECOVERED_M else 1
         peak = max(peak, left.force_n, right.force_n)
-    if revolutions >= drive.open_rev and speed >= 0.0:
-        revolutions, speed = drive.open_rev, 0.0
-        gap, jacobian = gap_and_rate(drive.link, revolutions)
-    elif revolutions <= drive.closed_rev and speed <= 0.0:
-        revolutions, speed = drive.closed_rev, 0.0
-        gap, jacobian = gap_and_rate(drive.link, revolutions)
-    motion = Motion(revolutions, speed, gap, jacobian)
-    contact = Contact(left_n, right_n, offset, touched, left, right, pending)
+    if touched != contact.touched:
+        left_n, right_n, offset, _, _, _, pending = contact
+        contact = Contact(left_n, right_n, offset, touched, left, right, pending)
+    if (revolutions >= drive.open_rev and speed >= 0.0) or (revolutions <= drive.closed_rev and speed <= 0.0):
+        end = drive.open_rev if revolutions >= drive.open_rev else drive.closed_rev
+        gap, jacobian = gap_and_rate(drive.link, end)
+        motion = Motion(end, 0.0, gap, jacobian)
     return PlantState(motion, contact, step, state.effort_n, peak)

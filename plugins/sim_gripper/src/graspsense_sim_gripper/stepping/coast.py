@@ -23,9 +23,11 @@ SHAPE_SCALE_M: Final = 1e-3
 def coast(params: PlantParams, state: PlantState, effort_n: float, h: float) -> tuple[bool, PlantState]:
     """Return whether a tick of `h` is such motion, and the plant after it."""
     motion, contact, step, given, peak = state
-    coasts, reach, pending = _free_until(params, contact, motion, h)
-    if not coasts:
-        return False, state
+    reach, pending = params.object.width_m + 2.0 * abs(contact.offset_m), contact.pending_s
+    if contact.touched == 1:
+        coasts, reach, pending = _free_until(params, contact, motion, h)
+        if not coasts:
+            return False, state
     load = 0.5 * (contact.left_n + contact.right_n)
     coasts, motion1 = _coasted(params, motion, load, effort_n, h)
     if not coasts or motion1.gap_m <= reach:
@@ -42,11 +44,9 @@ def coast(params: PlantParams, state: PlantState, effort_n: float, h: float) -> 
 
 
 def _free_until(params: PlantParams, contact: Contact, motion: Motion, h: float) -> tuple[bool, float, float]:
-    """Return whether nothing is pressed, the gap down to which that is so, and the time that the contact is behind."""
+    """Return whether an object that was touched is not pressed, the gap down to which, and the time it is behind."""
     model: ObjectModel = params.object
     left, right, pending = contact.left, contact.right, contact.pending_s
-    if contact.touched == 0:
-        return True, model.width_m + 2.0 * abs(contact.offset_m), pending
     if contact.left_n + contact.right_n > 0.0:
         pushed = not (
             left.force_n > 0.0 or left.compression_m != 0.0 or model.held == 1 or motion.speed_rev_s > 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from graspsense_sim_gripper.dynamics.state import PlantState
-from graspsense_sim_gripper.stepping.advance import may_coast, rests, take_steps
+from graspsense_sim_gripper.stepping.advance import rests, take_steps
 from graspsense_sim_gripper.stepping.coast import SHAPE_SCALE_M, coast
 from graspsense_sim_gripper.stepping.control import MAX_STEPS
 from graspsense_sim_gripper.stepping.scheme import FORCE_SCALE_N, SPEED_SCALE_M_S, PlantParams, Steps
@@ -23,9 +23,10 @@ def refine_until_converged(params: PlantParams, state: PlantState, effort_n: flo
     The state before the tick has to be kept for this, which costs compiled code 5 % where no tick is refined.
     """
     drive, model, steps = params
-    if rests(drive, state, effort_n):
-        return state
-    if steps.settle <= 0.0 and may_coast(params, state, dt):
+    if state.motion.speed_rev_s == 0.0:
+        if rests(drive, state, effort_n):
+            return state
+    elif steps.settle <= 0.0 and steps.longest_s >= dt <= state.step.next_s:
         coasts, after = coast(params, state, effort_n, dt)
         if coasts:
             return after
