@@ -28,6 +28,7 @@ from graspsense.plugin_api import (
     ObjectKind,
     Reading,
     UnknownName,
+    setting,
 )
 from graspsense.testing.gentle import GentleState, step
 
@@ -87,6 +88,20 @@ class Untyped:
 
 
 mutant("feature-set", "settings-have-types", "Annotate them", config=Untyped)(Peak)
+
+
+@frozen(kw_only=True)
+class Undescribed:
+    side: str = "left"
+
+
+@frozen(kw_only=True)
+class Unitless:
+    threshold_n: float = setting(default=3.0, meaning="Least force.")
+
+
+mutant("feature-set", "settings-declare-their-meaning", "declares no meaning", config=Undescribed)(Peak)
+mutant("feature-set", "settings-declare-their-meaning", 'unit="N"', config=Unitless)(Peak)
 
 
 @frozen(kw_only=True)

@@ -6,8 +6,7 @@ import math
 from math import inf, nan
 
 import numpy as np
-from attrs import field, frozen
-from attrs.validators import gt
+from attrs import frozen
 
 from graspsense.plugin_api import (
     EFFORT,
@@ -34,6 +33,7 @@ from graspsense.plugin_api import (
     SensorBackendEntry,
     TareRefused,
     in_words,
+    setting,
 )
 from graspsense.testing.bench import Bench
 from graspsense.testing.gentle import GentleController as Gentle
@@ -47,7 +47,7 @@ class NoKeys:
 
 @frozen(kw_only=True)
 class PeakConfig:
-    side: str = "left"
+    side: str = setting(default="left", meaning="The pad whose force counts.")
 
 
 class Peak(FeatureSet[PeakConfig]):
@@ -60,7 +60,7 @@ class Peak(FeatureSet[PeakConfig]):
 
 @frozen(kw_only=True)
 class LawConfig:
-    speed_m_s: float = field(default=0.01, validator=gt(0.0))
+    speed_m_s: float = setting(default=0.01, unit="m/s", above=0.0, meaning="Closing speed.")
 
 
 class Law(Controller[LawConfig]):
@@ -75,8 +75,8 @@ class Law(Controller[LawConfig]):
 
 @frozen(kw_only=True)
 class HandConfig:
-    vanishes_s: float = inf
-    here: bool = True
+    vanishes_s: float = setting(default=inf, unit="s", meaning="When the cable is pulled.")
+    here: bool = setting(default=True, meaning="Whether the gripper is connected.")
 
 
 class Hand(SensorBackend[HandConfig]):

@@ -287,15 +287,28 @@ class TestPluginsShow:
 
         assert "controller graspsense/hybrid" in ran.out
         assert "requires     gap in m, velocity in m/s, force_left in N, force_right in N\n" in ran.out
-        assert "    loop: 'open' | 'closed' = \"open\"\n" in ran.out
-        assert "recording: str, must be given" in run("plugins", "show", "graspsense/replay").out
+        assert "    loop: 'open' | 'closed'; default \"open\"\n" in ran.out
+        assert (
+            "    closing_speed_m_s: float; m/s; above 0; plausible 0.0001 to 0.2 m/s; default 0.01\n"
+            "        Closing speed of the gap.\n"
+        ) in ran.out
+        assert "recording: str; must be given" in run("plugins", "show", "graspsense/replay").out
         assert "p_first in m: gap at the first contact" in run("plugins", "show", "chitta").out
 
     def test_json(self, run):
         (component,) = run("plugins", "show", "hybrid", "--json").json["components"]
 
         assert component["qualified"] == "graspsense/hybrid"
-        assert component["keys"]["ramp_s"] == {"type": "float", "required": False, "default": 0.0}
+        ramp = component["keys"]["ramp_s"]
+        assert ramp.pop("meaning").startswith("Time over which the effort changes")
+        assert ramp == {
+            "type": "float",
+            "required": False,
+            "default": 0.0,
+            "unit": "s",
+            "allowed": "at least 0",
+            "plausible": "0 to 10 s",
+        }
         assert component["entry"]["commands"] == ["effort"]
 
     def test_a_component_whose_config_cannot_be_imported_is_shown_with_the_reason(
@@ -341,9 +354,9 @@ class TestConfig:
         )
 
     def test_json_has_no_infinity(self, run):
-        ran = run("config", "show", *REPLAY, "-o", "run.hold_s=inf", "--json")
+        ran = run("config", "show", *REPLAY, "-o", "run.late_periods=inf", "--json")
 
-        assert ran.json["values"]["run"]["hold_s"] == "inf"
+        assert ran.json["values"]["run"]["late_periods"] == "inf"
 
     def test_validate_says_yes_and_names_the_components(self, run):
         ran = run("config", "validate", *REPLAY)

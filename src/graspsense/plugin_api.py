@@ -30,7 +30,7 @@ _TABLE: Final[Table] = {
             "PipelineEntry",
             "SensorBackendEntry",
         ),
-        "setting_meaning": ("CHANGES_NO_RESULT", "NAMES_INPUT"),
+        "setting": ("CHANGES_NO_RESULT", "NAMES_INPUT", "setting"),
     },
     "Signals: what passes between a gripper and a controller": {
         "signals": (

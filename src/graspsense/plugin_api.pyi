@@ -16,8 +16,9 @@ from graspsense.core.entries import FoundDevice as FoundDevice
 from graspsense.core.entries import ModelEntry as ModelEntry
 from graspsense.core.entries import PipelineEntry as PipelineEntry
 from graspsense.core.entries import SensorBackendEntry as SensorBackendEntry
-from graspsense.core.setting_meaning import CHANGES_NO_RESULT as CHANGES_NO_RESULT
-from graspsense.core.setting_meaning import NAMES_INPUT as NAMES_INPUT
+from graspsense.core.setting import CHANGES_NO_RESULT as CHANGES_NO_RESULT
+from graspsense.core.setting import NAMES_INPUT as NAMES_INPUT
+from graspsense.core.setting import setting as setting
 
 # Signals: what passes between a gripper and a controller
 from graspsense.core.signals import CELLS as CELLS

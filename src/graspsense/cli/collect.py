@@ -44,6 +44,7 @@ def collect(
     object_name: str | None,
     options: tuple[str, ...],
     seed: int | None,
+    force: bool,
     as_json: bool,
 ) -> None:
     """Prompt for the next object, grasp it and store the trial (Enter: grasp, u: undo, r: repeat, q: stop).
@@ -62,14 +63,14 @@ def collect(
         seed=seed or 0,
         labels={"operator": operator} if operator else {},
     )
-    first = settings_of(pipeline, gripper, object_name, options, seed)
+    first = settings_of(pipeline, gripper, object_name, options, seed, force)
     check(first)
     if not _has_model(first):
         options = (*options, *GRIPPER_ALONE)
     finds = bool(first.gripper.create().objects())
 
     def settings_for(word: str, number: int) -> Settings:
-        return settings_of(pipeline, gripper, word if finds else object_name, options, number)
+        return settings_of(pipeline, gripper, word if finds else object_name, options, number, force)
 
     with Store.open(save) as store:
         _recover(store)

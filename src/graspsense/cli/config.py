@@ -24,9 +24,9 @@ def config() -> None:
 @pipeline_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def show(name: str | None, as_json: bool, **asked: Any) -> None:
-    """Print every setting with its origin: a default, a line of a file, or a command-line option.
+    """Print every setting with its meaning, unit, range and default, and with the origin of its value.
 
-    The output is a complete pipeline file.
+    The origin is a default, a line of a file, or a command-line option. The output is a complete pipeline file.
     """
     settings = _settings(name, asked)
     if as_json:
@@ -36,6 +36,7 @@ def show(name: str | None, as_json: bool, **asked: Any) -> None:
                 "components": settings.components,
                 "values": settings.values,
                 "origins": settings.origins,
+                "keys": {table: settings.keys(table) for table in settings.values},
             }
         )
         return

@@ -48,6 +48,7 @@ def emulate(
     object_name: str | None,
     options: tuple[str, ...],
     seed: int | None,
+    force: bool,
     as_json: bool,
 ) -> None:
     """Emulate the gripper NAME (for example pr2) as a device of the operating system, until Ctrl-C.
@@ -68,7 +69,7 @@ def emulate(
         )
     backend = f"{emulator.distribution}/{emulator.name}"
     settings = settings_of(
-        pipeline, backend, object_name, (*GRIPPER_ALONE, *emulator.entry.options, *options), seed
+        pipeline, backend, object_name, (*GRIPPER_ALONE, *emulator.entry.options, *options), seed, force
     )
     device: EmulatedDevice = emulator.load()(settings.gripper.config, wire, settings.run.seed)
     try:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from graspsense.cli.options import force_option
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import echo_table, talk
 
@@ -38,6 +39,7 @@ EXIT_INTERRUPTED = 130
     multiple=True,
     help="Set a key of the file: -o seeds=3, -o data.trials=2. Can be repeated.",
 )
+@force_option
 @click.option("--dry-run", is_flag=True, help="Print what would be done, and do nothing.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def experiment(
@@ -47,6 +49,7 @@ def experiment(
     executor: str | None,
     workers: int | None,
     options: tuple[str, ...],
+    force: bool,
     dry_run: bool,
     as_json: bool,
 ) -> None:
@@ -68,7 +71,7 @@ def experiment(
     from graspsense.experiments.summary import summarise
     from graspsense.recording.atomic_file import SaveFailed
 
-    planned = read_experiment(experiment, options)
+    planned = read_experiment(experiment, options, force=force)
     results = Results(Path(out or planned.name))
     make = chosen(executor, workers)
     if dry_run:

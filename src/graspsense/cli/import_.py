@@ -58,7 +58,8 @@ def import_(
 
     A FILE.csv needs --time, --gap and --force. KIND:NAME is a file of another reader, for example rosbag:FILE.bag.
     """
-    from graspsense.core.config import Flag, resolve
+    from graspsense.core.config import Flag, ImplausibleSettings, resolve
+    from graspsense.core.errors import ConfigError
     from graspsense.core.plugins import installed
     from graspsense.core.wiring import check
     from graspsense.sources.grasp_csv import named
@@ -82,7 +83,10 @@ def import_(
                 Flag("--gripper", "gripper.type", "replay"),
                 Flag("SOURCE", "gripper.recording", recording),
             )
-            settings = resolve(pipeline, options=options, flags=flags)
+            try:
+                settings = resolve(pipeline, options=options, flags=flags)
+            except ImplausibleSettings as error:  # whose advice, --force, names a column here
+                raise ConfigError(str(error)) from None
             check(settings)
             trial, number = import_recording(store, settings, installed(), labels)
             kept.append({"source": source, "trial": number, "outcome": trial.outcome.words})

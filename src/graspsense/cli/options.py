@@ -16,6 +16,14 @@ DEFAULT_PIPELINE: Final = "default"
 GRIPPER_ALONE: Final = ("classifier.type=none",)
 """Before the options of a command that is about the gripper: a classifier that is missing must not stop it."""
 
+
+def force_option(command: CommandT) -> CommandT:
+    """Add --force, which accepts settings outside of their plausible ranges."""
+    return click.option("--force", is_flag=True, help="Accept settings outside of their plausible range.")(
+        command
+    )
+
+
 _OPTIONS: Final = (
     click.option(
         "--pipeline",
@@ -37,11 +45,12 @@ _OPTIONS: Final = (
         help="Set any other key: -o controller.probing_force_n=17. Can be repeated.",
     ),
     click.option("--seed", type=int, help="Seed of all random numbers. (run.seed)"),
+    force_option,
 )
 
 
 def pipeline_options(command: CommandT) -> CommandT:
-    """Add --pipeline, --gripper, --object, -o and --seed; their values are what `settings_of` takes."""
+    """Add --pipeline, --gripper, --object, -o, --seed and --force; their values are what `settings_of` takes."""
     for option in reversed(_OPTIONS):
         command = option(command)
     return command
@@ -53,6 +62,7 @@ def settings_of(
     object_name: str | None,
     options: Sequence[str],
     seed: int | None,
+    force: bool = False,
 ) -> Settings:
     """Return the settings that these options ask for. Raises ConfigError with every error at once."""
     from graspsense.core.config import Flag, resolve
@@ -66,4 +76,5 @@ def settings_of(
         pipeline if pipeline is not None else DEFAULT_PIPELINE,
         options=options,
         flags=[flag for flag in flags if flag.value is not None],
+        force=force,
     )

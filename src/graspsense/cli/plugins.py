@@ -348,8 +348,10 @@ def _component_text(component: Component) -> str:
     if reason:
         lines.append(f"  not usable here: {reason}")
     elif keys:
-        lines.append(f"  keys of [{component.table}], with their types and defaults:")
-        lines += [f"    {key}: {one['type']}" + _default_text(one) for key, one in keys.items()]
+        lines.append(
+            f"  keys of [{component.table}], with their types, units, ranges, defaults and meanings:"
+        )
+        lines += _key_lines(keys, "    ")
     return "\n".join(lines)
 
 
@@ -363,12 +365,22 @@ def _declared(component: Component) -> Any:
         return component.entry
 
 
-def _default_text(key: dict[str, Any]) -> str:
-    from graspsense.core.config import toml_value
+def _key_lines(keys: dict[str, dict[str, Any]], indent: str) -> list[str]:
+    from textwrap import wrap
 
-    if key["required"]:
-        return ", must be given"
-    return ", not set" if key["default"] is None else f" = {toml_value(key['default'])}"
+    from graspsense.core.config import key_facts
+
+    lines = []
+    for key, declaration in keys.items():
+        facts = [
+            declaration["type"],
+            *(one for one in key_facts(declaration) if not one.startswith("one of")),
+        ]
+        lines.append(f"{indent}{key}: {'; '.join(facts)}")
+        text = declaration["meaning"] or "no meaning is declared"
+        lines += wrap(text, 100, initial_indent=f"{indent}    ", subsequent_indent=f"{indent}    ")
+        lines += _key_lines(declaration.get("keys", {}), f"{indent}    ")
+    return lines
 
 
 def _keys(component: Component) -> tuple[dict[str, dict[str, Any]], str]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from graspsense.cli.options import force_option
 from graspsense.cli.output import echo_json
 
 if TYPE_CHECKING:
@@ -25,10 +26,16 @@ if TYPE_CHECKING:
     multiple=True,
     help="Set a key of the pipeline: -o features.pads=left. Can be repeated.",
 )
+@force_option
 @click.option("--plot", metavar="FILE.png", help="Draw the grasp: forces, gap, phases, features, prediction.")
 @click.option("--json", "as_json", is_flag=True, help="Print the trial as JSON.")
 def replay(
-    recording: str, pipeline: str | None, options: tuple[str, ...], plot: str | None, as_json: bool
+    recording: str,
+    pipeline: str | None,
+    options: tuple[str, ...],
+    force: bool,
+    plot: str | None,
+    as_json: bool,
 ) -> None:
     """Compute features and a prediction from a recording, as during the grasp; nothing moves.
 
@@ -41,7 +48,7 @@ def replay(
     from graspsense.core.trial import trial_as_json
     from graspsense.core.wiring import check
 
-    settings = _settings(recording, pipeline, options)
+    settings = _settings(recording, pipeline, options, force)
     check(settings)
     if plot is not None:
         from graspsense.report.grasp_picture import require_picture
@@ -56,7 +63,7 @@ def replay(
         draw_grasp(trial, Path(plot))
 
 
-def _settings(recording: str, pipeline: str | None, options: tuple[str, ...]) -> Settings:
+def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], force: bool) -> Settings:
     from graspsense.core.config import Flag, resolve
     from graspsense.sources.replay import KINDS, kind_and_name
     from graspsense.store.trial_ref import recorded_settings
@@ -71,4 +78,7 @@ def _settings(recording: str, pipeline: str | None, options: tuple[str, ...]) ->
         Flag("--gripper", "gripper.type", "replay"),
         Flag("RECORDING", "gripper.recording", f"{kind}:{name}" if kind in KINDS else recording),
     )
-    return resolve(pipeline or "default", experiment=own, options=options, flags=flags)
+    # The settings of the recording have been accepted when it was made.
+    return resolve(
+        pipeline or "default", experiment=own, options=options, flags=flags, force=force or own is not None
+    )

@@ -54,7 +54,8 @@ def report(
         from graspsense.experiments.summary import summarise
 
         results = Results(Path(folder))
-        page = experiment_page(summarise(read_experiment(str(results.folder / EXPERIMENT)), results), results)
+        planned = read_experiment(str(results.folder / EXPERIMENT), force=True)
+        page = experiment_page(summarise(planned, results), results)
     else:
         with ProgressLine() as progress:
             page = store_page(

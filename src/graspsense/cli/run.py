@@ -42,6 +42,7 @@ def run(
     object_name: str | None,
     options: tuple[str, ...],
     seed: int | None,
+    force: bool,
     save: str | None,
     label: str | None,
     explain_model: bool,
@@ -62,11 +63,11 @@ def run(
 
     if explain_model:
         options = (*options, "gripper.explain=true")
-    settings = settings_of(pipeline, gripper, object_name, options, seed)
+    settings = settings_of(pipeline, gripper, object_name, options, seed, force)
     if label is not None and not agrees(settings, label):
         if object_name is not None or any(one.startswith("gripper.object=") for one in options):
             raise _contradiction(settings, label)
-        settings = settings_of(pipeline, gripper, label, options, seed)
+        settings = settings_of(pipeline, gripper, label, options, seed, force)
     check(settings)
     if dry_run:
         _say_what_would_be_done(settings, as_json)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
+from graspsense.cli.options import force_option
+
 if TYPE_CHECKING:
     from graspsense.cli.progress import ProgressLine
     from graspsense.core.config import SelectedComponent, Settings
@@ -70,6 +72,7 @@ _OPTIONS: Final = (
         help="Set a key of a component: -o controller.probing_force_n=17. Can be repeated.",
     ),
     click.option("--seed", type=int, default=0, show_default=True, help="Seed of all random numbers."),
+    force_option,
 )
 
 _ONLY_FOR: Final = {
@@ -189,10 +192,10 @@ def _settings(given: Mapping[str, Any], classifier: str | None) -> Settings:
     flags = [Flag("--gripper", "gripper.type", given["gripper"])] if given["gripper"] else []
     if classifier:
         flags.append(Flag("--classifier", "classifier.type", classifier))
-    settings = resolve(given["pipeline"], options=given["options"], flags=flags)
+    settings = resolve(given["pipeline"], options=given["options"], flags=flags, force=given["force"])
     if settings.classifier is None:
         flags.append(Flag("--classifier", "classifier.type", DEFAULT_CLASSIFIER))
-        settings = resolve(given["pipeline"], options=given["options"], flags=flags)
+        settings = resolve(given["pipeline"], options=given["options"], flags=flags, force=given["force"])
     return settings
 
 

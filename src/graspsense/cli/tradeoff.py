@@ -57,6 +57,7 @@ def simulation(
     object_name: str | None,
     options: tuple[str, ...],
     seed: int | None,
+    force: bool,
 ) -> None:
     """Run the same grasps with every scheme and fidelity of the simulator.
 
@@ -68,7 +69,7 @@ def simulation(
     from graspsense.report.simulation import simulation_markdown, simulation_png, simulation_rows
 
     beside = _peers(peers) if peers else None
-    settings = settings_of(pipeline, gripper, object_name, options, seed)
+    settings = settings_of(pipeline, gripper, object_name, options, seed, force)
     wanted = scenes or ((object_name,) if object_name else SCENES)
     first = settings.run.seed
     with ProgressLine() as progress:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from textwrap import indent
+from textwrap import indent, wrap
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from attrs import frozen
@@ -27,7 +27,15 @@ from graspsense.core.layers import (
     read_layer,
 )
 from graspsense.core.plugins import Component, Plugins, installed
-from graspsense.core.strict import InvalidValue, ValidationFailed, plain, shown, structured
+from graspsense.core.strict import (
+    InvalidValue,
+    ValidationFailed,
+    implausible_values,
+    keys_of,
+    plain,
+    shown,
+    structured,
+)
 from graspsense.core.toml_lines import KeyPath
 
 if TYPE_CHECKING:
@@ -53,6 +61,14 @@ NONE: Final = "none"
 
 _ROLE_OF_TABLE: Final[dict[str, Role]] = {table: role for role, table in TABLE_OF_ROLE.items()}
 _TABLES: Final = (*_ROLE_OF_TABLE, "run")
+
+
+class ImplausibleSettings(ConfigError):
+    """Settings are allowed, but outside of their plausible ranges; `resolve(..., force=True)` accepts them."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.add_note("Check the unit. If the value is meant, add --force (in Python force=True)")
 
 
 @frozen(eq=False)
@@ -97,6 +113,11 @@ class Settings:
             one for one in (self.gripper, self.controller, self.features, self.classifier) if one is not None
         )
 
+    def keys(self, table: str) -> dict[str, dict[str, Any]]:
+        """Return what each key of a table declares, as `keys_of` does."""
+        selected = next((one for one in self.chosen if one.component.table == table), None)
+        return keys_of(type(self.run if selected is None else selected.config))
+
     @property
     def components(self) -> dict[str, str]:
         """The `distribution/name version` of each component, by table."""
@@ -112,11 +133,13 @@ def resolve(
     experiment: Layer | None = None,
     options: Sequence[str] = (),
     flags: Sequence[Flag] = (),
+    force: bool = False,
 ) -> Settings:
     """Return the settings of a pipeline with options and flags.
 
     `pipeline` is the name of a pipeline or the path of a `.toml` file; `options` are as typed after `-o`; `plugins`
-    are by default those of the process. Raises ConfigError that lists all errors, each with its file and line.
+    are by default those of the process. `force` accepts values outside of their plausible ranges. Raises ConfigError
+    that lists all errors, each with its file and line; it is ImplausibleSettings if there are no others.
     """
     plugins = installed() if plugins is None else plugins
     layers = pipeline_layers(pipeline, plugins)
@@ -125,7 +148,7 @@ def resolve(
     typed, complaints = option_layers(options)
     layers += typed
     layers += [flag.layer() for flag in flags]
-    return _resolved_layers(pipeline, layers, complaints, plugins)
+    return _resolved_layers(pipeline, layers, complaints, plugins, force=force)
 
 
 def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | None = None) -> Settings:
@@ -136,15 +159,16 @@ def settings_from(values: Mapping[str, Any], called: str, plugins: Plugins | Non
     given = {
         table: {key: one for key, one in keys.items() if one is not None} for table, keys in values.items()
     }
-    return _resolved_layers(
-        called, [Layer.of(given, called)], [], installed() if plugins is None else plugins
-    )
+    plugins = installed() if plugins is None else plugins
+    # These values have been accepted before.
+    return _resolved_layers(called, [Layer.of(given, called)], [], plugins, force=True)
 
 
 def _resolved_layers(
-    pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins: Plugins
+    pipeline: str, layers: Sequence[Layer], complaints: list[str], plugins: Plugins, *, force: bool
 ) -> Settings:
     """Return the settings of these layers, of which each overrides those before. Raises ConfigError."""
+    doubts: list[str] = []
     layers = [_tables_only(layer, complaints) for layer in layers]
 
     from graspsense.core.run_config import RunConfig
@@ -171,12 +195,10 @@ def _resolved_layers(
         try:
             config = structured({k: v for k, v in merged.values.items() if k != "type"}, cls, called)
         except ValidationFailed as misfit:
-            for problem in misfit.under(table):
-                owner = merged.owner_of(problem.path)
-                complaints.append(
-                    owner.complain(problem) if owner else f"{dotted(problem.path)}: {problem.text}"
-                )
+            complaints += [_complaint(merged, problem) for problem in misfit.under(table)]
             continue
+        if not force:
+            doubts += [_complaint(merged, one.under(table)) for one in implausible_values(config)]
         if component is None:
             run = config
             values[table] = plain(config)
@@ -187,7 +209,9 @@ def _resolved_layers(
             owner = merged.owner.get(path)
             origins[dotted(path)] = owner.where(path) if owner else "default"
     if complaints:
-        raise ConfigError(_listed(complaints))
+        raise ConfigError(_listed([*complaints, *doubts]))
+    if doubts:
+        raise ImplausibleSettings(_listed(doubts))
     return Settings(
         pipeline=pipeline,
         gripper=chosen["gripper"],
@@ -198,6 +222,12 @@ def _resolved_layers(
         values=values,
         origins=origins,
     )
+
+
+def _complaint(merged: Merged, problem: InvalidValue) -> str:
+    """Return a problem of a key in one line, with the origin of its value."""
+    owner = merged.owner_of(problem.path)
+    return owner.complain(problem) if owner else f"{dotted(problem.path)}: {problem.text}"
 
 
 def _choose_sent_kind(merged: Merged, controller: Component, gripper: SelectedComponent) -> None:
@@ -267,13 +297,16 @@ def recipe_of(role: Role, part: Any) -> tuple[str, dict[str, Any]]:
 def to_toml(settings: Settings, origins: bool = False) -> str:
     """Return a complete pipeline file, which extends nothing and resolves to the same values.
 
-    With `origins`, a comment after each key gives the origin of its value.
+    With `origins`, comments tell the meaning, unit, range and default of each key, and the origin of its value.
     """
     lines = [f"# Resolved by graspsense {__version__} from the pipeline {json.dumps(settings.pipeline)}."]
     versions = {one.component.table: one.component.version for one in settings.chosen}
     for table, values in settings.values.items():
         lines += ["", f"[{table}]"]
+        declarations = settings.keys(table) if origins else {}
         for key, value in values.items():
+            if key in declarations:
+                lines += ["", *_comments(declarations[key])]
             line = (
                 f"{toml_key(key)} = {toml_value(value)}"
                 if value is not None
@@ -287,6 +320,31 @@ def to_toml(settings: Settings, origins: bool = False) -> str:
                 notes += list(dict.fromkeys(inside.values()))
             lines.append(f"{line:<40}  # {', '.join(notes)}" if notes else line)
     return "\n".join(lines) + "\n"
+
+
+def _comments(declaration: Mapping[str, Any], name: str = "") -> list[str]:
+    """Return what a key declares as comment lines, also what the keys of a table declare."""
+    facts = "; ".join(key_facts(declaration))
+    text = " ".join(one for one in (name, declaration["meaning"], f"[{facts}]" if facts else "") if one)
+    lines = wrap(text, 98, initial_indent="# ", subsequent_indent="#   ") if text else []
+    for inner, one in declaration.get("keys", {}).items():
+        lines += _comments(one, f"{inner}:")
+    return lines
+
+
+def key_facts(declaration: Mapping[str, Any]) -> list[str]:
+    """Return unit, type, range and default of a key of `keys_of`, each in words."""
+    facts = [declaration["unit"], declaration["allowed"]]
+    if "|" in declaration["type"] and "'" in declaration["type"]:
+        facts.append(f"one of {declaration['type'].replace(' | ', ', ')}")
+    if declaration["plausible"]:
+        facts.append(f"plausible {declaration['plausible']}")
+    if declaration["required"]:
+        facts.append("must be given")
+    elif "keys" not in declaration:
+        default = declaration["default"]
+        facts.append("not set by default" if default is None else f"default {toml_value(default)}")
+    return [fact for fact in facts if fact]
 
 
 def _within(path: str, key: str) -> bool:

@@ -26,7 +26,7 @@ from graspsense.core.features import UNKNOWN, Features, FeatureTable, Prediction
 from graspsense.core.firstparty import MODELS
 from graspsense.core.json_values import json_ready, settings_from_json
 from graspsense.core.novelty import Novelty, novelty_from, novelty_of
-from graspsense.core.setting_meaning import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked
+from graspsense.core.setting import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -48,6 +48,7 @@ class Pipeline:
                 plugins=self.plugins,
                 options=self.options,
                 flags=[flag for flag in flags if flag.value is not None],
+                force=True,  # these settings have been accepted
             )
         else:
             settings = self.settings
@@ -55,14 +56,20 @@ class Pipeline:
 
 
 def load_pipeline(
-    pipeline: str | Path = "default", *, options: Sequence[str] = (), plugins: Plugins | None = None
+    pipeline: str | Path = "default",
+    *,
+    options: Sequence[str] = (),
+    plugins: Plugins | None = None,
+    force: bool = False,
 ) -> Pipeline:
     """Return a pipeline by name or file, with options as after `-o` (`"controller.probing_force_n=17"`).
+
+    `force` accepts values outside of their plausible ranges.
 
     Raises ConfigError that lists all errors, WiringError if the components do not fit together.
     """
     plugins = installed() if plugins is None else plugins
-    settings = resolve(str(pipeline), plugins=plugins, options=options)
+    settings = resolve(str(pipeline), plugins=plugins, options=options, force=force)
     check(settings)
     return Pipeline(settings=settings, options=tuple(options), plugins=plugins)
 

@@ -25,7 +25,7 @@ from typing import (
 from attrs import field, frozen
 
 from graspsense.core.errors import ConfigError
-from graspsense.core.setting_meaning import NAMES_INPUT
+from graspsense.core.setting import NAMES_INPUT, setting
 from graspsense.core.signals import Command, Frame, Outcome, Pads
 from graspsense.core.step_params import params_of
 
@@ -355,8 +355,11 @@ class FeatureSet(ABC, Generic[ConfigT]):
 class ClassifierConfig:
     """The settings of every classifier; the config class of a classifier extends this one."""
 
-    model: str | None = field(default=None, metadata=NAMES_INPUT)
-    """The trained model: the name of a model that a plugin ships, or a .json file."""
+    model: str | None = setting(
+        default=None,
+        effect=NAMES_INPUT,
+        meaning="The trained model: the name of a model that a plugin ships, or a .json file.",
+    )
 
 
 class Classifier(ABC, Generic[ConfigT]):

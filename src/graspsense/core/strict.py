@@ -19,6 +19,7 @@ import cattrs
 from attrs import frozen
 
 from graspsense.core.errors import suggestion
+from graspsense.core.setting import declared, implausible
 from graspsense.core.toml_lines import KeyPath
 
 ConfigT = TypeVar("ConfigT")
@@ -33,6 +34,10 @@ class InvalidValue:
     path: KeyPath
     text: str
 
+    def under(self, key: str | int) -> InvalidValue:
+        """Return the defect of the value at this path below `key`."""
+        return InvalidValue((key, *self.path), self.text)
+
 
 class ValidationFailed(Exception):
     """Values that cannot be converted to an instance; `problems` holds all their defects."""
@@ -43,7 +48,7 @@ class ValidationFailed(Exception):
 
     def under(self, key: str | int) -> list[InvalidValue]:
         """Return the problems with paths that begin with this key."""
-        return [InvalidValue((key, *one.path), one.text) for one in self.problems]
+        return [one.under(key) for one in self.problems]
 
 
 def structured(values: Mapping[str, Any], cls: type[ConfigT], called: str) -> ConfigT:
@@ -90,11 +95,16 @@ def plain(config: object) -> dict[str, Any]:
 
 
 def keys_of(cls: type) -> dict[str, dict[str, Any]]:
-    """Return the `type` in words, `required` and `default` of each key of a config class."""
+    """Return what each key of a config class declares.
+
+    That is its `type` in words, whether it is `required`, its `default`, `meaning` and `unit`, the `allowed` values and
+    the `plausible` range in words, and for a key that is a table itself, its `keys`.
+    """
     attrs.resolve_types(cls)
     keys: dict[str, dict[str, Any]] = {}
     for field in attrs.fields(cls):
         if field.init:
+            declaration = declared(field)
             default = field.default
             if isinstance(default, attrs.Factory):  # type: ignore[arg-type]
                 default = None if default.takes_self else default.factory()
@@ -102,8 +112,27 @@ def keys_of(cls: type) -> dict[str, dict[str, Any]]:
                 "type": _kind_words(field.type),
                 "required": field.default is attrs.NOTHING,
                 "default": None if default is attrs.NOTHING else _plain(default),
+                "meaning": declaration.meaning,
+                "unit": declaration.unit,
+                "allowed": declaration.allowed,
+                "plausible": declaration.plausible_words,
+                **({"keys": keys_of(field.type)} if attrs.has(field.type) else {}),
             }
     return keys
+
+
+def implausible_values(config: object) -> list[InvalidValue]:
+    """Return the values of this config, also in its tables, that are outside of their plausible ranges."""
+    found = []
+    for field in attrs.fields(type(config)):  # type: ignore[arg-type]
+        if not field.init:
+            continue
+        value = getattr(config, field.name)
+        if attrs.has(type(value)):
+            found += [one.under(field.alias) for one in implausible_values(value)]
+        elif value != field.default and (reason := implausible(declared(field), value)):
+            found.append(InvalidValue((field.alias,), reason))
+    return found
 
 
 def _kind_words(kind: Any) -> str:

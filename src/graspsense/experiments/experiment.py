@@ -165,10 +165,13 @@ def shipped() -> dict[str, Any]:
     }
 
 
-def read_experiment(asked: str, options: Sequence[str] = (), within: Sequence[str] = ()) -> Planned:
+def read_experiment(
+    asked: str, options: Sequence[str] = (), within: Sequence[str] = (), *, force: bool = False
+) -> Planned:
     """Return a shipped experiment by name, or that of a `.toml` file, with options as after `-o` laid over it.
 
-    `within` names the experiments that this one is a part of. Raises ConfigError with every error that can be told,
+    `within` names the experiments that this one is a part of. `force` accepts settings outside of their plausible
+    ranges. Raises ConfigError with every error that can be told,
     each with its file and line.
     """
     layer, base, name = _found(asked)
@@ -193,15 +196,19 @@ def read_experiment(asked: str, options: Sequence[str] = (), within: Sequence[st
     if experiment is None or complaints:
         raise ConfigError("\n".join(complaints))
     if experiment.parts:
-        return _of_parts(name, experiment, layer, within)
-    return _Plan(name, experiment, layer).planned()
+        return _of_parts(name, experiment, layer, within, force=force)
+    return _Plan(name, experiment, layer, force=force).planned()
 
 
-def _of_parts(name: str, experiment: Experiment, layer: Layer, within: Sequence[str]) -> Planned:
+def _of_parts(
+    name: str, experiment: Experiment, layer: Layer, within: Sequence[str], *, force: bool
+) -> Planned:
     """Return the cases of all parts, each under its part's name."""
     kind_of(experiment.kind)
     seeds = _listed(experiment.seeds)
-    parts = [read_experiment(part, [f"seeds={list(seeds)}"], within) for part in experiment.parts]
+    parts = [
+        read_experiment(part, [f"seeds={list(seeds)}"], within, force=force) for part in experiment.parts
+    ]
     pipelines: dict[str, Settings] = {}
     cases: list[ExperimentCase] = []
     for part in parts:
@@ -235,8 +242,8 @@ def _listed(seeds: int | tuple[int, ...]) -> tuple[int, ...]:
 class _Plan:
     """What the steps from an experiment to its cases share."""
 
-    def __init__(self, name: str, experiment: Experiment, layer: Layer) -> None:
-        self.name, self.experiment, self.layer = name, experiment, layer
+    def __init__(self, name: str, experiment: Experiment, layer: Layer, *, force: bool) -> None:
+        self.name, self.experiment, self.layer, self.force = name, experiment, layer, force
         self.complaints: list[str] = []
 
     def planned(self) -> Planned:
@@ -252,7 +259,7 @@ class _Plan:
                     f"{self.layer.where(('pipelines',))}: two pipelines are called {of.name!r}: give one a name "
                     'of its own, { name = "...", pipeline = "..." }'
                 )
-            pipelines[of.name] = resolve(of.pipeline)
+            pipelines[of.name] = resolve(of.pipeline, force=self.force)
         if not pipelines:
             raise ConfigError(f"{self.layer.where(('pipelines',))}: pipelines: name at least one")
         sweep = self._sweep()
@@ -314,6 +321,7 @@ class _Plan:
         settings = resolve(
             pipeline.pipeline,
             experiment=Layer(label=self.layer.label, values=over, lines=self.layer.lines),
+            force=self.force,
         )
         name = ", ".join(
             str(value) if key in ("pipeline", "variant") else in_a_name(key, value)

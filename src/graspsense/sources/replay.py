@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from typing import Final, final
 
-from attrs import Attribute, field, frozen
-from attrs.validators import instance_of
+from attrs import Attribute, frozen
+from attrs.validators import and_, instance_of
 
 from graspsense.core.entries import KINDS as COMMAND_KINDS
 from graspsense.core.entries import Channel
 from graspsense.core.errors import DeviceLost, RecordingEnded, suggestion
 from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
-from graspsense.core.setting_meaning import NAMES_INPUT
+from graspsense.core.setting import NAMES_INPUT, setting
 from graspsense.core.signals import CHANNELS, EFFORT, Command, Pads
 from graspsense.recording.replayable import Recording
 from graspsense.sources.icub import read_recording
@@ -77,12 +77,14 @@ def _known_kind(_config: object, _attribute: Attribute[str], value: str) -> None
 
 @frozen
 class ReplayConfig:
-    """Which recording: `KIND:FILE` with a kind of `KINDS`, as in `icub:FOLDER/full_vitamin_water_1.txt`.
+    """Which recording is replayed."""
 
-    `store:DIR#NUMBER` is a trial of a store; a `FILE.mcap` of ours needs no kind.
-    """
-
-    recording: str = field(validator=[instance_of(str), _known_kind], metadata=NAMES_INPUT)
+    recording: str = setting(
+        validator=and_(instance_of(str), _known_kind),
+        effect=NAMES_INPUT,
+        meaning="The recording, KIND:FILE, as in icub:FOLDER/full_vitamin_water_1.txt. store:DIR#NUMBER is a trial of "
+        "a store. A FILE.mcap needs no kind.",
+    )
 
 
 @final

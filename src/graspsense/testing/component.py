@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import tomllib
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 import attrs
@@ -11,6 +12,7 @@ import attrs
 from graspsense.core.config import build, toml_key, toml_value
 from graspsense.core.errors import PluginUnavailable
 from graspsense.core.roles import ClassifierConfig
+from graspsense.core.setting import unit_of_name
 from graspsense.core.strict import keys_of, plain
 from graspsense.testing.checks import CheckFailed, checks_of, demand
 from graspsense.testing.subject import Subject
@@ -59,6 +61,32 @@ def settings_have_types(subject: Subject) -> None:
         f"{config_name(subject)} has keys without a type: {', '.join(bare)}. Annotate them, as in "
         f"`{(bare or ['key'])[0]}: float = 1.0`",
     )
+
+
+def settings_declare_their_meaning(subject: Subject) -> None:
+    """Every key declares its meaning, and a unit if its name ends in that of one, by `setting`."""
+    for key, declaration in _all_keys(keys_of(subject.component.config_class())):
+        where, name = f"key {key!r} of {subject.entry.config}", key.rpartition(".")[2]
+        demand(
+            bool(declaration["meaning"]),
+            f"{where} declares no meaning, so `graspsense config show` cannot tell it. Declare the key as in "
+            f'`{name}: {declaration["type"]} = setting(default=..., meaning="What the value does.")`, with '
+            "`from graspsense.plugin_api import setting`",
+        )
+        unit = unit_of_name(name)
+        demand(
+            bool(declaration["unit"]) or not unit,
+            f'{where} ends like a value in {unit} and declares no unit: add unit="{unit}" to its `setting`, or '
+            "rename it",
+        )
+
+
+def _all_keys(
+    keys: Mapping[str, Mapping[str, Any]], above: str = ""
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for key, declaration in keys.items():
+        yield above + key, declaration
+        yield from _all_keys(declaration.get("keys", {}), f"{above}{key}.")
 
 
 def defaults_are_what_their_types_say(subject: Subject) -> None:
@@ -187,6 +215,7 @@ CHECKS: Final = checks_of(
     classes_can_be_imported,
     declared_once,
     settings_have_types,
+    settings_declare_their_meaning,
     defaults_are_what_their_types_say,
     settings_survive_a_file,
     settings_cannot_be_changed,

@@ -20,8 +20,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from attrs import field, frozen
-from attrs.validators import gt
+from attrs import frozen
 
 from graspsense.plugin_api import (
     CONTACT_FORCE_N,
@@ -34,6 +33,7 @@ from graspsense.plugin_api import (
     FeatureSet,
     create,
     missing,
+    setting,
 )
 
 if TYPE_CHECKING:
@@ -82,8 +82,13 @@ LEAST_LOSS: Final = 0.02
 class GraspCurveConfig:
     """The threshold of contact."""
 
-    contact_force_n: float = field(default=CONTACT_FORCE_N, validator=gt(0.0))
-    """Force on each pad at contact."""
+    contact_force_n: float = setting(
+        default=CONTACT_FORCE_N,
+        unit="N",
+        above=0.0,
+        plausible=(0.01, 20.0),
+        meaning="Force on each pad at contact.",
+    )
 
 
 class GraspCurveFeatures(FeatureSet[GraspCurveConfig]):

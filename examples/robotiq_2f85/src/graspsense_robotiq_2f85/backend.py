@@ -9,8 +9,7 @@ from contextlib import suppress
 from math import inf, nan
 from typing import Final, final
 
-from attrs import field, frozen
-from attrs.validators import and_, ge, gt, le
+from attrs import frozen
 
 from graspsense.plugin_api import (
     FORCE,
@@ -26,6 +25,7 @@ from graspsense.plugin_api import (
     Pads,
     Reading,
     SensorBackend,
+    setting,
 )
 from graspsense_robotiq_2f85.fake import Fake
 from graspsense_robotiq_2f85.modbus import Client, NoReply, opened
@@ -57,14 +57,31 @@ FASTEST_RAMP_M_S: Final = 0.02
 class Robotiq2F85Config:
     """The keys of [gripper]."""
 
-    port: str = "/dev/ttyUSB0"
-    """A serial port, `rtu-tcp:HOST:PORT` (a UR's tool connector), `tcp:HOST:PORT` (Modbus TCP), or `fake`."""
-    address: int = field(default=9, validator=and_(ge(1), le(247)))
-    reply_timeout_s: float = field(default=0.1, validator=gt(0.0))
-    newtons_per_ampere: float = field(default=150.0, validator=gt(0.0))
-    """Grip force per motor current. The manual does not give it, so this is an assumption: measure yours."""
-    vanishes_s: float = field(default=inf, validator=gt(0.0))
-    """Time at which the cable of the emulated gripper is pulled, for tests."""
+    port: str = setting(
+        default="/dev/ttyUSB0",
+        meaning="A serial port, rtu-tcp:HOST:PORT (a UR's tool connector), tcp:HOST:PORT (Modbus TCP), or fake.",
+    )
+    address: int = setting(default=9, minimum=1, maximum=247, meaning="Modbus address of the gripper.")
+    reply_timeout_s: float = setting(
+        default=0.1,
+        unit="s",
+        above=0.0,
+        plausible=(1e-3, 10.0),
+        meaning="Longest wait for a reply.",
+    )
+    newtons_per_ampere: float = setting(
+        default=150.0,
+        unit="N/A",
+        above=0.0,
+        plausible=(1.0, 2000.0),
+        meaning="Grip force per motor current. The manual does not give it, so this is an assumption: measure yours.",
+    )
+    vanishes_s: float = setting(
+        default=inf,
+        unit="s",
+        above=0.0,
+        meaning="Time at which the cable of the emulated gripper is pulled, for tests.",
+    )
 
 
 @final

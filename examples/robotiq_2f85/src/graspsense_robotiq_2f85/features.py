@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from attrs import evolve, field, frozen
-from attrs.validators import gt
+from attrs import evolve, frozen
 
-from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, create
+from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, create, setting
 
 if TYPE_CHECKING:
     from graspsense.plugin_api import Trace
@@ -17,10 +16,27 @@ if TYPE_CHECKING:
 class WithoutPadsConfig:
     """Thresholds of contact and rest."""
 
-    contact_effort_n: float = field(default=10.5, validator=gt(0.0))
-    """Effort at contact, above that for moving the fingers freely."""
-    rest_speed_m_s: float = field(default=1e-3, validator=gt(0.0))
-    rest_window_s: float = field(default=0.15, validator=gt(0.0))
+    contact_effort_n: float = setting(
+        default=10.5,
+        unit="N",
+        above=0.0,
+        plausible=(0.1, 235.0),
+        meaning="Effort at contact, above that for moving the fingers freely.",
+    )
+    rest_speed_m_s: float = setting(
+        default=1e-3,
+        unit="m/s",
+        above=0.0,
+        plausible=(1e-6, 0.05),
+        meaning="Speed below which the fingers are at rest, if throughout the window.",
+    )
+    rest_window_s: float = setting(
+        default=0.15,
+        unit="s",
+        above=0.0,
+        plausible=(0.01, 5.0),
+        meaning="Time for which the fingers must stay below the rest speed.",
+    )
 
 
 class WithoutPads(FeatureSet[WithoutPadsConfig]):

@@ -5,8 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from attrs import field, frozen
-from attrs.validators import gt
+from attrs import frozen
 
 from graspsense.plugin_api import (
     APPROACH,
@@ -24,6 +23,7 @@ from graspsense.plugin_api import (
     Pads,
     Stillness,
     at_rest,
+    setting,
     watch,
 )
 
@@ -32,14 +32,55 @@ from graspsense.plugin_api import (
 class CloseUntilStoppedConfig:
     """The keys of [controller]."""
 
-    closing_speed_m_s: float = field(default=0.02, validator=gt(0.0))
-    grip_force_n: float = field(default=25.0, validator=gt(0.0))
-    contact_effort_n: float = field(default=10.5, validator=gt(0.0))
-    """Effort at contact, above that for moving the fingers freely."""
-    rest_speed_m_s: float = field(default=1e-3, validator=gt(0.0))
-    rest_window_s: float = field(default=0.15, validator=gt(0.0))
-    closed_gap_m: float = field(default=0.002, validator=gt(0.0))
-    timeout_s: float = field(default=15.0, validator=gt(0.0))
+    closing_speed_m_s: float = setting(
+        default=0.02,
+        unit="m/s",
+        above=0.0,
+        plausible=(1e-3, 0.15),
+        meaning="Closing speed of the gap.",
+    )
+    grip_force_n: float = setting(
+        default=25.0,
+        unit="N",
+        above=0.0,
+        plausible=(1.0, 235.0),
+        meaning="Force with which the fingers squeeze.",
+    )
+    contact_effort_n: float = setting(
+        default=10.5,
+        unit="N",
+        above=0.0,
+        plausible=(0.1, 235.0),
+        meaning="Effort at contact, above that for moving the fingers freely.",
+    )
+    rest_speed_m_s: float = setting(
+        default=1e-3,
+        unit="m/s",
+        above=0.0,
+        plausible=(1e-6, 0.05),
+        meaning="Speed below which the fingers are at rest, if throughout the window.",
+    )
+    rest_window_s: float = setting(
+        default=0.15,
+        unit="s",
+        above=0.0,
+        plausible=(0.01, 5.0),
+        meaning="Time for which the fingers must stay below the rest speed.",
+    )
+    closed_gap_m: float = setting(
+        default=0.002,
+        unit="m",
+        above=0.0,
+        plausible=(1e-5, 0.085),
+        meaning="Gap at which the fingers count as closed.",
+    )
+    timeout_s: float = setting(
+        default=15.0,
+        unit="s",
+        above=0.0,
+        plausible=(0.1, 600.0),
+        meaning="Longest duration of approach and squeeze together.",
+    )
 
 
 class State(NamedTuple):

@@ -6,8 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-from attrs import field, frozen
-from attrs.validators import and_, ge, gt, in_, lt
+from attrs import frozen
 
 from graspsense.plugin_api import (
     Classifier,
@@ -19,6 +18,7 @@ from graspsense.plugin_api import (
     TreeNode,
     hookimpl,
     in_words,
+    setting,
 )
 
 if TYPE_CHECKING:
@@ -44,22 +44,38 @@ def graspsense_classifiers() -> Iterable[ClassifierEntry]:
 class C45Config(ClassifierConfig):
     """How the tree is grown and pruned. The defaults are those of J48."""
 
-    criterion: Literal["gain_ratio", "info_gain"] = field(
-        default="gain_ratio", validator=in_(("gain_ratio", "info_gain"))
+    criterion: Literal["gain_ratio", "info_gain"] = setting(
+        default="gain_ratio",
+        meaning="The measure by which tests are chosen: the gain ratio, or the information gain.",
     )
-    pruning: Literal["pessimistic", "reduced_error", "none"] = field(
-        default="pessimistic", validator=in_(("pessimistic", "reduced_error", "none"))
+    pruning: Literal["pessimistic", "reduced_error", "none"] = setting(
+        default="pessimistic",
+        meaning="pessimistic: by error estimates. reduced_error: by errors on held-out trials. none: no pruning.",
     )
-    """`pessimistic`: by error estimates; `reduced_error`: by errors on held-out trials."""
-    confidence_factor: float = field(default=0.25, validator=and_(gt(0.0), lt(1.0)))
-    """Of the pessimistic estimate; a smaller one prunes more."""
-    min_objects: float = field(default=2.0, validator=ge(1.0))
-    """Least number of trials in at least two branches."""
-    mdl_correction: bool = True
-    """Whether the gain of a numeric test is reduced by the cost of its threshold."""
-    subtree_raising: bool = True
-    rep_folds: int = field(default=3, validator=ge(2))
-    """`reduced_error` holds out one of this number of parts."""
+    confidence_factor: float = setting(
+        default=0.25,
+        above=0.0,
+        below=1.0,
+        meaning="Confidence level of the pessimistic estimate; a smaller one prunes more.",
+    )
+    min_objects: float = setting(
+        default=2.0,
+        minimum=1.0,
+        meaning="Least number of trials in at least two branches of a test.",
+    )
+    mdl_correction: bool = setting(
+        default=True,
+        meaning="Whether the gain of a numeric test is reduced by the cost of its threshold.",
+    )
+    subtree_raising: bool = setting(
+        default=True,
+        meaning="Whether pruning may replace a test by its largest branch.",
+    )
+    rep_folds: int = setting(
+        default=3,
+        minimum=2,
+        meaning="reduced_error holds out one of this number of parts.",
+    )
 
 
 class C45(Classifier[C45Config]):

@@ -5,96 +5,216 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from attrs import field, frozen
-from attrs.validators import and_, ge, gt, in_, instance_of, le, lt, optional
+from attrs import frozen
 
-from graspsense.plugin_api import CHANGES_NO_RESULT, NAMES_INPUT
-from graspsense_sim_gripper.drive_models import LINKAGES
-
-FIDELITIES = ("scene", "full", "reference")
-NOT_NEGATIVE = and_(ge(0.0), lt(math.inf))
-POSITIVE = and_(gt(0.0), lt(math.inf))
-SCHEMES = ("auto", "explicit", "implicit")
+from graspsense.plugin_api import CHANGES_NO_RESULT, NAMES_INPUT, setting
 
 
 @frozen(kw_only=True, cache_hash=True)
 class SimConfig:
     """A model of a PR2 gripper: the object in it, its drive and its sensors. SI units."""
 
-    object: str = field(default="odwalla:full_closed", metadata=NAMES_INPUT)
-    """Name in the catalogue with its state: `odwalla:full_closed`, `can:empty_open`, `block`; `none`: no object.
-
-    Or a scene file, as in `my_bottle.toml`.
-    `can:empty_open#3` is one particular can: its width and stiffness are the same in every trial."""
-    spread: bool = True
-    """Whether instance, placement and friction vary with the seed."""
-    sensor: Literal["pads", "ideal"] = field(default="pads", validator=in_(("pads", "ideal")))
-    """`pads`: encoder, and 22 cells a fingertip every 41 ms. `ideal`: exact values at every tick."""
-    accuracy: float = field(default=0.01, validator=and_(ge(1e-4), le(0.5)))
-    """Relative error that features, peak force and trace may have; model and steps follow from it."""
-    fidelity: Literal["scene", "full", "reference"] = field(default="scene", validator=in_(FIDELITIES))
-    """`scene`: the terms that the accuracy needs. `full`: every term. `reference`: every term, in steps that are
-    halved until the result no longer changes."""
-    expected_force_n: float | None = field(
-        default=None, validator=optional(POSITIVE), metadata=CHANGES_NO_RESULT
+    object: str = setting(
+        default="odwalla:full_closed",
+        effect=NAMES_INPUT,
+        meaning="Name in the catalogue with its state, as in odwalla:full_closed or can:empty_open; none: no "
+        "object. can:empty_open#3 is one particular can: its width and stiffness are the same in every "
+        "trial. Or a scene file, as in my_bottle.toml.",
     )
-    """The gripping force, and the speed of the fingers at the contact, for which the model is selected.
-
-    Not set: those of a trial grasp under the controller."""
-    expected_speed_m_s: float | None = field(
-        default=None, validator=optional(POSITIVE), metadata=CHANGES_NO_RESULT
+    spread: bool = setting(
+        default=True,
+        meaning="Whether instance, placement and friction vary with the seed.",
     )
-    scheme: Literal["auto", "explicit", "implicit"] = field(default="auto", validator=in_(SCHEMES))
-    """Prescribes the scheme of the steps, for a study."""
-    step_s: float | None = field(default=None, validator=optional(gt(0.0)))
-    """Prescribes the length of the steps, for a study; not set: as long as the accuracy allows."""
-    rate_hz: float = field(default=1000.0, validator=and_(ge(10.0), le(1e5)))
-    transmission: Literal["pr2", "pr2_2009", "pr2_paper", "straight"] = field(
-        default="pr2", validator=in_(tuple(LINKAGES))
+    sensor: Literal["pads", "ideal"] = setting(
+        default="pads",
+        meaning="pads: encoder, and 22 cells a fingertip every 41 ms. ideal: exact values at every tick.",
     )
-    """A drive of `drive_models`: a published linkage of the PR2, or `straight` (jaws on a screw, constant mass)."""
-    moving_mass_kg: float = field(default=100.0, validator=and_(ge(1e-6), le(1e6)))
-    """Mass that moves with the gap where the transmission is `straight`; `rotor_kg_m2` is then ignored."""
-    rotor_kg_m2: float = field(default=4e-7, validator=and_(ge(1e-12), le(1.0)))
-    """4 g cm2, an assumption: typical of a 24 mm motor such as the Maxon RE-max 24."""
-    coulomb_n: float = field(default=7.0, validator=NOT_NEGATIVE)
-    """Coulomb friction: the value that pr2_gripper_sensor feeds forward."""
-    coulomb_spread_n: float = field(default=0.4, validator=NOT_NEGATIVE)
-    """Its standard deviation between trials."""
-    breakaway_n: float = field(default=8.0, validator=NOT_NEGATIVE)
-    """Static friction: a little more than Coulomb friction (an assumption)."""
-    stribeck_m_s: float = field(default=0.002, validator=POSITIVE)
-    """Speed over which friction falls from static to Coulomb (an assumption)."""
-    load_share: float = field(default=0.5, validator=NOT_NEGATIVE)
-    """Friction of the loaded screw per newton on the pads: gives about 20 N on a flat surface at 23 N."""
-    damping_n_s_m: float = field(default=10.0, validator=NOT_NEGATIVE)
-    """Viscous friction on the gap, as in the description of the PR2."""
-    open_gap_m: float = field(default=0.086, validator=and_(gt(0.0), le(0.09)))
-    """Gap of the open fingers."""
-    skin_n_m: float = field(default=3e4, validator=gt(0.0))
-    """Stiffness of one fingertip's pad: 1e4 to 1e5 N/m (an assumption); `inf`: rigid."""
-    skin_damping_n_s_m: float = field(default=0.0, validator=NOT_NEGATIVE)
-    """Damper parallel to that spring."""
-    skin_creep_n_m: float = field(default=0.0, validator=NOT_NEGATIVE)
-    """Stiffness of a Maxwell branch parallel to that spring, which makes the pad creep."""
-    skin_creep_s: float = field(default=0.3, validator=POSITIVE)
-    """Time constant of that branch."""
-    drive_lag_s: float = field(default=0.0, validator=NOT_NEGATIVE)
-    """Time constant with which the effort follows the command; 0: no lag."""
-    compile: Literal["worth", "always", "never"] = field(
-        default="worth", validator=in_(("worth", "always", "never")), metadata=CHANGES_NO_RESULT
+    accuracy: float = setting(
+        default=0.01,
+        minimum=1e-4,
+        maximum=0.5,
+        meaning="Relative error that features, peak force and trace may have; model and steps follow from it.",
     )
-    """Whether batches are compiled: where that saves more time than it takes, always, or never."""
-    explain: bool = field(default=False, metadata=CHANGES_NO_RESULT)
-    """Whether the report lists the contribution of each term of the object (`--explain-model`)."""
-    noise_counts: float = field(default=15.0, validator=NOT_NEGATIVE)
-    """Standard deviation of a cell's noise: margins of 125 to 225 counts are in use on the robot."""
-    pad_period_s: float = field(default=0.041, validator=and_(ge(0.001), le(1.0)))
-    """Time between cell images: the PR2's pads report every 41 ms (pr2_gripper_sensor, pressure_observer.cpp)."""
-    pad_cells: int = field(default=15, validator=[instance_of(int), ge(1), le(15)])
-    """Number of cells of the gripping face, the ones nearest to its middle; the others read no force."""
-    pad_delay_s: float = field(default=0.0, validator=and_(ge(0.0), le(0.04)))
-    """Time between the sampling of a cell image and its arrival: 0.01 with the reports of the PR2's driver."""
+    fidelity: Literal["scene", "full", "reference"] = setting(
+        default="scene",
+        meaning="scene: the terms that the accuracy needs. full: every term. reference: every term, in steps that "
+        "are halved until the result no longer changes.",
+    )
+    expected_force_n: float | None = setting(
+        default=None,
+        unit="N",
+        above=0.0,
+        plausible=(0.1, 1000.0),
+        effect=CHANGES_NO_RESULT,
+        meaning="Gripping force for which the model is selected; not set: that of a trial grasp under the controller.",
+    )
+    expected_speed_m_s: float | None = setting(
+        default=None,
+        unit="m/s",
+        above=0.0,
+        plausible=(1e-4, 1.0),
+        effect=CHANGES_NO_RESULT,
+        meaning="Speed of the fingers at the contact for which the model is selected; not set: that of a trial grasp.",
+    )
+    scheme: Literal["auto", "explicit", "implicit"] = setting(
+        default="auto",
+        meaning="Prescribes the scheme of the steps, for a study.",
+    )
+    step_s: float | None = setting(
+        default=None,
+        unit="s",
+        above=0.0,
+        plausible=(1e-7, 0.01),
+        meaning="Prescribes the length of the steps, for a study; not set: as long as the accuracy allows. The time"
+        " of a grasp grows as the step shrinks.",
+    )
+    rate_hz: float = setting(
+        default=1000.0,
+        unit="Hz",
+        minimum=10.0,
+        maximum=1e5,
+        meaning="Rate of the frames.",
+    )
+    transmission: Literal["pr2", "pr2_2009", "pr2_paper", "straight"] = setting(
+        default="pr2",
+        meaning="A drive of drive_models: a published linkage of the PR2, or straight (jaws on a screw, constant "
+        "mass).",
+    )
+    moving_mass_kg: float = setting(
+        default=100.0,
+        unit="kg",
+        minimum=1e-6,
+        maximum=1e6,
+        meaning="Mass that moves with the gap where the transmission is straight; rotor_kg_m2 is then ignored.",
+    )
+    rotor_kg_m2: float = setting(
+        default=4e-7,
+        unit="kg m2",
+        minimum=1e-12,
+        maximum=1.0,
+        meaning="Moment of inertia of the rotor: 4 g cm2, an assumption, typical of a 24 mm motor such as the Maxon"
+        " RE-max 24.",
+    )
+    coulomb_n: float = setting(
+        default=7.0,
+        unit="N",
+        minimum=0.0,
+        plausible=(0.0, 200.0),
+        meaning="Coulomb friction: the value that pr2_gripper_sensor feeds forward.",
+    )
+    coulomb_spread_n: float = setting(
+        default=0.4,
+        unit="N",
+        minimum=0.0,
+        plausible=(0.0, 50.0),
+        meaning="Standard deviation of the Coulomb friction between trials.",
+    )
+    breakaway_n: float = setting(
+        default=8.0,
+        unit="N",
+        minimum=0.0,
+        plausible=(0.0, 200.0),
+        meaning="Static friction: a little more than Coulomb friction (an assumption).",
+    )
+    stribeck_m_s: float = setting(
+        default=0.002,
+        unit="m/s",
+        above=0.0,
+        plausible=(1e-7, 1.0),
+        meaning="Speed over which friction falls from static to Coulomb (an assumption).",
+    )
+    load_share: float = setting(
+        default=0.5,
+        minimum=0.0,
+        plausible=(0.0, 20.0),
+        meaning="Friction of the loaded screw per newton on the pads: gives about 20 N on a flat surface at 23 N.",
+    )
+    damping_n_s_m: float = setting(
+        default=10.0,
+        unit="N s/m",
+        minimum=0.0,
+        plausible=(0.0, 1e6),
+        meaning="Viscous friction on the gap, as in the description of the PR2.",
+    )
+    open_gap_m: float = setting(
+        default=0.086,
+        unit="m",
+        above=0.0,
+        maximum=0.09,
+        meaning="Gap of the open fingers.",
+    )
+    skin_n_m: float = setting(
+        default=3e4,
+        unit="N/m",
+        above=0.0,
+        maximum=math.inf,
+        plausible=(10.0, math.inf),
+        meaning="Stiffness of one fingertip's pad: 1e4 to 1e5 N/m (an assumption); inf: rigid.",
+    )
+    skin_damping_n_s_m: float = setting(
+        default=0.0,
+        unit="N s/m",
+        minimum=0.0,
+        meaning="Damper parallel to the spring of the pad.",
+    )
+    skin_creep_n_m: float = setting(
+        default=0.0,
+        unit="N/m",
+        minimum=0.0,
+        meaning="Stiffness of a Maxwell branch parallel to the spring of the pad, which makes it creep.",
+    )
+    skin_creep_s: float = setting(
+        default=0.3,
+        unit="s",
+        above=0.0,
+        plausible=(1e-6, 1e4),
+        meaning="Time constant of the Maxwell branch of the pad.",
+    )
+    drive_lag_s: float = setting(
+        default=0.0,
+        unit="s",
+        minimum=0.0,
+        plausible=(0.0, 10.0),
+        meaning="Time constant with which the effort follows the command; 0: no lag.",
+    )
+    compile: Literal["worth", "always", "never"] = setting(
+        default="worth",
+        effect=CHANGES_NO_RESULT,
+        meaning="Whether batches are compiled: where that saves more time than it takes, always, or never.",
+    )
+    explain: bool = setting(
+        default=False,
+        effect=CHANGES_NO_RESULT,
+        meaning="Whether the report lists the contribution of each term of the object (--explain-model).",
+    )
+    noise_counts: float = setting(
+        default=15.0,
+        unit="counts",
+        minimum=0.0,
+        plausible=(0.0, 1e4),
+        meaning="Standard deviation of a cell's noise: margins of 125 to 225 counts are in use on the robot.",
+    )
+    pad_period_s: float = setting(
+        default=0.041,
+        unit="s",
+        minimum=0.001,
+        maximum=1.0,
+        meaning="Time between cell images: the PR2's pads report every 41 ms (pr2_gripper_sensor, "
+        "pressure_observer.cpp).",
+    )
+    pad_cells: int = setting(
+        default=15,
+        minimum=1,
+        maximum=15,
+        meaning="Number of cells of the gripping face, the ones nearest to its middle; the others read no force.",
+    )
+    pad_delay_s: float = setting(
+        default=0.0,
+        unit="s",
+        minimum=0.0,
+        maximum=0.04,
+        meaning="Time between the sampling of a cell image and its arrival: 0.01 with the reports of the PR2's driver.",
+    )
 
     @property
     def has_forced_steps(self) -> bool:

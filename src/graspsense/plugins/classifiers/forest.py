@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from attrs import field, frozen
-from attrs.validators import ge, instance_of
+from attrs import frozen
 
+from graspsense.plugin_api import setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier, most_likely
 
 if TYPE_CHECKING:
@@ -19,9 +19,8 @@ if TYPE_CHECKING:
 class ForestConfig(KeptConfig):
     """Settings of the forest."""
 
-    trees: int = field(default=100, validator=[instance_of(int), ge(1)])
-    min_leaf: int = field(default=1, validator=[instance_of(int), ge(1)])
-    """Smallest number of training trials at a leaf."""
+    trees: int = setting(default=100, minimum=1, plausible=(1, 100_000), meaning="Number of trees.")
+    min_leaf: int = setting(default=1, minimum=1, meaning="Smallest number of training trials at a leaf.")
 
 
 class Forest(ScikitClassifier[ForestConfig]):

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from attrs import field, frozen
-from attrs.validators import ge, instance_of
+from attrs import frozen
 
-from graspsense.plugin_api import ClassifierConfig
+from graspsense.plugin_api import ClassifierConfig, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier
 
 if TYPE_CHECKING:
@@ -20,8 +19,11 @@ if TYPE_CHECKING:
 class KnnConfig(ClassifierConfig):
     """Settings of the vote."""
 
-    neighbours: int = field(default=5, validator=[instance_of(int), ge(1)])
-    """Number of training trials that vote; fewer if there are fewer."""
+    neighbours: int = setting(
+        default=5,
+        minimum=1,
+        meaning="Number of training trials that vote; fewer if there are fewer.",
+    )
 
 
 class Knn(ScikitClassifier[KnnConfig]):

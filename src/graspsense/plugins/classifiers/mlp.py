@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from attrs import field, frozen
-from attrs.validators import ge, instance_of
+from attrs import frozen
 
+from graspsense.plugin_api import setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier, most_likely
 
 if TYPE_CHECKING:
@@ -19,10 +19,13 @@ if TYPE_CHECKING:
 class MlpConfig(KeptConfig):
     """Settings of the network."""
 
-    hidden: int = field(default=20, validator=[instance_of(int), ge(1)])
-    """Neurons of the hidden layer."""
-    weight_decay: float = field(default=0.01, validator=ge(0.0))
-    """L2 penalty on the weights."""
+    hidden: int = setting(
+        default=20,
+        minimum=1,
+        plausible=(1, 10_000),
+        meaning="Neurons of the hidden layer.",
+    )
+    weight_decay: float = setting(default=0.01, minimum=0.0, meaning="L2 penalty on the weights.")
 
 
 class Mlp(ScikitClassifier[MlpConfig]):

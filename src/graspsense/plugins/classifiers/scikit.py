@@ -13,10 +13,17 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from attrs import field, frozen
-from attrs.validators import in_
+from attrs import frozen
 
-from graspsense.plugin_api import Classifier, ClassifierConfig, Features, FeatureTable, Prediction, in_words
+from graspsense.plugin_api import (
+    Classifier,
+    ClassifierConfig,
+    Features,
+    FeatureTable,
+    Prediction,
+    in_words,
+    setting,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,8 +36,10 @@ ScikitConfigT = TypeVar("ScikitConfigT", bound=ClassifierConfig)
 class KeptConfig(ClassifierConfig):
     """Settings of classifiers whose model can be stored in two ways."""
 
-    kept_as: Literal["trials", "skops"] = field(default="trials", validator=in_(("trials", "skops")))
-    """What a model file holds: the training trials, or the fitted estimator (needs the extra skops)."""
+    kept_as: Literal["trials", "skops"] = setting(
+        default="trials",
+        meaning="What a model file holds: the training trials, or the fitted estimator (needs the extra skops).",
+    )
 
 
 @frozen(kw_only=True, eq=False)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from attrs import field, frozen
-from attrs.validators import gt
+from attrs import frozen
 
+from graspsense.plugin_api import setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier, most_likely
 
 if TYPE_CHECKING:
@@ -19,8 +19,11 @@ if TYPE_CHECKING:
 class SvmConfig(KeptConfig):
     """Settings of the machine; the width of the kernel is `scale` of scikit-learn."""
 
-    c: float = field(default=10.0, validator=gt(0.0))
-    """Penalty of a training trial on the wrong side; a larger one fits the data more closely."""
+    c: float = setting(
+        default=10.0,
+        above=0.0,
+        meaning="Penalty of a training trial on the wrong side; a larger one fits the data more closely.",
+    )
 
 
 class Svm(ScikitClassifier[SvmConfig]):

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
-from attrs import field, frozen
-from attrs.validators import ge, in_, instance_of
+from attrs import frozen
 
-from graspsense.plugin_api import in_words
+from graspsense.plugin_api import in_words, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier
 
 if TYPE_CHECKING:
@@ -20,9 +19,11 @@ if TYPE_CHECKING:
 class CartConfig(KeptConfig):
     """Settings of the tree."""
 
-    criterion: Literal["entropy", "gini"] = field(default="entropy", validator=in_(("entropy", "gini")))
-    min_leaf: int = field(default=2, validator=[instance_of(int), ge(1)])
-    """Smallest number of training trials at a leaf."""
+    criterion: Literal["entropy", "gini"] = setting(
+        default="entropy",
+        meaning="The impurity by which splits are chosen.",
+    )
+    min_leaf: int = setting(default=2, minimum=1, meaning="Smallest number of training trials at a leaf.")
 
 
 class Cart(ScikitClassifier[CartConfig]):

@@ -8,14 +8,11 @@ from __future__ import annotations
 from math import inf
 from typing import Literal, NamedTuple
 
-from attrs import field, frozen
-from attrs.validators import in_
+from attrs import frozen
 
-from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, Pads
+from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, Pads, setting
 from graspsense.plugins.controllers.supervision import (
     LAW_CHANNELS,
-    NOT_NEGATIVE,
-    POSITIVE,
     GraspProgress,
     Supervision,
     SupervisionConfig,
@@ -29,16 +26,38 @@ from graspsense.plugins.controllers.supervision import (
 class ForceLoopConfig:
     """The target of the squeeze, and the control loop."""
 
-    probing_force_n: float = field(default=20.0, validator=POSITIVE)
-    """The effort of the squeeze; with `loop = "closed"`, the force on each pad."""
-    loop: Literal["open", "closed"] = field(default="open", validator=in_(("open", "closed")))
-    """`open`: a constant effort, as in the authors' code. `closed`: an integral loop on the pads' mean force."""
-    force_gain_1_s: float = field(default=4.0, validator=NOT_NEGATIVE)
-    """Closed loop only: rate of the effort per newton of error (1/s); slow compared with a cell image every 41 ms."""
-    force_tolerance_n: float = field(default=0.3, validator=POSITIVE)
-    """Closed loop only: largest error of the mean force at steady state (as in pr2_gripper_sensor)."""
-    effort_limit_n: float = field(default=100.0, validator=POSITIVE)
-    """Closed loop only: upper limit of the effort; the lower limit is 0."""
+    probing_force_n: float = setting(
+        default=20.0,
+        unit="N",
+        above=0.0,
+        plausible=(0.1, 200.0),
+        meaning="The effort of the squeeze; with loop = closed, the force on each pad.",
+    )
+    loop: Literal["open", "closed"] = setting(
+        default="open",
+        meaning="open: a constant effort, as in the authors' code. closed: an integral loop on the pads' mean force.",
+    )
+    force_gain_1_s: float = setting(
+        default=4.0,
+        unit="1/s",
+        minimum=0.0,
+        meaning="Closed loop only: rate of the effort per newton of error; slow compared with a cell image every 41"
+        " ms.",
+    )
+    force_tolerance_n: float = setting(
+        default=0.3,
+        unit="N",
+        above=0.0,
+        plausible=(0.01, 20.0),
+        meaning="Closed loop only: largest error of the mean force at steady state (as in pr2_gripper_sensor).",
+    )
+    effort_limit_n: float = setting(
+        default=100.0,
+        unit="N",
+        above=0.0,
+        plausible=(1.0, 500.0),
+        meaning="Closed loop only: upper limit of the effort; the lower limit is 0.",
+    )
 
 
 @frozen(kw_only=True, slots=False)

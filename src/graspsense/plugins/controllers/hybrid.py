@@ -9,9 +9,9 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
-from attrs import field, frozen
+from attrs import frozen
 
-from graspsense.plugin_api import APPROACH, VELOCITY, Command, Controller, Frame, Pads
+from graspsense.plugin_api import APPROACH, VELOCITY, Command, Controller, Frame, Pads, setting
 from graspsense.plugins.controllers.force import (
     ForceLoop,
     ForceLoopConfig,
@@ -21,7 +21,6 @@ from graspsense.plugins.controllers.force import (
 )
 from graspsense.plugins.controllers.supervision import (
     LAW_CHANNELS,
-    NOT_NEGATIVE,
     GraspProgress,
     Supervision,
     SupervisionConfig,
@@ -42,8 +41,14 @@ from graspsense.plugins.controllers.velocity import (
 class HybridConfig(SupervisionConfig, ForceLoopConfig, VelocityLoopConfig):
     """Settings of the hybrid controller."""
 
-    ramp_s: float = field(default=0.0, validator=NOT_NEGATIVE)
-    """Time over which the effort changes from that of the velocity loop to that of the force law (0: at once)."""
+    ramp_s: float = setting(
+        default=0.0,
+        unit="s",
+        minimum=0.0,
+        plausible=(0.0, 10.0),
+        meaning="Time over which the effort changes from that of the velocity loop to that of the force law (0: at "
+        "once).",
+    )
 
 
 class HybridParams(NamedTuple):

@@ -10,8 +10,7 @@ from __future__ import annotations
 from math import inf
 from typing import Final, NamedTuple
 
-from attrs import field, frozen
-from attrs.validators import and_, ge, gt, lt
+from attrs import frozen
 
 from graspsense.plugin_api import (
     APPROACH,
@@ -34,6 +33,7 @@ from graspsense.plugin_api import (
     Stillness,
     at_rest,
     both_touch,
+    setting,
     watch,
 )
 
@@ -44,38 +44,91 @@ LAW_CHANNELS: Final = (
     Channel("force_right", "N"),
 )
 """The channels that every control law of this package reads."""
-POSITIVE = and_(gt(0.0), lt(inf))
-NOT_NEGATIVE = and_(ge(0.0), lt(inf))
-"""Validators of settings of control laws."""
 
 
 @frozen(kw_only=True, slots=False)
 class SupervisionConfig:
     """Thresholds and time-outs of every control law of this package."""
 
-    contact_force_n: float = field(default=CONTACT_FORCE_N, validator=POSITIVE)
-    """Force on both pads, above their tared zero, from which on they touch the object."""
-    rest_speed_m_s: float = field(default=REST_SPEED_M_S, validator=POSITIVE)
-    """Speed below which the fingers are at rest, if throughout the window."""
-    rest_window_s: float = field(default=REST_WINDOW_S, validator=POSITIVE)
-    edge_force_n: float = field(default=0.25, validator=POSITIVE)
-    """Force on a single edge cell above which closing ends as a side impact (100 counts of the most sensitive cell)."""
-    move_timeout_s: float = field(default=10.0, validator=POSITIVE)
-    """Longest approach; extended if the closing speed requires it."""
-    steady_timeout_s: float = field(default=3.0, validator=POSITIVE)
-    """Longest squeeze, after which the grasp ends as never steady."""
-    closed_gap_m: float = field(default=0.003, validator=NOT_NEGATIVE)
-    """Gap at which the fingers count as closed: there is no object, or after contact none is left."""
-    too_wide_m: float = field(default=0.001, validator=NOT_NEGATIVE)
-    """Travel within which a contact means that the object is wider than the opening."""
-    crush_share: float = field(default=0.2, validator=POSITIVE)
-    """The object is crushed if the force falls below this share of its peak as the gap closes by `crush_travel_m`."""
-    crush_travel_m: float = field(default=0.002, validator=POSITIVE)
-    slip_time_s: float = field(default=0.2, validator=POSITIVE)
-    """Both pads below half the contact force for this long, closed further than at the peak: slipped out.
-
-    A finger that bounces off a rigid object loses contact too, but opens.
-    """
+    contact_force_n: float = setting(
+        default=CONTACT_FORCE_N,
+        unit="N",
+        above=0.0,
+        plausible=(0.01, 20.0),
+        meaning="Force on both pads, above their tared zero, from which on they touch the object.",
+    )
+    rest_speed_m_s: float = setting(
+        default=REST_SPEED_M_S,
+        unit="m/s",
+        above=0.0,
+        plausible=(1e-7, 0.05),
+        meaning="Speed below which the fingers are at rest, if throughout the window.",
+    )
+    rest_window_s: float = setting(
+        default=REST_WINDOW_S,
+        unit="s",
+        above=0.0,
+        plausible=(0.001, 5.0),
+        meaning="Time for which the fingers must stay below the rest speed.",
+    )
+    edge_force_n: float = setting(
+        default=0.25,
+        unit="N",
+        above=0.0,
+        plausible=(0.01, 50.0),
+        meaning="Force on a single edge cell above which closing ends as a side impact (100 counts of the most "
+        "sensitive cell).",
+    )
+    move_timeout_s: float = setting(
+        default=10.0,
+        unit="s",
+        above=0.0,
+        plausible=(0.01, 600.0),
+        meaning="Longest approach; extended if the closing speed requires it.",
+    )
+    steady_timeout_s: float = setting(
+        default=3.0,
+        unit="s",
+        above=0.0,
+        plausible=(0.01, 600.0),
+        meaning="Longest squeeze, after which the grasp ends as never steady.",
+    )
+    closed_gap_m: float = setting(
+        default=0.003,
+        unit="m",
+        minimum=0.0,
+        plausible=(0.0, 0.1),
+        meaning="Gap at which the fingers count as closed: there is no object, or after contact none is left.",
+    )
+    too_wide_m: float = setting(
+        default=0.001,
+        unit="m",
+        minimum=0.0,
+        plausible=(0.0, 0.1),
+        meaning="Travel within which a contact means that the object is wider than the opening.",
+    )
+    crush_share: float = setting(
+        default=0.2,
+        above=0.0,
+        plausible=(0.001, 0.999),
+        meaning="The object is crushed if the force falls below this share of its peak as the gap closes by "
+        "crush_travel_m.",
+    )
+    crush_travel_m: float = setting(
+        default=0.002,
+        unit="m",
+        above=0.0,
+        plausible=(1e-6, 0.1),
+        meaning="Travel of the gap that belongs to crush_share.",
+    )
+    slip_time_s: float = setting(
+        default=0.2,
+        unit="s",
+        above=0.0,
+        plausible=(0.001, 10.0),
+        meaning="Both pads below half the contact force for this long, closed further than at the peak: slipped "
+        "out. A finger that bounces off a rigid object loses contact too, but opens.",
+    )
 
 
 class Supervision(NamedTuple):

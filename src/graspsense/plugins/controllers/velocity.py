@@ -9,14 +9,11 @@ from __future__ import annotations
 from math import inf
 from typing import Literal, NamedTuple
 
-from attrs import field, frozen
-from attrs.validators import in_
+from attrs import frozen
 
-from graspsense.plugin_api import EFFORT, VELOCITY, Command, Controller, Frame, Pads
+from graspsense.plugin_api import EFFORT, VELOCITY, Command, Controller, Frame, Pads, setting
 from graspsense.plugins.controllers.supervision import (
     LAW_CHANNELS,
-    NOT_NEGATIVE,
-    POSITIVE,
     GraspProgress,
     Supervision,
     SupervisionConfig,
@@ -30,18 +27,35 @@ from graspsense.plugins.controllers.supervision import (
 class VelocityLoopConfig:
     """Gains of the velocity loop: 15000 and 25, with the integral limited to 100 N, as in the authors' code."""
 
-    closing_speed_m_s: float = field(default=0.010, validator=POSITIVE)
-    """Closing speed of the gap."""
-    velocity_gain_n_s_m: float = field(default=15000.0, validator=NOT_NEGATIVE)
-    """Effort per error of the speed (N s/m)."""
-    integral_gain_n_m: float = field(default=25.0, validator=NOT_NEGATIVE)
-    """Effort per error of the gap (N/m)."""
-    integral_limit_n: float = field(default=100.0, validator=NOT_NEGATIVE)
-    preload_n: float = field(default=7.0, validator=NOT_NEGATIVE)
-    """Initial value of the integral: the Coulomb friction of the gripper (7 N is fed forward in pr2_gripper_sensor)."""
-    sends: Literal["effort", "velocity"] = field(default="effort", validator=in_(("effort", "velocity")))
-    """What is commanded. `velocity` is for a gripper with a velocity loop of its own: this loop's gains then count for
-    nothing, and the squeeze closes on with the effort as a limit."""
+    closing_speed_m_s: float = setting(
+        default=0.010, unit="m/s", above=0.0, plausible=(1e-4, 0.2), meaning="Closing speed of the gap."
+    )
+    velocity_gain_n_s_m: float = setting(
+        default=15000.0, unit="N s/m", minimum=0.0, meaning="Effort per error of the speed."
+    )
+    integral_gain_n_m: float = setting(
+        default=25.0, unit="N/m", minimum=0.0, meaning="Effort per error of the gap."
+    )
+    integral_limit_n: float = setting(
+        default=100.0,
+        unit="N",
+        minimum=0.0,
+        plausible=(0.0, 500.0),
+        meaning="Largest effort, in either direction, that the integral of the speed error contributes.",
+    )
+    preload_n: float = setting(
+        default=7.0,
+        unit="N",
+        minimum=0.0,
+        plausible=(0.0, 100.0),
+        meaning="Initial value of the integral: the Coulomb friction of the gripper (7 N is fed forward in "
+        "pr2_gripper_sensor).",
+    )
+    sends: Literal["effort", "velocity"] = setting(
+        default="effort",
+        meaning="What is commanded. velocity is for a gripper with a velocity loop of its own: the gains then have no "
+        "effect, and the squeeze closes on with the effort as a limit.",
+    )
 
 
 @frozen(kw_only=True, slots=False)

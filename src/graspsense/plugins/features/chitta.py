@@ -15,8 +15,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, Literal
 
-from attrs import field, frozen
-from attrs.validators import gt, in_
+from attrs import frozen
 
 from graspsense.plugin_api import (
     APPROACH,
@@ -30,6 +29,7 @@ from graspsense.plugin_api import (
     FeatureSet,
     first_rest,
     missing,
+    setting,
 )
 
 if TYPE_CHECKING:
@@ -47,15 +47,31 @@ RATES: Final = NAMES[4:]
 class ChittaConfig:
     """The force to use, and the thresholds of contact and rest."""
 
-    force: Literal["mean", "left", "right", "min", "sum"] = field(
-        default="mean", validator=in_(("mean", "left", "right", "min", "sum"))
+    force: Literal["mean", "left", "right", "min", "sum"] = setting(
+        default="mean",
+        meaning="The force f from those of the two pads: their mean, one of them, the smaller, or their sum.",
     )
-    """The force f from those of the two pads: their mean, one of them, the smaller, or their sum."""
-    contact_force_n: float = field(default=CONTACT_FORCE_N, validator=gt(0.0))
-    """tau_1, for each pad."""
-    rest_speed_m_s: float = field(default=REST_SPEED_M_S, validator=gt(0.0))
-    """tau_2, below which the speed must stay throughout the window."""
-    rest_window_s: float = field(default=REST_WINDOW_S, validator=gt(0.0))
+    contact_force_n: float = setting(
+        default=CONTACT_FORCE_N,
+        unit="N",
+        above=0.0,
+        plausible=(0.01, 20.0),
+        meaning="tau_1 of the paper: the force on each pad from which on it touches the object.",
+    )
+    rest_speed_m_s: float = setting(
+        default=REST_SPEED_M_S,
+        unit="m/s",
+        above=0.0,
+        plausible=(1e-7, 0.05),
+        meaning="tau_2 of the paper, below which the speed must stay throughout the window.",
+    )
+    rest_window_s: float = setting(
+        default=REST_WINDOW_S,
+        unit="s",
+        above=0.0,
+        plausible=(0.001, 5.0),
+        meaning="Time for which the speed must stay below rest_speed_m_s.",
+    )
 
 
 class ChittaFeatures(FeatureSet[ChittaConfig]):
