@@ -83,17 +83,20 @@ def collect(
             say=talk,
             changed=changed,
         )
-
         _run_until_stopped(collection)
-        counts = collection.counts()
-    done = all(n >= each for n in counts.values())
+        _print_counts(save, collection, as_json)
+
+
+def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
+    counts, each = collection.counts(), collection.wanted.each
     if as_json:
+        done = all(n >= each for n in counts.values())
         echo_json(
             {"store": save, "trials": collection.numbers, "counts": counts, "each": each, "complete": done}
         )
-    else:
-        for word, n in counts.items():
-            click.echo(f"{word:<24}{n:>4} of {each}")
+        return
+    for word, n in counts.items():
+        click.echo(f"{word:<24}{n:>4} of {each}")
 
 
 def _has_model(settings: Settings) -> bool:

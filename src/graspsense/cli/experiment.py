@@ -15,6 +15,7 @@ from graspsense.cli.terminal import echo_table, talk
 
 if TYPE_CHECKING:
     from graspsense.experiments.findings import Findings
+    from graspsense.experiments.results import Results
     from graspsense.experiments.run import Account
     from graspsense.experiments.summary import Summary
 
@@ -65,11 +66,10 @@ def experiment(
         return
     from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.executors.choose import chosen
-    from graspsense.experiments.page import findings_of, write_page
+    from graspsense.experiments.page import findings_of
     from graspsense.experiments.results import Results
     from graspsense.experiments.run import run_experiment
     from graspsense.experiments.summary import summarise
-    from graspsense.recording.atomic_file import SaveFailed
 
     planned = read_experiment(experiment, options, force=force)
     results = Results(Path(out or planned.name))
@@ -88,12 +88,7 @@ def experiment(
             said=talk,
         )
     found = summarise(planned, results)
-    page: Path | None = None
-    problem = ""
-    try:
-        page = write_page(found, results)
-    except SaveFailed as error:
-        problem = str(error)
+    page, problem = _written_page(found, results)
     more = findings_of(found)
     if as_json:
         _print_json(found, more, page, _counts(account, problem))
@@ -103,6 +98,17 @@ def experiment(
         sys.exit(EXIT_INTERRUPTED)
     if problem or not account.complete:
         sys.exit(EXIT_INCOMPLETE)
+
+
+def _written_page(found: Summary, results: Results) -> tuple[Path | None, str]:
+    """Write the page and return its path, or None and why it could not be written."""
+    from graspsense.experiments.page import write_page
+    from graspsense.recording.atomic_file import SaveFailed
+
+    try:
+        return write_page(found, results), ""
+    except SaveFailed as error:
+        return None, str(error)
 
 
 def _counts(account: Account, problem: str) -> dict[str, object]:

@@ -63,11 +63,7 @@ def run(
 
     if explain_model:
         options = (*options, "gripper.explain=true")
-    settings = settings_of(pipeline, gripper, object_name, options, seed, force)
-    if label is not None and not agrees(settings, label):
-        if object_name is not None or any(one.startswith("gripper.object=") for one in options):
-            raise _contradiction(settings, label)
-        settings = settings_of(pipeline, gripper, label, options, seed, force)
+    settings = _labelled_settings(label, pipeline, gripper, object_name, options, seed, force)
     check(settings)
     if dry_run:
         _say_what_would_be_done(settings, as_json)
@@ -105,6 +101,24 @@ def _print_model(trial: Trial) -> None:
         print_model(trial.report["model"])
         if "selection" in trial.report:
             print_selection(trial.report["selection"])
+
+
+def _labelled_settings(
+    label: str | None,
+    pipeline: str | None,
+    gripper: str | None,
+    object_name: str | None,
+    options: tuple[str, ...],
+    seed: int | None,
+    force: bool,
+) -> Settings:
+    """Return the settings of a grasp of what the label says, where the gripper can be told what it holds."""
+    settings = settings_of(pipeline, gripper, object_name, options, seed, force)
+    if label is None or agrees(settings, label):
+        return settings
+    if object_name is not None or any(one.startswith("gripper.object=") for one in options):
+        raise _contradiction(settings, label)
+    return settings_of(pipeline, gripper, label, options, seed, force)
 
 
 def agrees(settings: Settings, label: str) -> bool:
