@@ -384,7 +384,7 @@ def test_an_experiment_does_not_write_into_a_store(run, file, tmp_path):
 
 
 def test_a_slip_in_the_number_of_seeds_is_refused_at_once(file):
-    with pytest.raises(ConfigError, match="1000000 seeds: at most 10000"):
+    with pytest.raises(ConfigError, match="1000000 seeds: give at most 10000"):
         read_experiment(str(file), ["seeds=1000000"])
 
 

@@ -56,7 +56,7 @@ def test_labels_order_and_what_is_left_out(folder):
     assert any(
         "3 grasps of full_coke left out: their author calls them unreliable" in note for note in found.notes
     )
-    assert any("times count frames" in note for note in found.notes)
+    assert any("times are frame numbers" in note for note in found.notes)
     assert read(folder, unreliable=True).labels == ("can",) * 3 + ("full_coke",) * 3 + ("none",) * 3
 
 
@@ -73,7 +73,7 @@ def test_features_are_relative_to_the_first_frame_and_the_variant_adds_it_back(f
     assert absolute.values[:3, 2] - relative.values[:3, 2] == pytest.approx(0.1 * 15 * 12)
     assert (absolute.values[:3, 3:] == relative.values[:3, 3:])[~np.isnan(relative.values[:3, 3:])].all()
     assert np.isnan(relative.values[3:]).all()
-    assert any("3 of 6 grasps have no contact of both sides" in note for note in found.notes)
+    assert any("3 of 6 grasps have no contact on both sides" in note for note in found.notes)
     assert relative.units == ("m", "m", "N", "frame", "m/frame", "N/frame")
 
 
@@ -88,7 +88,7 @@ def test_a_folder_without_grasps_and_a_damaged_file(folder, tmp_path):
     with pytest.raises(ConfigError, match="there is no folder"):
         read(tmp_path / "nowhere")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(ConfigError, match="holds no file of the iCub Grasp Dataset"):
+    with pytest.raises(ConfigError, match="contains no file of the iCub Grasp Dataset"):
         read(tmp_path / "empty")
     (folder / "can_2.txt").write_text((folder / "can_2.txt").read_text()[:-40])
     with pytest.raises(DataDamaged, match=r"can_2\.txt, line"):
@@ -134,4 +134,4 @@ def test_no_instance_can_be_held_out_there(found):
     held = found.controls["instance_held_out"]
 
     assert held.rate is None
-    assert held.reason == "every class of this set is one object, so that none can be held out"
+    assert held.reason == "every class of this data set is a single object, so none can be held out"

@@ -165,13 +165,13 @@ def damaged_files() -> list[tuple[str, bytes, str]]:
             "line 11: the file ends after 3 of the 7 lines of frame 2",
         ),
         ("mid_line", good[:-4], "line 15: the file ends within this line"),
-        ("taxel_lost", short, "line 5: 11 index taxel values where 12 are expected"),
+        ("taxel_lost", short, "line 5: 11 index taxel values; 12 are expected"),
         ("word", good.replace(b"45.0", b"fast", 1), "line 2: encoder value 'fast' is not a number"),
-        ("nan", good.replace(b"45.0", b"nan", 1), "line 2: encoder value nan lies outside -360 to 360"),
+        ("nan", good.replace(b"45.0", b"nan", 1), "line 2: encoder value nan is outside -360 to 360"),
         (
             "nine_bits",
             good.replace(b"240.0", b"256.0", 1),
-            "line 4: thumb taxel value 256.0 lies outside 0 to 255",
+            "line 4: thumb taxel value 256.0 is outside 0 to 255",
         ),
     ]
 
@@ -207,12 +207,12 @@ def test_folder_may_be_the_one_that_contains_the_data_set(tmp_path: Path) -> Non
     write(inside / "full_bottle_1.txt", frame_lines())
     assert read_recording(f"{inside}/full_bottle_1.txt").name == "iCub hand, full_bottle_1.txt"
     assert read_recording(f"{tmp_path}/full_bottle_1.txt").name == "iCub hand, full_bottle_1.txt"
-    with pytest.raises(ConfigError, match=r"holds 1 files.*Did you mean 'full_bottle_1.txt'\?"):
+    with pytest.raises(ConfigError, match=r"contains 1 files.*Did you mean 'full_bottle_1.txt'\?"):
         read_recording(f"{tmp_path}/ful_bottle_1.txt")
 
 
 def test_folder_in_place_of_a_file(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="is a folder: name one grasp in it"):
+    with pytest.raises(ConfigError, match="is a folder: name a grasp in it"):
         read_recording(str(tmp_path))
 
 

@@ -220,7 +220,7 @@ def test_bag_of_both_grippers_must_be_told_which(tmp_path: Path) -> None:
         read_bag(path)
     assert {one.frame.gap_m for one in read_bag(path + "#l").readings} == {0.05}
     assert read_bag(path + "#r").readings[-1].pads.left[0] == 3507
-    with pytest.raises(ConfigError, match="comes l or r"):
+    with pytest.raises(ConfigError, match="write l or r after #"):
         read_bag(path + "#x")
 
 

@@ -80,7 +80,7 @@ def test_a_stalled_write_is_a_loss_within_a_second(
     stalled = threading.Event()
     monkeypatch.setattr(type(machine.open_handles[0]), "write", lambda self, data: stalled.wait(60.0) and -1)
     began = time.monotonic()
-    with pytest.raises(DeviceLost, match=r"not taken within 0\.25 s"):
+    with pytest.raises(DeviceLost, match=r"not accepted within 0\.25 s"):
         opened.apply(RELAX)
     assert time.monotonic() - began < 30.0  # not the minute that the write takes
     stalled.set()
@@ -160,14 +160,14 @@ def test_mouse_under_our_numbers_is_not_driven(machine: Any, board: Any) -> None
     wire = board()
     wire.firmware.feature = lambda: bytes(64)
     machine.plug("/dev/hidraw3", wire)
-    with pytest.raises(NoDevice, match="is no PR2 gripper to this driver: wrong CRC"):
+    with pytest.raises(NoDevice, match="does not answer as a PR2 gripper: wrong CRC"):
         Pr2Backend(Pr2Config()).open(0)
     assert machine.open_handles == []
 
 
 def test_serial_of_the_usb_string_must_be_the_boards_own(machine: Any, board: Any) -> None:
     machine.plug("/dev/hidraw3", board(serial="R2"), "L7")
-    with pytest.raises(NoDevice, match="'R2', asked for is 'L7'"):
+    with pytest.raises(NoDevice, match="'R2', but the settings ask for 'L7'"):
         Pr2Backend(Pr2Config(serial="L7")).open(0)
 
 

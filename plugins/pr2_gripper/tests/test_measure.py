@@ -145,7 +145,7 @@ def test_steady_load_is_refused_against_the_stored_tare(device_identity: Any) ->
 
 def test_without_a_stored_tare_an_improbable_zero_is_refused(device_identity: Any) -> None:
     heavy = (4700.0,) * 22
-    with pytest.raises(TareRefused, match="4700 counts a cell"):
+    with pytest.raises(TareRefused, match="4700 counts per cell"):
         Measure(device_identity(), Pr2Config(), None, None).tare([Pads(0.0, 1, TIP, heavy)])
     Measure(device_identity(), Pr2Config(), (heavy, heavy), None).tare([Pads(0.0, 1, heavy, heavy)])
 

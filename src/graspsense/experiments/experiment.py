@@ -1,4 +1,4 @@
-"""An experiment as a file has it, and the tasks that it stands for. docs/experiments.md describes the file."""
+"""The file of an experiment, and the cases and tasks that it describes (docs/experiments.md)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PIPELINE_TABLES: Final = (*(one for one in TABLE_OF_ROLE.values() if one != "cla
 SWEPT_TABLES: Final = (*PIPELINE_TABLES, "classifier", "data", "test", "judge")
 DEFAULT_CLASSIFIER: Final = "c45"
 MOST_SEEDS: Final = 10_000
-"""More seeds than that are a slip: intervals have long stopped to narrow."""
+"""Largest number of seeds; intervals hardly narrow with more."""
 
 
 def _seeds(experiment: object, attribute: object, value: int | tuple[int, ...]) -> None:
@@ -34,18 +34,18 @@ def _seeds(experiment: object, attribute: object, value: int | tuple[int, ...]) 
         raise ValueError(f"{value} seeds: give at least 1, or a list of seeds")
     number = value if isinstance(value, int) else len(value)
     if number > MOST_SEEDS:
-        raise ValueError(f"{number} seeds: at most {MOST_SEEDS}, each of which is a task of every case")
+        raise ValueError(f"{number} seeds: give at most {MOST_SEEDS}; every case has one task for each seed")
     if not isinstance(value, int) and (not value or len(set(value)) < len(value) or min(value) < 0):
-        raise ValueError("seeds: give a number of them, or a list of different ones from 0 on")
+        raise ValueError("seeds: give their number, or a list of different integers from 0 on")
 
 
 @frozen(kw_only=True)
 class PipelineOf:
-    """A pipeline under a name of its own."""
+    """A pipeline with a name to show."""
 
     name: str
     pipeline: str
-    """The name of a pipeline, or its file."""
+    """The name or the file of a pipeline."""
 
 
 @frozen(kw_only=True)
@@ -71,31 +71,31 @@ class Experiment:
     question: str = ""
     kind: str = "recognise"
     parts: tuple[str, ...] = ()
-    """Experiments that this one consists of, names or files, each with this one's seeds. It has no other cases."""
+    """Names or files of the experiments that this one consists of. Its seeds apply to all; it has no cases itself."""
     seeds: int | tuple[int, ...] = field(default=1, validator=_seeds)
-    """How many, from 0 on, or which. Each seed makes its own trials, where they are simulated, and its own folds."""
+    """Number of seeds, or a list of them. Each seed has its own simulated trials and its own folds."""
     pipelines: tuple[str | PipelineOf, ...] = ("default",)
     gripper: Mapping[str, Any] = field(factory=dict)
-    """Keys of pipelines that are laid over every one of them. Likewise the next three."""
+    """Keys that override those of all pipelines. Likewise `controller`, `features` and `run`."""
     controller: Mapping[str, Any] = field(factory=dict)
     features: Mapping[str, Any] = field(factory=dict)
     run: Mapping[str, Any] = field(factory=dict)
     classifiers: tuple[str | Mapping[str, Any], ...] = ()
-    """Names, or tables with `type`, a `name` to call it, and keys; none: the pipeline's, or c45."""
+    """Names, or tables with a `type`, a `name` to show, and keys. Default: that of the pipeline, or c45."""
     variants: tuple[Variant, ...] = ()
     sweep: Mapping[str, Any] = field(factory=dict)
-    """Keys, as `controller.probing_force_n`, each with a list of values: every combination is a case."""
+    """Keys such as `controller.probing_force_n`, each with a list of values; every combination is a case."""
     data: Mapping[str, Any] = field(factory=dict)
     """Keys of `graspsense.sources.trial_source.TrialSource`."""
     test: Mapping[str, Any] = field(factory=dict)
-    """Other trials to judge on, in place of a cross validation."""
+    """Other trials to test on, instead of cross-validation."""
     judge: Mapping[str, Any] = field(factory=dict)
-    """Keys of the kind, as `graspsense.experiments.recognise.EvaluationSettings`."""
+    """Keys that the kind of the experiment defines, such as `graspsense.experiments.recognise.EvaluationSettings`."""
 
 
 @frozen(kw_only=True, eq=False)
 class LearnerSpec:
-    """A classifier to be judged: how it is called, its qualified name, its keys."""
+    """A classifier to evaluate: its name in results, its qualified name, and its keys."""
 
     name: str
     type: str
@@ -104,11 +104,11 @@ class LearnerSpec:
 
 @frozen(kw_only=True, eq=False)
 class ExperimentCase:
-    """One of the things compared: its name, what it differs in, and everything that its tasks follow from."""
+    """One of the cases that are compared: its name, its differences from the others, and all that defines its tasks."""
 
     name: str
     at: Mapping[str, Any]
-    """`pipeline`, `variant` and swept keys (but the classifier's) with the values of this case."""
+    """The values of `pipeline`, `variant` and the swept keys (except those of the classifier) in this case."""
     settings: Settings
     data: TrialSource
     test: TrialSource | None
@@ -116,14 +116,14 @@ class ExperimentCase:
     judge: Any
     kind: str = "recognise"
     part: str = ""
-    """The name of the experiment that it is of, where it is part of another one."""
+    """Name of the part of the experiment that the case belongs to, if the experiment has parts."""
 
 
 @frozen(kw_only=True, eq=False)
 class Planned:
-    """An experiment that was read and checked: its cases and its tasks.
+    """An experiment whose file was read and checked, with its cases.
 
-    `values` is the experiment itself with everything filled in, `pipelines` the resolved pipelines that it names.
+    `pipelines` are the resolved pipelines by the names that the experiment gives them.
     """
 
     name: str
@@ -134,11 +134,11 @@ class Planned:
     parts: tuple[Planned, ...] = ()
 
     def tasks(self) -> list[Task]:
-        """Return every task, the seeds of a case one after the other, all cases for one seed first."""
+        """Return every task: all cases with the first seed, then all with the second, and so on."""
         return [self.task(case, seed) for seed in self.seeds for case in self.cases]
 
     def task(self, case: ExperimentCase, seed: int) -> Task:
-        """Return the task of this case with this seed."""
+        """Return the task for a case and a seed."""
         params = {
             "settings": {
                 table: {key: one for key, one in case.settings.values[table].items() if one is not None}
@@ -156,7 +156,7 @@ class Planned:
 
 
 def shipped() -> dict[str, Any]:
-    """Return the experiments that come with graspsense: name to file."""
+    """Return the files of the experiments that are part of graspsense, by name."""
     folder = files("graspsense.experiments").joinpath("shipped")
     return {
         one.name.removesuffix(".toml"): one
@@ -168,11 +168,10 @@ def shipped() -> dict[str, Any]:
 def read_experiment(
     asked: str, options: Sequence[str] = (), within: Sequence[str] = (), *, force: bool = False
 ) -> Planned:
-    """Return a shipped experiment by name, or that of a `.toml` file, with options as after `-o` laid over it.
+    """Read an experiment of graspsense by name, or a `.toml` file; `options` override its keys as `-o` does.
 
     `within` names the experiments that this one is a part of. `force` accepts settings outside of their plausible
-    ranges. Raises ConfigError with every error that can be told,
-    each with its file and line.
+    ranges. Raises ConfigError that lists all errors with their files and lines.
     """
     layer, base, name = _found(asked)
     identity = asked if base is None else str(Path(asked).expanduser().resolve())
@@ -203,7 +202,7 @@ def read_experiment(
 def _of_parts(
     name: str, experiment: Experiment, layer: Layer, within: Sequence[str], *, force: bool
 ) -> Planned:
-    """Return the cases of all parts, each under its part's name."""
+    """Return the experiment with the cases of all parts; the name of a case starts with that of its part."""
     kind_of(experiment.kind)
     seeds = _listed(experiment.seeds)
     parts = [
@@ -223,7 +222,7 @@ def _of_parts(
             cases.append(evolve(case, name=where, at={"part": part.name, **case.at}, part=part.name))
     if len({part.name for part in parts}) < len(parts):
         raise ConfigError(
-            f"{layer.where(('parts',))}: two parts have one name: {', '.join(experiment.parts)}"
+            f"{layer.where(('parts',))}: two parts have the same name: {', '.join(experiment.parts)}"
         )
     return Planned(
         name=name,
@@ -240,14 +239,14 @@ def _listed(seeds: int | tuple[int, ...]) -> tuple[int, ...]:
 
 
 class _Plan:
-    """What the steps from an experiment to its cases share."""
+    """Expands an experiment to its cases, and collects all errors."""
 
     def __init__(self, name: str, experiment: Experiment, layer: Layer, *, force: bool) -> None:
         self.name, self.experiment, self.layer, self.force = name, experiment, layer, force
         self.complaints: list[str] = []
 
     def planned(self) -> Planned:
-        """Return the cases."""
+        """Return the experiment with its cases. Raises ConfigError that lists all errors."""
         one = self.experiment
         kind_of(one.kind)
         seeds = _listed(one.seeds)
@@ -256,8 +255,8 @@ class _Plan:
             of = asked if isinstance(asked, PipelineOf) else PipelineOf(name=Path(asked).stem, pipeline=asked)
             if of.name in pipelines:
                 raise ConfigError(
-                    f"{self.layer.where(('pipelines',))}: two pipelines are called {of.name!r}: give one a name "
-                    'of its own, { name = "...", pipeline = "..." }'
+                    f"{self.layer.where(('pipelines',))}: two pipelines are called {of.name!r}: name one of "
+                    'them, { name = "...", pipeline = "..." }'
                 )
             pipelines[of.name] = resolve(of.pipeline, force=self.force)
         if not pipelines:
@@ -279,7 +278,7 @@ class _Plan:
         return Planned(name=self.name, experiment=one, cases=tuple(cases), seeds=seeds, pipelines=pipelines)
 
     def _sweep(self) -> dict[tuple[str, ...], Sequence[Any]]:
-        """Return the swept keys, as paths, with their values."""
+        """Return the values of each swept key, by its path."""
         found: dict[tuple[str, ...], Sequence[Any]] = {}
 
         def take(path: tuple[str, ...], value: Any, where: tuple[str, ...]) -> None:
@@ -291,10 +290,10 @@ class _Plan:
             if path[0] not in SWEPT_TABLES or len(path) < 2:
                 near = suggestion(path[0], SWEPT_TABLES)
                 self.complaints.append(
-                    f"{place}: no such table.{near} A sweep is over keys of {', '.join(SWEPT_TABLES)}"
+                    f"{place}: no such table.{near} A sweep can have keys of {', '.join(SWEPT_TABLES)}"
                 )
             elif not isinstance(value, list) or not value:
-                self.complaints.append(f"{place}: give a list of values, as [17.0, 20.0, 23.0]")
+                self.complaints.append(f"{place}: give a list of values, such as [17.0, 20.0, 23.0]")
             else:
                 found[path] = value
 
@@ -346,7 +345,7 @@ class _Plan:
         )
 
     def _check_folds(self, settings: Settings, data: TrialSource, judge: Any) -> None:
-        """Complain of more folds than trials, which every task of the case would end with."""
+        """Add an error if there are more folds than trials, because every task of the case would fail."""
         folds = getattr(judge, "folds", None)
         if folds is None:
             return
@@ -372,7 +371,7 @@ class _Plan:
         variant: Mapping[str, Any],
         sweep: Mapping[tuple[str, ...], Sequence[Any]],
     ) -> Iterator[LearnerSpec]:
-        """Yield every classifier at every point of the sweep over its keys."""
+        """Yield every classifier with every combination of its swept keys."""
         given = self.experiment.classifiers
         if not given:
             chosen = pipeline.classifier
@@ -419,7 +418,7 @@ class _Plan:
 
 
 def _number_of_trials(settings: Settings, data: TrialSource) -> int | None:
-    """Return how many trials a source has, None where that is known only when a data set is read."""
+    """Return the number of trials of a source, None for a data set, which would have to be read."""
     if data.kind == SIMULATED:
         return len(plan_trials(settings, groups_of(data), 0).labels)
     if data.kind == "CSV":
@@ -428,14 +427,14 @@ def _number_of_trials(settings: Settings, data: TrialSource) -> int | None:
 
 
 def in_a_name(key: str, value: Any) -> str:
-    """Return a key with its value as a person says them: `probing force 20 N`."""
+    """Return a key with its value in words: `probing force 20 N`."""
     return " ".join(
         worded(key.rpartition(".")[2], shown(value) if isinstance(value, list | tuple) else value)
     )
 
 
 def shown(value: Any) -> str:
-    """Return a value as it stands in a case's name."""
+    """Return a value as text for the name of a case."""
     if isinstance(value, float):
         return f"{value:g}"
     if isinstance(value, list | tuple):
@@ -444,7 +443,7 @@ def shown(value: Any) -> str:
 
 
 def _fresh(config: Any) -> dict[str, Any]:
-    """Return a classifier's keys without those that are not set, and without a trained model."""
+    """Return the keys of a classifier that are set, without a trained model."""
     return {key: one for key, one in plain(config).items() if one is not None and key != "model"}
 
 
@@ -455,7 +454,7 @@ def _tables(one: Experiment | Variant) -> dict[str, Mapping[str, Any]]:
 def _points(
     sweep: Mapping[tuple[str, ...], Sequence[Any]], table: str, *, within: bool
 ) -> list[tuple[tuple[tuple[str, ...], Any], ...]]:
-    """Return every combination of the swept keys within this table, or of all others."""
+    """Return every combination of the swept keys of this table, or, if not `within`, of all other tables."""
     chosen = {path: values for path, values in sweep.items() if (path[0] == table) is within}
     return [tuple(zip(chosen, values, strict=True)) for values in itertools.product(*chosen.values())]
 
@@ -469,26 +468,26 @@ def _put(values: dict[str, Any], path: Sequence[str], value: Any) -> None:
 
 
 def _found(asked: str) -> tuple[Layer, Path | None, str]:
-    """Return the file of an experiment, the folder that its paths count from, and its name."""
+    """Return the content of the file of an experiment, the folder that its paths are relative to, and its name."""
     if asked.endswith(".toml"):
         path = Path(asked).expanduser()
         return read_toml(path, asked, "experiment file"), path.parent, path.stem
     known = shipped()
     if asked not in known:
         hint = (
-            f"; there is a file {asked}.toml: give it with its ending"
+            f"; there is a file {asked}.toml: write the name with .toml"
             if Path(f"{asked}.toml").is_file()
             else ""
         )
         raise UnknownName(
             f"no experiment named {asked!r}. Known: {', '.join(known)}.{suggestion(asked, known)}"
-            f"\n  One of your own is a file: write its name with .toml{hint}"
+            f"\n  An experiment of your own is a file: write its name with .toml{hint}"
         )
     return read_toml(known[asked], f"experiment {asked}", "experiment file"), None, asked
 
 
 def _located(values: Mapping[str, Any], base: Path | None) -> dict[str, Any]:
-    """Return the values with the files that they name found from the folder of the experiment file."""
+    """Return the values with absolute paths instead of paths that are relative to the folder `base`."""
     if base is None:
         return dict(values)
 

@@ -2,15 +2,15 @@
 
 Source: Harold Soh, Yanyu Su and Yiannis Demiris, "Online Spatio-Temporal Gaussian Process Experts with
 Application to Tactile Classification", IEEE/RSJ IROS 2012; https://github.com/clear-nus/icub_grasp_dataset,
-copyright 2012 Harold Soh. One file is one grasp: a first line `-10000`, then seven lines a frame: nine
-encoder values of the hand (degrees), five maxima of `255 - reading`, and the twelve taxels of thumb, index,
-middle, ring and little fingertip (8 bits, lower is more pressure). There are no time stamps.
+copyright 2012 Harold Soh. Each file is one grasp. After a first line `-10000`, each frame has seven lines: the
+nine encoder values of the hand (degrees), five maxima of `255 - reading`, and the twelve taxels of each fingertip, from
+the thumb to the little finger (8 bits, lower is more pressure). There are no time stamps.
 
 The encoders are joints 7 to 15 of an iCub arm: 7 spreads the fingers, 8 opposes the thumb, 9 and 10 are the
 thumb's proximal and distal flexion, 11 and 12 the index finger's, 13 and 14 the middle finger's, 15 closes
 ring and little finger together (https://icub-tech-iit.github.io/documentation, page "iCub Joints").
 
-`relative_readings` maps them onto a gripper with two fingers; `docs/icub.md` gives reasons for its numbers.
+`relative_readings` maps them onto a gripper with two fingers; docs/icub.md explains its numbers.
 """
 
 from __future__ import annotations
@@ -39,24 +39,24 @@ _FULL_TURN_DEG: Final = 360.0
 _FULL_SCALE: Final = 255.0
 
 UNITS: Final = {"t": "frame", "velocity": "m/frame"}
-"""What is not SI in a recording, since there are no time stamps."""
+"""Units of a recording that are not SI: without time stamps, time is counted in frames."""
 THUMB_FLEXION: Final = (9, 10)
 FINGER_FLEXION: Final = (11, 12, 13, 14)
 START_GAP_M: Final = 0.08
-"""Nominal gap in the first frame: it only keeps the gap positive, since no frame tells the true one."""
+"""Nominal gap in the first frame. The true gap is unknown; this value keeps the gap positive."""
 GAP_M_PER_DEG: Final = 1e-3
-"""Nominal: by this much the gap falls when thumb and fingers flex by one degree in the mean."""
+"""Nominal decrease of the gap when thumb and fingers flex by one degree on average."""
 FORCE_N_PER_COUNT: Final = 0.1
-"""Nominal: force on a fingertip for one count of pressure, summed over its twelve taxels."""
+"""Nominal force on a fingertip for one count of pressure, summed over its twelve taxels."""
 
 
 @frozen(kw_only=True, eq=False)
 class IcubGrasp:
-    """One grasp as the file has it, over `n` frames.
+    """The raw data of one grasp over `n` frames.
 
-    `encoders_deg` has shape (n, 9), joints 7 to 15. `maxima` has shape (n, 5) and `taxels` (n, 5, 12), in
-    counts, thumb first. The maxima differ by up to 6 counts from those of the taxels in the same frame: they
-    were read at another moment.
+    `encoders_deg` has shape (n, 9), joints 7 to 15. `maxima` has shape (n, 5) and `taxels` (n, 5, 12), in counts, thumb
+    first. The maxima differ by up to 6 counts from the largest taxel of the same frame, because they were read at
+    another time.
     """
 
     encoders_deg: NDArray[np.float64]
@@ -71,9 +71,9 @@ class IcubGrasp:
 def read_recording(name: str) -> Recording:
     """Return the grasp in this file as a recording, mapped by `relative_readings`.
 
-    `name` is a file in the data set's folder, or in the one that contains `iCubGraspDataset`.
+    `name` is a file in the folder of the data set, or in the folder that contains `iCubGraspDataset`.
 
-    Raises ConfigError where no such file can be read, DataDamaged where it is not what it claims to be.
+    Raises ConfigError if the file cannot be read, DataDamaged if it is not a valid grasp.
     """
     path = _locate(name)
     grasp = read_grasp(path)
@@ -86,15 +86,15 @@ def read_recording(name: str) -> Recording:
             f"{len(grasp)} frames of an iCub hand without time stamps: times are frame numbers, not seconds",
             "metres and newtons are nominal: gap from the encoders, forces from the taxels, "
             "all relative to the first frame (docs/icub.md)",
-            "the recording goes its own way: what the controller commands has no effect on it",
+            "the commands of the controller have no effect on a recording",
         ),
     )
 
 
 def read_grasp(path: Path) -> IcubGrasp:
-    """Return the frames of one file as they stand there.
+    """Return the raw frames of one file.
 
-    Raises ConfigError where the file cannot be read, DataDamaged where its content is not a whole grasp.
+    Raises ConfigError if the file cannot be read, DataDamaged if its content is not a complete grasp.
     """
     try:
         text = path.read_bytes().decode("ascii")
@@ -107,16 +107,16 @@ def read_grasp(path: Path) -> IcubGrasp:
         raise DataDamaged(f"{path} is empty: a grasp of the iCub data set starts with the line {FIRST_LINE}")
     if lines[0].strip() != FIRST_LINE:
         raise _damaged(
-            path, 1, f"it starts with {lines[0][:40]!r}, a grasp starts with the line {FIRST_LINE}"
+            path, 1, f"it starts with {lines[0][:40]!r}, but a grasp starts with the line {FIRST_LINE}"
         )
     if not text.endswith("\n"):
-        raise _damaged(path, len(lines), "the file ends within this line: fetch it again")
+        raise _damaged(path, len(lines), "the file ends within this line: download it again")
     frames, rest = divmod(len(lines) - 1, len(_LINES))
     if rest:
         raise _damaged(
             path,
             len(lines),
-            f"the file ends after {rest} of the {len(_LINES)} lines of frame {frames + 1}: fetch it again",
+            f"the file ends after {rest} of the {len(_LINES)} lines of frame {frames + 1}: download it again",
         )
     if not frames:
         raise _damaged(path, 1, "there is no frame after the first line")
@@ -129,13 +129,12 @@ def read_grasp(path: Path) -> IcubGrasp:
 
 
 def relative_readings(grasp: IcubGrasp) -> tuple[Reading, ...]:
-    """Return one reading a frame, thumb against fingers, all relative to the first frame.
+    """Return one reading per frame, thumb against fingers, relative to the first frame.
 
-    Left force is the thumb, right force the finger with the most pressure in that frame: `FORCE_N_PER_COUNT`
-    times the pressure above the first frame, summed over the taxels with its sign, so that noise adds no
-    force of its own. The gap falls from `START_GAP_M` by `GAP_M_PER_DEG` times the mean of two flexions, the
-    thumb's and that of index and middle finger. Time is the number of the frame. Nothing is taken from a
-    later frame.
+    The left force is that of the thumb, the right force that of the finger with the most pressure in the frame. A force
+    is `FORCE_N_PER_COUNT` times the pressure above the first frame, summed over the taxels with its sign, so that noise
+    has no bias. The gap decreases from `START_GAP_M` by `GAP_M_PER_DEG` times the mean of two flexions: that of the
+    thumb, and that of the index and middle finger. Time is the frame number. No reading depends on a later frame.
     """
     pressure = FORCE_N_PER_COUNT * (grasp.taxels[0] - grasp.taxels).sum(axis=2)
     thumb_deg = grasp.encoders_deg[:, [joint - FIRST_JOINT for joint in THUMB_FLEXION]].mean(axis=1)
@@ -170,7 +169,7 @@ def _locate(name: str) -> Path:
         return path
     if given.is_dir():
         raise ConfigError(
-            f"{given} is a folder: name one grasp in it, such as {given}/full_vitamin_water_1.txt"
+            f"{given} is a folder: name a grasp in it, such as {given}/full_vitamin_water_1.txt"
         )
     folder = next((f for f in (given.parent / DATA_FOLDER, given.parent) if f.is_dir()), None)
     if folder is None:
@@ -178,14 +177,14 @@ def _locate(name: str) -> Path:
     grasps = [p.name for p in folder.glob("*.txt")]
     near = suggestion(given.name, grasps)
     raise ConfigError(
-        f"no file {given}: {folder} holds {len(grasps)} files *.txt, but none of this name.{near}"
+        f"no file {given}: {folder} contains {len(grasps)} files *.txt, but none with this name.{near}"
     )
 
 
 def _numbers(path: Path, number: int, line: str, what: str, count: int) -> list[float]:
     words = line.split()
     if len(words) != count:
-        raise _damaged(path, number, f"{len(words)} {what} values where {count} are expected")
+        raise _damaged(path, number, f"{len(words)} {what} values; {count} are expected")
     lowest, highest = (-_FULL_TURN_DEG, _FULL_TURN_DEG) if what == "encoder" else (0.0, _FULL_SCALE)
     values = []
     for word in words:
@@ -194,7 +193,7 @@ def _numbers(path: Path, number: int, line: str, what: str, count: int) -> list[
         except ValueError:
             raise _damaged(path, number, f"{what} value {word[:40]!r} is not a number") from None
         if not lowest <= value <= highest:
-            raise _damaged(path, number, f"{what} value {word[:40]} lies outside {lowest:g} to {highest:g}")
+            raise _damaged(path, number, f"{what} value {word[:40]} is outside {lowest:g} to {highest:g}")
         values.append(value)
     return values
 

@@ -1,11 +1,10 @@
 """The iCub Grasp Dataset as labelled trials: `icub:FOLDER`.
 
-Each grasp becomes a trace by `icub.relative_readings`, as the replay backend reads it, all of it in the phase of
-the approach, since no controller of ours was there; the features are drawn from that trace. So they are relative
-to the first frame. The variant `absolute` adds back what the first frame held: contact and rest are the same, and
-`p_first`, `p_steady` and `f_steady` are shifted by the gap and the force of the first frame. What the first frame
-alone tells, before anything is squeezed, is the control from before the contact: all of its 74 numbers as they
-stand in the file. All of this was settled before any recognition rate was looked at.
+`icub.relative_readings` turns each grasp into a trace, as for replay. All of it is in the phase `approach`, because no
+controller of graspsense was involved. Features are extracted from that trace, so they are relative to the first frame.
+The variant `absolute` adds the gap and the force of the first frame to `p_first`, `p_steady` and `f_steady`; contact
+and rest are the same. The control from before contact uses the 74 raw numbers of the first frame, in which nothing is
+squeezed yet. All of this was decided before any recognition rate was computed.
 """
 
 from __future__ import annotations
@@ -38,47 +37,48 @@ from graspsense.sources.icub import (
 )
 
 UNRELIABLE: Final = "full_coke"
-"""The class whose data the author of the set calls unreliable (its README)."""
+"""The class whose data the author of the data set calls unreliable in its README."""
 _FILE: Final = re.compile(r"(?P<label>[a-z_]+)_(?P<number>\d+)\.txt")
 _SHIFTED_BY: Final = {"p_first": "gap", "p_steady": "gap", "f_steady": "force"}
 
 
 def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = False) -> Labelled:
-    """Return the grasps in this folder, or in `iCubGraspDataset` in it.
+    """Return the grasps in this folder, or in its subfolder `iCubGraspDataset`.
 
-    `unreliable` takes in the class that its author calls so. Raises ConfigError where there are no such files,
-    DataDamaged where one of them is not whole.
+    With `unreliable`, the class that the author calls unreliable is included. Raises ConfigError if there are no
+    grasps, DataDamaged if a file is incomplete.
     """
     paths = _grasps(folder)
     left_out = [path for path, label, _ in paths if label == UNRELIABLE] if not unreliable else []
     paths = [one for one in paths if one[0] not in left_out]
     if not paths:
-        raise ConfigError(f"{folder} holds grasps of {UNRELIABLE} only: --unreliable takes them in")
+        raise ConfigError(
+            f"all grasps in {folder} are of {UNRELIABLE}, which the author calls unreliable: include them with "
+            "--unreliable"
+        )
     grasps = [read_grasp(path) for path, _, _ in paths]
     table = table_of([features.extract(_trace(grasp)) for grasp in grasps])
     notes = [
-        "an iCub hand's data without time stamps: times count frames (delta_t is in frames)",
+        "the data of the iCub hand have no time stamps: times are frame numbers (delta_t is in frames)",
         "metres and newtons are nominal, and relative to the first frame (docs/icub.md)",
     ]
     if left_out:
         notes.append(
             f"{len(left_out)} grasps of {UNRELIABLE} left out: their author calls them unreliable "
-            "(--unreliable takes them in)"
+            "(include them with --unreliable)"
         )
     without = int(np.isnan(table.values).all(axis=1).sum())
     if without:
-        notes.append(f"{without} of {len(grasps)} grasps have no contact of both sides, so no feature at all")
+        notes.append(f"{without} of {len(grasps)} grasps have no contact on both sides, and so no features")
     variants = {}
     if set(_SHIFTED_BY) <= set(table.names):
-        what = (
-            "the same features with gap and force of the first frame added back (p_first, p_steady, f_steady)"
-        )
+        what = "the same features plus the gap and the force of the first frame (p_first, p_steady, f_steady)"
         variants["absolute"] = ControlFeatures(table=_absolute(table, grasps), what=what)
     return Labelled(
         source=f"icub:{folder}",
         table=table,
         labels=tuple(label for _, label, _ in paths),
-        no_instances="every class of this set is one object, so that none can be held out",
+        no_instances="every class of this data set is a single object, so none can be held out",
         order=tuple(number for _, _, number in paths),
         **controls(
             table,
@@ -93,19 +93,19 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
 
 
 def _grasps(folder: str) -> list[tuple[Path, str, int]]:
-    """Return path, label and number of every grasp, by label and number."""
+    """Return the path, label and number of every grasp, sorted by label and number."""
     given = Path(folder).expanduser()
     within = given / DATA_FOLDER
     place = within if within.is_dir() else given
     if not place.is_dir():
-        raise ConfigError(f"there is no folder {given}: name that of the iCub Grasp Dataset")
+        raise ConfigError(f"there is no folder {given}: name the folder of the iCub Grasp Dataset")
     found = []
     for path in place.glob("*.txt"):
         match = _FILE.fullmatch(path.name)
         if match:
             found.append((path, match["label"], int(match["number"])))
     if not found:
-        raise ConfigError(f"{place} holds no file of the iCub Grasp Dataset (CLASS_NUMBER.txt)")
+        raise ConfigError(f"{place} contains no file of the iCub Grasp Dataset (CLASS_NUMBER.txt)")
     return sorted(found, key=lambda one: (one[1], one[2]))
 
 

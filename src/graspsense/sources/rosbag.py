@@ -1,18 +1,18 @@
-"""Recorded PR2 data: ROS 1 and ROS 2 bags as recordings of one gripper.
+"""Recordings of a PR2 gripper from ROS 1 and ROS 2 bags.
 
-Read are, for the left (`l`) or right (`r`) gripper:
+These topics of the left (`l`) or right (`r`) gripper are read:
 
-| topic | type | for |
+| topic | type | used for |
 |---|---|---|
 | `/pressure/{l,r}_gripper_motor` | pr2_msgs/PressureState (2009: ethercat_hardware/PressureState) | cell images |
 | `/joint_states` | sensor_msgs/JointState | gap, its rate, effort |
-| `/{l,r}_gripper_controller/state` | pr2_controllers_msgs/JointControllerState | the same, without joint states |
-| `/pr2_gripper_controller/state` | pr2_msgs/GripperControllerState (2009) | the same, without either |
+| `/{l,r}_gripper_controller/state` | pr2_controllers_msgs/JointControllerState | if there are no joint states |
+| `/pr2_gripper_controller/state` | pr2_msgs/GripperControllerState (2009) | if there is neither |
 
-Cells are 16 bits unsigned that the driver put into signed fields, so values above 32767 come as negative ones; the
-two tips are called l_finger_tip and r_finger_tip, in 2009 data0 and data1. Messages without a header, or with a
-stamp of zero, are at the time at which they were recorded (pr2_ethercat_drivers, pr2_common, and personalrobots-pkg
-of September 2009). ROS counts an effort that opens as positive; here one that squeezes is.
+The driver stores the unsigned 16-bit cells in signed fields, so values above 32767 appear as negative numbers. The
+fields of the two tips are l_finger_tip and r_finger_tip, or data0 and data1 in 2009. A message without a header, or
+with a stamp of zero, has the time at which it was recorded (pr2_ethercat_drivers, pr2_common, and personalrobots-pkg of
+September 2009). In ROS a positive effort opens the gripper; here it squeezes.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 SIDES: Final = {"l": "left", "r": "right"}
 TIP_FIELDS: Final = (("l_finger_tip", "r_finger_tip"), ("data0", "data1"))
-"""Names of the two tips' fields, now and in 2009."""
+"""Names of the fields of the two tips, since 2010 and in 2009."""
 TARE_IMAGES: Final = 6
 PAD_COUNTS_PER_N: Final = 1600.0
 """Counts of the sum of the fifteen cells of the gripping face under one newton (fingertip_pressure, scripts/
@@ -53,7 +53,7 @@ DEFINITIONS: Final[Mapping[str, str]] = {
         "float64 time_step\nfloat64 command\nfloat64 p\nfloat64 i\nfloat64 d\nfloat64 i_clamp\n"
     ),
 }
-"""The messages that are not ROS's own, for a bag without definitions; one with them is read by its own."""
+"""Definitions of the messages of the PR2, for bags that contain no definitions of their own."""
 
 _NAN: Final = float("nan")
 
@@ -72,18 +72,18 @@ class _Image(NamedTuple):
 
 
 def read_bag(name: str) -> Recording:
-    """Return the recording in a bag: `FILE`, or `FILE#l` and `FILE#r` where it holds both grippers.
+    """Return the recording in a bag: `FILE`, or `FILE#l` and `FILE#r` if it contains both grippers.
 
-    The zero of the pads is the mean of the first images. Raises ConfigError where there is no such file or it must be
-    said which gripper is meant, DataDamaged where it is no bag or lacks what a grasp needs, PluginUnavailable
-    without rosbags.
+    The zero of the pads is the mean of the first images. Raises ConfigError if the file does not exist or the gripper
+    must be named, DataDamaged if the file is not a bag or has no complete grasp, PluginUnavailable without the library
+    rosbags.
     """
     file, _, side = name.partition("#")
     path = Path(file)
     if not path.exists():
         raise ConfigError(f"there is no bag {file!r}: name a .bag file, or the folder of a ROS 2 bag")
     if side not in ("", *SIDES):
-        raise ConfigError(f"{name!r}: behind # comes l or r, for the left or the right gripper")
+        raise ConfigError(f"{name!r}: write l or r after #, for the left or the right gripper")
     images: list[_Image] = []
     motions: list[_Motion] = []
     with _bag(path) as reader:
@@ -93,14 +93,14 @@ def read_bag(name: str) -> Recording:
         for topic, t_ns, message in _messages(path, reader, (pressure, source)):
             if topic == pressure:
                 image = _image(path, t_ns, message)
-                # A message may repeat the image before: the board's clock is not in it.
+                # A message can repeat the previous image, because it does not contain the clock of the board.
                 if not images or image[1:] != images[-1][1:]:
                     images.append(image)
             else:
                 motions += _motion(t_ns, message, f"{side}_gripper_joint")
     if len(motions) < 2 or not images:
         raise DataDamaged(
-            f"{path} holds {len(motions)} positions of the {SIDES[side]} gripper on {source} and {len(images)} cell "
+            f"{path} contains {len(motions)} positions of the {SIDES[side]} gripper on {source} and {len(images)} cell "
             f"images on {pressure}: a grasp needs both"
         )
     motions.sort()
@@ -127,14 +127,14 @@ def _bag(path: Path) -> Iterator[AnyReader]:
             f'reading ROS bags needs rosbags: {error}\n  try: pip install "graspsense[ros]"'
         ) from error
 
-    # Not every ROS 2 bag carries the definitions of its messages.
+    # Not every ROS 2 bag contains the definitions of its messages.
     store = get_typestore(Stores.ROS2_HUMBLE)
     for name, definition in DEFINITIONS.items():
         store.register(get_types_from_msg(definition, name))
     try:
         reader = AnyReader([path], default_typestore=store)
         reader.open()
-    except Exception as error:  # rosbags meets damage with whatever it stumbles over
+    except Exception as error:  # rosbags raises various exceptions on damaged files
         raise DataDamaged(f"{path} cannot be read as a ROS bag: {error}") from error
     try:
         yield reader
@@ -143,7 +143,7 @@ def _bag(path: Path) -> Iterator[AnyReader]:
 
 
 def _messages(path: Path, reader: AnyReader, topics: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
-    """Yield topic, time and message: the time of its header where that has one, else of its recording."""
+    """Yield topic, time and message. The time is that of the header, or that of the recording if it has none."""
     connections = [one for one in reader.connections if one.topic in topics]
     try:
         for connection, recorded_ns, raw in reader.messages(connections=connections):
@@ -170,7 +170,7 @@ def _side(path: Path, side: str, topics: Collection[str]) -> str:
         raise ConfigError(f"{path} has no {SIDES[side]} gripper: no topic {PRESSURE.format(side)}")
     if len(there) > 1:
         raise ConfigError(
-            f"{path} holds both grippers: write {path}#l for the left or {path}#r for the right one"
+            f"{path} contains both grippers: write {path}#l for the left or {path}#r for the right one"
         )
     return there[0]
 
@@ -180,7 +180,7 @@ def _source(path: Path, side: str, topics: Collection[str]) -> str:
     for topic in wanted:
         if topic in topics:
             return topic
-    raise DataDamaged(f"{path} does not say how far the gripper is open: no topic {', '.join(wanted)}")
+    raise DataDamaged(f"{path} has no gap of the gripper: no topic {', '.join(wanted)}")
 
 
 def _image(path: Path, t_ns: int, message: Any) -> _Image:
@@ -199,7 +199,7 @@ def _image(path: Path, t_ns: int, message: Any) -> _Image:
 
 
 def _motion(t_ns: int, message: Any, joint: str) -> list[_Motion]:
-    """Return what a message says of this joint: one motion, or none where it is of other joints."""
+    """Return the motion of this joint in a message, or nothing if the message is of other joints."""
     if hasattr(message, "process_value"):
         return [_Motion(t_ns, message.process_value, message.process_value_dot, -message.command)]
     if hasattr(message, "joint_position"):
@@ -222,7 +222,7 @@ def _readings(motions: Sequence[_Motion], images: Sequence[_Image], notes: list[
     except TareRefused as refused:
         zero = zero_of([one.left for one in first]), zero_of([one.right for one in first])
         notes.append(
-            f"the zero of the pads is doubtful, as the first {len(first)} images cannot tare them: {refused}"
+            f"the zero of the pads is uncertain, because the first {len(first)} images cannot be used for it: {refused}"
         )
     times = [one.t_ns for one in images]
     before: _Motion | None = None
@@ -246,7 +246,7 @@ def _readings(motions: Sequence[_Motion], images: Sequence[_Image], notes: list[
 
 
 def _forces(cells: Cells, zero: Cells) -> tuple[float, float]:
-    """Return pad and edge force of a tip; NaN where none of its cells answers."""
+    """Return the pad force and the edge force of a tip; NaN if no cell has a value."""
     kept, bad = masked(cells, zero)
     return (
         (_NAN, _NAN)

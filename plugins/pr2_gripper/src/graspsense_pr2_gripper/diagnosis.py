@@ -1,4 +1,4 @@
-"""Why a gripper does not work: what is plugged in, who may open it, what each transport measures."""
+"""Diagnosis of a gripper: connected devices, permissions, and the measurements of each transport."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ from graspsense_pr2_gripper.watching import Watched, share_of, watch_link
 
 TRANSPORTS: Final[tuple[Literal["hidraw", "pyusb"], ...]] = ("hidraw", "pyusb")
 LOST_SHARE: Final = 0.001
-"""A cable and a hub that are well lose nothing."""
+"""Largest number of lost reports; a working cable and hub lose none."""
 SLOW_SHARE: Final = 0.95
 
 
 class _Tried(NamedTuple):
-    """A transport that worked, and what the device says it is."""
+    """A transport that works: the identity of the device and the measurements."""
 
     identity: Identity
     watched: Watched
 
 
 def diagnose(config: object, timeout_s: float) -> Iterator[Finding]:
-    """Return the findings on the gripper of these settings, or on the one under the default numbers."""
+    """Return the findings about the gripper of these settings, by default about that with the default USB ids."""
     named = isinstance(config, Pr2Config)
     if config is not None and not named:
         return
     wanted = config if isinstance(config, Pr2Config) else Pr2Config()
     yield from _libraries()
     if wanted.transport == "emulated":
-        yield Finding("device", "note", "gripper.transport is emulated: no device is looked for")
+        yield Finding("device", "note", "gripper.transport is emulated, so no device is searched")
         return
     found = search(wanted)
     yield from _plugged(found, named)
@@ -87,14 +87,14 @@ def _plugged(found: Search, named: bool) -> Iterator[Finding]:
                 "device",
                 "problem",
                 f"{found.wanted} is on the bus ({', '.join(on_bus)}), but has no HID node",
-                "another program may have it through libusb, or the module usbhid is missing: `sudo modprobe usbhid`",
+                "another program may use it through libusb, or the module usbhid is missing: `sudo modprobe usbhid`",
             )
         else:
             yield Finding(
                 "device",
                 "problem" if named else "note",
                 f"no {found.wanted}",
-                f"plug it in and switch it on; {found.looked}. Other numbers: -o gripper.vendor_id=0x1209 "
+                f"plug it in and switch it on; {found.looked}. Other USB ids: -o gripper.vendor_id=0x1209 "
                 "-o gripper.product_id=0x0001",
             )
         return
@@ -107,24 +107,28 @@ def _plugged(found: Search, named: bool) -> Iterator[Finding]:
             yield Finding(
                 "permission",
                 "problem",
-                f"you may not open {one.path}",
+                f"no permission to open {one.path}",
                 f"put this line in {RULES_FILE}:\n  {hidraw_rule(config)}\nthen `{RELOAD}`, and plug it in again",
             )
         else:
             yield Finding(
                 "permission",
                 "ok",
-                f"you may open {one.path}",
-                f"the rule for it, if another may not:\n  {hidraw_rule(config)}",
+                f"permission to open {one.path}",
+                f"the udev rule, for users without permission:\n  {hidraw_rule(config)}",
             )
     if (config.vendor_id, config.product_id) == TEST_NUMBER:
-        yield Finding("number", "note", "1209:0001 is for private tests: do not pass on a device that has it")
+        yield Finding(
+            "number",
+            "note",
+            "the USB ids 1209:0001 are for private tests: do not distribute a device with them",
+        )
 
 
 def _transport(config: Pr2Config, seconds: float) -> Generator[Finding, None, _Tried | None]:
-    """Yield what this transport does; return what it told of the device, or None where it did not work."""
+    """Yield the findings about this transport; return its measurements, None if it does not work."""
     subject = f"transport {config.transport}"
-    # The one that the user has not chosen may well be missing.
+    # A transport that the user has not selected may be missing.
     bad: Literal["note", "problem"] = "problem" if config.transport == "hidraw" else "note"
     try:
         opened = open_board(config, 0, 0.0)
@@ -141,7 +145,7 @@ def _transport(config: Pr2Config, seconds: float) -> Generator[Finding, None, _T
     try:
         watched = watch_link(link, seconds)
     except DeviceLost as error:
-        yield Finding(subject, "problem", str(error), "its cable, a hub, its power")
+        yield Finding(subject, "problem", str(error), "check its cable, the hub and its power")
         return None
     finally:
         clean = link.close()
@@ -178,17 +182,17 @@ def _measured(subject: str, identity: Identity, watched: Watched, clean: bool) -
         )
     wrong = []
     if not watched.reports:
-        wrong.append("it is silent: reports should flow from power-on; check its power and firmware")
+        wrong.append("it sends no reports, although it should from power-on: check its power and firmware")
     elif watched.rate_hz < SLOW_SHARE * wanted_hz:
-        wrong.append("reports are missing or slow: another port, no hub, less load on this machine")
+        wrong.append("reports are missing or late: try another port, no hub, or less load on this computer")
     if watched.lost > LOST_SHARE * max(watched.reports, 1):
         wrong.append(
-            "reports are lost: another cable or port, or the usual scheduler kept the reader waiting"
+            "reports are lost: try another cable or port; the scheduler may also have delayed the reader"
         )
     if watched.corrupt:
-        wrong.append("reports are damaged though USB checks them too: that is the firmware's doing")
+        wrong.append("reports are damaged although USB checks them: the firmware is faulty")
     if watched.reports and not watched.in_use and not watched.trips_s:
-        wrong.append("no command was echoed: it reports but does not listen")
+        wrong.append("no command was echoed: it sends reports but does not receive commands")
     return Finding(subject, "problem" if wrong else "ok", found, "\n".join(wrong), numbers)
 
 

@@ -1,4 +1,4 @@
-"""Finding the gripper among the HID devices of this machine."""
+"""Search for the gripper among the HID devices of this computer."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from graspsense.plugin_api import FoundDevice, PluginUnavailable
 from graspsense_pr2_gripper.config import Pr2Config
 
 BACKEND = "pr2"
-# On Linux the module `hid` goes through libusb, which takes the device from the kernel; `hidraw` shares it.
+# On Linux the module `hid` uses libusb, which detaches the kernel driver; `hidraw` does not.
 LIBRARY = "hidraw" if sys.platform == "linux" else "hid"
 
 
 @frozen
 class HidDevice:
-    """A HID device as the operating system lists it: its serial number, and the node it is opened by."""
+    """A HID device as the operating system lists it: its serial number, and the node that is opened."""
 
     serial: str
     path: str
 
     @property
     def readable(self) -> bool:
-        """Whether this user may open it. Only Linux says so beforehand."""
+        """Whether the user has permission to open it. Only Linux can tell before opening."""
         return sys.platform != "linux" or os.access(self.path, os.R_OK | os.W_OK)
 
 
 @frozen
 class Search:
-    """What was looked for, and what there was: `matching` under the wanted numbers, `total` HID devices."""
+    """The result of a search: the devices with the USB ids of the config, and the number of all HID devices."""
 
     config: Pr2Config
     matching: tuple[HidDevice, ...]
@@ -42,21 +42,21 @@ class Search:
 
     @property
     def wanted(self) -> str:
-        """The device looked for, as a person writes it."""
+        """The device of the config in words."""
         serial = f" with serial number {self.config.serial!r}" if self.config.serial else ""
         return f"USB HID device {self.config.vendor_id:04x}:{self.config.product_id:04x}{serial}"
 
     @property
     def looked(self) -> str:
-        """Where it was looked for, and what was seen there."""
-        seen = f"looked with the module {LIBRARY} of hidapi, which lists {self.total} HID device(s)"
+        """How it was searched, and what exists, in words."""
+        seen = f"searched with the module {LIBRARY} of hidapi, which lists {self.total} HID device(s)"
         if sys.platform != "linux":
             return seen
         return f"{seen}; nodes present: {', '.join(sorted(glob('/dev/hidraw*'))) or 'no /dev/hidraw*'}"
 
 
 def search(config: Pr2Config) -> Search:
-    """List the HID devices and keep those wanted. Raises PluginUnavailable where hidapi is missing."""
+    """Return the HID devices with these USB ids and serial number. Raises PluginUnavailable without hidapi."""
     try:
         listed = import_module(LIBRARY).enumerate()
     except ImportError as error:
@@ -73,7 +73,7 @@ def search(config: Pr2Config) -> Search:
 
 
 def on_the_bus(config: Pr2Config) -> list[str]:
-    """Return the places on the bus that have a device of these numbers, as Linux lists them without any library."""
+    """Return the places on the USB bus with a device of these USB ids, as Linux lists them without a library."""
     found = []
     for folder in glob("/sys/bus/usb/devices/*"):
         try:
@@ -86,7 +86,7 @@ def on_the_bus(config: Pr2Config) -> list[str]:
 
 
 def found_devices() -> Sequence[FoundDevice]:
-    """Return the devices under the default numbers, as `graspsense devices` lists them."""
+    """Return the devices with the default USB ids, for `graspsense devices`."""
     return [
         FoundDevice(
             backend=BACKEND,

@@ -32,7 +32,7 @@ BAD_CELL: Final = 1 << 16
 BEYOND_TABLE: Final = 1 << 17
 """Status: a pad force is outside its load table."""
 UNLOADED_COUNTS: Final = 4500.0
-"""Without a stored tare, a pad whose cells read more than this in the mean is taken to be loaded: users report
+"""Without a stored tare, a pad whose cells read more than this in the mean counts as loaded: users report
 2900 to 3800 without a load (public PressureListener scripts for the PR2, differing by finger and run)."""
 
 Tips = tuple[tuple[float, ...], tuple[float, ...]]
@@ -50,7 +50,7 @@ _MIRRORED: Final = (
 """The cells of a fingertip with the -z and +z sides swapped: sides, corners, tip cells, and the columns of the pad."""
 
 
-class _Felt(NamedTuple):
+class _PadForces(NamedTuple):
     left_n: float
     right_n: float
     left_edge_n: float
@@ -58,7 +58,7 @@ class _Felt(NamedTuple):
     status: int
 
 
-_NOTHING: Final = _Felt(math.nan, math.nan, math.nan, math.nan, 0)
+_NO_FORCES: Final = _PadForces(math.nan, math.nan, math.nan, math.nan, 0)
 
 
 class Measure:
@@ -84,7 +84,7 @@ class Measure:
         self._stored, self._tables = stored, tables
         self._zero: Tips | None = stored
         self._pads = NO_PADS
-        self._felt = _NOTHING
+        self._forces = _NO_FORCES
         self._first_us: int | None = None
         self._last_us = 0
         self.bad_cells = 0
@@ -98,8 +98,8 @@ class Measure:
         if image is not None and image.counter != self._pads.counter:
             self._take(image)
         gap, rate = gap_and_rate(self._link, report.encoder_ticks / self._ticks_rev)
-        felt, status = self._felt, report.status
-        left, right = felt.left_n, felt.right_n
+        forces, status = self._forces, report.status
+        left, right = forces.left_n, forces.right_n
         if status & (LEFT_ABSENT | RIGHT_ABSENT):
             swap = self._swap
             left = math.nan if status & (RIGHT_ABSENT if swap else LEFT_ABSENT) else left
@@ -112,9 +112,9 @@ class Measure:
             report.effort_un / 1e6,
             left,
             right,
-            felt.left_edge_n,
-            felt.right_edge_n,
-            status | felt.status,
+            forces.left_edge_n,
+            forces.right_edge_n,
+            status | forces.status,
         )
         self._last_us = report.time_us
         return Reading(frame, self._pads)
@@ -128,13 +128,13 @@ class Measure:
                 mean = sum(good) / len(good) if good else 0.0
                 if mean > UNLOADED_COUNTS:
                     raise TareRefused(
-                        f"the {side} pad reads {mean:.0f} counts a cell, and up to {UNLOADED_COUNTS:.0f} pass for "
-                        "unloaded: take everything out of the gripper and try again; or, if nothing touches it, store "
+                        f"the {side} pad reads {mean:.0f} counts per cell; an unloaded one reads at most "
+                        f"{UNLOADED_COUNTS:.0f}: empty the gripper and try again. If nothing touches the pad, store "
                         "its zero once with `graspsense calibrate tare --replace`"
                     )
         self._zero = zero
         if self._pads.counter:
-            self._feel()
+            self._compute_forces()
 
     def _take(self, image: Image) -> None:
         cells = tuple(map(float, image.cells))
@@ -147,13 +147,13 @@ class Measure:
             right = tuple([right[i] for i in _MIRRORED])
         first_us = self._first_us if self._first_us is not None else 0
         self._pads = Pads((image.time_us - first_us) / 1e6, image.counter, left, right)
-        self._feel()
+        self._compute_forces()
 
-    def _feel(self) -> None:
+    def _compute_forces(self) -> None:
         zero = self._zero
         if zero is None:
             # Without a tare there is no force: the offsets alone are some thousand counts for each cell.
-            self._felt = _Felt(0.0, 0.0, 0.0, 0.0, 0)
+            self._forces = _PadForces(0.0, 0.0, 0.0, 0.0, 0)
             return
         left, left_bad = masked(self._pads.left, zero[0])
         right, right_bad = masked(self._pads.right, zero[1])
@@ -167,7 +167,7 @@ class Measure:
             right_n, right_inside = load_of(self._tables[1], right_n)
             if not (left_inside and right_inside):
                 status |= BEYOND_TABLE
-        self._felt = _Felt(
+        self._forces = _PadForces(
             math.nan if left_bad == CELLS else left_n,
             math.nan if right_bad == CELLS else right_n,
             edge_force(left, zero[0], self._edge_per_n),

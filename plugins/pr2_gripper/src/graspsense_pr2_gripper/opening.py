@@ -38,17 +38,17 @@ def open_board(config: Pr2Config, seed: int, wait_s: float) -> Opened:
     transport = _open_transport(config, wait_s)
     try:
         identity = decode_identity(transport.feature(FEATURE_ID))
-        # An old report may have waited in the device; with it, all reports in between would count as lost.
+        # An old report can remain in the device; all reports after it would count as lost.
         transport.read(READ_S)
         if config.serial and identity.serial != config.serial:
             raise ProtocolError(
-                f"its feature report says serial {identity.serial!r}, asked for is {config.serial!r}"
+                f"its feature report says serial {identity.serial!r}, but the settings ask for {config.serial!r}"
             )
     except (ProtocolError, TransportGone) as error:
         close_within(transport, JOIN_S)
         raise NoDevice(
-            f"a device {config.vendor_id:04x}:{config.product_id:04x} is there, but is no PR2 gripper to this driver: "
-            f"{error}\n  try: other numbers with -o gripper.vendor_id and gripper.product_id, or -o gripper.serial"
+            f"the device {config.vendor_id:04x}:{config.product_id:04x} does not answer as a PR2 gripper: "
+            f"{error}\n  try: other USB ids with -o gripper.vendor_id and gripper.product_id, or -o gripper.serial"
         ) from error
     return Opened(ThreadedLink(transport), identity, None)
 
@@ -74,11 +74,11 @@ def _open_transport(config: Pr2Config, wait_s: float) -> Transport:
             try:
                 return openers[0]()
             except OSError as error:
-                # Right after plugging in, udev may not yet have set the permissions of the node.
+                # Directly after plugging in, udev may not have set the permissions of the node yet.
                 missing = NoDevice(
-                    f"the PR2 gripper is there but cannot be opened: {error}\n"
+                    f"the PR2 gripper is connected but cannot be opened: {error}\n"
                     "  try: the udev rule that `graspsense doctor` prints, then plug it in again;\n"
-                    "       or close the other program that has it"
+                    "       or close the other program that uses it"
                 )
         elif openers:
             raise NoDevice(
@@ -95,10 +95,10 @@ def _hidraw(config: Pr2Config) -> tuple[Sequence[Callable[[], Transport]], NoDev
 
     found = search(config)
     missing = NoDevice(
-        f"no PR2 gripper: looked for {found.wanted}\n"
+        f"no PR2 gripper: searched for {found.wanted}\n"
         f"  {found.looked}\n"
         "  try: plug it in and switch it on, then `graspsense devices`\n"
-        "       other numbers: -o gripper.vendor_id=0x1209 -o gripper.product_id=0x0001\n"
+        "       other USB ids: -o gripper.vendor_id=0x1209 -o gripper.product_id=0x0001\n"
         "       no gripper at hand: -o gripper.transport=emulated, or `graspsense run --gripper sim`"
     )
     return [partial(HidrawTransport, one) for one in found.matching], missing
@@ -110,7 +110,7 @@ def _pyusb(config: Pr2Config) -> tuple[Sequence[Callable[[], Transport]], NoDevi
     devices = find(config)
     serial = f" with serial number {config.serial!r}" if config.serial else ""
     missing = NoDevice(
-        f"no PR2 gripper: looked for USB device {config.vendor_id:04x}:{config.product_id:04x}{serial} with libusb\n"
+        f"no PR2 gripper: searched for USB device {config.vendor_id:04x}:{config.product_id:04x}{serial} with libusb\n"
         "  try: plug it in and switch it on; gripper.transport hidraw sees devices that are not on USB, too\n"
         "       no gripper at hand: -o gripper.transport=emulated, or `graspsense run --gripper sim`"
     )

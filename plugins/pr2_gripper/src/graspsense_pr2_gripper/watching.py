@@ -21,9 +21,9 @@ FIRST_COUNTER: Final = 0x8000
 
 
 class Watched(NamedTuple):
-    """What was seen of a link. Delays are over the fastest report's, as no clock tells of that one's own.
+    """Measurements of a link. Delays are relative to the fastest report, whose own delay cannot be measured.
 
-    `in_use` says that another program commands the device: then nothing was sent to it, and no trip was timed.
+    `in_use` means that another program commands the device. Nothing is sent then, and no round trip is measured.
     """
 
     reports: int
@@ -37,7 +37,7 @@ class Watched(NamedTuple):
 
 
 def watch_link(link: Link, seconds: float) -> Watched:
-    """Listen for `seconds`, then time commands that let go until their echo. Raises DeviceLost."""
+    """Receive reports for `seconds`, then measure the round trip of commands that release. Raises DeviceLost."""
     began = time.monotonic()
     arrivals: list[tuple[float, float]] = []
     echoes: set[int] = set()
@@ -64,7 +64,7 @@ def watch_link(link: Link, seconds: float) -> Watched:
 
 
 def share_of(values: Sequence[float], share: float) -> float:
-    """Return the value that this share of the sorted values does not exceed; NaN where there are none."""
+    """Return this quantile of sorted values, NaN if there are none."""
     return values[min(int(len(values) * share), len(values) - 1)] if values else float("nan")
 
 

@@ -1,1 +1,1 @@
-"""The software board as a device of the operating system: real nodes, real kernel, no hardware."""
+"""The emulated board as a device of the operating system, with real device nodes and the real kernel drivers."""

@@ -1,4 +1,4 @@
-"""A software board plugged into this machine: it runs by the clock, and does what somebody tells it to do wrong."""
+"""An emulated board connected to this computer. It runs in real time, and shows faults on request."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ from graspsense_pr2_gripper.protocol import FEATURE_ID, INPUT_LAYOUT, OUTPUT_ID
 
 PRODUCT: Final = "graspsense emulated PR2 gripper"
 APPEARS_S: Final = 5.0
-"""A node that is to appear is waited for this long."""
+"""Largest time to wait for the device node to appear."""
 JOIN_S: Final = 2.0
 
 Mood = Literal["well", "silent", "stalled"]
 
 
 def emulate(config: object, wire: str, seed: int) -> EmulatedBoard:
-    """Return the board of these settings on `uhid` or `usb`, or on the first that can be had; not plugged in yet.
+    """Return an emulated board that is not connected yet.
 
-    Raises NoDevice where there is no way in, ConfigError.
+    `wire` is `uhid` or `usb`, or any other text for the first of them that is available. Raises NoDevice if none is
+    available, ConfigError.
     """
     assert isinstance(config, Pr2Config)
     return EmulatedBoard(config, _way_in(wire), seed)
@@ -35,7 +36,7 @@ def emulate(config: object, wire: str, seed: int) -> EmulatedBoard:
 
 @final
 class EmulatedBoard(EmulatedDevice):
-    """Steps the firmware in a thread of its own, whether or not it is plugged in: a pulled plug takes no power away."""
+    """Runs the firmware in its own thread, connected or not: an unplugged board keeps its power."""
 
     def __init__(self, config: Pr2Config, wire: str, seed: int) -> None:
         self._board = emulated_board(config, seed).wire
@@ -57,12 +58,12 @@ class EmulatedBoard(EmulatedDevice):
 
     @property
     def stalled(self) -> bool:
-        """Whether nothing completes, in either direction."""
+        """Whether no transfer completes, in either direction."""
         return self._mood == "stalled"
 
     @property
     def words(self) -> Mapping[str, str]:
-        """What it can be told."""
+        """The commands of `do`, with their meanings."""
         return {
             "unplug": "pull the plug; the board keeps its power",
             "plug": "plug it in again",
@@ -73,11 +74,11 @@ class EmulatedBoard(EmulatedDevice):
         }
 
     def tell(self, word: str) -> None:
-        """Do one of `words`. Raises KeyError for any other, NoDevice where it cannot be plugged in."""
+        """Execute one of the commands of `words`. Raises KeyError for any other, NoDevice if it cannot be connected."""
         self._told()[word]()
 
     def state(self) -> Mapping[str, float | int | str | bool]:
-        """Return how it is: what the fingers do, and what has been sent, lost and taken since it was started."""
+        """Return the state of the fingers, and the numbers of sent and lost reports and of received commands."""
         with self._lock:
             firmware = self._board.firmware
             return {
@@ -94,18 +95,18 @@ class EmulatedBoard(EmulatedDevice):
             }
 
     def node(self) -> str:
-        """Return the hidraw node of this device, or an empty string where it has none, as while libusb has it."""
+        """Return the hidraw node of this device, "" if it has none, for example while libusb uses it."""
         return next(iter(sorted(nodes(self._serial) - self._known)), "")
 
     def close(self) -> None:
-        """Unplug it and stop it."""
+        """Disconnect the board and stop its thread."""
         self._stop = True
         self._thread.join(JOIN_S)
         self._plugged = False
         self._port.close()
 
     def output(self, report: bytes) -> None:
-        """Take a command from the host."""
+        """Receive a command from the host."""
         if report[:1] != bytes((OUTPUT_ID,)):
             return
         with self._lock:
@@ -137,7 +138,9 @@ class EmulatedBoard(EmulatedDevice):
         while not self.node() and time.monotonic() < give_up:
             time.sleep(0.01)
         if not self.node():
-            raise NoDevice(f"the kernel took the device, but no node of it appeared within {APPEARS_S:.0f} s")
+            raise NoDevice(
+                f"the kernel accepted the device, but no device node appeared within {APPEARS_S:.0f} s"
+            )
 
     def _unplug(self) -> None:
         self._plugged = False
@@ -154,13 +157,13 @@ class EmulatedBoard(EmulatedDevice):
                 with self._lock:
                     reports = self._board.step()
                     self._late_s = late_s
-                # Without the lock: the port has one of its own, and calls `output` with it held.
+                # Without the lock: the port calls `output` while it holds its own lock.
                 for report in reports:
                     self._hand_over(report)
                 if self._board.unplugged and self._plugged:
                     self._unplug()
         except Exception as error:
-            # A body of anybody's may fail; to the host that is a device that went away.
+            # The simulated fingers can be a user's code and fail; the host then sees a lost device.
             self._failed = f"{type(error).__name__}: {error}"
             self._unplug()
 
@@ -202,7 +205,7 @@ _WHY_NOT: Final = {"uhid": why_no_uhid, "usb": why_no_vhci}
 
 
 def _way_in(wire: str) -> str:
-    """Return the wire asked for, or the first that can be had. Raises NoDevice, with what each one lacks."""
+    """Return this wire, or the first that is available. Raises NoDevice with the reason for each wire."""
     wires = (wire,) if wire else tuple(_PORTS)
     reasons = {one: _WHY_NOT[one]() for one in wires}
     for one, reason in reasons.items():
@@ -210,7 +213,7 @@ def _way_in(wire: str) -> str:
             return one
     told = "\n".join(f"{one}: {reason}" for one, reason in reasons.items())
     raise NoDevice(
-        f"the emulated gripper cannot be a device of this machine\n{told}\n"
-        "without any device of the system, in one process:\n"
+        f"the emulated gripper cannot be connected to this computer\n{told}\n"
+        "to emulate it within one process, without a device of the system:\n"
         "  graspsense run --gripper pr2 -o gripper.transport=emulated -o gripper.pace=device"
     )

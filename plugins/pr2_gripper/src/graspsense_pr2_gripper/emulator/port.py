@@ -1,4 +1,4 @@
-"""What an emulated board asks of a way into this machine's HID stack, and the other way round."""
+"""The interface between an emulated board and a port into the HID subsystem of this computer."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 
 class Plug(NamedTuple):
-    """Who the device says it is when it is plugged in."""
+    """The identity of the device on the bus."""
 
     vendor_id: int
     product_id: int
@@ -16,38 +16,38 @@ class Plug(NamedTuple):
 
 
 class Device(Protocol):
-    """The board, as its port calls it; any thread may."""
+    """The side of the board that its port calls, from any thread."""
 
     @property
     def stalled(self) -> bool:
-        """Whether nothing completes, in either direction."""
+        """Whether no transfer completes, in either direction."""
 
     def output(self, report: bytes) -> None:
-        """Take an output report of the host's."""
+        """Receive an output report from the host."""
 
     def feature(self, report_id: int) -> bytes | None:
-        """Return a feature report, or None where there is none."""
+        """Return a feature report, None if there is no such report."""
 
 
 class Port(ABC):
-    """A socket of this machine that the board can be plugged into. `close` unplugs, and so does the process's end."""
+    """A port that the board can be connected to. `close`, or the end of the process, disconnects it."""
 
     @abstractmethod
     def plug(self) -> None:
-        """Make the device appear. Raises NoDevice where the kernel refuses."""
+        """Connect the device. Raises NoDevice if the kernel refuses it."""
 
     @abstractmethod
     def unplug(self) -> None:
-        """Make it disappear at once, as a pulled plug does."""
+        """Disconnect the device abruptly, as pulling the plug does."""
 
     @abstractmethod
     def send(self, report: bytes) -> bool:
-        """Hand a report to the host; return whether one before it was lost for want of a host that asked."""
+        """Pass a report to the host; return whether an earlier one was lost because the host had not read it."""
 
     @abstractmethod
     def close(self) -> None:
-        """Unplug and give everything back."""
+        """Disconnect the device and release all resources."""
 
     def halt(self) -> bool:
-        """Answer the next reads with a stall until the host clears it; return whether this port knows such a thing."""
+        """Stall the reading endpoint until the host clears it; return whether the port supports stalls."""
         return False

@@ -1,4 +1,4 @@
-"""Why a way into this machine's HID stack is closed: module, permission, container or platform, and what to do."""
+"""Why the board cannot be emulated as a device here: kernel module, permission, container or platform; and remedies."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MODULES: Final = Path("/lib/modules")
 
 
 def why_no_uhid() -> str:
-    """Return why there can be no device through uhid, or an empty string where there can."""
+    """Return the reason why a device through uhid is impossible, "" if it is possible."""
     if reason := _not_linux("uhid"):
         return reason
     if not os.path.exists(UHID_NODE):
@@ -36,7 +36,7 @@ def why_no_uhid() -> str:
 
 
 def why_no_vhci() -> str:
-    """Return why there can be no whole USB device, or an empty string where there can."""
+    """Return the reason why a USB device through vhci-hcd is impossible, "" if it is possible."""
     if reason := _not_linux("vhci-hcd"):
         return reason
     attach = VHCI / "attach"
@@ -50,7 +50,7 @@ def why_no_vhci() -> str:
 
 
 def container() -> str:
-    """Return the kind of container this process runs in, or an empty string."""
+    """Return the kind of container that this process runs in, "" if it is none."""
     for path, kind in (("/.dockerenv", "docker"), ("/run/.containerenv", "podman")):
         if os.path.exists(path):
             return kind

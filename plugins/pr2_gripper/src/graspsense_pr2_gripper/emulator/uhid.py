@@ -1,4 +1,4 @@
-"""A HID device through /dev/uhid (linux/uhid.h): a hidraw node without a USB device below it."""
+"""A HID device through /dev/uhid (linux/uhid.h), which has a hidraw node but is not on the USB bus."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SET_REPORT: Final = 13
 _SET_REPORT_REPLY: Final = 14
 _DATA: Final = 4096
 _EVENT: Final = 4 + 4372
-"""Bytes of the largest event, `struct uhid_event`."""
+"""Size in bytes of `struct uhid_event`."""
 _BUS_USB: Final = 3
 
 _KIND: Final = struct.Struct("<I")
@@ -40,7 +40,7 @@ _SIZE: Final = struct.Struct("<H")
 
 @final
 class UhidPort(Port):
-    """Raises NoDevice, with what to do, where /dev/uhid cannot be had."""
+    """Raises NoDevice with a remedy if /dev/uhid cannot be used."""
 
     def __init__(self, device: Device, plug: Plug) -> None:
         reason = why_no_uhid()
@@ -88,7 +88,7 @@ class UhidPort(Port):
                 os.write(self._node, _KIND.pack(_DESTROY))
 
     def send(self, report: bytes) -> bool:
-        """Hand a report to the kernel, which keeps it for whoever has the node open."""
+        """Pass a report to the kernel, which queues it for the programs that have opened the node."""
         with self._lock:
             if self._plugged:
                 os.write(self._node, _INPUT2_REQUEST.pack(_INPUT2, len(report)) + report)
@@ -104,12 +104,12 @@ class UhidPort(Port):
             os.close(descriptor)
 
     def _serve(self) -> None:
-        """Answer the kernel, which waits five seconds for each answer, until closed."""
+        """Answer requests of the kernel, which waits five seconds for each answer, until the port is closed."""
         while True:
             ready, _, _ = select.select([self._node, self._wake], [], [])
             if self._wake in ready:
                 return
-            with suppress(OSError):  # of a device that has just been destroyed
+            with suppress(OSError):  # for a device that has just been destroyed
                 self._answer(os.read(self._node, _EVENT))
 
     def _answer(self, event: bytes) -> None:

@@ -1,4 +1,4 @@
-"""The board as a USB device: its descriptors, and what it answers on its control endpoint (USB 2.0, 9; HID 1.11)."""
+"""The board as a USB device: its descriptors and its control endpoint (USB 2.0, chapter 9; HID 1.11)."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class UsbDevice:
         )
 
     def control(self, setup: bytes, data: bytes) -> bytes | None:
-        """Return what the device answers, nothing for a request that it accepts, or None for a stall."""
+        """Return the answer of the device: empty bytes if it only accepts the request, None for a stall."""
         kind, request, value, index, length = SETUP.unpack(setup)
         asked = (kind, request)
         high, low = value >> 8, value & 0xFF

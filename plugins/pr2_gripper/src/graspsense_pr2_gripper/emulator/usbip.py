@@ -1,6 +1,6 @@
-"""A USB device by USB/IP: the protocol of Documentation/usb/usbip_protocol.rst of the kernel, over any stream socket.
+"""A USB device over USB/IP, the protocol of Documentation/usb/usbip_protocol.rst of Linux, on any stream socket.
 
-An unlink is always answered, whatever else is not: a host that waits for one hangs for good.
+An unlink request is always answered, even if nothing else is: a host that waits for that answer never recovers.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from graspsense_pr2_gripper.emulator.port import Device, Plug
 from graspsense_pr2_gripper.emulator.usb_device import UsbDevice
 
 HEADER: Final = struct.Struct(">5I28s")
-"""Command, sequence number, device, direction, endpoint; what the command asks."""
+"""Command, sequence number, device, direction and endpoint of a request, and its parameters."""
 SUBMITTED: Final = struct.Struct(">Iiiii8s")
-"""Flags, length, and what interrupt transfers have no use for; the setup packet."""
+"""Flags, length, fields that interrupt transfers do not use, and the setup packet."""
 RETURN: Final = struct.Struct(">5Iiiiii8x")
-"""The header's first five; status, length, and what interrupt transfers have no use for."""
+"""The first five fields of the request, the status, the length, and fields that interrupt transfers do not use."""
 SUBMIT, UNLINK = 1, 2
 RET_SUBMIT, RET_UNLINK = 3, 4
 IN: Final = 1
@@ -29,7 +29,7 @@ _RETURN_UNLINK: Final = struct.Struct(">5Ii24x")
 
 
 class _Waiting(NamedTuple):
-    """A transfer of the host's that is not complete yet."""
+    """A transfer of the host that has not completed."""
 
     number: int
     endpoint: int
@@ -51,14 +51,14 @@ class UsbipServer:
         self._armed = b""
 
     def connect(self, connection: socket.socket) -> None:
-        """Take a host's connection; `serve` then answers it."""
+        """Store the connection of a host; `serve` answers it."""
         with self._lock:
             self._connection = connection
             self._waiting.clear()
             self._armed, self._usb.halted = b"", False
 
     def serve(self) -> None:
-        """Answer the host until it hangs up, or `hang_up` does."""
+        """Answer the host until it or `hang_up` closes the connection."""
         connection = self._connection
         if connection is None:
             return
@@ -76,7 +76,7 @@ class UsbipServer:
                     self._unlink(number, *_VICTIM.unpack_from(asked))
 
     def hang_up(self) -> None:
-        """End `serve`, at once."""
+        """End `serve` immediately."""
         with self._lock:
             connection, self._connection = self._connection, None
         if connection is not None:
@@ -84,9 +84,9 @@ class UsbipServer:
                 connection.shutdown(socket.SHUT_RDWR)
 
     def send(self, report: bytes) -> bool:
-        """Complete the host's read with this report, or arm the endpoint with it; return whether it was lost.
+        """Complete a pending read of the host with this report, or buffer it; return whether it was lost.
 
-        Like the endpoint of a microcontroller it holds one report; one that comes while it is full is lost.
+        The buffer holds a single report, as the endpoint of a microcontroller does. A report is lost if it is full.
         """
         with self._lock:
             if self._connection is None:
@@ -112,7 +112,7 @@ class UsbipServer:
             self._write(_RETURN_UNLINK.pack(RET_UNLINK, number, 0, 0, 0, status))
 
     def _complete(self) -> None:
-        """Complete every transfer that can be; with the lock held."""
+        """Complete all transfers that can be completed. The caller holds the lock."""
         if self._device.stalled:
             return
         waiting, self._waiting = self._waiting, []
@@ -141,5 +141,5 @@ class UsbipServer:
 
     def _write(self, data: bytes) -> None:
         if self._connection is not None:
-            with suppress(OSError):  # unplugged at this moment
+            with suppress(OSError):  # disconnected at this moment
                 self._connection.sendall(data)

@@ -1,6 +1,6 @@
-"""A whole USB device through vhci-hcd: USB/IP with this machine itself, over a socket pair that no network sees.
+"""A USB device through the kernel module vhci-hcd: USB/IP within this computer, over a socket pair without a network.
 
-The device goes with the socket, and so with this process.
+The device disappears when the socket is closed, and so at the latest with this process.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from graspsense_pr2_gripper.emulator.usbip import UsbipServer
 _DEVICE_ID: Final = 1 << 16 | 2
 _FULL_SPEED: Final = 2
 _FREE_PORT: Final = "004"
-"""VDEV_ST_NULL, as the status file has it."""
+"""State of a free port in the status file (VDEV_ST_NULL)."""
 
 
 @final
 class VhciPort(Port):
-    """Raises NoDevice, with what to do, where vhci-hcd cannot be had."""
+    """Raises NoDevice with a remedy if vhci-hcd cannot be used."""
 
     def __init__(self, device: Device, plug: Plug) -> None:
         reason = why_no_vhci()
@@ -51,7 +51,7 @@ class VhciPort(Port):
             self._thread.start()
 
     def unplug(self) -> None:
-        """Cut the connection; the kernel then takes the device away."""
+        """Close the connection; the kernel then removes the device."""
         with self._lock:
             thread, self._thread = self._thread, None
             if thread is not None:
@@ -59,7 +59,7 @@ class VhciPort(Port):
                 thread.join()
 
     def send(self, report: bytes) -> bool:
-        """Complete the host's read with this report, or arm the endpoint with it."""
+        """Complete a pending read of the host with this report, or buffer it."""
         return self._server.send(report)
 
     def halt(self) -> bool:

@@ -1,1 +1,1 @@
-"""The ways to a board: one thin interface, a file for each wire."""
+"""Transports: one interface, and one file for each way to reach a board."""

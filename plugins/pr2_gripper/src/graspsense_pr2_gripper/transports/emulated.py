@@ -1,4 +1,4 @@
-"""A software board in this process, in lock-step with its reader or running by the clock."""
+"""An emulated board in this process, in lock-step with its reader or in real time."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
 
 _GONE: Final = "the emulated cable was pulled"
 QUEUE: Final = 64
-"""Reports that wait for a reader who lags; the newer ones are lost, as behind a Linux hidraw node."""
+"""Largest number of queued reports; newer ones are lost, as with a Linux hidraw node."""
 
 
 @final
 class LockStepTransport(Transport):
-    """A period of device time passes whenever a read finds no report waiting, and at no other time."""
+    """Device time advances by one period whenever a read finds no queued report, and at no other time."""
 
     def __init__(self, wire: Wire) -> None:
         self._wire = wire
@@ -26,7 +26,7 @@ class LockStepTransport(Transport):
         self._waiting: deque[bytes] = deque()
 
     def read(self, timeout_s: float) -> bytes:
-        """Return a waiting report, or let up to `timeout_s` of device time pass until there is one."""
+        """Return a queued report, or advance the device by up to `timeout_s` until there is one."""
         waiting = self._waiting
         if not waiting:
             for _ in range(math.ceil(timeout_s / self._period_s - 1e-9)):
@@ -38,22 +38,22 @@ class LockStepTransport(Transport):
         return waiting.popleft() if waiting else b""
 
     def write(self, report: bytes) -> None:
-        """Hand a command to the board."""
+        """Send a command to the board."""
         if self._wire.unplugged:
             raise TransportGone(_GONE)
         self._wire.output(report)
 
     def feature(self, report_id: int) -> bytes:
-        """Return the board's feature report."""
+        """Return the feature report of the board."""
         return self._wire.firmware.feature()
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: there are no resources."""
 
 
 @final
 class PacedTransport(Transport):
-    """The board runs in a thread of its own, on a grid of absolute times."""
+    """The board runs in its own thread, on a grid of absolute times."""
 
     def __init__(self, wire: Wire) -> None:
         self._wire = wire
@@ -76,18 +76,18 @@ class PacedTransport(Transport):
             return b""
 
     def write(self, report: bytes) -> None:
-        """Hand a command to the board."""
+        """Send a command to the board."""
         with self._arrived:
             if self._gone():
                 raise TransportGone(self._failed or _GONE)
             self._wire.output(report)
 
     def feature(self, report_id: int) -> bytes:
-        """Return the board's feature report."""
+        """Return the feature report of the board."""
         return self._wire.firmware.feature()
 
     def close(self) -> None:
-        """Stop the board's thread."""
+        """Stop the thread of the board."""
         self._stop = True
         self._thread.join()
 
@@ -105,7 +105,7 @@ class PacedTransport(Transport):
                             self._waiting.append(report)
                     self._arrived.notify()
         except Exception as error:
-            # A body of anybody's may fail; to the host that is a device that went away.
+            # The simulated fingers can be a user's code and fail; the host then sees a lost device.
             with self._arrived:
                 self._failed = f"the emulated board failed: {type(error).__name__}: {error}"
                 self._arrived.notify()

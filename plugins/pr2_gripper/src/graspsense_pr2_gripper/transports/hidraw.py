@@ -1,4 +1,4 @@
-"""HID through hidapi: on Linux its module `hidraw`, which leaves the device to the kernel and sees uhid devices."""
+"""HID through hidapi: on Linux its module `hidraw`, which keeps the kernel driver and supports uhid devices."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from graspsense_pr2_gripper.protocol import REPORT_SIZE
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
 
 WRITE_TIMEOUT_S: Final = 0.25
-"""How long a write may take. Where an endpoint is stalled the kernel itself waits for 5 s, uninterruptibly."""
+"""Largest time of a write. If an endpoint is stalled, the kernel itself waits for 5 s, without interruption."""
 
 
 @final
 class HidrawTransport(Transport):
-    """A device opened by its path. Raises OSError where it cannot be opened.
+    """A device opened by its path. Raises OSError if it cannot be opened.
 
-    Writes are made by a thread of their own, so that a stalled endpoint is reported within `WRITE_TIMEOUT_S`.
+    A separate thread writes, so that a stalled endpoint is reported within `WRITE_TIMEOUT_S`.
     """
 
     def __init__(self, device: HidDevice) -> None:
@@ -33,8 +33,8 @@ class HidrawTransport(Transport):
         self._writer.start()
 
     def read(self, timeout_s: float) -> bytes:
-        """Return the next report, as hidapi's list of integers made bytes."""
-        # A timeout of 0 would call the read that blocks for good.
+        """Return the next report; hidapi gives it as a list of integers."""
+        # A timeout of 0 would mean to wait forever.
         timeout_ms = max(1, math.ceil(timeout_s * 1e3))
         try:
             return bytes(self._device.read(REPORT_SIZE, timeout_ms=timeout_ms))
@@ -42,16 +42,18 @@ class HidrawTransport(Transport):
             raise TransportGone(f"reading {self._path}: {error}") from error
 
     def write(self, report: bytes) -> None:
-        """Send a report; hidapi tells of a device that is gone by -1 alone."""
+        """Send a report; for a lost device, hidapi returns -1 without a reason."""
         self._reports.put(report)
         try:
             written = self._written.get(timeout=WRITE_TIMEOUT_S)
         except Empty:
-            raise TransportGone(f"writing to {self._path}: not taken within {WRITE_TIMEOUT_S:g} s") from None
+            raise TransportGone(
+                f"writing to {self._path}: not accepted within {WRITE_TIMEOUT_S:g} s"
+            ) from None
         if isinstance(written, Exception):
             raise TransportGone(f"writing to {self._path}: {written}") from written
         if written != len(report):
-            raise TransportGone(f"writing to {self._path}: {written} of {len(report)} bytes were taken")
+            raise TransportGone(f"writing to {self._path}: {written} of {len(report)} bytes were accepted")
 
     def feature(self, report_id: int) -> bytes:
         """Return a feature report."""
@@ -61,7 +63,7 @@ class HidrawTransport(Transport):
             raise TransportGone(f"feature report {report_id} of {self._path}: {error}") from error
 
     def close(self) -> None:
-        """Close the node, never under a write: a stalled one is waited for."""
+        """Close the node, after a stalled write has ended."""
         self._reports.put(None)
         self._writer.join()
         self._device.close()

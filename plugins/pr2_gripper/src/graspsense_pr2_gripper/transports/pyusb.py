@@ -1,4 +1,4 @@
-"""The same reports through libusb, for a device that has no HID driver or for finding out what one does."""
+"""The same reports through libusb, for a device without a HID driver, or to examine the effect of that driver."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _FEATURE_TYPE: Final = 3
 
 
 def find(config: Pr2Config) -> list[Any]:
-    """Return the USB devices of the wanted numbers and serial.
+    """Return the USB devices with the USB ids and the serial number of the config.
 
-    A device whose serial cannot be read, for want of permission, is not left out: opening it says so. Raises
-    PluginUnavailable where pyusb or the library libusb-1.0 is missing.
+    A device whose serial number cannot be read for lack of permission is included; opening it reports the reason.
+    Raises PluginUnavailable without pyusb or the library libusb-1.0.
     """
     try:
         core, util = import_module("usb.core"), import_module("usb.util")
@@ -34,7 +34,7 @@ def find(config: Pr2Config) -> list[Any]:
         raise PluginUnavailable(f"transport pyusb needs pyusb: {error}\n  try: pip install pyusb") from error
     except core.NoBackendError as error:
         raise PluginUnavailable(
-            "transport pyusb needs the system's library libusb-1.0, which pyusb does not find\n"
+            "transport pyusb needs the system library libusb-1.0, which pyusb cannot find\n"
             "  try: apt install libusb-1.0-0, or -o gripper.transport=hidraw"
         ) from error
     if not config.serial:
@@ -52,13 +52,13 @@ def find(config: Pr2Config) -> list[Any]:
 
 @final
 class PyusbTransport(Transport):
-    """A USB device, its HID interface claimed. Raises usb.core.USBError where it cannot be claimed."""
+    """A USB device with its HID interface claimed. Raises usb.core.USBError if it cannot be claimed."""
 
     def __init__(self, device: Any) -> None:
         self._core, self._util = import_module("usb.core"), import_module("usb.util")
         self._device = device
         self._detached = False
-        # No reset: it would enumerate the device anew and kill every handle.
+        # No reset: it would enumerate the device again and invalidate every handle.
         try:
             if device.is_kernel_driver_active(_INTERFACE):
                 device.detach_kernel_driver(_INTERFACE)
@@ -72,7 +72,7 @@ class PyusbTransport(Transport):
         self._out = next((one for one in addresses if not one & 0x80), 0x01)
 
     def read(self, timeout_s: float) -> bytes:
-        """Return the next report; a time-out is the normal idle case."""
+        """Return the next report, empty bytes after the timeout."""
         try:
             data: bytes = self._device.read(
                 self._in, REPORT_SIZE, max(1, math.ceil(timeout_s * 1e3))
@@ -86,13 +86,13 @@ class PyusbTransport(Transport):
         return data
 
     def write(self, report: bytes) -> None:
-        """Send a report. A device that does not take it in time counts as gone: nobody knows what it does."""
+        """Send a report. A device that does not accept it in time counts as lost, because its state is unknown."""
         try:
             written = self._device.write(self._out, report, WRITE_TIMEOUT_MS)
         except self._core.USBError as error:
             raise TransportGone(f"writing: {error}") from error
         if written != len(report):
-            raise TransportGone(f"writing: {written} of {len(report)} bytes were taken")
+            raise TransportGone(f"writing: {written} of {len(report)} bytes were accepted")
 
     def feature(self, report_id: int) -> bytes:
         """Return a feature report through the control endpoint."""
@@ -105,7 +105,7 @@ class PyusbTransport(Transport):
         return data
 
     def close(self) -> None:
-        """Release the interface and give it back to the kernel, as far as the device still lets us."""
+        """Release the interface and return it to the kernel; errors of a lost device are ignored."""
         for give_back in (self._release, self._reattach):
             with suppress(self._core.USBError, NotImplementedError):
                 give_back()
