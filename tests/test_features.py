@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from traces import made_trace
 
-from graspsense.core.features import in_words
 from graspsense.core.signals import Phase
 from graspsense.core.trace import SI_UNITS
+from graspsense.core.units import in_words
 from graspsense.plugins.features.chitta import NAMES, ChittaConfig, ChittaFeatures
 
 FEATURES = ChittaFeatures(ChittaConfig())

@@ -113,11 +113,13 @@ _TABLE: Final[Table] = {
         ),
     },
     "Feature sets": {
-        "features": ("Features", "in_words", "missing"),
+        "features": ("Features", "missing"),
         "roles": ("FeatureSet",),
         "trace": ("Trace", "TraceRecorder", "trace_of"),
+        "units": ("in_words",),
     },
     "Classifiers": {
+        "decision_path": ("SplitTest", "leaf_in_words", "path_in_words"),
         "features": ("UNKNOWN", "FeatureTable", "Prediction", "table_of"),
         "roles": ("Classifier", "ClassifierConfig"),
         "tree": ("TreeNode",),

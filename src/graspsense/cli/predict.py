@@ -104,10 +104,10 @@ def _trials(
 
 
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:
-    header = ("TRIAL", "ANSWER", "SURE", *(("TRUTH",) if labels else ()), "BECAUSE")
+    header = ("TRIAL", "PREDICTION", "CERTAINTY", *(("TRUTH",) if labels else ()), "BECAUSE")
     rows = []
     for i, one in enumerate(predictions):
-        sure = f"{one.probabilities.get(one.label, 0.0):.0%}" if _known(one) else ""
+        sure = percent(one.certainty) if one.certainty is not None else ""
         truth = (labels[i],) if labels else ()
         rows.append((str(i + 1), one.label, sure, *truth, "; ".join(one.because)))
     echo_table(header, rows)
@@ -138,6 +138,7 @@ def _as_json(prediction: Prediction, truth: str | None) -> dict[str, Any]:
     found = {
         "label": prediction.label,
         "probabilities": dict(prediction.probabilities),
+        "support": None if prediction.support is None else list(prediction.support),
         "because": list(prediction.because),
     }
     return found if truth is None else {**found, "truth": truth}

@@ -110,7 +110,9 @@ class Prediction:
 
     `label` is a class, or `unknown` for a trial far outside the training data. `probabilities` sum to 1; they are empty
     if the model could not be applied. `because` is the reason in words and units, with one step in each item. `model`
-    describes in one line what the model was trained on.
+    describes in one line what the model was trained on. `support` is what the probability of the label was counted
+    from, where it is a share of training trials (those in a leaf of a tree, or the nearest): the number of trials with
+    the label, and of all.
     """
 
     label: str
@@ -118,18 +120,40 @@ class Prediction:
     because: tuple[str, ...] = field(converter=_texts)
     warnings: tuple[str, ...] = field(default=(), converter=_texts)
     model: str = ""
+    support: tuple[float, float] | None = None
+
+    @property
+    def certainty(self) -> float | None:
+        """How certain the label is, as a probability below 1; None without probabilities.
+
+        A share of few training trials overstates it: 6 of 6 does not mean that the next one is certain. Such a share is
+        therefore corrected by the rule of succession, (with the label + 1) / (all + 2), which gives 88 % for 6 of 6.
+        """
+        if self.support is not None:
+            with_label, trials = self.support
+            return (with_label + 1) / (trials + 2)
+        return self.probabilities.get(self.label)
+
+    @property
+    def certainty_in_words(self) -> str:
+        """The certainty with what it rests on, such as `about 88 %: 6 of 6 training trials`; empty without any."""
+        if self.certainty is None:
+            return ""
+        if self.support is None:
+            return f"{percent(self.certainty)} by the model"
+        with_label, trials = self.support
+        about = percent(self.certainty).removeprefix("over ")
+        return f"about {about}: {with_label:.4g} of {trials:.4g} training trials"
 
 
 UNKNOWN = "unknown"
 
 
+def percent(probability: float) -> str:
+    """Return a probability in per cent. No model is certain, so that 1 is `over 99 %`."""
+    return "over 99 %" if probability > 0.995 else f"{100 * probability:.0f} %"
+
+
 def missing(names: Iterable[str], reason: str) -> dict[str, str]:
     """Return one reason for each of these features."""
     return dict.fromkeys(names, reason)
-
-
-def in_words(value: float, unit: str) -> str:
-    """Return a value with its unit, lengths in mm."""
-    if unit == "m" or unit.startswith("m/"):
-        return f"{value * 1e3:.4g} m{unit}"
-    return f"{value:.4g} {unit if unit != '1' else ''}".rstrip()

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.features import Features, FeatureTable, in_words
+from graspsense.core.features import Features, FeatureTable
+from graspsense.core.units import in_words
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

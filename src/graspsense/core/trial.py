@@ -71,6 +71,7 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
         else {
             "label": prediction.label,
             "probabilities": dict(prediction.probabilities),
+            "support": None if prediction.support is None else list(prediction.support),
             "because": list(prediction.because),
             "warnings": list(prediction.warnings),
             "model": prediction.model,

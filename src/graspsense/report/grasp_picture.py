@@ -10,8 +10,8 @@ import numpy as np
 
 from graspsense.core.errors import ConfigError, PluginUnavailable
 from graspsense.core.signals import Phase
+from graspsense.core.units import display_unit
 from graspsense.report.confusion import MATPLOTLIB_HINT
-from graspsense.report.units import for_people
 
 if TYPE_CHECKING:
     from graspsense.core.trace import Floats, Integers, Trace
@@ -71,7 +71,7 @@ def grasp_png(trial: Trial, path: Path) -> None:
     force.set_ylim(top=max(force.get_ylim()[1], 1.0))
     force.legend(loc="upper left", fontsize=8, framealpha=0.9)
     force.tick_params(labelbottom=False)
-    shown, factor = for_people(trace.units["gap"])
+    shown, factor = display_unit(trace.units["gap"])
     gap.plot(t, factor * trace.gap_m[start:], color=GAP, lw=1.6)
     gap.set_ylabel(f"gap, {shown}")
     gap.set_xlabel(f"{'time' if contact is None else 'time since contact'}, {trace.units['t']}")
@@ -122,14 +122,13 @@ def _words(trial: Trial) -> list[str]:
     features, prediction = trial.features, trial.prediction
     lines = [f"Outcome: {trial.outcome.words}", "", "Features"]
     for name, value, unit in zip(features.names, features.values, features.units, strict=True):
-        shown, factor = for_people(unit)
+        shown, factor = display_unit(unit)
         number = "missing" if value != value else f"{factor * value:.4g} {'' if shown == '1' else shown}"
         lines.append(f"   {name} = {number.rstrip()}")
     lines.append("")
     if prediction is None:
         return [*lines, "Prediction: none, the pipeline has no classifier"]
-    probability = prediction.probabilities.get(prediction.label)
-    certainty = "" if probability is None else f" ({probability:.0%})"
+    certainty = f" ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""
     lines += ["Prediction", f"   {prediction.label}{certainty}", "", "because"]
     lines += [f"   {step}" for step in prediction.because]
     if trial.report.get("simulated"):

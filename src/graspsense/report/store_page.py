@@ -10,7 +10,7 @@ from attrs import frozen
 
 from graspsense.core.config import SelectedComponent, select_component
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.features import in_words
+from graspsense.core.units import in_words
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.recording.reader import read_recorded
 from graspsense.report.evaluation_sections import code, confusion_section, controls_section, tree_section

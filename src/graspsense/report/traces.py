@@ -10,10 +10,10 @@ from attrs import frozen
 
 from graspsense.core.labelled import class_of
 from graspsense.core.plugins import installed
+from graspsense.core.units import display_unit, without_underscores
 from graspsense.report.grasp_curve import GraspCurve
 from graspsense.report.html import figure, folded, panels, table
 from graspsense.report.svg import DASHES, GRID, INKS, QUIET, AxisScale, Picture, number, reaching
-from graspsense.report.units import for_people, in_a_line
 
 STATES: Final = 8
 """Largest number of line styles in one picture."""
@@ -99,7 +99,7 @@ def _legend(picture: Picture, states: Sequence[str], grasps: Sequence[GraspCurve
     for k, label in enumerate(states):
         y = LEGEND_TOP + 15 * k
         picture.line([(36, y - 4), (66, y - 4)], INKS[k], width=2, dash=DASHES[k])
-        state = in_a_line(label.partition(":")[2] or label)
+        state = without_underscores(label.partition(":")[2] or label)
         picture.text(72, y, state)
         peak = max(grasp.peak_force_n for grasp in grasps if grasp.label == label)
         peaks.append(f"{state} up to {number(peak)} N")
@@ -177,7 +177,7 @@ def feature_meanings() -> dict[str, str]:
 def _feature(
     name: str, unit: str, meaning: str, labels: Sequence[str], column: Sequence[float | None]
 ) -> str:
-    shown, factor = for_people(unit)
+    shown, factor = display_unit(unit)
     title = f"{name}, {shown}" if shown else name
     of: dict[str, list[float]] = {label: [] for label in sorted(set(labels))}
     for label, value in zip(labels, column, strict=True):

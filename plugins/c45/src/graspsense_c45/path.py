@@ -10,7 +10,22 @@ from attrs import frozen
 from graspsense_c45.branch_words import branch, with_unit
 from graspsense_c45.numbers_as_text import short
 from graspsense_c45.prediction import class_indices, distributions
+from graspsense_c45.schema import Attribute
 from graspsense_c45.tree import Tree
+
+
+@frozen
+class NumericTest:
+    """A test of a numeric attribute: the value of the row, NaN if it is missing, and whether it is above the threshold.
+
+    share: the part of the training weight that took the same branch.
+    """
+
+    attribute: Attribute
+    value: float
+    threshold: float
+    above: bool
+    share: float
 
 
 @frozen
@@ -19,13 +34,16 @@ class Path:
 
     steps: one test each, such as ``delta_t 0.61 s > 0.542 s``. label, probability: the prediction for the row.
     support: the training weight at the leaf, in rows. Where a tested value is missing, the prediction is a mean over
-    all branches; the path follows the heaviest branch, and the step says so.
+    all branches; the path follows the heaviest branch, and the step says so. numeric_tests: the tests of numeric
+    attributes among the steps, as numbers. with_label: the training weight at the leaf that has the label.
     """
 
     steps: tuple[str, ...]
     label: str | int | float | bool
     probability: float
     support: float
+    numeric_tests: tuple[NumericTest, ...] = ()
+    with_label: float = 0.0
 
     def __str__(self) -> str:
         """Return the prediction and the steps in one line."""
@@ -41,27 +59,38 @@ def explain(tree: Tree, row: Sequence[float]) -> Path:
     values = np.array([row], dtype=np.float64)
     shares = distributions(tree, values, "numpy")[0]
     chosen = int(class_indices(tree, values, "numpy")[0])
-    node, steps = 0, []
+    node, steps, tests = 0, [], []
     while not tree.is_leaf(node):
         tested = values[0, tree.splits.feature[node]]
         slot = int(tree.splits.slot(np.array([node]), np.array([tested]))[0])
         if slot < 0:
             slot = int(np.argmax(tree.weighted_n_node_samples[tree.children(node)]))
-            share = (
-                tree.weighted_n_node_samples[tree.children(node)[slot]] / tree.weighted_n_node_samples[node]
-            )
+            share = _share(tree, node, slot)
             steps.append(
                 f"{tree.attribute(node).name} missing ({branch(tree, node, slot)} in {share:.0%} of training)"
             )
         else:
             steps.append(_step(tree, node, slot, float(tested)))
+        attribute = tree.attribute(node)
+        if not attribute.is_nominal:
+            threshold = float(tree.splits.threshold[node])
+            tests.append(
+                NumericTest(attribute, float(tested), threshold, slot == 1, _share(tree, node, slot))
+            )
         node = tree.children(node)[slot]
     return Path(
         tuple(steps),
         tree.schema.classes[chosen],
         float(shares[chosen]),
         float(tree.weighted_n_node_samples[node]),
+        tuple(tests),
+        float(tree.class_weights[node, chosen]),
     )
+
+
+def _share(tree: Tree, node: int, slot: int) -> float:
+    weights = tree.weighted_n_node_samples
+    return float(weights[tree.children(node)[slot]] / weights[node])
 
 
 def _step(tree: Tree, node: int, slot: int, tested: float) -> str:

@@ -15,9 +15,12 @@ from graspsense.plugin_api import (
     Features,
     FeatureTable,
     Prediction,
+    SplitTest,
     TreeNode,
     hookimpl,
     in_words,
+    leaf_in_words,
+    path_in_words,
     setting,
 )
 
@@ -135,10 +138,25 @@ class C45(Classifier[C45Config]):
             for one, value in zip(tree.schema.attributes, row, strict=True)
             if math.isnan(value)
         ]
+        tests = [
+            SplitTest(
+                feature=test.attribute.name,
+                unit=test.attribute.unit,
+                value=test.value,
+                threshold=test.threshold,
+                above=test.above,
+                share=test.share,
+            )
+            for test in path.numeric_tests
+        ]
+        leaf = leaf_in_words(path.with_label, path.support, str(path.label))
+        # Where a tested feature is missing, the probability is a mean over leaves and not the share in this one.
+        one_leaf = not any(math.isnan(test.value) for test in tests)
         return Prediction(
             label=str(path.label),
             probabilities=dict(zip(self.classes(), shares, strict=True)),
-            because=(*missing, *path.steps, f"{path.support:g} training trials came to this leaf"),
+            because=(*missing, *path_in_words(tests), leaf),
+            support=(path.with_label, path.support) if one_leaf and path.support > 0 else None,
         )
 
     def tree(self) -> Sequence[TreeNode]:

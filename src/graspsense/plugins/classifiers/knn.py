@@ -43,3 +43,9 @@ class Knn(ScikitClassifier[KnnConfig]):
             f"{votes.count(label)} of the {len(votes)} nearest training trials are {label}; the nearest is "
             f"{distances[0, 0]:.2g} standard deviations away",
         )
+
+    def support(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float]:
+        """Return the votes for the label, and all votes."""
+        _, rows = fitted.estimator.kneighbors(row)
+        votes = [fitted.labels[i] for i in rows[0].tolist()]
+        return float(max(votes.count(vote) for vote in votes)), float(len(votes))

@@ -76,6 +76,13 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
     def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
         """Return the reasons for this label of one preprocessed trial, of shape (1, features)."""
 
+    def support(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float] | None:
+        """Return the training trials that the largest probability was counted from: with the label, and in all.
+
+        None where the probabilities are not a share of training trials.
+        """
+        return None
+
     def shares(self, fitted: FittedEstimator, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the probabilities of preprocessed trials, in the order of the classes of the estimator."""
         import numpy as np
@@ -146,6 +153,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             probabilities=dict(zip(self.classes(), shares, strict=True)),
             because=(*filled, *self.reasons(fitted, row, label)),
             warnings=self._version_warnings(),
+            support=self.support(fitted, row),
         )
 
     def to_json(self) -> dict[str, Any]:

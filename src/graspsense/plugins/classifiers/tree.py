@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import frozen
 
-from graspsense.plugin_api import in_words, setting
+from graspsense.plugin_api import SplitTest, leaf_in_words, path_in_words, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier
 
 if TYPE_CHECKING:
@@ -41,15 +41,23 @@ class Cart(ScikitClassifier[CartConfig]):
         """Return the path through the tree, with thresholds in the units of the features."""
         inner = fitted.estimator.tree_
         nodes = fitted.estimator.decision_path(row).indices.tolist()
-        sentences = []
+        tests = []
         for node in nodes[:-1]:
             k = int(inner.feature[node])
-            name, unit = fitted.table.names[k], fitted.table.units[k]
-            value = float(row[0, k] * fitted.scale[k] + fitted.mean[k])
-            threshold = float(inner.threshold[node] * fitted.scale[k] + fitted.mean[k])
-            sign = "<=" if row[0, k] <= inner.threshold[node] else ">"
-            sentences.append(f"{name} = {in_words(value, unit)} {sign} {in_words(threshold, unit)}")
-        share = float(inner.value[nodes[-1]].max() / inner.value[nodes[-1]].sum())
-        trials = int(inner.n_node_samples[nodes[-1]])
-        sentences.append(f"{share:.0%} of the {trials} training trials that came here were {label}")
-        return sentences
+            tests.append(
+                SplitTest(
+                    feature=fitted.table.names[k],
+                    unit=fitted.table.units[k],
+                    value=float(row[0, k] * fitted.scale[k] + fitted.mean[k]),
+                    threshold=float(inner.threshold[node] * fitted.scale[k] + fitted.mean[k]),
+                    above=bool(row[0, k] > inner.threshold[node]),
+                )
+            )
+        return (*path_in_words(tests), leaf_in_words(*self.support(fitted, row), label))
+
+    def support(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float]:
+        """Return how many training trials in the leaf have its most frequent label, and how many there are."""
+        inner, leaf = fitted.estimator.tree_, int(fitted.estimator.apply(row)[0])
+        trials = int(inner.n_node_samples[leaf])
+        shares = inner.value[leaf]
+        return float(round(trials * shares.max() / shares.sum())), float(trials)

@@ -1,0 +1,37 @@
+"""Values and units as people read them: lengths in millimetres, one unit for a quantity in a whole output."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def display_unit(unit: str) -> tuple[str, float]:
+    """Return the unit in which a quantity is shown, and the factor to it: mm for m, mm/s for m/s."""
+    return (f"m{unit}", 1e3) if unit == "m" or unit.startswith("m/") else (unit, 1.0)
+
+
+def in_words(value: float, unit: str) -> str:
+    """Return a value with its unit, lengths in mm."""
+    shown, factor = display_unit(unit)
+    return with_unit(f"{value * factor:.4g}", shown)
+
+
+def in_words_apart(values: Sequence[float], unit: str) -> list[str]:
+    """Return values with their unit, with three significant digits or as many as tell different values apart."""
+    shown, factor = display_unit(unit)
+    scaled = [value * factor for value in values]
+    for digits in range(3, 18):
+        texts = [f"{value:.{digits}g}" for value in scaled]
+        if len(set(texts)) == len(set(scaled)):
+            break
+    return [with_unit(text, shown) for text in texts]
+
+
+def with_unit(number: str, shown: str) -> str:
+    """Return a number with the unit in which it is shown; the unit 1, that of a ratio, is left out."""
+    return f"{number} {shown}" if shown not in ("", "1") else number
+
+
+def without_underscores(text: str) -> str:
+    """Return a name without the underscores of a key."""
+    return text.replace("_", " ")

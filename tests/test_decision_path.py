@@ -1,0 +1,102 @@
+"""The path through a tree as reasons: one range a feature, which accepts exactly what all the tests accept."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from graspsense.core.decision_path import FeatureRange, SplitTest, feature_ranges, path_in_words
+from graspsense.core.features import Features, FeatureTable, Prediction
+from graspsense.core.units import in_words_apart
+from graspsense.plugin_api import create
+
+NUMBERS = st.floats(-1e3, 1e3) | st.sampled_from([0.0569, 0.057, 0.0570001])
+
+
+@given(tests=st.lists(st.tuples(st.sampled_from("abc"), NUMBERS), max_size=12), value=NUMBERS, other=NUMBERS)
+def test_the_ranges_accept_exactly_what_all_the_tests_accept(tests, value, other):
+    path = [
+        SplitTest(feature=name, unit="m", value=value, threshold=threshold, above=value > threshold)
+        for name, threshold in tests
+    ]
+    ranges = {one.feature: one for one in feature_ranges(path)}
+
+    for name in "abc":
+        accepted = all((other > test.threshold) == test.above for test in path if test.feature == name)
+        assert (name not in ranges or ranges[name].contains(other)) == accepted
+    assert len(path_in_words(path)) == len({name for name, _ in tests})
+
+
+@given(values=st.lists(NUMBERS, min_size=1, max_size=4))
+def test_different_values_read_differently_and_in_order(values):
+    texts = in_words_apart(sorted(values), "m")
+
+    read = [float(re.fullmatch(r"(\S+) mm", text)[1]) for text in texts]
+    assert read == sorted(read)
+    assert len(set(read)) == len({1e3 * value for value in values})
+
+
+def test_the_tightest_bound_is_told_with_the_unit_for_people():
+    def test(threshold: float, above: bool) -> SplitTest:
+        return SplitTest(feature="p_first", unit="m", value=0.0579, threshold=threshold, above=above)
+
+    assert path_in_words([test(0.0569, True), test(0.057, True)]) == ("p_first = 57.9 mm > 57 mm",)
+    assert path_in_words([test(0.0569, True), test(0.0599, False)]) == (
+        "56.9 mm < p_first = 57.9 mm <= 59.9 mm",
+    )
+    assert FeatureRange(feature="f", unit="1", value=0.5, high=0.50001).words == "f = 0.5 <= 0.50001"
+
+
+@pytest.mark.parametrize("name", ["c45", "tree"])
+def test_trials_within_the_told_ranges_have_the_same_prediction(name):
+    rng = np.random.default_rng(5)
+    values = rng.uniform(0.0, 0.1, (200, 2))
+    labels = [f"{int(a // 0.02)}{int(b // 0.03)}" for a, b in values]
+    classifier = create("classifier", name)
+    classifier.fit(FeatureTable(names=("a", "b"), units=("m", "m"), values=values), labels, 0)
+    several = 0
+    for a, b in rng.uniform(0.0, 0.1, (50, 2)).tolist():
+        said = classifier.explain(Features(names=("a", "b"), values=(a, b), units=("m", "m")))
+        tests = [one for one in said.because if " = " in one]
+        assert len(tests) == len({re.search(r"(\w) = ", one)[1] for one in tests})
+        several += any("<" in one.split(" = ")[0] for one in tests)
+        # Within the printed bounds, which are rounded, the label does not change.
+        inside = {"a": a, "b": b}
+        for one in tests:
+            low, feature, value, sign, bound = re.fullmatch(
+                r"(?:(\S+) mm < )?(\w) = (\S+) mm (?:(<=|>) (\S+) mm)", one
+            ).groups()
+            end = float(low) if low else float(bound)
+            inside[feature] = (float(value) + 0.5 * (end - float(value))) / 1e3
+            assert sign
+        moved = Features(names=("a", "b"), values=(inside["a"], inside["b"]), units=("m", "m"))
+        assert classifier.explain(moved).label == said.label
+    assert several > 10
+
+
+def test_few_training_trials_do_not_make_a_prediction_certain():
+    few = Prediction(label="x", probabilities={"x": 1.0, "y": 0.0}, because=("r",), support=(6.0, 6.0))
+    many = Prediction(label="x", probabilities={"x": 1.0, "y": 0.0}, because=("r",), support=(600.0, 600.0))
+    model = Prediction(label="x", probabilities={"x": 1.0, "y": 0.0}, because=("r",))
+
+    assert few.certainty_in_words == "about 88 %: 6 of 6 training trials"
+    assert many.certainty_in_words == "about 99 %: 600 of 600 training trials"
+    assert model.certainty_in_words == "over 99 % by the model"
+    assert Prediction(label="unknown", probabilities={"x": 1.0}, because=("r",)).certainty_in_words == ""
+
+
+@pytest.mark.parametrize(("name", "settings"), [("c45", {}), ("tree", {}), ("knn", {"neighbours": 4})])
+def test_classifiers_that_count_training_trials_say_how_many(name, settings):
+    values = np.array([[0.01], [0.011], [0.012], [0.013], [0.05], [0.051], [0.052], [0.053]])
+    classifier = create("classifier", name, **settings)
+    classifier.fit(FeatureTable(names=("a",), units=("m",), values=values), ["x"] * 4 + ["y"] * 4, 0)
+
+    said = classifier.explain(Features(names=("a",), values=(0.0515,), units=("m",)))
+
+    assert (said.label, said.support) == ("y", (4.0, 4.0))
+    assert said.certainty == pytest.approx(5 / 6)
+    assert max(said.probabilities.values()) == 1.0
