@@ -392,8 +392,8 @@ class TestConfig:
 class TestDevices:
     def test_nobody_looks(self, run):
         ran = run("devices")
-        assert (ran.code, ran.out) == (0, "")
-        assert ran.err == "no installed plugin looks for devices (graspsense plugins list)\n"
+        assert (ran.code, ran.err) == (0, "")
+        assert ran.out == "no installed plugin looks for devices (graspsense plugins list)\n"
 
     def test_found_and_failed(self, run):
         class Looking:

@@ -39,7 +39,8 @@ def test_an_honest_rate_of_ones_own_csv_in_one_command(run, csv):
     code, out, _ = run("evaluate", csv, "--label", "what", "--instance", "thing")
 
     assert code == 0
-    assert "rate        0.9" in out
+    assert "\nrate        9" in out
+    assert out.startswith("c45 recognises the object and its state in 9")
     for line in (
         "instance_held_out",
         "stratified_10_fold",
@@ -96,7 +97,7 @@ def test_train_then_predict(run, csv, tmp_path):
 
     code, out, _ = run("predict", model, csv, "--label", "what")
     assert code == 0
-    assert "an answer of unknown counts as wrong" in out
+    assert "unknown counts as wrong" in out
 
 
 def test_a_model_of_states_or_classes(run, csv, tmp_path):

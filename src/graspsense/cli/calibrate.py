@@ -10,7 +10,7 @@ import click
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import echo_table, talk
+from graspsense.cli.terminal import echo, echo_table, talk
 
 if TYPE_CHECKING:
     from graspsense.core.calibrating import Rig
@@ -162,7 +162,7 @@ def _store(bench: _Bench, kind: str, data: Mapping[str, Any], as_json: bool) -> 
         echo_json({"file": str(path), "kind": kind, "serial": written.serial, "made": written.made,
                    "sha256": written.sha256, "data": dict(written.data)})  # fmt: skip
     else:
-        talk(f"{kind} of {written.serial} kept in {path}")
+        echo(f"{kind} of {written.serial} kept in {path}", indent=2)
     for note in bench.info.notes:
         talk(f"note: {note}")
 

@@ -9,6 +9,7 @@ import click
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import Style, echo
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings
@@ -68,9 +69,9 @@ def validate(name: str | None, as_json: bool, **asked: Any) -> None:
             {"valid": True, "pipeline": settings.pipeline, "components": settings.components, "notes": notes}
         )
     else:
-        click.echo(f"{settings.pipeline} is valid: {', '.join(settings.components.values())}")
+        echo(f"{settings.pipeline} is valid: {', '.join(settings.components.values())}", Style.GOOD, indent=2)
         for note in notes:
-            click.echo(f"note: {note}")
+            echo(f"note: {note}", Style.CAUTION, indent=2)
 
 
 def _settings(name: str | None, asked: Mapping[str, Any]) -> Settings:

@@ -6,7 +6,7 @@ import attrs
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import echo_table, talk
+from graspsense.cli.terminal import echo, echo_table, state_style, talk
 
 
 @click.command()
@@ -38,8 +38,8 @@ def devices(timeout_s: float, as_json: bool) -> None:
             (one.backend, one.serial or "-", one.where, "ready" if one.ready else "not ready", one.advice)
             for _, one in found
         ]
-        echo_table(("GRIPPER", "SERIAL", "WHERE", "STATE", "ADVICE"), rows)
+        echo_table(("GRIPPER", "SERIAL", "WHERE", "STATE", "ADVICE"), rows, {"STATE": state_style})
     elif probes:
-        talk(f"no device found by {', '.join(probe.distribution for probe in probes)}")
+        echo(f"no device found by {', '.join(probe.distribution for probe in probes)}")
     else:
-        talk("no installed plugin looks for devices (graspsense plugins list)")
+        echo("no installed plugin looks for devices (graspsense plugins list)")

@@ -9,7 +9,7 @@ import click
 
 from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import talk
+from graspsense.cli.terminal import Style, echo, echo_entry, state_style
 
 if TYPE_CHECKING:
     from graspsense.core.entries import Finding
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 EXIT_PROBLEM: Final = 1
 MARKS: Final = {"ok": "ok", "note": "note", "problem": "PROBLEM"}
+_MARK: Final = 11
+"""Width of a mark with its margins."""
 
 
 @click.command(short_help="Diagnose plugins, permissions and devices.")
@@ -51,7 +53,7 @@ def doctor(timeout_s: float, as_json: bool, **asked: Any) -> None:
     else:
         for one in diagnoses:
             _print(one)
-        talk(f"{problems} problem(s)" if problems else "no problem found")
+        echo(f"{problems} problem(s)", Style.BAD) if problems else echo("no problem found", Style.GOOD)
     if problems:
         raise click.exceptions.Exit(EXIT_PROBLEM)
 
@@ -101,11 +103,16 @@ def _as_json(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _print(diagnosis: Diagnosis) -> None:
-    click.echo(diagnosis.distribution)
+    echo(diagnosis.distribution, Style.HEADING)
     if diagnosis.error:
-        click.echo(f"  PROBLEM  could not look: {diagnosis.error}")
+        echo_entry("  PROBLEM", f"could not look: {diagnosis.error}", Style.BAD, width=_MARK)
     for one in diagnosis.findings:
-        click.echo(f"  {MARKS[one.state]:<8} {one.subject}: {one.found}")
-        if one.state != "ok":
-            for line in filter(None, one.advice.split("\n")):
-                click.echo(f"             {line}")
+        style = None if one.state == "ok" else state_style(one.state)
+        echo_entry(f"  {MARKS[one.state]}", f"{one.subject}: {one.found}", style, width=_MARK)
+        if one.state != "ok" and one.advice:
+            if "\n" in one.advice:
+                for line in filter(None, one.advice.split("\n")):
+                    # Not wrapped: lines of a file, or commands, are copied.
+                    click.echo(f"             {line}")
+            else:
+                echo(f"             {one.advice}")

@@ -9,7 +9,7 @@ import click
 
 from graspsense.cli.output import echo_json, file_to_write
 from graspsense.cli.sources import SOURCES, classifier_option, learner_of, source_options, trials_of
-from graspsense.cli.terminal import echo_table, talk
+from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 
 if TYPE_CHECKING:
     from graspsense.evaluation.results import Evaluation, Measurement
@@ -87,47 +87,59 @@ def evaluate(
 
 
 def _print(found: Evaluation) -> None:
+    from graspsense.evaluation.intervals import percentage, percentages
     from graspsense.report.confusion import confusion_text
+    from graspsense.report.verdict import verdict
 
-    what = {"both": "labels as they are", "class": "classes", "state": "states, each class apart"}[
-        found.target
-    ]
-    click.echo(f"{found.classifier} on {found.source}: {found.headline.n} trials, {what}")
-    click.echo(
-        f"features: {', '.join(f'{name} [{unit}]' if unit else name for name, unit in found.features)}"
-    )
-    click.echo(f"\nrate        {found.headline.words}   {found.protocol}")
+    echo(verdict(found), Style.HEADING)
     for warning in found.warnings:
-        click.echo(f"WARNING     {warning}")
-    click.echo()
-    rows = [_row(name, one) for name, one in found.protocols.items()]
-    rows += [_row(name, one) for name, one in found.controls.items() if name not in found.protocols]
-    echo_table(("PROTOCOL OR CONTROL", "RATE", "95 %", "LOWER BY", "THAN", "WHAT"), rows)
-    click.echo("\nconfusion (rows are the truth)")
-    for line in confusion_text(found.confusion):
-        click.echo(f"  {line}")
-    if len(found.by_class) > 1 and found.target != "class":
-        click.echo("\nby class")
-        for name, rate in found.by_class.items():
-            click.echo(f"  {name:<20}{rate.words}")
-    click.echo("\nlearning curve")
-    for point in found.learning_curve:
-        click.echo(f"  {point.trained_on:8.1f} trials  {point.rate.words}")
-    click.echo(f"\nwould be called unknown: {found.unknown.words}")
+        echo_entry("WARNING", warning, Style.CAUTION)
+    echo()
+    echo_entry("rate", f"{found.headline.words}, by {found.protocol}")
+    echo_entry("classifier", found.classifier)
+    echo_entry("features", ", ".join(name for name, _ in found.features))
+    echo_entry("unknown", f"{found.unknown.words} would be called unknown")
     for note in found.notes:
-        click.echo(f"note: {note}")
+        echo_entry("note", note)
+    echo()
+    controls = {name: one for name, one in found.controls.items() if name not in found.protocols}
+    measured = {name: one for name, one in {**found.protocols, **controls}.items() if one.rate is not None}
+    echo_table(
+        ("PROTOCOL OR CONTROL", "RATE", "95 %", "LOWER BY, IN POINTS", "THAN", "WHAT"),
+        [_row(name, one) for name, one in measured.items()],
+    )
+    for name, one in {**found.protocols, **controls}.items():
+        if one.rate is None:
+            echo(f"{name}: not measured ({one.reason})", indent=2)
+    echo("\nconfusion (rows are the truth)")
+    for line in confusion_text(found.confusion):
+        echo(f"  {line}")
+    if len(found.by_class) > 1 and found.target != "class":
+        echo()
+        rows = [(name, percentage(one.rate), percentages(one.interval), f"{one.correct} of {one.n}")
+                for name, one in found.by_class.items()]  # fmt: skip
+        echo_table(("CLASS", "RATE", "95 %", "TRIALS"), rows)
+    if found.learning_curve:
+        echo("\nlearning curve")
+        rows = [(f"{one.trained_on:.0f}", percentage(one.rate.rate), percentages(one.rate.interval))
+                for one in found.learning_curve]  # fmt: skip
+        echo_table(("TRAINING TRIALS", "RATE", "95 %"), rows)
 
 
 def _row(name: str, measured: Measurement) -> tuple[str, ...]:
-    if measured.rate is None:
-        return name, "-", "", "", "", f"{measured.what}: not measured ({measured.reason})"
-    low, high = measured.rate.interval
-    difference = measured.difference.words if measured.difference else ""
+    from graspsense.evaluation.intervals import percentage, percentages
+
+    assert measured.rate is not None
+    by = measured.difference
+    lower = (
+        f"{100 * by.value:+.1f} ({100 * by.interval[0]:+.1f} to {100 * by.interval[1]:+.1f})" if by else ""
+    )
+    rate = measured.rate
     return (
         name,
-        f"{measured.rate.rate:.3f}",
-        f"{low:.3f} to {high:.3f}",
-        difference,
+        percentage(rate.rate),
+        percentages(rate.interval),
+        lower,
         measured.difference_of,
         measured.what,
     )

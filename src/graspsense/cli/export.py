@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import talk
+from graspsense.cli.terminal import echo
 
 
 @click.command(short_help="Export trials or a recording.")
@@ -49,6 +49,6 @@ def export(source: str, target: str, as_json: bool) -> None:
     if as_json:
         echo_json({"file": target, **written})
     else:
-        talk(
+        echo(
             f"{target}: {', '.join(f'{value} {key}' for key, value in written.items() if key != 'features')}"
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import talk
+from graspsense.cli.terminal import Style, echo
 
 
 @click.command("import", short_help="Import recordings of other programs.")
@@ -90,8 +90,8 @@ def import_(
             check(settings)
             trial, number = import_recording(store, settings, installed(), labels)
             kept.append({"source": source, "trial": number, "outcome": trial.outcome.words})
-            talk(f"{source}: trial {number}, {trial.outcome.words}")
+            echo(f"{source}: trial {number}, {trial.outcome.words}", indent=2, err=as_json)
             for note in trial.device.notes:
-                talk(f"  {note}")
+                echo(f"  {note}", Style.CAUTION, err=as_json)
     if as_json:
         echo_json({"store": save, "trials": kept})

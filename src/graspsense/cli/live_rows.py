@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Final
 
-from graspsense.cli.terminal import talk
+from graspsense.cli.terminal import talk, terminal_width
 
 if TYPE_CHECKING:
     from graspsense.core.signals import Command, Frame, Pads
 
 BAR: Final = 24
-"""Characters of a gap that is widest."""
+"""Characters of the bar of the widest gap, where the terminal has room for it."""
+_ROW: Final = 50
+"""Characters of a row without its bar."""
 
 
 class LiveRows:
@@ -21,6 +24,7 @@ class LiveRows:
         self._t_s = self._gap_m = self._force_n = 0.0
         self._widest_m = 0.0
         self._quiet_s = 0.5
+        self._bar = BAR
 
     def take(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
         """Take one tick."""
@@ -37,12 +41,15 @@ class LiveRows:
             self._widest_m = max(frame.gap_m, 1e-9)
             # On a clock of frames, not seconds, every frame is worth a line.
             self._quiet_s = max(0.5, frame.dt_s) if frame.dt_s < 0.5 else 0.0
-            talk("      t  phase       gap                                    left     right")
+            room = (terminal_width(sys.stderr) or _ROW + BAR) - _ROW
+            self._bar = min(max(room, 0), BAR)
+            gap = f"{'gap':<{self._bar + 13}}"
+            talk(f"      t  phase       {gap}  left     right")
         self._phase, self._t_s, self._gap_m, self._force_n = phase, frame.t_s, frame.gap_m, force
         share = min(max(frame.gap_m / self._widest_m, 0.0), 1.0)
-        bar = "█" * round(BAR * share)
+        bar = "█" * round(self._bar * share)
         talk(
-            f"{frame.t_s:7.3f}  {_phase_name(phase):<10}{frame.gap_m * 1e3:6.1f} mm  {bar:<{BAR}}"
+            f"{frame.t_s:7.3f}  {_phase_name(phase):<10}{frame.gap_m * 1e3:6.1f} mm  {bar:<{self._bar}}"
             f"{_newtons(frame.force_left_n)} {_newtons(frame.force_right_n)}"
         )
 

@@ -10,7 +10,7 @@ import attrs
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import echo_table, talk
+from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, state_style
 
 if TYPE_CHECKING:
     from graspsense.core.plugins import Component, Plugins, PluginStatus
@@ -33,14 +33,19 @@ def list_plugins(as_json: bool) -> None:
         echo_json(rows)
         return
     columns = ("role", "name", "distribution", "version", "state")
-    table = [[*(row[key] or "-" for key in columns), row["reason"] or row["summary"]] for row in rows]
-    echo_table([*(key.upper() for key in columns), "WHAT"], [[_line(cell) for cell in row] for row in table])
+    table = [[_line(row[key] or "-") for key in columns] for row in rows]
+    table = [[*cells, _line(row["reason"] or row["summary"])] for cells, row in zip(table, rows, strict=True)]
+    echo_table(
+        [*(key.upper() for key in columns), "WHAT"],
+        [[_line(cell) for cell in row] for row in table],
+        {"STATE": state_style},
+    )
     advice = list(dict.fromkeys(f"{row['distribution']}: {one}" for row in rows for one in row["advice"]))
     advice += loaded.unknown_names
     if advice:
-        click.echo("\nTo be done:")
+        echo("\nTo be done:", Style.CAUTION)
         for one in advice:
-            click.echo(f"  {one}")
+            echo(f"  {one}", indent=2)
 
 
 @plugins.command()
@@ -68,7 +73,7 @@ def show(name: str, as_json: bool) -> None:
         )
         return
     texts = [_status_text(status) for status in statuses] + [_component_text(one) for one in components]
-    click.echo("\n\n".join(texts))
+    echo("\n\n".join(texts), indent=4)
 
 
 @plugins.command()
@@ -116,7 +121,9 @@ def check(
 
     def told(result: Any) -> None:
         text = f": {result.text}" if result.text else ""
-        talk(f"{result.state:<8} {result.subject}  {result.check}{text}")
+        line = f"{result.subject}  {result.check}{text}"
+        style = None if result.state == "passed" else state_style(result.state)
+        echo_entry(result.state, line, style, width=9, err=True)
 
     report = examined.report(told)
     if as_json:
@@ -128,10 +135,10 @@ def check(
             }
         )
     else:
-        click.echo(report.counts())
-        click.echo("conforms" if not report.failures else "does not conform:")
+        echo(report.counts(), indent=2)
+        echo("does not conform:", Style.BAD) if report.failures else echo("conforms", Style.GOOD)
         for failure in report.failures:
-            click.echo(f"  {failure}")
+            echo(f"  {failure}", indent=2)
     ctx.exit(1 if report.failures else 0)
 
 
@@ -151,7 +158,7 @@ def new(name: str, roles: tuple[str, ...], folder: Path | None) -> None:
     from graspsense.scaffold.make import make
 
     for line in make(name, roles, folder if folder is not None else Path(name)):
-        click.echo(line)
+        echo(line, indent=2)
 
 
 @plugins.command()
@@ -171,7 +178,7 @@ def disable(distribution: str) -> None:
             f"{suggestion(name, known)}"
         )
     path = write_disabled({*map(canonical, disabled_in_config()), name})
-    click.echo(f"{name} is disabled, in {path}; `graspsense plugins enable {name}` takes it back")
+    echo(f"{name} is disabled, in {path}; `graspsense plugins enable {name}` takes it back")
 
 
 @plugins.command()
@@ -186,7 +193,7 @@ def enable(distribution: str) -> None:
     if name not in names:
         raise UnknownName(f"{name} is not disabled. Disabled are: {', '.join(sorted(names)) or 'none'}")
     path = write_disabled(names - {name})
-    click.echo(f"{name} is enabled again, in {path}")
+    echo(f"{name} is enabled again, in {path}")
 
 
 def _settings(options: Sequence[str]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import click
 
 from graspsense.cli.output import echo_json
 from graspsense.cli.sources import SOURCES, is_csv, source_options, trials_of
-from graspsense.cli.terminal import echo_table, talk
+from graspsense.cli.terminal import Style, correct_style, echo_entry, echo_table, prediction_style
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -51,7 +51,8 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     if len(table) > MOST_WITH_REASONS:
         notes = (
             *notes,
-            f"predictions of more than {MOST_WITH_REASONS} trials are given without reasons",
+            f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons, and their certainty is the "
+            "probability of the model",
         )
         predictions = _without_reasons(asked, table)
     else:
@@ -78,12 +79,15 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
             long=len(predictions) > MOST_WITH_REASONS,
         )
         return
-    for text in (*warnings, *notes):
-        talk(f"note: {text}")
-    click.echo(asked.in_a_line)
     _print(predictions, labels)
+    click.echo()
     if rate is not None:
-        click.echo(f"\nrate        {rate.words}   (an answer of unknown counts as wrong)")
+        echo_entry("rate", f"{rate.words}; unknown counts as wrong")
+    echo_entry("model", asked.in_a_line)
+    for text in warnings:
+        echo_entry("warning", text, Style.CAUTION)
+    for text in notes:
+        echo_entry("note", text)
 
 
 def _trials(
@@ -104,13 +108,15 @@ def _trials(
 
 
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:
-    header = ("TRIAL", "PREDICTION", "CERTAINTY", *(("TRUTH",) if labels else ()), "BECAUSE")
+    from graspsense.core.features import percent
+
+    header = ("TRIAL", "PREDICTION", "CERTAINTY", *(("LABEL", "CORRECT") if labels else ()), "BECAUSE")
     rows = []
     for i, one in enumerate(predictions):
-        sure = percent(one.certainty) if one.certainty is not None else ""
-        truth = (labels[i],) if labels else ()
-        rows.append((str(i + 1), one.label, sure, *truth, "; ".join(one.because)))
-    echo_table(header, rows)
+        certainty = percent(one.certainty) if one.certainty is not None else ""
+        label = (labels[i], "yes" if one.label == labels[i] else "no") if labels else ()
+        rows.append((str(i + 1), one.label, certainty, *label, "; ".join(one.because)))
+    echo_table(header, rows, {"PREDICTION": prediction_style, "CORRECT": correct_style})
 
 
 def _without_reasons(model: Model, table: FeatureTable) -> list[Prediction]:

@@ -9,6 +9,8 @@ from typing import Final
 
 import click
 
+from graspsense.cli.terminal import can_redraw, terminal_width
+
 FIRST_S: Final = 2.0
 AGAIN_S: Final = 0.2
 AGAIN_IN_A_LOG_S: Final = 10.0
@@ -20,7 +22,7 @@ class ProgressLine:
     """Reports what is being done and how much of it; leaves nothing behind on a terminal."""
 
     def __init__(self) -> None:
-        self._terminal = sys.stderr.isatty()
+        self._width = terminal_width(sys.stderr) if can_redraw(sys.stderr) else None
         self._next = time.monotonic() + FIRST_S
         self._shown = False
 
@@ -29,10 +31,12 @@ class ProgressLine:
         now = time.monotonic()
         if now < self._next:
             return
-        self._next = now + (AGAIN_S if self._terminal else AGAIN_IN_A_LOG_S)
-        if self._terminal:
+        self._next = now + (AGAIN_S if self._width is not None else AGAIN_IN_A_LOG_S)
+        if self._width is not None:
             bar = "█" * round(BAR * done / max(total, 1))
-            click.echo(f"\r\033[K{bar:<{BAR}} {done} of {total}  {what}", err=True, nl=False)
+            line = f"{bar:<{BAR}} {done} of {total}  {what}"
+            # A line that fills the terminal would go on in the next one, which is not erased.
+            click.echo(f"\r\033[K{line[: self._width - 1]}", err=True, nl=False)
             self._shown = True
         else:
             click.echo(f"{what}: {done} of {total}", err=True)

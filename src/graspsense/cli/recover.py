@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import echo
 
 EXIT_DAMAGED = 5
 
@@ -37,8 +38,11 @@ def recover(source: str, out: str | None, as_json: bool) -> None:
         for one in found:
             where = f" as trial {one.trial}" if one.trial is not None else f" in {one.recording}"
             why = f": {one.why}" if one.why else ""
-            click.echo(f"{one.file.name}: {one.what}{where if one.recording else ''}, {one.ticks} ticks{why}")
+            echo(
+                f"{one.file.name}: {one.what}{where if one.recording else ''}, {one.ticks} ticks{why}",
+                indent=2,
+            )
         if not found:
-            click.echo("nothing to recover")
+            echo("nothing to recover")
     if any(one.what == "failed" for one in found):
         raise click.exceptions.Exit(EXIT_DAMAGED)

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import Style, echo
 
 
 @click.command(short_help="Write the report page of a store or an experiment.")
@@ -71,5 +72,5 @@ def report(
     if as_json:
         echo_json({"page": str(path), "answer": page.answer})
     else:
-        click.echo(page.answer)
+        echo(page.answer, Style.HEADING)
         click.echo(f"page        {path}")

@@ -11,12 +11,23 @@ from graspsense.cli.live_rows import LiveRows
 from graspsense.cli.model_table import print_model, print_selection
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import echo_table, talk
+from graspsense.cli.terminal import (
+    LABEL_WIDTH,
+    Style,
+    echo,
+    echo_entry,
+    echo_table,
+    outcome_style,
+    prediction_style,
+    talk,
+    warn,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from graspsense.core.config import Settings
+    from graspsense.core.features import Prediction
     from graspsense.core.runner import Sink
     from graspsense.core.trial import Trial
 
@@ -84,6 +95,8 @@ def run(
     if as_json:
         echo_json(trial_as_json(trial) if kept is None else {**trial_as_json(trial), "kept": kept})
     else:
+        if sinks:
+            echo()
         print_trial(trial)
         _print_model(trial)
     if plot is not None:
@@ -164,7 +177,7 @@ def _kept(
     if grasp.number is not None:
         talk(f"kept as trial {grasp.number} in {save}")
         if grasp.counts["dropped"]:
-            talk(f"warning: the recorder could not follow: {grasp.counts['dropped']} messages are missing")
+            warn(f"the recorder could not follow: {grasp.counts['dropped']} messages are missing")
     return grasp.trial, {
         "store": save,
         "trial": grasp.number,
@@ -174,45 +187,45 @@ def _kept(
 
 
 def print_trial(trial: Trial) -> None:
-    """Print the outcome, the features, the prediction, and notes."""
-    click.echo()
+    """Print outcome, features, prediction, and what qualifies them."""
     reason = f": {trial.reason}" if trial.reason else ""
-    click.echo(f"outcome     {trial.outcome.words}{reason}")
+    echo_entry("outcome", f"{trial.outcome.words}{reason}", outcome_style(trial.outcome.words))
     features = trial.features
-    wide = max([12, *(len(name) + 1 for name in features.names)])
+    wide = max([LABEL_WIDTH, *(len(name) + 1 for name in features.names)])
     for name, value, unit in zip(features.names, features.values, features.units, strict=True):
-        click.echo(f"{name:<{wide}}{_shown(value, unit, features.reasons.get(name, ''))}")
+        echo_entry(name, _shown(value, unit, features.reasons.get(name, "")), width=wide)
     if trial.prediction is not None:
-        prediction = trial.prediction
-        probability = prediction.probabilities.get(prediction.label)
-        sure = "" if probability is None else f"  ({probability:.0%})"
-        click.echo(f"prediction  {prediction.label}{sure}")
-        for step in prediction.because:
-            click.echo(f"            {step}")
-        click.echo(f"model       {prediction.model}")
-        for warning in prediction.warnings:
-            talk(f"warning: {warning}")
+        _print_prediction(trial.prediction)
     for note in trial.device.notes:
-        click.echo(f"note        {note}")
-    if trial.counts.get("guarded"):
-        click.echo(
-            f"note        the guard limited {trial.counts['guarded']} of {trial.counts['ticks']} ticks"
-        )
-    if trial.counts.get("late"):
-        click.echo(f"note        {trial.counts['late']} of {trial.counts['ticks']} frames came late")
+        echo_entry("note", note)
+    counts = trial.counts
+    if counts.get("guarded"):
+        echo_entry("note", f"the guard limited {counts['guarded']} of {counts['ticks']} ticks")
+    if counts.get("late"):
+        echo_entry("note", f"{counts['late']} of {counts['ticks']} frames came late")
     if trial.seconds_simulated is not None:
-        length = (
-            f"{trial.seconds_simulated:.2f} {trial.trace.units['t']} of grasp in {trial.seconds_wall:.2f} s"
-        )
-        click.echo(f"took        {length}")
+        unit = trial.trace.units["t"]
+        echo_entry("took", f"{trial.seconds_simulated:.2f} {unit} of grasp in {trial.seconds_wall:.2f} s")
+
+
+def _print_prediction(prediction: Prediction) -> None:
+    """Print the label with its certainty, the reasons, the model, and the warnings about its validity."""
+    certainty = f"  ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""
+    echo_entry("prediction", f"{prediction.label}{certainty}", prediction_style(prediction.label))
+    for step in prediction.because:
+        echo_entry("", step)
+    echo_entry("model", prediction.model)
+    for warning in prediction.warnings:
+        echo_entry("warning", warning, Style.CAUTION)
 
 
 def _shown(value: float, unit: str, reason: str) -> str:
+    from graspsense.core.units import display_unit, with_unit
+
     if value != value:
         return f"{'-':>9}  ({reason})"
-    if unit == "m" or unit.startswith("m/"):
-        return f"{value * 1e3:9.3f} m{unit}"
-    return f"{value:9.3f} {unit if unit != '1' else ''}".rstrip()
+    shown, factor = display_unit(unit)
+    return with_unit(f"{value * factor:9.3f}", shown)
 
 
 def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
@@ -236,17 +249,17 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
         return
     from graspsense.core.config import toml_value
 
-    click.echo("would open, tare, close, hold and release with:")
+    echo("would open, tare, close, hold and release with:")
     for table, component in settings.components.items():
-        click.echo(f"  {table:<11}{component}")
+        echo(f"  {table:<11}{component}")
     for table, values in settings.values.items():
         for key, value in values.items():
             if key != "type":
-                click.echo(f"    {table}.{key} = {'not set' if value is None else toml_value(value)}")
+                echo(f"    {table}.{key} = {'not set' if value is None else toml_value(value)}")
     if rehearsed is None:
-        click.echo(f"commands: not rehearsed, {why_not}")
+        echo(f"commands: not rehearsed, {why_not}")
     else:
-        click.echo(f"would command, as rehearsed on {rehearsed.device} ({rehearsed.outcome}):")
+        echo(f"would command, as rehearsed on {rehearsed.device} ({rehearsed.outcome}):")
         rows = [
             (
                 one.phase,
@@ -258,4 +271,4 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
             for one in rehearsed.phases
         ]
         echo_table(("PHASE", "FOR", "EFFORT (+ squeezes)", "FASTEST", "BY THE GUARD"), rows)
-    click.echo("nothing was opened")
+    echo("nothing was opened")

@@ -11,7 +11,7 @@ import click
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json, file_to_write
-from graspsense.cli.terminal import echo_table, talk
+from graspsense.cli.terminal import echo, echo_table, talk
 from graspsense.cli.tradeoff_recognition import commands
 
 if TYPE_CHECKING:
@@ -90,9 +90,7 @@ def simulation(
         echo_json({**found.as_json(), "peers": beside})
         return
     made = ", ".join(f"{key} {value}" for key, value in found.made.items())
-    click.echo(
-        f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each\n{made}\n"
-    )
+    echo(f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each\n{made}\n")
     echo_table(*simulation_rows(found))
 
 

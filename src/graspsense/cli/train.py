@@ -16,7 +16,7 @@ from graspsense.cli.sources import (
     source_options,
     trials_of,
 )
-from graspsense.cli.terminal import talk
+from graspsense.cli.terminal import echo, echo_entry, talk
 
 if TYPE_CHECKING:
     from graspsense.core.labelled import Labelled
@@ -99,10 +99,10 @@ def train(
             }
         )
         return
-    click.echo(f"{out}: {model.in_a_line}")
-    click.echo(f"labels      {', '.join(model.classifier.classes())}")
-    how_good = command_line(("out", "keep", "as_json"), "evaluate")
-    click.echo(f"how good    {how_good}")
+    echo(f"{out}: {model.in_a_line}", indent=2)
+    echo_entry("labels", ", ".join(model.classifier.classes()))
+    # In one line, so that it can be copied.
+    click.echo(f"how good    {command_line(('out', 'keep', 'as_json'), 'evaluate')}")
 
 
 def _with_target(labelled: Labelled, target: str) -> Labelled:

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import Style, echo, echo_entry
 
 EXIT_DAMAGED = 5
 
@@ -28,11 +29,12 @@ def verify(source: str, as_json: bool) -> None:
         echo_json(found.as_json())
     else:
         for problem in found.problems:
-            click.echo(f"damaged     {problem}")
+            echo_entry("damaged", str(problem), Style.BAD)
         for one in found.unfinished:
-            click.echo(f"unfinished  {one}")
-        click.echo(f"{found.trials} trials, {found.recordings} recordings, {len(found.problems)} damaged")
+            echo_entry("unfinished", str(one), Style.CAUTION)
+        counts = f"{found.trials} trials, {found.recordings} recordings, {len(found.problems)} damaged"
+        echo(counts, Style.BAD if found.problems else Style.GOOD)
         if found.unfinished:
-            click.echo("graspsense recover saves what is unfinished")
+            echo("graspsense recover saves what is unfinished")
     if found.problems:
         raise click.exceptions.Exit(EXIT_DAMAGED)

@@ -17,7 +17,7 @@ from graspsense.core.labelled import ControlFeatures, Labelled, Target, class_of
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.folds import commonest, in_order, instance_held_out, stratified
-from graspsense.evaluation.intervals import RecognitionRate, difference
+from graspsense.evaluation.intervals import RecognitionRate, difference, percentage
 from graspsense.evaluation.results import CurvePoint, Evaluation, Measurement
 
 if TYPE_CHECKING:
@@ -309,8 +309,9 @@ class _Evaluator:
         correct = self.pooled_by_control["before_contact"].right(self.labels)
         if difference(correct, majority_correct).interval[0] > 0.0:
             self.warnings.append(
-                f"{control.rate.rate:.3f} are recognised from before contact ({control.what}); the most frequent label "
-                f"alone gives {np.mean(majority_correct):.3f}. The recording itself reveals the labels"
+                f"{percentage(control.rate.rate)} are recognised from before contact ({control.what}); the most "
+                f"frequent label alone gives {percentage(float(np.mean(majority_correct)))}. The recording itself "
+                "reveals the labels"
             )
 
     def _warn_of_leaks(self, controls: Mapping[str, Measurement]) -> None:
@@ -320,7 +321,7 @@ class _Evaluator:
         ):
             by = controls[name].difference
             if by is not None and by.interval[0] > 0.0:
-                self.warnings.append(f"{name} is lower by {by.words}: {why}")
+                self.warnings.append(f"the rate of {name} is lower by {by.words}: {why}")
 
 
 def _trials_for(labelled: Labelled, target: Target, notes: list[str]) -> Labelled:

@@ -39,9 +39,8 @@ class RecognitionRate:
 
     @property
     def words(self) -> str:
-        """The rate as text: share, counts and interval."""
-        low, high = self.interval
-        return f"{self.rate:.3f} ({self.correct}/{self.n}, 95 % {low:.3f} to {high:.3f})"
+        """The rate as text: percentage, counts and interval."""
+        return f"{percentage(self.rate)} ({self.correct} of {self.n}; 95 %: {percentages(self.interval)})"
 
 
 @frozen
@@ -53,8 +52,19 @@ class Difference:
 
     @property
     def words(self) -> str:
-        """The rate as text: share, counts and interval."""
-        return f"{self.value:+.3f} ({self.interval[0]:+.3f} to {self.interval[1]:+.3f})"
+        """The difference as text, in percentage points, with its interval."""
+        low, high = self.interval
+        return f"{100 * self.value:+.1f} points (95 %: {100 * low:+.1f} to {100 * high:+.1f})"
+
+
+def percentage(share: float) -> str:
+    """Return a share in per cent."""
+    return f"{100 * share:.1f} %"
+
+
+def percentages(interval: tuple[float, float]) -> str:
+    """Return an interval of shares in per cent."""
+    return f"{100 * interval[0]:.1f} to {100 * interval[1]:.1f} %"
 
 
 def wilson(correct: float, n: int) -> tuple[float, float]:
