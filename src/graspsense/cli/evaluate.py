@@ -121,9 +121,9 @@ def _print(found: Evaluation) -> None:
         echo_table(("CLASS", "RATE", "95 %", "TRIALS"), rows)
     if found.learning_curve:
         echo("\nlearning curve")
-        rows = [(f"{one.trained_on:.0f}", percentage(one.rate.rate), percentages(one.rate.interval))
-                for one in found.learning_curve]  # fmt: skip
-        echo_table(("TRAINING TRIALS", "RATE", "95 %"), rows)
+        points = [(f"{one.trained_on:.0f}", percentage(one.rate.rate), percentages(one.rate.interval))
+                  for one in found.learning_curve]  # fmt: skip
+        echo_table(("TRAINING TRIALS", "RATE", "95 %"), points)
 
 
 def _row(name: str, measured: Measurement) -> tuple[str, ...]:

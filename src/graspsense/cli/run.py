@@ -95,8 +95,6 @@ def run(
     if as_json:
         echo_json(trial_as_json(trial) if kept is None else {**trial_as_json(trial), "kept": kept})
     else:
-        if sinks:
-            echo()
         print_trial(trial)
         _print_model(trial)
     if plot is not None:
@@ -188,6 +186,7 @@ def _kept(
 
 def print_trial(trial: Trial) -> None:
     """Print outcome, features, prediction, and what qualifies them."""
+    echo()
     reason = f": {trial.reason}" if trial.reason else ""
     echo_entry("outcome", f"{trial.outcome.words}{reason}", outcome_style(trial.outcome.words))
     features = trial.features
