@@ -1,0 +1,177 @@
+"""Generated from the table of graspsense.plugin_api by `graspsense.core.lazy_names`: change the table."""
+
+# Declaring what a plugin brings
+from graspsense.core.hookspecs import hookimpl as hookimpl
+from graspsense.core.entries import Channel as Channel
+from graspsense.core.entries import ClassifierEntry as ClassifierEntry
+from graspsense.core.entries import CommandEntry as CommandEntry
+from graspsense.core.entries import ConformanceCheckEntry as ConformanceCheckEntry
+from graspsense.core.entries import ControllerEntry as ControllerEntry
+from graspsense.core.entries import DatasetEntry as DatasetEntry
+from graspsense.core.entries import EmulatorEntry as EmulatorEntry
+from graspsense.core.entries import Feature as Feature
+from graspsense.core.entries import FeatureSetEntry as FeatureSetEntry
+from graspsense.core.entries import Finding as Finding
+from graspsense.core.entries import FoundDevice as FoundDevice
+from graspsense.core.entries import ModelEntry as ModelEntry
+from graspsense.core.entries import PipelineEntry as PipelineEntry
+from graspsense.core.entries import SensorBackendEntry as SensorBackendEntry
+from graspsense.core.setting import CHANGES_NO_RESULT as CHANGES_NO_RESULT
+from graspsense.core.setting import NAMES_INPUT as NAMES_INPUT
+from graspsense.core.setting import setting as setting
+
+# Signals: what passes between a gripper and a controller
+from graspsense.core.signals import CELLS as CELLS
+from graspsense.core.signals import CHANNELS as CHANNELS
+from graspsense.core.signals import FIRST_PAD_CELL as FIRST_PAD_CELL
+from graspsense.core.signals import NO_PADS as NO_PADS
+from graspsense.core.signals import Command as Command
+from graspsense.core.signals import CommandKind as CommandKind
+from graspsense.core.signals import Frame as Frame
+from graspsense.core.signals import Outcome as Outcome
+from graspsense.core.signals import Pads as Pads
+from graspsense.core.signals import Phase as Phase
+
+# The same kinds, phases and outcomes as plain integers, for laws that are compiled
+from graspsense.core.signals import APPROACH as APPROACH
+from graspsense.core.signals import CRUSHED as CRUSHED
+from graspsense.core.signals import EFFORT as EFFORT
+from graspsense.core.signals import FORCE as FORCE
+from graspsense.core.signals import HOLD as HOLD
+from graspsense.core.signals import NEVER_STEADY as NEVER_STEADY
+from graspsense.core.signals import NOTHING_THERE as NOTHING_THERE
+from graspsense.core.signals import ONE_FINGER as ONE_FINGER
+from graspsense.core.signals import POSITION as POSITION
+from graspsense.core.signals import RUNNING as RUNNING
+from graspsense.core.signals import SIDE_IMPACT as SIDE_IMPACT
+from graspsense.core.signals import SLIPPED as SLIPPED
+from graspsense.core.signals import SQUEEZE as SQUEEZE
+from graspsense.core.signals import STEADY as STEADY
+from graspsense.core.signals import TOO_WIDE as TOO_WIDE
+from graspsense.core.signals import VELOCITY as VELOCITY
+from graspsense.core.tick import OPENING as OPENING
+from graspsense.core.tick import RELEASE as RELEASE
+from graspsense.core.tick import TARING as TARING
+
+# Sensor backends
+from graspsense.core.roles import DeviceInfo as DeviceInfo
+from graspsense.core.roles import ObjectKind as ObjectKind
+from graspsense.core.roles import Reading as Reading
+from graspsense.core.roles import SensorBackend as SensorBackend
+
+# Sensor backends that do many grasps at once
+from graspsense.core.roles import BatchBackend as BatchBackend
+from graspsense.core.roles import BatchOptions as BatchOptions
+from graspsense.core.roles import Grasped as Grasped
+from graspsense.core.roles import SimulationVariant as SimulationVariant
+
+# Emulated devices
+from graspsense.core.emulated import EmulatedDevice as EmulatedDevice
+
+# Calibration: from cell counts to newtons
+from graspsense.core.calibration import LoadTable as LoadTable
+from graspsense.core.calibration import edge_force as edge_force
+from graspsense.core.calibration import load_of as load_of
+from graspsense.core.calibration import masked as masked
+from graspsense.core.calibration import pad_force as pad_force
+from graspsense.core.calibration import tare as tare
+from graspsense.core.calibration import zero_of as zero_of
+from graspsense.core.calibration_files import calibrations_of as calibrations_of
+from graspsense.core.calibration_files import stored_friction as stored_friction
+from graspsense.core.calibration_files import stored_tables as stored_tables
+from graspsense.core.calibration_files import stored_zero as stored_zero
+
+# Transmission: from motor revolutions to the gap
+from graspsense.core.transmission import ScrewLinkage as ScrewLinkage
+from graspsense.core.transmission import gap_and_rate as gap_and_rate
+from graspsense.core.transmission import revolutions_at as revolutions_at
+from graspsense.core.transmission import screw_linkage as screw_linkage
+from graspsense.core.transmission import straight_linkage as straight_linkage
+
+# Controllers
+from graspsense.core.roles import Controller as Controller
+from graspsense.core.roles import ControllerState as ControllerState
+from graspsense.core.roles import StepLaw as StepLaw
+
+# Contact and rest, the same for controllers and features
+from graspsense.core.contact import CONTACT_FORCE_N as CONTACT_FORCE_N
+from graspsense.core.contact import REST_SPEED_M_S as REST_SPEED_M_S
+from graspsense.core.contact import REST_WINDOW_S as REST_WINDOW_S
+from graspsense.core.contact import Stillness as Stillness
+from graspsense.core.contact import at_rest as at_rest
+from graspsense.core.contact import both_touch as both_touch
+from graspsense.core.contact import first_rest as first_rest
+from graspsense.core.contact import watch as watch
+
+# Feature sets
+from graspsense.core.features import Features as Features
+from graspsense.core.features import missing as missing
+from graspsense.core.roles import FeatureSet as FeatureSet
+from graspsense.core.trace import Trace as Trace
+from graspsense.core.trace import TraceRecorder as TraceRecorder
+from graspsense.core.trace import trace_of as trace_of
+from graspsense.core.units import in_words as in_words
+
+# Classifiers
+from graspsense.core.decision_path import SplitTest as SplitTest
+from graspsense.core.decision_path import leaf_in_words as leaf_in_words
+from graspsense.core.decision_path import path_in_words as path_in_words
+from graspsense.core.features import UNKNOWN as UNKNOWN
+from graspsense.core.features import FeatureTable as FeatureTable
+from graspsense.core.features import Prediction as Prediction
+from graspsense.core.features import table_of as table_of
+from graspsense.core.roles import Classifier as Classifier
+from graspsense.core.roles import ClassifierConfig as ClassifierConfig
+from graspsense.core.tree import TreeNode as TreeNode
+
+# Data sets
+from graspsense.core.labelled import ControlFeatures as ControlFeatures
+from graspsense.core.labelled import Labelled as Labelled
+
+# Observers
+from graspsense.core.trial import GraspEvent as GraspEvent
+from graspsense.core.trial import RunInfo as RunInfo
+from graspsense.core.trial import Trial as Trial
+
+# The tick of the runner, for a backend that runs it compiled
+from graspsense.core.binding import bind as bind
+from graspsense.core.binding import maker as maker
+from graspsense.core.guard import GuardParams as GuardParams
+from graspsense.core.guard import GuardState as GuardState
+from graspsense.core.run_config import RunConfig as RunConfig
+from graspsense.core.runner import ended_by_itself as ended_by_itself
+from graspsense.core.runner import overdue as overdue
+from graspsense.core.runner import seconds_at_most as seconds_at_most
+from graspsense.core.runner import tick_params as tick_params
+from graspsense.core.tick import Schedule as Schedule
+from graspsense.core.tick import TickParams as TickParams
+from graspsense.core.tick import TickState as TickState
+from graspsense.core.tick import first_state as first_state
+from graspsense.core.tick import tick as tick
+
+# Compiling a function with all that it calls
+from graspsense.core.call_graph import NotCompilable as NotCompilable
+from graspsense.core.call_graph import fingerprint as fingerprint
+from graspsense.core.compiling import CompileOptions as CompileOptions
+from graspsense.core.compiling import Inlining as Inlining
+from graspsense.core.compiling import compile_function as compile_function
+from graspsense.core.compiling import entry_point as entry_point
+from graspsense.core.compiling import first_call as first_call
+
+# Building other components, collecting what other plugins bring, and where to keep files
+from graspsense.core.config import create as create
+from graspsense.core.config import recipe_of as recipe_of
+from graspsense.core.plugins import collect as collect
+from graspsense.core.user_folders import cache_folder as cache_folder
+
+# Errors
+from graspsense.core.errors import ConfigError as ConfigError
+from graspsense.core.errors import DataDamaged as DataDamaged
+from graspsense.core.errors import DeviceLost as DeviceLost
+from graspsense.core.errors import GraspsenseError as GraspsenseError
+from graspsense.core.errors import NoDevice as NoDevice
+from graspsense.core.errors import PluginUnavailable as PluginUnavailable
+from graspsense.core.errors import RecordingEnded as RecordingEnded
+from graspsense.core.errors import TareRefused as TareRefused
+from graspsense.core.errors import UnknownName as UnknownName
+from graspsense.core.errors import suggestion as suggestion
