@@ -20,7 +20,21 @@ PUBLIC: Final = LazyNames(
             "trace": ("Trace",),
             "features": ("FeatureTable", "Features", "Prediction"),
         },
-        "Errors": {"errors": ("GraspsenseError",)},
+        "Trials and evaluation": {
+            "sources.trial_source": ("load_trials",),
+            "config": ("select_component",),
+            "labelled": ("Labelled",),
+            "evaluation.evaluate": ("evaluate",),
+            "evaluation.results": ("Evaluation",),
+        },
+        "Experiments": {
+            "experiments.experiment": ("read_experiment",),
+            "experiments.executors.serial": ("Serial",),
+            "experiments.results": ("Results",),
+            "experiments.run": ("run_experiment",),
+            "experiments.summary": ("summarise",),
+        },
+        "Errors": {"errors": ("ConfigError", "GraspsenseError", "WiringError")},
     },
 )
 

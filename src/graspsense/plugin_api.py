@@ -127,6 +127,11 @@ _TABLE: Final[Table] = {
     "Data sets": {
         "labelled": ("ControlFeatures", "Labelled"),
     },
+    "Tests of a plugin": {
+        "testing.conformance": ("parametrize_checks",),
+        "testing.samples": ("a_trial", "squeeze", "three_kinds", "with_channels"),
+        "testing.bench": ("bench", "drive"),
+    },
     "Observers": {
         "trial": ("GraspEvent", "RunInfo", "Trial"),
     },

@@ -128,6 +128,15 @@ from graspsense.core.tree import TreeNode as TreeNode
 from graspsense.core.labelled import ControlFeatures as ControlFeatures
 from graspsense.core.labelled import Labelled as Labelled
 
+# Tests of a plugin
+from graspsense.testing.conformance import parametrize_checks as parametrize_checks
+from graspsense.testing.samples import a_trial as a_trial
+from graspsense.testing.samples import squeeze as squeeze
+from graspsense.testing.samples import three_kinds as three_kinds
+from graspsense.testing.samples import with_channels as with_channels
+from graspsense.testing.bench import bench as bench
+from graspsense.testing.bench import drive as drive
+
 # Observers
 from graspsense.core.trial import GraspEvent as GraspEvent
 from graspsense.core.trial import RunInfo as RunInfo

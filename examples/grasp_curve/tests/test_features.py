@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.plugin_api import HOLD, create
-from graspsense.testing import parametrize_checks
-from graspsense.testing.samples import masked, squeeze
+from graspsense.plugin_api import HOLD, create, parametrize_checks, squeeze, with_channels
 
 
 @parametrize_checks("graspsense-grasp-curve")
@@ -96,7 +94,7 @@ def test_a_grasp_that_is_not_over_says_what_it_lacks():
 
 
 def test_a_gripper_without_cells_has_the_rest():
-    features = curve(masked(squeeze(), {"gap", "force_left", "force_right"}))
+    features = curve(with_channels(squeeze(), {"gap", "force_left", "force_right"}))
 
     assert features.reasons["contact_area"] == "there are no cell images"
     assert features["peak_force"] > 10.0

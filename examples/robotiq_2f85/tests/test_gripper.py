@@ -11,9 +11,8 @@ from graspsense_robotiq_2f85.fake import Fake
 from graspsense_robotiq_2f85.modbus import Client, NoReply, SocketLine, crc, opened
 from graspsense_robotiq_2f85.registers import FORCES_N, SPEEDS_M_S, byte_of, gap_of, position_of
 
-from graspsense import load_pipeline
-from graspsense.plugin_api import VELOCITY, Command, NoDevice, create
-from graspsense.testing import parametrize_checks
+from graspsense import WiringError, load_pipeline
+from graspsense.plugin_api import VELOCITY, Command, NoDevice, create, parametrize_checks
 
 
 @pytest.fixture
@@ -96,8 +95,6 @@ def test_a_grasp_over_every_wire(way):
 
 
 def test_the_six_features_need_pads_and_the_user_is_told():
-    from graspsense.core.errors import WiringError
-
     with pytest.raises(WiringError, match=r"needs the channel 'force_left' in N.*robotiq-2f85 does not have"):
         load_pipeline("robotiq-2f85", options=["features.type=chitta"])
 

@@ -39,6 +39,17 @@ class Features:
             if math.isnan(value) and not self.reasons.get(name):
                 raise ValueError(f"feature {name!r} is NaN without a reason: add one to `reasons`")
 
+    def __repr__(self) -> str:
+        from graspsense.core.notebook import quantity
+
+        each = zip(self.names, self.values, self.units, strict=True)
+        return f"<Features: {', '.join(f'{name} {quantity(value, unit)}' for name, value, unit in each) or 'none'}>"
+
+    def _repr_html_(self) -> str:
+        from graspsense.core.notebook import features_html
+
+        return features_html(self)
+
     def __getitem__(self, name: str) -> float:
         """Return the value of one feature; KeyError names the known ones."""
         try:
@@ -144,6 +155,15 @@ class Prediction:
         with_label, trials = self.support
         about = percent(self.certainty).removeprefix("over ")
         return f"about {about}: {with_label:.4g} of {trials:.4g} training trials"
+
+    def __repr__(self) -> str:
+        certainty = f", {self.certainty_in_words}" if self.certainty_in_words else ""
+        return f"<Prediction: {self.label}{certainty}>"
+
+    def _repr_html_(self) -> str:
+        from graspsense.core.notebook import prediction_html
+
+        return prediction_html(self)
 
 
 UNKNOWN = "unknown"

@@ -1,4 +1,4 @@
-"""The names of a public module, imported from `graspsense.core` when they are first used.
+"""The names of a public module, imported when they are first used.
 
 Listing plugins and printing help therefore load neither numpy nor a driver. Type checkers read a stub beside the
 module, which is generated from the same table:
@@ -17,7 +17,10 @@ from importlib import import_module
 from typing import Any, Final
 
 Table = Mapping[str, Mapping[str, tuple[str, ...]]]
-"""What names are for, the module of `graspsense.core` that defines them, and the names."""
+"""What names are for, the module that defines them, and the names.
+
+A module is one of `graspsense.core`, or, with a dot, one of another package of graspsense: `testing.bench`.
+"""
 
 
 class LazyNames:
@@ -34,7 +37,7 @@ class LazyNames:
         """Import a name, and keep it in the module. Raises AttributeError if the module does not offer it."""
         if name not in self._home_of:
             raise AttributeError(f"module {self.module!r} has no attribute {name!r}")
-        value = getattr(import_module(f"graspsense.core.{self._home_of[name]}"), name)
+        value = getattr(import_module(_module(self._home_of[name])), name)
         setattr(sys.modules[self.module], name, value)
         return value
 
@@ -48,5 +51,9 @@ class LazyNames:
         for purpose, homes in self.table.items():
             lines += ["", f"# {purpose}"]
             for home, names in homes.items():
-                lines += [f"from graspsense.core.{home} import {name} as {name}" for name in names]
+                lines += [f"from {_module(home)} import {name} as {name}" for name in names]
         return "\n".join(lines)
+
+
+def _module(home: str) -> str:
+    return f"graspsense.{home}" if "." in home else f"graspsense.core.{home}"

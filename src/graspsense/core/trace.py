@@ -54,6 +54,26 @@ class Trace:
         """Return the number of ticks."""
         return len(self.t_s)
 
+    def __repr__(self) -> str:
+        from graspsense.core.notebook import trace_words
+
+        return f"<Trace: {trace_words(self)}>"
+
+    def _repr_html_(self) -> str:
+        from graspsense.core.notebook import sentence, trace_svg, trace_words
+
+        return sentence(trace_words(self)) + trace_svg(self)
+
+    def plot(self) -> tuple[Any, Any]:
+        """Draw the trace as `graspsense run --plot` does, and return the axes of the forces and of the gap.
+
+        These are matplotlib's, so that a notebook shows them and a script can add to them: `axes[0].figure` is the
+        figure. Raises PluginUnavailable without matplotlib, which the extra `plot` installs.
+        """
+        from graspsense.core.trace_plot import plot
+
+        return plot(self)
+
     def until(self, t_s: float) -> Trace:
         """Return the trace up to time `t_s`: every tick and image that is not later."""
         n = int(np.searchsorted(self.t_s, t_s, side="right"))

@@ -56,6 +56,17 @@ class Trial:
     seconds_simulated: float | None
     seconds_wall: float
 
+    def __repr__(self) -> str:
+        parts = [self.outcome.words, *self.run.labels.values(), f"{len(self.trace)} ticks"]
+        if self.prediction is not None:
+            parts.append(f"predicted {self.prediction.label}")
+        return f"<Trial: {', '.join(parts)}>"
+
+    def _repr_html_(self) -> str:
+        from graspsense.core.notebook import trial_html
+
+        return trial_html(self)
+
 
 def trial_as_json(trial: Trial) -> dict[str, Any]:
     """Return the trial without its trace as `graspsense run --json` prints it; a missing feature is None."""

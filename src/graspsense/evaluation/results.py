@@ -8,6 +8,7 @@ from typing import Any
 from attrs import field, frozen
 
 from graspsense.core.labelled import Target
+from graspsense.core.notebook import sentence, table
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import Difference, RecognitionRate
 
@@ -63,3 +64,18 @@ class Evaluation:
     notes: tuple[str, ...]
     confusions: Mapping[str, Confusion] = field(factory=dict)
     """The confusion matrix of each protocol that was measured."""
+
+    def __repr__(self) -> str:
+        return f"<Evaluation: {self._words()}>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (name, "not measured" if one.rate is None else one.rate.words, one.reason or one.what)
+            for name, one in {**self.protocols, **self.controls}.items()
+        ]
+        parts = [sentence(self._words(), strong=True)]
+        parts += [sentence(f"warning: {warning}") for warning in self.warnings]
+        return "".join([*parts, table(("protocol or control", "rate", "what it is"), rows)])
+
+    def _words(self) -> str:
+        return f"{self.classifier} on {self.source}: {self.headline.words}, {self.protocol}"

@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.core.trace_plot import MATPLOTLIB_HINT
 
 if TYPE_CHECKING:
     from graspsense.evaluation.confusion import Confusion
-
-MATPLOTLIB_HINT = 'a picture needs matplotlib: pip install "graspsense[plot]", or pip install matplotlib'
 
 
 def confusion_text(confusion: Confusion) -> list[str]:

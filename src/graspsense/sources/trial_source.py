@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -10,6 +11,7 @@ from attrs import fields_dict, frozen
 
 from graspsense.core.errors import ConfigError, PluginUnavailable
 from graspsense.core.labelled import Labelled
+from graspsense.core.strict import ValidationFailed, structured
 from graspsense.sources.simulated import Group, simulated
 
 if TYPE_CHECKING:
@@ -48,6 +50,37 @@ class TrialSource(Group):
     def kind(self) -> Kind:
         """The kind of source. Raises ConfigError if the text names no source."""
         return kind_of(self.source)
+
+
+def load_trials(
+    source: str = SIMULATED,
+    *,
+    pipeline: str = "default",
+    options: Sequence[str] = (),
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+    **keys: Any,
+) -> Labelled:
+    """Return labelled trials: `simulated`, a CSV of features, or a data set as `store:FOLDER`.
+
+    `pipeline` and `options` (`"features.type=chitta"`) select the components that simulate trials, or compute their
+    features; `keys` are the further fields of `TrialSource`, such as `label` or `objects`. Raises ConfigError,
+    DataDamaged.
+    """
+    from graspsense.core.config import resolve
+
+    try:
+        described = structured({**keys, "source": source}, TrialSource, source)
+    except ValidationFailed as misfit:
+        raise ConfigError("\n".join(f"{one.path[0]}: {one.text}" for one in misfit.problems)) from None
+    settings = cache(lambda: resolve(pipeline, options=options))
+    return labelled_trials(
+        described,
+        settings=settings,
+        features=lambda: settings().features.create(),
+        seed=seed,
+        progress=progress,
+    )
 
 
 def kind_of(source: str) -> Kind:

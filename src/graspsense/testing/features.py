@@ -14,10 +14,10 @@ from graspsense.testing.samples import (
     COLUMNS_OF_CHANNEL,
     columns_of,
     copied,
-    masked,
     odd_traces,
     shifted,
     squeeze,
+    with_channels,
 )
 from graspsense.testing.subject import Subject
 
@@ -41,7 +41,7 @@ def _features(subject: Subject, trace: Trace, of: str = "a whole grasp") -> Feat
 
 def _own(subject: Subject) -> Trace:
     """Return a whole grasp of a gripper that has only the channels in `requires`."""
-    return masked(squeeze(), {one.name for one in subject.entry.requires})
+    return with_channels(squeeze(), {one.name for one in subject.entry.requires})
 
 
 def _same(a: Features, b: Features) -> bool:

@@ -65,7 +65,7 @@ def _image(frame: _Frame, counter: int) -> Pads:
     return Pads(frame.t_s, counter, cells[0], cells[1])
 
 
-def masked(trace: Trace, channels: set[str]) -> Trace:
+def with_channels(trace: Trace, channels: set[str]) -> Trace:
     """Return the trace of a gripper that has these channels only."""
     columns = {}
     for channel, names in COLUMNS_OF_CHANNEL.items():
@@ -106,8 +106,8 @@ def odd_traces() -> dict[str, Trace]:
         "a trace in which one pad touched": squeeze(contacts=(0.06, -1.0)),
         "a trace with contact from the first tick on": squeeze(contacts=(0.08, 0.08)),
         "a trace of an object without stiffness": squeeze(stiffness_n_m=0.0),
-        "a trace without cell images": masked(whole, set(COLUMNS_OF_CHANNEL) - {"pads"}),
-        "a trace without any channel": masked(whole, set()),
+        "a trace without cell images": with_channels(whole, set(COLUMNS_OF_CHANNEL) - {"pads"}),
+        "a trace without any channel": with_channels(whole, set()),
         "a trace with gaps in its numbers": _holed(whole),
     }
 

@@ -1,0 +1,102 @@
+"""The drawing of a trace with matplotlib: pad forces and gap over time, with the phases behind them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from graspsense.core.errors import PluginUnavailable
+from graspsense.core.signals import Phase
+from graspsense.core.units import display_unit
+
+if TYPE_CHECKING:
+    from graspsense.core.trace import Floats, Integers, Trace
+
+MATPLOTLIB_HINT: Final = (
+    'a picture needs matplotlib: pip install "graspsense[plot]", or pip install matplotlib'
+)
+BEFORE_CONTACT_S: Final = 0.8
+"""How much of the approach is shown where time is in seconds: the rest is motion through free air."""
+PHASE_COLOURS: Final = {Phase.APPROACH: "#e9eff6", Phase.SQUEEZE: "#fbdcb4", Phase.HOLD: "#c9e6cf"}
+OTHER_PHASE: Final = "#f3f3f3"
+LEAST_NAMED: Final = 0.05
+"""A phase that lasts less than this share of the grasp is shaded but not named."""
+LEFT, RIGHT, GAP = "#0b5fa5", "#b3400a", "#3d3d3d"
+
+
+def plot(trace: Trace) -> tuple[Any, Any]:
+    """Draw a trace in a new figure of pyplot and return its axes. Raises PluginUnavailable without matplotlib."""
+    try:
+        from matplotlib import pyplot
+    except ImportError as error:
+        raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
+    _, (force, gap) = pyplot.subplots(2, 1, sharex=True, figsize=(6.4, 4.4), layout="constrained")
+    draw_trace(trace, force, gap)
+    return force, gap
+
+
+def draw_trace(trace: Trace, force: Any, gap: Any) -> None:
+    """Draw the pad forces and the gap into two axes of matplotlib that share the axis of time."""
+    contact = contact_time(trace)
+    zero = 0.0 if contact is None else contact
+    start = shown_from(trace)
+    t = trace.t_s[start:] - zero
+    force.plot(t, trace.force_left_n[start:], color=LEFT, lw=1.6, label="left pad")
+    force.plot(t, trace.force_right_n[start:], color=RIGHT, lw=1.6, ls="--", label="right pad")
+    force.set_ylabel(f"force, {trace.units['force_left']}")
+    # Noise alone does not fill the axis.
+    force.set_ylim(top=max(force.get_ylim()[1], 1.0))
+    force.legend(loc="upper left", fontsize=8, framealpha=0.9)
+    force.tick_params(labelbottom=False)
+    shown, factor = display_unit(trace.units["gap"])
+    gap.plot(t, factor * trace.gap_m[start:], color=GAP, lw=1.6)
+    gap.set_ylabel(f"gap, {shown}")
+    gap.set_xlabel(f"{'time' if contact is None else 'time since contact'}, {trace.units['t']}")
+    for axes in (force, gap):
+        _shade_phases(axes, t, trace.phase[start:], named=axes is force)
+        axes.margins(x=0.0)
+        axes.grid(color="white", lw=0.8)
+        axes.set_axisbelow(True)
+
+
+def contact_time(trace: Trace) -> float | None:
+    """Return when both pads touched, where the phase changes from approach to squeeze; None if they never did."""
+    squeezed = np.flatnonzero(trace.phase == int(Phase.SQUEEZE))
+    return float(trace.t_s[squeezed[0]]) if len(squeezed) else None
+
+
+def shown_from(trace: Trace) -> int:
+    """Return the first tick that is drawn: shortly before contact where there is one, else the first."""
+    contact = contact_time(trace)
+    if contact is None or trace.units["t"] != "s":
+        return 0
+    return int(np.searchsorted(trace.t_s, contact - BEFORE_CONTACT_S))
+
+
+def phase_spans(t: Floats, phases: Integers) -> list[tuple[Phase, float, float]]:
+    """Return each phase in turn with the times at which it begins and ends."""
+    if len(t) == 0:
+        return []
+    starts = [0, *(np.flatnonzero(np.diff(phases)) + 1).tolist()]
+    ends = [*starts[1:], len(t) - 1]
+    return [
+        (Phase(int(phases[start])), float(t[start]), float(t[end]))
+        for start, end in zip(starts, ends, strict=True)
+    ]
+
+
+def _shade_phases(axes: Any, t: Floats, phases: Integers, *, named: bool) -> None:
+    """Shade each phase behind the lines; `named`: write its name above it."""
+    for phase, begin, end in phase_spans(t, phases):
+        axes.axvspan(begin, end, color=PHASE_COLOURS.get(phase, OTHER_PHASE), lw=0.0, zorder=0)
+        if named and end - begin >= LEAST_NAMED * float(t[-1] - t[0]):
+            axes.text(
+                0.5 * (begin + end),
+                1.02,
+                phase.name.lower(),
+                transform=axes.get_xaxis_transform(),
+                ha="center",
+                va="bottom",
+                fontsize=8,
+            )

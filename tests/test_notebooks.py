@@ -1,0 +1,186 @@
+"""What notebooks and interpreters show of values, and that two modules are enough for what the documentation shows."""
+
+from __future__ import annotations
+
+import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from attrs import evolve
+
+import graspsense
+from graspsense import Evaluation, Features, Prediction
+from graspsense.core.errors import PluginUnavailable
+from graspsense.evaluation.confusion import Confusion
+from graspsense.evaluation.intervals import RecognitionRate
+from graspsense.evaluation.results import Measurement
+from graspsense.plugin_api import a_trial, squeeze, with_channels
+
+ROOT = Path(__file__).parents[1]
+PAGES = [*ROOT.glob("docs/**/*.md"), ROOT / "README.md", *ROOT.glob("examples/*/README.md")]
+SOURCES = [*ROOT.glob("examples/**/*.py"), *ROOT.glob("src/graspsense/scaffold/templates/**/*.py.txt")]
+
+
+class Tags(HTMLParser):
+    """The balance of the tags of a piece of HTML, and its text."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.open, self.text, self.seen = [], [], []
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+        self.seen.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_startendtag(self, tag, attrs):
+        self.seen.append(tag)
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def shown(value):
+    """Return the text of what a notebook shows; its tags are balanced, and it has no colours for text of its own."""
+    html = value._repr_html_()
+    tags = Tags(html)
+    assert not tags.open
+    assert not {"script", "link", "img"} & set(tags.seen)
+    assert not re.search(r"background|[^-]color:", html)
+    return " ".join(tags.text)
+
+
+EVALUATION = Evaluation(
+    source="simulated <grasps>",
+    classifier="c45",
+    target="both",
+    features=(("p_first", "m"),),
+    folds=4,
+    seed=0,
+    protocol="stratified_4_fold",
+    headline=RecognitionRate(15, 20),
+    confusion=Confusion(("a", "b"), ((8, 2), (3, 7))),
+    protocols={"stratified_4_fold": Measurement("4 folds", RecognitionRate(15, 20))},
+    controls={"width_only": Measurement("the width alone", reason="there is no width")},
+    by_class={},
+    unknown=RecognitionRate(0, 20),
+    learning_curve=(),
+    warnings=("the order alone reveals the label",),
+    notes=(),
+)
+
+
+def test_a_trial_shows_outcome_curve_features_and_prediction():
+    prediction = Prediction(
+        label="cup:<full>",
+        probabilities={"cup:<full>": 0.98, "cup:empty": 0.02, "can": 0.001},
+        because=("force 7 N > 5 N",),
+        warnings=("few trials",),
+    )
+    trial = evolve(a_trial(), prediction=prediction)
+
+    text = shown(trial)
+
+    for part in (trial.outcome.words, "force, N", "hold", "predicted: cup:<full>", "98 %", "force 7 N > 5 N"):
+        assert part in text
+    assert "warning: few trials" in text
+    assert " can " not in text
+    assert "&lt;full&gt;" in trial._repr_html_()
+    assert repr(trial).startswith("<Trial: steady, ")
+    assert repr(trial).endswith("predicted cup:<full>>")
+    assert repr(prediction) == "<Prediction: cup:<full>, 98 % by the model>"
+
+
+def test_a_trace_shows_a_curve_also_without_forces_and_without_ticks():
+    whole = squeeze()
+    assert re.fullmatch(r"<Trace: \d+ ticks, [\d.]+ s, forces to [\d.]+ N, gap .* mm to .* mm>", repr(whole))
+    blind = with_channels(whole, {"gap"})
+    for trace in (whole, blind, with_channels(whole, set()), whole.until(-1.0)):
+        svg = re.search(r"<svg.*</svg>", trace._repr_html_(), re.DOTALL)[0]
+        picture = ElementTree.fromstring(svg)
+        assert "nan" not in svg
+        assert picture.get("aria-label") in repr(trace)
+        shown(trace)
+    assert "forces" not in repr(blind)
+    assert repr(whole.until(-1.0)) == "<Trace: no ticks>"
+
+
+def test_features_show_units_for_people_and_reasons():
+    features = Features(
+        names=("p_first", "ratio", "hysteresis"),
+        values=(0.0578, 0.5, float("nan")),
+        units=("m", "1", "1"),
+        reasons={"hysteresis": "no <release>"},
+    )
+
+    assert repr(features) == "<Features: p_first 57.8 mm, ratio 0.5, hysteresis missing>"
+    assert "no <release>" in shown(features)
+    assert "why it is missing" in shown(features)
+
+
+def test_an_evaluation_shows_its_rate_warnings_and_controls():
+    assert repr(EVALUATION) == (
+        "<Evaluation: c45 on simulated <grasps>: 0.750 (15/20, 95 % 0.531 to 0.888), stratified_4_fold>"
+    )
+    text = shown(EVALUATION)
+    for part in ("warning: the order alone", "width_only", "not measured", "there is no width", "0.750"):
+        assert part in text
+
+
+def test_a_plot_is_that_of_run_and_can_be_added_to(monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+
+    forces, gap = squeeze().plot()
+
+    assert [line.get_label() for line in forces.lines] == ["left pad", "right pad"]
+    assert forces.get_ylabel() == "force, N"
+    assert gap.get_ylabel() == "gap, mm"
+    assert gap.get_xlabel() == "time since contact, s"
+    pyplot.close(forces.figure)
+
+
+def test_a_plot_without_matplotlib_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+
+    with pytest.raises(
+        PluginUnavailable, match=r"a picture needs matplotlib: pip install \"graspsense\[plot\]\""
+    ):
+        squeeze().plot()
+
+
+def imports_of_graspsense(text):
+    return re.findall(r"^\s*(?:from (graspsense[\w.]*) import|import (graspsense[\w.]*))", text, re.MULTILINE)
+
+
+@pytest.mark.parametrize("path", [*PAGES, *SOURCES], ids=lambda path: str(path.relative_to(ROOT)))
+def test_two_modules_are_enough_for_what_the_documentation_shows(path):
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".md":
+        text = "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
+    used = {first or second for first, second in imports_of_graspsense(text)}
+
+    assert used - {"graspsense", "graspsense.plugin_api"} <= {
+        name for name in used if name.split(".")[0] != "graspsense"
+    }
+
+
+def test_what_the_page_on_notebooks_shows_runs(tmp_path, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs/notebooks.md").read_text(), re.DOTALL)
+    names: dict = {}
+
+    for block in blocks:
+        exec(block, names)
+
+    assert (tmp_path / "grasp.png").stat().st_size > 10_000
+    assert repr(names["trial"]).startswith("<Trial: steady, ")
+    assert isinstance(names["evaluation"], graspsense.Evaluation)
+    assert "protocol or control" in shown(names["evaluation"])
