@@ -10,7 +10,7 @@ from typing import Any, Final
 from attrs import asdict, frozen
 
 from graspsense.core.errors import ConfigError, PluginUnavailable
-from graspsense.report.confusion import MATPLOTLIB_HINT
+from graspsense.core.trace_plot import MATPLOTLIB_HINT
 
 HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP, S")
 PEAK: Final = "peak force"
