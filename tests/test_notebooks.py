@@ -126,10 +126,10 @@ def test_features_show_units_for_people_and_reasons():
 
 def test_an_evaluation_shows_its_rate_warnings_and_controls():
     assert repr(EVALUATION) == (
-        "<Evaluation: c45 on simulated <grasps>: 0.750 (15/20, 95 % 0.531 to 0.888), stratified_4_fold>"
+        "<Evaluation: c45 on simulated <grasps>: 75.0 % (15 of 20; 95 %: 53.1 to 88.8 %), stratified_4_fold>"
     )
     text = shown(EVALUATION)
-    for part in ("warning: the order alone", "width_only", "not measured", "there is no width", "0.750"):
+    for part in ("warning: the order alone", "width_only", "not measured", "there is no width", "75.0 %"):
         assert part in text
 
 
