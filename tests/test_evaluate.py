@@ -172,7 +172,7 @@ def test_the_json_is_whole_and_stable():
         "controls",
         "learning_curve",
     }
-    assert found["headline"].keys() == {"correct", "n", "rate", "interval"}
+    assert found["headline"].keys() == {"correct", "n", "rate", "interval", "no_interval", "instances"}
     assert list(found["controls"])[:5] == [
         "before_contact",
         "width_only",

@@ -283,7 +283,8 @@ def test_seeds_that_agree_are_no_certainty():
 
     assert high == 1.0
     assert low == pytest.approx(0.9750, abs=1e-4)  # Wilson's of 150 of 150
-    value, (low, high) = mean_difference((0.9, 0.9), (0.8, 0.8), 50)
+    same = mean_difference((0.9, 0.9), (0.8, 0.8), 50)
+    value, (low, high) = same.value, same.interval
     assert value == pytest.approx(0.1)
     assert low < value < high
 

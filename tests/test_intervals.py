@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.evaluation.intervals import RecognitionRate, difference, wilson
+from graspsense.evaluation.intervals import RecognitionRate, difference, rate_of, wilson
+from graspsense.evaluation.json_codec import from_json, to_json
 
 
 @pytest.mark.parametrize(
@@ -78,3 +79,64 @@ def test_the_interval_of_a_difference_covers_the_true_one_nineteen_times_in_twen
 def test_of_two_lengths_there_is_no_difference():
     with pytest.raises(ValueError, match="must be of the same trials"):
         difference([True], [True, False])
+
+
+def counted(counts, trials=8):
+    """Return which trials are right, and the instance of each, from the right trials of every instance."""
+    right = [j < count for count in counts for j in range(trials)]
+    return right, [f"bottle#{i}" for i in range(len(counts)) for _ in range(trials)]
+
+
+@pytest.mark.parametrize("instances", [6, 12])
+@pytest.mark.parametrize("correlation", [0.1, 0.3])
+def test_the_interval_over_instances_covers_where_that_of_the_trials_does_not(instances, correlation):
+    """benchmarks/coverage.py prints the whole table."""
+    rng = np.random.default_rng(0)
+    rate, size, runs = 0.85, (1 - correlation) / correlation, 400
+    covered = by_trials = 0
+    for _ in range(runs):
+        right, names = counted(rng.binomial(8, rng.beta(rate * size, (1 - rate) * size, instances)))
+        low, high = rate_of(right, names).interval
+        covered += low <= rate <= high
+        low, high = RecognitionRate(sum(right), len(right)).interval
+        by_trials += low <= rate <= high
+
+    assert covered / runs > 0.92
+    assert by_trials / runs < 0.91
+
+
+def test_the_difference_over_instances_covers_too():
+    """Half of 12 instances are recognised better by the first, half by the second: the true difference is 0."""
+    rng = np.random.default_rng(0)
+    runs, covered, by_trials = 400, 0, 0
+    for _ in range(runs):
+        shift = rng.choice([-0.25, 0.25], 12)
+        first, names = counted(rng.binomial(8, 0.6 + shift))
+        second, _ = counted(rng.binomial(8, 0.6 - shift))
+        low, high = difference(first, second, names).interval
+        covered += low <= 0.0 <= high
+        low, high = difference(first, second).interval
+        by_trials += low <= 0.0 <= high
+
+    assert covered / runs > 0.92
+    assert by_trials / runs < 0.8
+
+
+def test_fewer_than_six_instances_have_no_interval_but_the_reason():
+    right, names = counted([8, 7, 8, 2, 8])
+
+    rate = rate_of(right, names)
+    assert rate.interval is None
+    assert "no interval: 5 instances, at least 6 are needed" in rate.words
+    assert difference(right, right, names).interval is None
+    assert not difference(right, [False] * len(right), names).is_positive
+    assert from_json(to_json(rate), RecognitionRate) == rate
+
+
+@pytest.mark.parametrize("counts", [[8] * 6, [0] * 6, [8, 8, 8, 8, 8, 7]])
+def test_instances_that_agree_give_no_interval_narrower_than_their_trials(counts):
+    right, names = counted(counts)
+
+    low, high = rate_of(right, names).interval
+    below, above = RecognitionRate(sum(right), len(right)).interval
+    assert 0.0 <= low <= below <= above <= high <= 1.0

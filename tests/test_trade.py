@@ -15,7 +15,6 @@ from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
 from graspsense.experiments.trade.front import front
 from graspsense.experiments.trade.next_squeeze import Decision, Forces, Promise, SqueezeAnswers, decide
-from graspsense.experiments.trade.paired import corrected_t, mcnemar
 
 CASES = st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=1, max_size=12)
 
@@ -33,23 +32,6 @@ def test_nothing_beats_what_is_on_the_front_and_something_there_beats_the_rest(c
 
 def test_a_high_value_may_be_the_cheap_one():
     assert front([1.0, 2.0], [0.5, 0.5], cheap_is_low=False) == [False, True]
-
-
-def test_mcnemar_counts_only_where_they_differ():
-    test = mcnemar([1, 1, 1, 1, 1, 1, 0, 1], [0, 0, 0, 0, 0, 0, 0, 1])
-    assert (test.only_first, test.only_second) == (6, 0)
-    assert test.p == pytest.approx(2 / 2**6)  # the two tails of six tosses
-    assert mcnemar([1, 0], [1, 0]).p == 1.0
-
-
-def test_the_corrected_t_test_is_the_plain_one_where_nothing_is_shared_and_milder_else():
-    from scipy.stats import ttest_1samp
-
-    differences = [0.1, 0.0, 0.05, 0.1, -0.02, 0.04]
-    plain = ttest_1samp(differences, 0.0).pvalue
-    assert corrected_t(differences, 0.0, 1.0) == pytest.approx(plain)
-    assert corrected_t(differences, 1.0, 9.0) > plain
-    assert corrected_t([0.0, 0.0], 1.0, 9.0) == 1.0
 
 
 KNOWS = np.array([[0.98, 0.02], [0.02, 0.98]])

@@ -130,16 +130,12 @@ def _row(name: str, measured: Measurement) -> tuple[str, ...]:
     from graspsense.evaluation.intervals import percentage, percentages
 
     assert measured.rate is not None
-    by = measured.difference
-    lower = (
-        f"{100 * by.value:+.1f} ({100 * by.interval[0]:+.1f} to {100 * by.interval[1]:+.1f})" if by else ""
-    )
     rate = measured.rate
     return (
         name,
         percentage(rate.rate),
         percentages(rate.interval),
-        lower,
+        "" if measured.difference is None else measured.difference.points,
         measured.difference_of,
         measured.what,
     )

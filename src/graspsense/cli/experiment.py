@@ -174,10 +174,9 @@ def _print(found: Summary, more: Findings | None, account: Account, page: str) -
 def _print_rates(found: Summary) -> None:
     rows = []
     for one in found.conditions:
-        low, high = one.rate.interval
-        rows.append(
-            (one.name or "-", one.target, f"{one.rate.mean:.3f}", f"{low:.3f} to {high:.3f}", one.protocol)
-        )
+        interval = one.rate.interval
+        within = "no interval" if interval is None else f"{interval[0]:.3f} to {interval[1]:.3f}"
+        rows.append((one.name or "-", one.target, f"{one.rate.mean:.3f}", within, one.protocol))
     if rows:
         echo_table(("CASE", "TARGET", "RATE", "95 %", "PROTOCOL"), rows)
         click.echo()

@@ -34,7 +34,8 @@ class Labelled:
     `labels` are `class:state`, or a class alone. `instances` identify the individual object of each trial
     (`odwalla#3`); None if that was not recorded, with the reason in `no_instances`. `order` numbers the trials in the
     order of recording. `before_contact` are features from before contact only, None with the reason in
-    `no_before_contact`; `width` is the width alone. `variants` are further tables to evaluate. `notes` tell what a
+    `no_before_contact`; `width` is the width alone. `variants` are further tables to evaluate. If rates on these
+    trials say nothing about other objects, `no_interval` is the reason, and they get no interval. `notes` tell what a
     reader of a rate must know, `provenance` how the trials were made.
     """
 
@@ -43,6 +44,7 @@ class Labelled:
     labels: tuple[str, ...]
     instances: tuple[str, ...] | None = None
     no_instances: str = ""
+    no_interval: str = ""
     order: tuple[int, ...] | None = None
     no_order: str = ""
     before_contact: ControlFeatures | None = None

@@ -17,7 +17,14 @@ from graspsense.core.labelled import ControlFeatures, Labelled, Target, class_of
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.folds import commonest, in_order, instance_held_out, stratified
-from graspsense.evaluation.intervals import RecognitionRate, difference, percentage
+from graspsense.evaluation.intervals import (
+    MIN_INSTANCES,
+    Difference,
+    RecognitionRate,
+    difference,
+    percentage,
+    rate_of,
+)
 from graspsense.evaluation.results import CurvePoint, Evaluation, Measurement
 
 if TYPE_CHECKING:
@@ -27,6 +34,9 @@ if TYPE_CHECKING:
 INSTANCE_HELD_OUT: Final = "instance_held_out"
 SHARES: Final = (0.1, 0.2, 0.4, 0.7, 1.0)
 """Shares of the training trials at which the learning curve is measured."""
+
+PERMUTATIONS: Final = 19
+"""Permutations of the labels: as many as p = 0.05 needs."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -42,16 +52,18 @@ def evaluate(
     settings: Mapping[str, Any] | None = None,
     controls: bool = True,
     learning_curve: bool = True,
+    permutations: int = PERMUTATIONS,
     progress: Progress | None = None,
 ) -> Evaluation:
     """Cross-validate a classifier on labelled trials, with controls and learning curve unless these are switched off.
 
     `target` selects what is recognised: the label as it is (`both`), the class, or the state within each class.
-    Raises ConfigError if there is only one label, or if there are too few trials.
+    `permutations` is how often the labels are shuffled. Raises ConfigError if there is only one label, or if there are
+    too few trials.
     """
     notes = list(labelled.notes)
     trials = _trials_for(labelled, target, notes)
-    evaluator = _Evaluator(learner, trials, target, folds, seed, progress, notes)
+    evaluator = _Evaluator(learner, trials, target, folds, seed, permutations, progress, notes)
     headline, protocols = evaluator.measure_protocols()
     measured = evaluator.measure_controls(headline, protocols) if controls else {}
     curve = evaluator.learning_curve(headline) if learning_curve else ()
@@ -69,8 +81,8 @@ def evaluate(
         confusion=confusion(labels, headline.pooled.predicted),
         protocols=protocols,
         controls=measured,
-        by_class=_by_class(labels, headline.pooled),
-        unknown=RecognitionRate(int(headline.pooled.unlike.sum()), len(labels)),
+        by_class=evaluator.by_class(headline.pooled),
+        unknown=evaluator.unknown(headline.pooled),
         learning_curve=curve,
         warnings=tuple(evaluator.warnings),
         notes=tuple(notes),
@@ -99,10 +111,12 @@ class _Evaluator:
         target: Target,
         k: int,
         seed: int,
+        permutations: int,
         progress: Progress | None,
         notes: list[str],
     ) -> None:
         self.learner, self.trials, self.k, self.seed = learner, trials, k, seed
+        self.permutations = permutations
         self.progress, self.notes = progress, notes
         self.labels = trials.labels
         self.groups = _groups(self.labels, target)
@@ -111,6 +125,7 @@ class _Evaluator:
         self.pooled_by_protocol: dict[str, Pooled] = {}
         self.pooled_by_control: dict[str, Pooled] = {}
         self._note_small_labels()
+        self._note_few_instances()
 
     def measure_protocols(self) -> tuple[_Headline, dict[str, Measurement]]:
         """Measure the rate under each protocol. The headline holds out whole instances if that is possible."""
@@ -148,7 +163,7 @@ class _Evaluator:
             INSTANCE_HELD_OUT: protocols[INSTANCE_HELD_OUT],
             "recording_order": self._in_order(),
             "majority_class": majority,
-            "shuffled_labels": self._shuffled(),
+            "shuffled_labels": self._shuffled(headline),
         }
         for name, control in trials.variants.items():
             controls[name] = self._other_features(name, control, headline)
@@ -177,7 +192,32 @@ class _Evaluator:
 
     def rate(self, pooled: Pooled) -> RecognitionRate:
         """Return the rate of these predictions."""
-        return RecognitionRate(sum(pooled.right(self.labels)), len(self.labels))
+        return self._rate_of(pooled.right(self.labels))
+
+    def by_class(self, pooled: Pooled) -> dict[str, RecognitionRate]:
+        """Return the rate among the trials of each class."""
+        right = pooled.right(self.labels)
+        rows: dict[str, list[int]] = {}
+        for i, label in enumerate(self.labels):
+            rows.setdefault(class_of(label), []).append(i)
+        return {name: self._rate_of(right, of) for name, of in sorted(rows.items())}
+
+    def unknown(self, pooled: Pooled) -> RecognitionRate:
+        """Return the share of trials that the model of their fold calls unknown."""
+        return self._rate_of(pooled.unlike.tolist())
+
+    def _rate_of(self, right: Sequence[bool], rows: Sequence[int] | None = None) -> RecognitionRate:
+        """Return the rate of these trials (default: all), with the interval that their instances allow."""
+        instances = self.trials.instances
+        rows = range(len(right)) if rows is None else rows
+        return rate_of(
+            [right[i] for i in rows],
+            None if instances is None else [instances[i] for i in rows],
+            self.trials.no_interval,
+        )
+
+    def _difference(self, first: Sequence[bool], second: Sequence[bool]) -> Difference:
+        return difference(first, second, self.trials.instances)
 
     def _note_small_labels(self) -> None:
         counts = Counter(self.labels)
@@ -187,6 +227,15 @@ class _Evaluator:
             self.notes.append(f"labels with a single trial, which no fold can predict: {', '.join(single)}")
         if few:
             self.notes.append(f"labels with fewer trials than folds ({self.k}): {', '.join(few)}")
+
+    def _note_few_instances(self) -> None:
+        if self.trials.instances is not None:
+            count = len(set(self.trials.instances))
+            if count < MIN_INSTANCES:
+                self.notes.append(
+                    f"{count} instances: with fewer than {MIN_INSTANCES}, rates and differences have no interval, and "
+                    "the controls give no warning"
+                )
 
     def _folds(self, assign: Callable[[Sequence[str], Any], Folds]) -> list[Folds]:
         return [assign([self.labels[i] for i in rows], rows) for rows in self.groups]
@@ -216,7 +265,7 @@ class _Evaluator:
 
     def _against(self, what: str, pooled: Pooled, other: Pooled, other_name: str) -> Measurement:
         """Return the rate of `pooled` with its difference to another protocol."""
-        by = difference(other.right(self.labels), pooled.right(self.labels))
+        by = self._difference(other.right(self.labels), pooled.right(self.labels))
         return Measurement(what, self.rate(pooled), difference=by, difference_of=other_name)
 
     def _instance_held_out(self, plain: Pooled) -> tuple[_Headline | None, Measurement]:
@@ -283,31 +332,57 @@ class _Evaluator:
             what += " (the most frequent state of each class)"
         return correct.tolist(), Measurement(
             what,
-            RecognitionRate(int(correct.sum()), len(correct)),
-            difference=difference(headline.pooled.right(self.labels), correct.tolist()),
+            self._rate_of(correct.tolist()),
+            difference=self._difference(headline.pooled.right(self.labels), correct.tolist()),
             difference_of=headline.protocol,
         )
 
-    def _shuffled(self) -> Measurement:
-        """Measure the rate on labels that carry no information: shuffled among the trials of each group."""
+    def _shuffled(self, headline: _Headline) -> Measurement:
+        """Measure the rate on labels that carry no information, and the permutation p of the headline.
+
+        The labels of whole instances are exchanged, so that shuffled trials depend on each other as the real ones do.
+        p is (b + 1) / (m + 1), with b of m permutations at least as good as the headline (B. Phipson and G. K. Smyth,
+        Stat. Appl. Genet. Mol. Biol. 9 (2010) 39).
+        """
+        what = f"mean of {self.permutations} permutations of the labels, in the folds of the headline"
         rng = np.random.default_rng(self.seed)
+        counts = []
+        for k in range(self.permutations):
+            shuffled = self._permuted(rng)
+            name = f"shuffled_labels {k + 1}/{self.permutations}"
+            try:
+                pooled = self._pooled(name, self.trials.table, headline.folds, labels=shuffled)
+            except FitRefused as refusal:
+                return Measurement(what, reason=str(refusal))
+            counts.append(sum(pooled.right(shuffled)))
+        reached = self.rate(headline.pooled).correct
+        p = None
+        if self.permutations >= PERMUTATIONS:
+            p = (sum(count >= reached for count in counts) + 1) / (len(counts) + 1)
+            what += f"; permutation p of the headline: {p:.2g}"
+        no_interval = "a mean over permutations"
+        rate = RecognitionRate(round(sum(counts) / len(counts)), len(self.labels), None, no_interval)
+        return Measurement(what, rate, permutation_p=p)
+
+    def _permuted(self, rng: np.random.Generator) -> list[str]:
+        """Return the labels exchanged among the instances of each group; among its trials if no instances are known."""
         labels = np.array(self.labels)
         for rows in self.groups:
-            labels[rows] = rng.permutation(labels[rows])
-        shuffled = labels.tolist()
-        folds = [stratified([shuffled[i] for i in rows], self.k, self.seed) for rows in self.groups]
-        what = "the same trials with shuffled labels, in stratified folds"
-        try:
-            pooled = self._pooled("shuffled_labels", self.trials.table, folds, labels=shuffled)
-        except FitRefused as refusal:
-            return Measurement(what, reason=str(refusal))
-        return Measurement(what, RecognitionRate(sum(pooled.right(shuffled)), len(shuffled)))
+            if self.trials.instances is None:
+                labels[rows] = rng.permutation(labels[rows])
+                continue
+            instances = np.array(self.trials.instances)[rows]
+            blocks = [rows[instances == name] for name in np.unique(instances)]
+            order = rng.permutation(len(blocks))
+            given = np.concatenate([rng.permutation(labels[blocks[k]]) for k in order])
+            labels[np.concatenate([blocks[k] for k in rng.permutation(len(blocks))])] = given
+        return [str(label) for label in labels]
 
     def _warn_of_early_recognition(self, control: Measurement, majority_correct: Sequence[bool]) -> None:
         if control.rate is None:
             return
         correct = self.pooled_by_control["before_contact"].right(self.labels)
-        if difference(correct, majority_correct).interval[0] > 0.0:
+        if self._difference(correct, majority_correct).is_positive:
             self.warnings.append(
                 f"{percentage(control.rate.rate)} are recognised from before contact ({control.what}); the most "
                 f"frequent label alone gives {percentage(float(np.mean(majority_correct)))}. The recording itself "
@@ -320,7 +395,7 @@ class _Evaluator:
             ("recording_order", "part of the stratified rate comes from the time of recording"),
         ):
             by = controls[name].difference
-            if by is not None and by.interval[0] > 0.0:
+            if by is not None and by.is_positive:
                 self.warnings.append(f"the rate of {name} is lower by {by.words}: {why}")
 
 
@@ -364,10 +439,3 @@ def _groups(labels: Sequence[str], target: Target) -> Groups:
         return [np.arange(len(labels))]
     classes = np.array([class_of(label) for label in labels])
     return [np.flatnonzero(classes == name) for name in np.unique(classes)]
-
-
-def _by_class(labels: Sequence[str], pooled: Pooled) -> dict[str, RecognitionRate]:
-    correct: dict[str, list[bool]] = {}
-    for label, right in zip(labels, pooled.right(labels), strict=True):
-        correct.setdefault(class_of(label), []).append(right)
-    return {name: RecognitionRate(sum(of), len(of)) for name, of in sorted(correct.items())}

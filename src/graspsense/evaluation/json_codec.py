@@ -1,7 +1,7 @@
 """The JSON form of results: one codec for everything that an evaluation or an experiment returns.
 
 `to_json` and `from_json` are inverse for attrs classes of numbers, texts, tuples, mappings and other such classes.
-A rate is written with its share and interval, which are computed again when it is read.
+A rate is written with its share, for those who read the JSON.
 """
 
 from __future__ import annotations
@@ -30,11 +30,25 @@ def from_json(values: Any, cls: type[T]) -> T:
 
 
 def _write_rate(rate: RecognitionRate) -> dict[str, Any]:
-    return {"correct": rate.correct, "n": rate.n, "rate": rate.rate, "interval": list(rate.interval)}
+    return {
+        "correct": rate.correct,
+        "n": rate.n,
+        "rate": rate.rate,
+        "interval": None if rate.interval is None else list(rate.interval),
+        "no_interval": rate.no_interval,
+        "instances": rate.instances,
+    }
 
 
 def _read_rate(values: Any, _: type) -> RecognitionRate:
-    return RecognitionRate(correct=values["correct"], n=values["n"])
+    interval = values["interval"]
+    return RecognitionRate(
+        correct=values["correct"],
+        n=values["n"],
+        interval=None if interval is None else (float(interval[0]), float(interval[1])),
+        no_interval=values.get("no_interval", ""),
+        instances=values.get("instances"),
+    )
 
 
 _CONVERTER: Final = cattrs.Converter()

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from attrs import frozen
 
-from graspsense.evaluation.intervals import wilson
+from graspsense.evaluation.intervals import Interval, RecognitionRate, wilson
 
 
 @frozen
@@ -17,12 +17,15 @@ class OverSeeds:
     `interval` is the confidence interval of the mean, `prediction` the interval for the rate of one more seed. Both
     are at 95 %, from Student's t with one degree of freedom less than there are seeds, clipped to 0 and 1. A published
     rate is one such run, so it is compared with `prediction`. Neither interval is narrower than the Wilson interval of
-    the trials (of all seeds, or of one), because a few seeds may agree by chance. With one seed, both are it.
+    the trials (of all seeds, or of one), because a few seeds may agree by chance. With one seed, both are the interval
+    of its trials, `single` if that is given; None if these have none.
     """
 
     rates: tuple[float, ...]
     n: int
     """Trials per seed."""
+    single: RecognitionRate | None = None
+    """The rate of the only run, if there is one run."""
 
     def __attrs_post_init__(self) -> None:
         if not self.rates or self.n < 1:
@@ -34,16 +37,18 @@ class OverSeeds:
         return math.fsum(self.rates) / len(self.rates)
 
     @property
-    def interval(self) -> tuple[float, float]:
+    def interval(self) -> Interval | None:
         """The 95 % interval of the mean."""
         return self._around(math.sqrt(1 / len(self.rates)), self.n * len(self.rates))
 
     @property
-    def prediction(self) -> tuple[float, float]:
+    def prediction(self) -> Interval | None:
         """The 95 % prediction interval for the rate of one more seed."""
         return self._around(math.sqrt(1 + 1 / len(self.rates)), self.n)
 
-    def _around(self, factor: float, n: int) -> tuple[float, float]:
+    def _around(self, factor: float, n: int) -> Interval | None:
+        if len(self.rates) == 1 and self.single is not None:
+            return self.single.interval
         least = wilson(self.mean * n, n)
         if len(self.rates) == 1:
             return least
@@ -53,24 +58,43 @@ class OverSeeds:
     @property
     def words(self) -> str:
         """The mean as text, with its interval."""
+        if self.interval is None:
+            return f"{self.mean:.3f} (no interval{f': {self.single.no_interval}' if self.single else ''})"
         low, high = self.interval
         return f"{self.mean:.3f} (95 % {low:.3f} to {high:.3f})"
 
 
+@frozen
+class MeanDifference:
+    """The mean of differences paired by seed, its 95 % interval and two-sided p from Student's t.
+
+    Both are corrected for the number of comparisons that are made with the same rate (Bonferroni), so that the interval
+    excludes zero exactly if p is below 0.05.
+    """
+
+    value: float
+    interval: Interval
+    p: float
+
+
 def mean_difference(
-    first: Sequence[float], second: Sequence[float], n: int
-) -> tuple[float, tuple[float, float]]:
-    """Return the mean of `first` minus `second`, paired by seed, and its 95 % interval from Student's t.
+    first: Sequence[float], second: Sequence[float], n: int, comparisons: int = 1
+) -> MeanDifference:
+    """Return the mean of `first` minus `second`, paired by seed.
 
     Rates of `n` trials have steps of 1/n, so the standard deviation between seeds is taken as at least 1/n. Raises
     ValueError if the lengths differ or there are fewer than two seeds.
     """
+    from scipy.special import stdtr
+
     if len(first) != len(second) or len(first) < 2:
         raise ValueError(f"{len(first)} and {len(second)} rates: give two or more, of the same seeds")
     each = [one - other for one, other in zip(first, second, strict=True)]
     mean = math.fsum(each) / len(each)
-    half = _t(len(each) - 1) * max(_deviation(each), 1 / n) / math.sqrt(len(each))
-    return mean, (mean - half, mean + half)
+    error = max(_deviation(each), 1 / n) / math.sqrt(len(each))
+    half = _t(len(each) - 1, comparisons) * error
+    p = 2.0 * float(stdtr(len(each) - 1, -abs(mean) / error))
+    return MeanDifference(mean, (mean - half, mean + half), min(1.0, comparisons * p))
 
 
 def _deviation(values: Sequence[float]) -> float:
@@ -78,8 +102,8 @@ def _deviation(values: Sequence[float]) -> float:
     return math.sqrt(math.fsum((one - mean) ** 2 for one in values) / (len(values) - 1))
 
 
-def _t(degrees: int) -> float:
-    """Return the 97.5 % quantile of Student's distribution."""
+def _t(degrees: int, comparisons: int = 1) -> float:
+    """Return the 97.5 % quantile of Student's distribution, for one of several comparisons."""
     from scipy.special import stdtrit
 
-    return float(stdtrit(degrees, 0.975))
+    return float(stdtrit(degrees, 1.0 - 0.025 / comparisons))

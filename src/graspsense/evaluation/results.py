@@ -18,6 +18,7 @@ class Measurement:
     """A rate under one protocol or control, or the reason why it could not be measured.
 
     `what` defines it. `difference` is the rate of the protocol named in `difference_of`, minus this rate.
+    `permutation_p` is the p-value of the headline among shuffled labels, None for all other controls.
     """
 
     what: str
@@ -25,6 +26,7 @@ class Measurement:
     reason: str = ""
     difference: Difference | None = None
     difference_of: str = ""
+    permutation_p: float | None = None
 
 
 @frozen

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from graspsense.evaluation.over_seeds import MeanDifference
 from graspsense.experiments.summary import ConditionResult, Summary
 from graspsense.report.wording import TARGETS
 
@@ -32,13 +33,16 @@ def _comparison(conditions: Sequence[ConditionResult], best: ConditionResult) ->
     ends = _ends_of_sweep(conditions)
     change = None if ends is None else ends[1].minus(ends[0])
     if ends is not None and change is not None:
-        return f"From {ends[0].name} to {ends[1].name} the rate changes by {_points(*change)}."
+        return f"From {ends[0].name} to {ends[1].name} the rate changes by {_points(change)}."
     worst = min(conditions, key=lambda condition: condition.rate.mean)
     gap = best.minus(worst)
     name = _capitalised(worst.name)
     if gap is not None:
-        return f"{name} is worst, with {_rate(worst)}; the difference is {_points(*gap)}."
-    if worst.rate.interval[1] >= best.rate.interval[0]:
+        return f"{name} is worst, with {_rate(worst)}; the difference is {_points(gap)}."
+    low, high = best.rate.interval, worst.rate.interval
+    if low is None or high is None:
+        return f"{name} is worst, with {_rate(worst)}; without intervals the difference may be chance."
+    if high[1] >= low[0]:
         return (
             f"{name} is worst, with {_rate(worst)}; as the intervals overlap, the difference may be chance."
         )
@@ -64,8 +68,8 @@ def _ends_of_sweep(
     return ordered[0], ordered[-1]
 
 
-def _points(value: float, interval: tuple[float, float]) -> str:
-    low, high = interval
+def _points(change: MeanDifference) -> str:
+    value, (low, high) = change.value, change.interval
     chance = "" if low > 0 or high < 0 else ", which may be chance"
     text = f"{100 * value:+.1f} percentage points (95 %: {100 * low:+.1f} to {100 * high:+.1f}){chance}"
     return text.replace("-", "−")
@@ -77,5 +81,7 @@ def _capitalised(name: str) -> str:
 
 
 def _rate(condition: ConditionResult) -> str:
-    low, high = condition.rate.interval
-    return f"{100 * condition.rate.mean:.1f} % (95 %: {100 * low:.1f} to {100 * high:.1f})"
+    interval = condition.rate.interval
+    if interval is None:
+        return f"{100 * condition.rate.mean:.1f} % (no interval)"
+    return f"{100 * condition.rate.mean:.1f} % (95 %: {100 * interval[0]:.1f} to {100 * interval[1]:.1f})"

@@ -97,8 +97,10 @@ def percent(rate: float) -> str:
     return f"{100 * rate:.1f} %"
 
 
-def span(interval: Sequence[float]) -> str:
+def span(interval: Sequence[float] | None) -> str:
     """Return an interval of rates in per cent."""
+    if interval is None:
+        return "no interval"
     return f"{100 * interval[0]:.1f} to {100 * interval[1]:.1f}"
 
 

@@ -296,7 +296,7 @@ def _made_of(summary: Summary, results: Results) -> Section:
         + paragraph(
             "The method follows S. Chitta, M. Piccoli and J. Sturm, Tactile Object Class and Internal State "
             "Recognition for Mobile Manipulation, ICRA 2010. Intervals over seeds are Student's; those of one run "
-            "are Wilson's (J. Am. Stat. Assoc. 22, 1927, 209)."
+            "are Wilson's, widened for trials of the same object (docs/evaluation.md)."
         )
     )
     if summary.failed:

@@ -130,6 +130,7 @@ def _cross_validated(
         seed=seed,
         controls=settings.controls,
         learning_curve=settings.learning_curve,
+        permutations=1,  # one for each seed
     )
     protocol = _protocol(evaluation, settings.protocol)
     rate = evaluation.headline

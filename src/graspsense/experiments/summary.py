@@ -10,7 +10,8 @@ from attrs import frozen
 
 from graspsense.core.labelled import Target
 from graspsense.evaluation.confusion import Confusion
-from graspsense.evaluation.over_seeds import OverSeeds, mean_difference
+from graspsense.evaluation.intervals import RecognitionRate
+from graspsense.evaluation.over_seeds import MeanDifference, OverSeeds, mean_difference
 from graspsense.experiments.experiment import ExperimentCase, Planned
 from graspsense.experiments.results import Results
 from graspsense.experiments.task import TaskResult
@@ -72,7 +73,7 @@ class ConditionResult:
     @cached_property
     def rate(self) -> OverSeeds:
         """The rate over the seeds. Recorded trials are the same for every seed, so their mean is a single rate."""
-        return self._over_seeds(list(self.rates.values()))
+        return self._over_seeds([result.rate for result in self.by_seed.values()])
 
     @cached_property
     def controls(self) -> dict[str, ControlOverSeeds]:
@@ -80,7 +81,7 @@ class ConditionResult:
         controls = {}
         for name, control in self.first.controls.items():
             measured = (result.controls[name].rate for result in self.by_seed.values())
-            rates = [rate.rate for rate in measured if rate is not None]
+            rates = [rate for rate in measured if rate is not None]
             rate = self._over_seeds(rates) if rates else None
             controls[name] = ControlOverSeeds(what=control.what, rate=rate, reason=control.reason)
         return controls
@@ -104,17 +105,22 @@ class ConditionResult:
                     counts[place[label]][place[other]] += count
         return Confusion(tuple(labels), tuple(map(tuple, counts)))
 
-    def minus(self, other: ConditionResult) -> tuple[float, tuple[float, float]] | None:
-        """Return this rate minus another's, paired by seed, with its interval; None with fewer than two seeds."""
+    def minus(self, other: ConditionResult, comparisons: int = 1) -> MeanDifference | None:
+        """Return this rate minus another's, paired by seed; None with fewer than two seeds.
+
+        `comparisons` is the number of rates that are compared with the same one.
+        """
         seeds = [seed for seed in self.rates if seed in other.rates]
         if len(seeds) < 2 or not self.simulated:
             return None
-        return mean_difference([self.rates[s] for s in seeds], [other.rates[s] for s in seeds], self.rate.n)
+        first, second = ([one.rates[seed] for seed in seeds] for one in (self, other))
+        return mean_difference(first, second, self.rate.n, comparisons)
 
-    def _over_seeds(self, rates: list[float]) -> OverSeeds:
+    def _over_seeds(self, measured: list[RecognitionRate]) -> OverSeeds:
+        rates = [one.rate for one in measured]
         if not self.simulated:
             rates = [sum(rates) / len(rates)]
-        return OverSeeds(tuple(rates), self.first.rate.n)
+        return OverSeeds(tuple(rates), self.first.rate.n, measured[0] if len(rates) == 1 else None)
 
 
 @frozen(kw_only=True, eq=False)
@@ -176,8 +182,8 @@ class Summary:
                     "n": one.rate.n,
                     "rates": {str(seed): rate for seed, rate in one.rates.items()},
                     "rate": one.rate.mean,
-                    "interval": list(one.rate.interval),
-                    "prediction_interval": list(one.rate.prediction),
+                    "interval": None if one.rate.interval is None else list(one.rate.interval),
+                    "prediction_interval": None if one.rate.prediction is None else list(one.rate.prediction),
                 }
                 for one in self.conditions
             ],

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 class ClassifierResult:
     """The rate of one classifier for one target, with its confusion matrix.
 
-    `cost` is what the rate costs in a trade-off experiment, `squeezes` the mean number of squeezes per answer. For
-    paired tests, `correct` states which trials are predicted correctly, and `fold` the fold of each trial.
+    `cost` is what the rate costs in a trade-off experiment, `squeezes` the mean number of squeezes per answer.
     """
 
     classifier: str
@@ -39,8 +38,6 @@ class ClassifierResult:
     """The tree that the classifier grows on all trials; None if it grows none, or was not asked to."""
     cost: float | None = None
     squeezes: float | None = None
-    correct: tuple[bool, ...] | None = None
-    fold: tuple[int, ...] | None = None
 
     @classmethod
     def of(

@@ -17,7 +17,7 @@ class RateRow:
 
     name: str
     rate: float
-    interval: tuple[float, float]
+    interval: tuple[float, float] | None
     what: str = ""
     strong: bool = False
     """Whether it is what the others are held against."""
@@ -25,8 +25,14 @@ class RateRow:
     @property
     def words(self) -> str:
         """Return it in per cent with its interval."""
-        low, high = self.interval
-        return f"{100 * self.rate:.1f} % ({100 * low:.1f} to {100 * high:.1f})"
+        return f"{100 * self.rate:.1f} % ({self.interval_text})"
+
+    @property
+    def interval_text(self) -> str:
+        """Return the interval in per cent."""
+        if self.interval is None:
+            return "no interval"
+        return f"{100 * self.interval[0]:.1f} to {100 * self.interval[1]:.1f}"
 
 
 ROW: Final = 34
@@ -42,8 +48,9 @@ def rates_picture(rows: Sequence[RateRow], caption: str) -> str:
         y = 22.0 + ROW * k
         ink = INKS[0] if row.strong else INKS[7]
         picture.text(8, y - 5, f"{row.name}: {100 * row.rate:.1f} %", bold=row.strong)
-        low, high = (scale(100 * one) for one in row.interval)
-        picture.line([(low, y + 5), (high, y + 5)], ink, width=3)
+        if row.interval is not None:
+            low, high = (scale(100 * one) for one in row.interval)
+            picture.line([(low, y + 5), (high, y + 5)], ink, width=3)
         picture.mark(scale(100 * row.rate), y + 5, ink, 0 if row.strong else 3, 4.5)
     words = "; ".join(f"{row.name} {row.words}" for row in rows)
     return figure(picture.svg(f"Recognition rates with 95 % intervals: {words}"), caption)
@@ -75,8 +82,9 @@ def rates_over(
         places = [(x_scale(x) + shift, y_scale(100 * row.rate)) for x, row in drawn]
         picture.line(places, ink, width=2, dash=dash)
         for (x, y), (_, row) in zip(places, drawn, strict=True):
-            low, high = (y_scale(100 * one) for one in row.interval)
-            picture.line([(x, low), (x, high)], ink, width=2)
+            if row.interval is not None:
+                low, high = (y_scale(100 * one) for one in row.interval)
+                picture.line([(x, low), (x, high)], ink, width=2)
             picture.mark(x, y, ink, k)
         y = 262.0 + 15 * k
         picture.line([(40, y - 4), (66, y - 4)], ink, width=2, dash=dash)
@@ -90,11 +98,8 @@ def rates_over(
 
 def rates_table(caption: str, rows: Sequence[RateRow]) -> str:
     """Return the rates as a table."""
-    cells = [
-        (row.name, f"{100 * row.rate:.1f} %", f"{100 * row.interval[0]:.1f} to {100 * row.interval[1]:.1f} %")
-        for row in rows
-    ]
-    return table(caption, ("case", "recognised", "95 % interval"), cells, 1)
+    cells = [(row.name, f"{100 * row.rate:.1f} %", row.interval_text) for row in rows]
+    return table(caption, ("case", "recognised", "95 % interval, %"), cells, 1)
 
 
 def rates_list(rows: Sequence[RateRow]) -> str:

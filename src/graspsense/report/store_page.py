@@ -133,11 +133,16 @@ def _curves(store: Store) -> list[GraspCurve]:
 def _answer(evaluation: Evaluation | None, total: int, problem: str) -> str:
     if evaluation is None:
         return f"There are {total} grasps, but no recognition rate: {problem}."
-    low, high = evaluation.headline.interval
+    interval = evaluation.headline.interval
+    within = (
+        f"no interval: {evaluation.headline.no_interval}"
+        if interval is None
+        else f"95 %: {100 * interval[0]:.1f} to {100 * interval[1]:.1f}"
+    )
     name = evaluation.classifier.partition(" ")[0].rpartition("/")[2]
     return (
         f"{name} recognises {TARGETS[evaluation.target]} in {100 * evaluation.headline.rate:.1f} % "
-        f"(95 %: {100 * low:.1f} to {100 * high:.1f}) of {evaluation.headline.n} grasps."
+        f"({within}) of {evaluation.headline.n} grasps."
     )
 
 

@@ -23,9 +23,10 @@ def _rate(evaluation: Evaluation) -> str:
         protocol = "objects of which no grasp was used for training"
     else:
         protocol = "objects of which other grasps may have been used for training"
+    interval = f"95 %: {percentages(rate.interval)}" if rate.interval else f"no interval: {rate.no_interval}"
     return (
         f"{name} recognises {TARGETS[evaluation.target]} in {percentage(rate.rate)} of {trials} "
-        f"(95 %: {percentages(rate.interval)}), on {protocol}."
+        f"({interval}), on {protocol}."
     )
 
 
@@ -33,7 +34,7 @@ def _against_guessing(majority: Measurement | None) -> str:
     if majority is None or majority.rate is None or majority.difference is None:
         return ""
     guessing = f"always giving the most frequent label ({percentage(majority.rate.rate)})"
-    if majority.difference.interval[0] > 0.0:
+    if majority.difference.is_positive:
         return f"This is better than {guessing}."
     return f"This is not shown to be better than {guessing}."
 
@@ -47,6 +48,8 @@ def _before_contact(evaluation: Evaluation) -> str:
     before = percentage(control.rate.rate)
     if any("from before contact" in warning for warning in evaluation.warnings):
         return f"But {before} are recognised before any contact: the recording reveals the labels, so do not trust it."
+    if control.difference is not None and control.difference.interval is None:
+        return f"Before contact {before} are recognised, on too few instances to say what that means."
     return f"Before contact {before} are recognised, so the recording does not explain the rate."
 
 
@@ -56,6 +59,6 @@ def _width(control: Measurement | None) -> str:
     if control.rate is None or control.difference is None:
         return "How much of it the width alone explains was not measured."
     width = f"The width alone gives {percentage(control.rate.rate)}"
-    if control.difference.interval[0] > 0.0:
+    if control.difference.is_positive:
         return f"{width}; the squeeze adds {100 * control.difference.value:.1f} points."
     return f"{width}: the squeeze is not shown to add anything."

@@ -13,7 +13,7 @@ from typing import Any, Final
 from attrs import frozen
 
 from graspsense.evaluation.intervals import wilson
-from graspsense.evaluation.over_seeds import OverSeeds
+from graspsense.evaluation.over_seeds import MeanDifference, OverSeeds
 from graspsense.experiments.findings import percent, span
 from graspsense.experiments.paper.rows import condition_result, is_of
 from graspsense.experiments.summary import Summary
@@ -80,8 +80,8 @@ def claims(summary: Summary) -> list[Claim]:
     return [one for one in (check(summary) for check in checks) if one is not None]
 
 
-def _points(difference: tuple[float, tuple[float, float]]) -> str:
-    value, (low, high) = difference
+def _points(difference: MeanDifference) -> str:
+    value, (low, high) = difference.value, difference.interval
     return f"{100 * value:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f})"
 
 
@@ -96,7 +96,7 @@ def _approach_velocity(summary: Summary) -> Claim | None:
         says="the initial closing velocity has a negligible effect on the recognition rate",
         rule="the rates at 5 and 20 mm/s differ by less than 5 points",
         basis="predicted",
-        holds=abs(gap[0]) < NEGLIGIBLE,
+        holds=abs(gap.value) < NEGLIGIBLE,
         number=f"20 mm/s minus 5 mm/s, state of an Odwalla bottle: {_points(gap)}",
     )
 
@@ -112,7 +112,7 @@ def _probing_force(summary: Summary) -> Claim | None:
         says="a stronger probing force raises the recognition rate",
         rule="the rate at 23 N is above that at 17 N, the 95 % interval of the difference above 0",
         basis="predicted",
-        holds=gap[1][0] > 0.0,
+        holds=gap.interval[0] > 0.0,
         number=f"23 N minus 17 N: {_points(gap)}; printed: +25.0 points",
     )
 
@@ -355,7 +355,7 @@ def _other_classifiers(summary: Summary) -> Claim | None:
         says="support vector machines and neural networks do about as well or slightly worse than C4.5",
         rule="each differs from C4.5 by less than 5 points, or is worse by less than 10, on class and state at once",
         basis="predicted",
-        holds=all(-0.10 < gap[0] < NEGLIGIBLE for gap in gaps.values()),
+        holds=all(-0.10 < gap.value < NEGLIGIBLE for gap in gaps.values()),
         number="; ".join(f"{name} minus c45: {_points(gap)}" for name, gap in gaps.items()),
     )
 

@@ -25,8 +25,8 @@ class RateComparison:
     @property
     def within(self) -> bool:
         """Whether the published rate is within the prediction interval of one more run of ours."""
-        low, high = self.ours.prediction
-        return low <= self.published.rate <= high
+        interval = self.ours.prediction
+        return interval is not None and interval[0] <= self.published.rate <= interval[1]
 
     @property
     def indistinguishable(self) -> bool | None:
@@ -65,8 +65,8 @@ class RateComparison:
             "published": one.rate,
             "published_interval": None if one.interval is None else list(one.interval),
             "ours": self.ours.mean,
-            "interval": list(self.ours.interval),
-            "prediction_interval": list(self.ours.prediction),
+            "interval": list(self.ours.interval or ()),
+            "prediction_interval": list(self.ours.prediction or ()),
             "seeds": len(self.ours.rates),
             "published_within_prediction": self.within,
             "ours_within_published_interval": self.indistinguishable,

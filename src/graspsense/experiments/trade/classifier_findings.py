@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 from attrs import frozen
 
+from graspsense.evaluation.over_seeds import MeanDifference
 from graspsense.experiments.findings import FoundTable, percent, span
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.trade.compare import WITHOUT
 from graspsense.experiments.trade.cost_findings import Report
-from graspsense.experiments.trade.paired import McNemar, corrected_t, mcnemar
 
 
 @frozen(kw_only=True)
@@ -18,9 +18,7 @@ class _Comparison:
     """One classifier compared with the first one, over the seeds that both have."""
 
     condition: ConditionResult
-    difference: tuple[float, tuple[float, float]] | None = None
-    counts: McNemar | None = None
-    t_test_p: float | None = None
+    difference: MeanDifference | None = None
 
     @property
     def name(self) -> str:
@@ -28,22 +26,24 @@ class _Comparison:
 
     @property
     def is_better(self) -> bool:
-        return self.difference is not None and self.difference[1][0] > 0.0
+        return self.difference is not None and self.difference.interval[0] > 0.0
 
     @property
     def is_worse(self) -> bool:
-        return self.difference is not None and self.difference[1][1] < 0.0
+        return self.difference is not None and self.difference.interval[1] < 0.0
 
     @property
     def points(self) -> str:
         """The difference in percentage points."""
-        return "" if self.difference is None else f"{100 * self.difference[0]:+.1f}"
+        return "" if self.difference is None else f"{100 * self.difference.value:+.1f}"
 
     @property
     def cells(self) -> tuple[str, ...]:
         rate = self.condition.rate
         interval = (
-            "" if self.difference is None else " to ".join(f"{100 * x:+.1f}" for x in self.difference[1])
+            ""
+            if self.difference is None
+            else " to ".join(f"{100 * x:+.1f}" for x in self.difference.interval)
         )
         return (
             self.name,
@@ -51,16 +51,18 @@ class _Comparison:
             span(rate.interval),
             self.points,
             interval,
-            "" if self.counts is None else f"{self.counts.only_first}:{self.counts.only_second}",
-            "" if self.counts is None else f"{self.counts.p:.2g}",
-            "" if self.t_test_p is None else f"{self.t_test_p:.2g}",
+            "" if self.difference is None else f"{self.difference.p:.2g}",
         )
 
 
 def compare_classifiers(part: str, title: str, conditions: Sequence[ConditionResult]) -> Report:
     """Return the comparison of every classifier with the first one."""
     base = conditions[0]
-    compared = [_Comparison(condition=one) if one is base else _compared(one, base) for one in conditions]
+    comparisons = max(len(conditions) - 1, 1)
+    compared = [
+        _Comparison(condition=one, difference=None if one is base else one.minus(base, comparisons))
+        for one in conditions
+    ]
     classifiers = [one for one in compared if not one.name.startswith(WITHOUT)]
     reduced = [one for one in compared if one.name.startswith(WITHOUT)]
     text = _text(base, classifiers, reduced)
@@ -70,9 +72,7 @@ def compare_classifiers(part: str, title: str, conditions: Sequence[ConditionRes
         "95 % of the mean",
         f"points above {base.classifier}",
         "95 % of that",
-        "McNemar counts",
-        "McNemar p",
-        "t-test p",
+        "p",
     )
     tables = [
         FoundTable(
@@ -80,9 +80,9 @@ def compare_classifiers(part: str, title: str, conditions: Sequence[ConditionRes
             title=title,
             header=header,
             rows=tuple(one.cells for one in classifiers),
-            note=f"{text} The McNemar counts are the trials that only this classifier, and only {base.classifier}, "
-            "recognises; the test is exact, over the trials of all seeds. The t-test is the corrected resampled one, "
-            "over the folds of all seeds.",
+            note=f"{text} Differences are paired by seed. Their intervals and p-values (Student's t) are corrected "
+            f"for all {comparisons} comparisons with {base.classifier} by Bonferroni's method: an interval excludes "
+            "zero exactly if p is below 0.05.",
             numbers=1,
         )
     ]
@@ -112,28 +112,3 @@ def _text(base: ConditionResult, classifiers: Sequence[_Comparison], reduced: Se
     elif reduced:
         text += " Leaving out any single feature does not measurably lower the rate."
     return text
-
-
-def _compared(condition: ConditionResult, base: ConditionResult) -> _Comparison:
-    first: list[bool] = []
-    second: list[bool] = []
-    by_fold: list[float] = []
-    n = folds = 1
-    for seed, result in condition.by_seed.items():
-        if seed not in base.by_seed:
-            continue
-        correct, base_correct = result.correct or (), base.by_seed[seed].correct or ()
-        first += correct
-        second += base_correct
-        fold_of = result.fold
-        if fold_of is not None:
-            n, folds = len(fold_of), max(fold_of) + 1
-            for fold in range(folds):
-                rows = [i for i, k in enumerate(fold_of) if k == fold]
-                by_fold.append(sum(correct[i] - base_correct[i] for i in rows) / len(rows))
-    return _Comparison(
-        condition=condition,
-        difference=condition.minus(base),
-        counts=mcnemar(first, second),
-        t_test_p=corrected_t(by_fold, n / folds, n - n / folds) if len(by_fold) > 1 else None,
-    )

@@ -1,11 +1,10 @@
-"""The task `compare`: classifiers on the same folds, trial by trial, and the effect of leaving out each feature."""
+"""The task `compare`: classifiers on the same folds, and the effect of leaving out each feature."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any, Final
 
-import numpy as np
 from attrs import frozen
 
 from graspsense.core.strict import structured
@@ -36,7 +35,7 @@ class ComparisonSettings(CostSettings):
 
 
 def compare(params: Mapping[str, Any], seed: int) -> RecognitionResult:
-    """Return the rate of each classifier, with the correct trials and the fold of each trial."""
+    """Return the rate of each classifier."""
     settings = structured(params["judge"], ComparisonSettings, "[judge]")
     data = simulated(settings_of(params), groups=trial_groups(params), seed=seed)
     classifiers = classifiers_of(params)
@@ -50,13 +49,7 @@ def compare(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     for target in settings.targets:
         folds = stratified_folds(data.labels, target, seed)
         true = target_labels(data.labels, target)
-        fold = tuple(np.concatenate(folds).tolist()) if len(folds) == 1 else None
         for name, (learner, table) in tables.items():
             predicted = predictions(learner, table, data.labels, target, folds, seed)
-            correct = tuple(a == b for a, b in zip(true, predicted, strict=True))
-            results.append(
-                ClassifierResult.of(
-                    name, target, STRATIFIED, true, predicted, cost=0.0, correct=correct, fold=fold
-                )
-            )
+            results.append(ClassifierResult.of(name, target, STRATIFIED, true, predicted, cost=0.0))
     return simulated_result(data, results)

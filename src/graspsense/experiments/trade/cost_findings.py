@@ -97,8 +97,10 @@ def _picture(series: Mapping[str, Sequence[TradePoint]], axis: str, title: str) 
         picture.line(line, ink, dash=DASHES[k % len(DASHES)])
         for point in points:
             place = x(point.cost)
-            low, high = (y(100 * rate) for rate in point.condition.rate.interval)
-            picture.line([(place, low), (place, high)], ink, width=1.2)
+            interval = point.condition.rate.interval
+            if interval is not None:
+                low, high = (y(100 * rate) for rate in interval)
+                picture.line([(place, low), (place, high)], ink, width=1.2)
             size = 4.0 if point.on_front else 1.8
             picture.mark(place, y(100 * point.condition.rate.mean), ink, k, size)
         legend = 262.0 + 15 * k

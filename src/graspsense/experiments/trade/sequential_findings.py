@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from graspsense.evaluation.over_seeds import MeanDifference
 from graspsense.experiments.findings import FoundTable, percent, span
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.trade.cost_findings import Report
 from graspsense.experiments.trade.next_squeeze import fixed_name
 from graspsense.experiments.trade.trade_point import TradePoint, mean_cost, trade_points
 
-Difference = tuple[float, tuple[float, float]]
+Saved = tuple[float, tuple[float, float]]
 
 
 def compare_sequential(
@@ -25,7 +26,7 @@ def compare_sequential(
         if point.condition is not fixed:
             difference, saved = point.condition.minus(fixed), _seconds_minus(point.condition, fixed)
         rows.append(_cells(point, difference, saved))
-        as_good = difference is not None and difference[0] >= 0.0
+        as_good = difference is not None and difference.value >= 0.0
         if point.name.startswith("sequential") and as_good and saved is not None and saved[1][1] < 0.0:
             faster.append((point, saved))
     header = (
@@ -45,7 +46,7 @@ def compare_sequential(
     return Report(text=text, tables=(table,))
 
 
-def _text(fixed: ConditionResult, fixed_n: float, faster: Sequence[tuple[TradePoint, Difference]]) -> str:
+def _text(fixed: ConditionResult, fixed_n: float, faster: Sequence[tuple[TradePoint, Saved]]) -> str:
     rate = f"{percent(fixed.rate.mean)} ({span(fixed.rate.interval)})"
     seconds = mean_cost(fixed)
     if not faster:
@@ -62,7 +63,7 @@ def _text(fixed: ConditionResult, fixed_n: float, faster: Sequence[tuple[TradePo
     )
 
 
-def _cells(point: TradePoint, difference: Difference | None, saved: Difference | None) -> tuple[str, ...]:
+def _cells(point: TradePoint, difference: MeanDifference | None, saved: Saved | None) -> tuple[str, ...]:
     squeezes = [one.squeezes or 0.0 for one in point.condition.by_seed.values()]
     return (
         point.name,
@@ -70,15 +71,15 @@ def _cells(point: TradePoint, difference: Difference | None, saved: Difference |
         f"{math.fsum(squeezes) / len(squeezes):.2f}",
         percent(point.condition.rate.mean),
         span(point.condition.rate.interval),
-        "" if difference is None else f"{100 * difference[0]:+.1f}",
-        "" if difference is None else " to ".join(f"{100 * x:+.1f}" for x in difference[1]),
+        "" if difference is None else f"{100 * difference.value:+.1f}",
+        "" if difference is None else " to ".join(f"{100 * x:+.1f}" for x in difference.interval),
         "" if saved is None else f"{saved[0]:+.2f}",
         "" if saved is None else " to ".join(f"{x:+.2f}" for x in saved[1]),
         "yes" if point.on_front else "no",
     )
 
 
-def _seconds_minus(condition: ConditionResult, other: ConditionResult) -> Difference | None:
+def _seconds_minus(condition: ConditionResult, other: ConditionResult) -> Saved | None:
     """Return the seconds of one condition minus another's, paired by seed, with a 95 % interval by Student's t."""
     from scipy.special import stdtrit
 

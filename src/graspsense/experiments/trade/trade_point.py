@@ -8,6 +8,7 @@ from typing import Final
 
 from attrs import frozen
 
+from graspsense.evaluation.over_seeds import MeanDifference
 from graspsense.experiments.findings import percent, span
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.trade.front import front
@@ -45,7 +46,7 @@ class Advice:
     axis: str
     recommended: TradePoint
     best: TradePoint
-    loss: tuple[float, tuple[float, float]] | None = None
+    loss: MeanDifference | None = None
     single_seed: bool = False
 
     @property
@@ -67,7 +68,7 @@ class Advice:
                 f"To recognise {self.recognises}, use {best}: it has the highest rate, {self.best.rate_text}. No "
                 "cheaper case is shown to be within 5 points of it."
             )
-        value, (low, high) = self.loss
+        value, (low, high) = self.loss.value, self.loss.interval
         chosen = f"{self.recommended.name} at {self.recommended.cost:.3g} {self.axis}"
         return (
             f"To recognise {self.recognises}, {chosen} is good enough: it has {self.recommended.rate_text}. The best, "
@@ -78,7 +79,7 @@ class Advice:
     @property
     def cells(self) -> tuple[str, ...]:
         """The row of a table."""
-        loss = "0" if self.loss is None else f"{100 * self.loss[0]:.1f}"
+        loss = "0" if self.loss is None else f"{100 * self.loss.value:.1f}"
         return (
             self.title,
             self.recognises,
@@ -116,7 +117,7 @@ def advise(points: Sequence[TradePoint], title: str, axis: str) -> Advice:
         if point is best:
             break
         loss = best.condition.minus(point.condition)
-        if loss is not None and loss[1][1] < ENOUGH:
+        if loss is not None and loss.interval[1] < ENOUGH:
             return Advice(title=title, axis=axis, recommended=point, best=best, loss=loss)
     return Advice(title=title, axis=axis, recommended=best, best=best)
 

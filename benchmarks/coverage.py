@@ -1,0 +1,121 @@
+"""Coverage of the 95 % intervals of recognition rates: how often they contain the true rate.
+
+    python benchmarks/coverage.py [--repeats 2000]
+
+The first table draws the rate of each instance from a beta distribution and its trials from that rate. `correlation` is
+that of two trials of the same instance. It compares the interval that graspsense prints (`graspsense`) with Wilson's of
+independent trials, Student's t of the rates by instance, and the percentile bootstrap of instances. The second table
+evaluates a classifier on features with differences between instances, with whole instances held out; the true rate is
+the mean of all repeats.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import platform
+import time
+
+import numpy as np
+from scipy.special import stdtrit
+
+from graspsense.core.config import SelectedComponent
+from graspsense.core.features import FeatureTable
+from graspsense.core.labelled import Labelled
+from graspsense.core.plugins import installed
+from graspsense.evaluation.evaluate import evaluate
+from graspsense.evaluation.intervals import Interval, clustered, wilson
+
+TRIALS = 8
+"""Trials of each instance."""
+INSTANCES = (4, 6, 8, 12, 24, 48)
+BOOTSTRAPS = 200
+
+
+def intervals(counts: np.ndarray, rng: np.random.Generator) -> dict[str, Interval]:
+    """Return the intervals of a rate from the number of correct trials of each instance."""
+    k = len(counts)
+    n, correct = TRIALS * k, int(counts.sum())
+    rate = correct / n
+    right = [j < count for count in counts for j in range(TRIALS)]
+    names = [str(i) for i in range(k) for _ in range(TRIALS)]
+    half = float(stdtrit(k - 1, 0.975)) * float(counts.std(ddof=1)) / TRIALS / math.sqrt(k)
+    resampled = counts[rng.integers(0, k, (BOOTSTRAPS, k))].sum(axis=1) / n
+    low, high = np.percentile(resampled, [2.5, 97.5]).tolist()
+    return {
+        "wilson": wilson(correct, n),
+        "t": (rate - half, rate + half),
+        "bootstrap": (low, high),
+        "graspsense": clustered(right, names),
+    }
+
+
+def coverage(k: int, rate: float, correlation: float, repeats: int, seed: int = 0) -> dict[str, float]:
+    """Return the coverage of each interval with `k` instances, and the mean width of ours."""
+    rng = np.random.default_rng([seed, k, round(1000 * rate), round(1000 * correlation)])
+    size = (1.0 - correlation) / correlation
+    covered: dict[str, int] = {}
+    width = 0.0
+    for _ in range(repeats):
+        counts = rng.binomial(TRIALS, rng.beta(rate * size, (1.0 - rate) * size, k))
+        for name, (low, high) in intervals(counts, rng).items():
+            covered[name] = covered.get(name, 0) + (low <= rate <= high)
+            if name == "graspsense":
+                width += high - low
+    return {**{name: count / repeats for name, count in covered.items()}, "width": width / repeats}
+
+
+def evaluated(k: int, repeats: int, classifier: str = "c45") -> dict[str, float]:
+    """Return the coverage for a classifier that is cross-validated on two states of each of `k` instances."""
+    component = installed().find("classifier", classifier)
+    learner = SelectedComponent(component, component.config_class()())
+    rates, found = [], []
+    for seed in range(repeats):
+        rng = np.random.default_rng([1, k, seed])
+        instance = np.repeat(np.arange(k), TRIALS)
+        full = np.tile(np.arange(TRIALS) % 2, k)
+        shift = rng.normal(size=(k, 2))[instance]
+        values = 2.0 * full[:, np.newaxis] * np.array([1.0, 0.6]) + shift + rng.normal(size=(k * TRIALS, 2))
+        trials = Labelled(
+            source="normal features",
+            table=FeatureTable(names=("a", "b"), units=("", ""), values=values),
+            labels=tuple("full" if one else "empty" for one in full),
+            instances=tuple(f"bottle#{i}" for i in instance),
+        )
+        rate = evaluate(
+            learner, trials, classifier=classifier, seed=seed, controls=False, learning_curve=False
+        ).headline
+        rates.append(rate.rate)
+        found.append((wilson(rate.correct, rate.n), rate.interval or (0.0, 1.0)))
+    true = float(np.mean(rates))
+    return {
+        "rate": true,
+        "wilson": float(np.mean([low <= true <= high for (low, high), _ in found])),
+        "graspsense": float(np.mean([low <= true <= high for _, (low, high) in found])),
+    }
+
+
+def main() -> None:
+    """Print both tables."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--repeats", type=int, default=2000)
+    repeats = parser.parse_args().repeats
+    print(f"{time.strftime('%Y-%m-%d', time.gmtime())}, {platform.platform()}, {repeats} repeats\n")
+    print("| instances | rate | correlation | Wilson | t | bootstrap | graspsense | mean width |")
+    print("|---|---|---|---|---|---|---|---|")
+    for k in INSTANCES:
+        for rate in (0.6, 0.85, 0.95):
+            for correlation in (0.02, 0.1, 0.3):
+                of = coverage(k, rate, correlation, repeats)
+                cells = [f"{of[name]:.3f}" for name in ("wilson", "t", "bootstrap", "graspsense", "width")]
+                print(f"| {k} | {rate} | {correlation} | {' | '.join(cells)} |", flush=True)
+    print("\n| instances | true rate | Wilson | graspsense |\n|---|---|---|---|")
+    for k in (6, 12, 24):
+        of = evaluated(k, max(repeats // 4, 20))
+        print(f"| {k} | {of['rate']:.3f} | {of['wilson']:.3f} | {of['graspsense']:.3f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
