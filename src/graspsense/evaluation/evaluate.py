@@ -63,9 +63,9 @@ def evaluate(
     """
     notes = list(labelled.notes)
     trials = _trials_for(labelled, target, notes)
-    evaluator = _Evaluator(learner, trials, target, folds, seed, permutations, progress, notes)
+    evaluator = _Evaluator(learner, trials, target, folds, seed, progress, notes)
     headline, protocols = evaluator.measure_protocols()
-    measured = evaluator.measure_controls(headline, protocols) if controls else {}
+    measured = evaluator.measure_controls(headline, protocols, permutations) if controls else {}
     curve = evaluator.learning_curve(headline) if learning_curve else ()
     labels, table = trials.labels, trials.table
     return Evaluation(
@@ -111,12 +111,10 @@ class _Evaluator:
         target: Target,
         k: int,
         seed: int,
-        permutations: int,
         progress: Progress | None,
         notes: list[str],
     ) -> None:
         self.learner, self.trials, self.k, self.seed = learner, trials, k, seed
-        self.permutations = permutations
         self.progress, self.notes = progress, notes
         self.labels = trials.labels
         self.groups = _groups(self.labels, target)
@@ -144,7 +142,7 @@ class _Evaluator:
         return held or headline, protocols
 
     def measure_controls(
-        self, headline: _Headline, protocols: Mapping[str, Measurement]
+        self, headline: _Headline, protocols: Mapping[str, Measurement], permutations: int
     ) -> dict[str, Measurement]:
         """Measure the controls, and warn if they show that the recording itself reveals the labels."""
         trials = self.trials
@@ -163,7 +161,7 @@ class _Evaluator:
             INSTANCE_HELD_OUT: protocols[INSTANCE_HELD_OUT],
             "recording_order": self._in_order(),
             "majority_class": majority,
-            "shuffled_labels": self._shuffled(headline),
+            "shuffled_labels": self._shuffled(headline, permutations),
         }
         for name, control in trials.variants.items():
             controls[name] = self._other_features(name, control, headline)
@@ -337,19 +335,19 @@ class _Evaluator:
             difference_of=headline.protocol,
         )
 
-    def _shuffled(self, headline: _Headline) -> Measurement:
+    def _shuffled(self, headline: _Headline, permutations: int) -> Measurement:
         """Measure the rate on labels that carry no information, and the permutation p of the headline.
 
         The labels of whole instances are exchanged, so that shuffled trials depend on each other as the real ones do.
         p is (b + 1) / (m + 1), with b of m permutations at least as good as the headline (B. Phipson and G. K. Smyth,
         Stat. Appl. Genet. Mol. Biol. 9 (2010) 39).
         """
-        what = f"mean of {self.permutations} permutations of the labels, in the folds of the headline"
+        what = f"mean of {permutations} permutations of the labels, in the folds of the headline"
         rng = np.random.default_rng(self.seed)
         counts = []
-        for k in range(self.permutations):
+        for k in range(permutations):
             shuffled = self._permuted(rng)
-            name = f"shuffled_labels {k + 1}/{self.permutations}"
+            name = f"shuffled_labels {k + 1}/{permutations}"
             try:
                 pooled = self._pooled(name, self.trials.table, headline.folds, labels=shuffled)
             except FitRefused as refusal:
@@ -357,7 +355,7 @@ class _Evaluator:
             counts.append(sum(pooled.right(shuffled)))
         reached = self.rate(headline.pooled).correct
         p = None
-        if self.permutations >= PERMUTATIONS:
+        if permutations >= PERMUTATIONS:
             p = (sum(count >= reached for count in counts) + 1) / (len(counts) + 1)
             what += f"; permutation p of the headline: {p:.2g}"
         no_interval = "a mean over permutations"
