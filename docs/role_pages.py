@@ -19,8 +19,9 @@ from typing import Any
 
 import attrs
 
-from graspsense.core import entries, hookspecs, roles, signals, strict
-from graspsense.core.entries import TABLE_OF_ROLE
+from graspsense import plugin_api
+from graspsense.core import contact, entries, hookspecs, roles, signals, strict, tick
+from graspsense.core.entries import DECLARED, TABLE_OF_ROLE
 from graspsense.core.features import Features, FeatureTable, Prediction
 from graspsense.core.trace import Trace
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
@@ -47,6 +48,25 @@ HOOKS = {
     "feature-set": "graspsense_feature_sets",
     "classifier": "graspsense_classifiers",
 }
+ROLE_OF_BASE = {base: role for role, base in BASES.items()}
+HELPERS = {
+    "Settings": ("setting",),
+    "Contact and rest": (
+        *("CONTACT_FORCE_N", "REST_SPEED_M_S", "REST_WINDOW_S"),
+        *("both_touch", "Stillness", "watch", "at_rest", "first_rest"),
+    ),
+    "Phases that a controller reports": ("APPROACH", "SQUEEZE", "HOLD"),
+    "Outcomes that a controller reports": (
+        *("RUNNING", "STEADY", "NEVER_STEADY", "NOTHING_THERE", "TOO_WIDE", "SIDE_IMPACT"),
+        *("ONE_FINGER", "CRUSHED", "SLIPPED"),
+    ),
+    "Kinds of command": ("EFFORT", "VELOCITY", "POSITION", "FORCE"),
+    "Features and tables": ("missing", "in_words", "table_of"),
+    "Tests of a plugin": (
+        *("parametrize_checks", "create", "bench", "drive"),
+        *("squeeze", "with_channels", "three_kinds", "a_trial"),
+    ),
+}
 FLOWING: tuple[Any, ...] = (
     *(signals.Frame, signals.Pads, signals.Command, roles.Reading, roles.DeviceInfo),
     *(Trace, Features, FeatureTable, Prediction, RunInfo, GraspEvent, Trial),
@@ -68,8 +88,10 @@ def page(role: str) -> str:
             "- `graspsense plugins check NAME` checks whether a component conforms to the role.",
             "- [The tutorial](../tutorial.md) creates a package by hand.",
             "- [What flows](signals.md) describes the values that pass between components.",
+            "- [Helpers](helpers.md) describes the functions and constants that a component is written with.",
             f"- The hook [{HOOKS[role]}](../hooks.md#{_anchor(role)}) declares components of this role.",
             "",
+            *_attributes(base),
             "## Methods",
             "",
             f"`graspsense.plugin_api.{base.__name__}`: {_text(base)}",
@@ -151,6 +173,72 @@ def _anchor(role: str) -> str:
     return _section(f"{HOOKS[role]}{inspect.signature(spec)}".replace("'", "")).partition("#")[2]
 
 
+def helpers_page() -> str:
+    """Return the page of the functions and constants of `plugin_api` that a component is written with."""
+    lines = [
+        HEAD + "# Helpers",
+        "",
+        "These functions and constants of `graspsense.plugin_api` are what a component is written with. The features "
+        "and the controllers of graspsense use the same, so that all of them agree on contact and rest.",
+        "",
+    ]
+    for title, names in HELPERS.items():
+        lines += [f"## {title}", ""]
+        constants = [name for name in names if not callable(getattr(plugin_api, name))]
+        if constants:
+            lines += ["| constant | value | meaning |", "|---|---|---|"]
+            lines += [_constant(name) for name in constants]
+            lines.append("")
+        for name in names:
+            if name not in constants:
+                lines += _helper(name)
+    return "\n".join(lines)
+
+
+def _helper(name: str) -> list[str]:
+    """Return the section on one function or named tuple: signature, meaning and example."""
+    helper = getattr(plugin_api, name)
+    signature = re.sub(r"'([^']+)'", r"\1", str(inspect.signature(helper)))
+    signature = re.sub(r"ForwardRef\((\w+)\)", r"\1", signature)
+    meaning, _, example = (inspect.getdoc(helper) or "").partition("\n\n>>> ")
+    lines = [f"### {name}", "", f"    {name}{signature}", "", re.sub(r"(?<!\n)\n(?!\n)", " ", meaning), ""]
+    return [*lines, "```pycon", ">>> " + example, "```", ""] if example else lines
+
+
+def _constant(name: str) -> str:
+    """Return the row of a constant, with the docstring that follows it in its module."""
+    value = getattr(plugin_api, name)
+    for module in (signals, contact, tick):
+        body = ast.parse(inspect.getsource(module)).body
+        for one, text in pairwise(body):
+            if (
+                isinstance(one, ast.AnnAssign)
+                and ast.unparse(one.target) == name
+                and isinstance(text, ast.Expr)
+            ):
+                return f"| `{name}` | {value:g} | {_cell(' '.join(ast.literal_eval(text.value).split()))} |"
+    raise LookupError(f"{name} has no docstring")
+
+
+def _attributes(base: Any) -> list[str]:
+    """Return what the class of a component declares by attributes."""
+    declared = DECLARED[ROLE_OF_BASE[base]]
+    if not declared:
+        return []
+    lines = ["## What the class declares", "", "| attribute | type | meaning |", "|---|---|---|"]
+    body = ast.parse(inspect.getsource(base)).body[0].body  # type: ignore[attr-defined]
+    for one, text in pairwise(body):
+        if isinstance(one, ast.AnnAssign) and ast.unparse(one.target) in declared:
+            kind = ast.unparse(one.annotation).removeprefix("ClassVar[").removesuffix("]")
+            meaning = " ".join(ast.literal_eval(text.value).split())  # type: ignore[attr-defined]
+            lines.append(f"| `{ast.unparse(one.target)}` | {_cell(kind)} | {_cell(meaning)} |")
+    for one in body:
+        if isinstance(one, ast.FunctionDef) and one.name in declared:
+            meaning = " ".join((ast.get_docstring(one) or "").split())
+            lines.append(f"| `{one.name}` | {_cell(ast.unparse(one.returns))} | {_cell(meaning)} |")  # type: ignore[arg-type]
+    return [*lines, ""]
+
+
 def _methods(base: Any) -> list[str]:
     lines = []
     for name, method in vars(base).items():
@@ -158,11 +246,12 @@ def _methods(base: Any) -> list[str]:
         if name.startswith("_") or not callable(function):
             continue
         signature = (
-            re.sub(r"'([^']*)'", r"\1", str(inspect.signature(function)))
+            re.sub(r"'([^']+)'", r"\1", str(inspect.signature(function)))
             .replace("self, ", "")
             .replace("(self)", "()")
         )
         must = "" if getattr(method, "__isabstractmethod__", False) else " (optional)"
+        must = " (ready to use)" if name in ("result", "undefined") else must
         lines += [f"### {name}{must}", "", f"    {name}{signature}", "", _text(function), ""]
     return lines
 
@@ -226,6 +315,7 @@ def main() -> None:
     for role in TITLES:
         (FOLDER / f"{role}.md").write_text(page(role), encoding="utf-8")
     (FOLDER / "hooks.md").write_text(hooks_page(), encoding="utf-8")
+    (FOLDER / "helpers.md").write_text(helpers_page(), encoding="utf-8")
     (FOLDER / "signals.md").write_text(signals_page(), encoding="utf-8")
 
 

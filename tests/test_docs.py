@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import doctest
 import importlib.util
 import pkgutil
 import re
 import shlex
+import sys
 from pathlib import Path
 
 import click
 import pytest
 from test_imports import MAY_KNOW
 
+from graspsense import plugin_api
 from graspsense.cli.main import cli
 from graspsense.experiments.experiment import read_experiment
 
@@ -59,6 +62,25 @@ def architecture_rows(title):
     page = (ROOT / "docs" / "architecture.md").read_text()
     section = page.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
     return [line.strip("| ").split(" | ") for line in section.splitlines() if line.startswith("| `")]
+
+
+def test_the_page_of_helpers_is_that_of_their_docstrings():
+    written = (ROOT / "docs" / "roles" / "helpers.md").read_text(encoding="utf-8")
+    assert written == PAGES.helpers_page(), "run: python docs/role_pages.py"
+
+
+HELPERS = [name for names in PAGES.HELPERS.values() for name in names if callable(getattr(plugin_api, name))]
+
+
+@pytest.mark.parametrize("name", HELPERS)
+def test_a_helper_has_an_example_that_holds(name):
+    helper = getattr(plugin_api, name)
+    finder = doctest.DocTestFinder(recurse=False)
+    (example,) = finder.find(helper, name, globs={**vars(sys.modules[helper.__module__])})
+    if name != "Stillness":
+        assert example.examples, f"{name} has no example in its docstring"
+
+    assert doctest.DocTestRunner().run(example).failed == 0
 
 
 def test_the_table_of_packages_is_the_rule_that_is_enforced():

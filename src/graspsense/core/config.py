@@ -262,6 +262,9 @@ def create(role: Role, name: str, /, **config: Any) -> Any:
     """Return a component by role and name. Its config is checked as strictly as one from a file.
 
     Raises UnknownName, PluginUnavailable, ConfigError.
+
+    >>> create("controller", "hybrid", closing_speed_m_s=0.01).config.closing_speed_m_s
+    0.01
     """
     return select_component(role, name, **config).create()
 

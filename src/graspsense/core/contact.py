@@ -27,14 +27,21 @@ FEW: Final = 8
 
 
 class Stillness(NamedTuple):
-    """The time since which the gap has been at rest, and its value then."""
+    """The time since which the gap has been at rest (s), and its value then (m).
+
+    A control law keeps one in its state and begins with `Stillness(0.0, 0.0)`.
+    """
 
     since_t_s: float
     gap_m: float
 
 
 def both_touch(force_left_n: float, force_right_n: float, contact_force_n: float) -> bool:
-    """Return whether both pads are at or above the contact force (equation 1). NaN counts as no contact."""
+    """Return whether both pads are at or above the contact force (N, equation 1). NaN counts as no contact.
+
+    >>> both_touch(0.8, 0.7, CONTACT_FORCE_N), both_touch(0.8, 0.1, CONTACT_FORCE_N)
+    (True, False)
+    """
     return force_left_n >= contact_force_n and force_right_n >= contact_force_n
 
 
@@ -43,8 +50,16 @@ def watch(
 ) -> Stillness:
     """Return the stillness after one more sample: unchanged, or starting at this sample if the gap has moved.
 
-    The gap may differ from its value at the start of the stillness by the rest speed times the window, or, if samples
-    are further apart than the window, by the rest speed times the elapsed time. A gap of NaN is never at rest.
+    Call it in every tick with the time (s) and the gap (m) of the frame, the speed below which the fingers are at rest
+    (m/s), and the time for which they must be (s). The gap may differ from its value at the start of the stillness by
+    the rest speed times the window, or, if samples are further apart than the window, by the rest speed times the
+    elapsed time. A gap of NaN is never at rest.
+
+    >>> still = Stillness(since_t_s=1.0, gap_m=0.05)
+    >>> watch(still, 1.02, 0.05, REST_SPEED_M_S, REST_WINDOW_S)
+    Stillness(since_t_s=1.0, gap_m=0.05)
+    >>> watch(still, 1.02, 0.049, REST_SPEED_M_S, REST_WINDOW_S)
+    Stillness(since_t_s=1.02, gap_m=0.049)
     """
     allowed_m = rest_speed_m_s * max(rest_window_s, t_s - still.since_t_s)
     if abs(gap_m - still.gap_m) <= allowed_m:
@@ -53,7 +68,14 @@ def watch(
 
 
 def at_rest(still: Stillness, t_s: float, rest_window_s: float) -> bool:
-    """Return whether the stillness has lasted for the window (equation 2); rest then began at `still.since_t_s`."""
+    """Return whether the stillness has lasted for the window (s) at time `t_s` (equation 2).
+
+    Rest then began at `still.since_t_s`.
+
+    >>> still = Stillness(since_t_s=1.0, gap_m=0.05)
+    >>> at_rest(still, 1.02, REST_WINDOW_S), at_rest(still, 1.06, REST_WINDOW_S)
+    (False, True)
+    """
     # The tolerance of half a nanosecond covers the rounding of sums of 1 ms ticks.
     return t_s - still.since_t_s >= rest_window_s - 5e-10
 
@@ -67,7 +89,13 @@ def first_rest(
 ) -> tuple[int, int] | None:
     """Return the sample at which rest begins and the first sample that shows it, or None.
 
-    The result is that of `watch` and `at_rest` applied to each sample in turn. Only samples in `shows` can show a rest.
+    Times (s), gaps (m) and the mask `shows` have shape (n,). The result is that of `watch` and `at_rest` applied to
+    each sample in turn. Only samples in `shows` can show a rest.
+
+    >>> import numpy as np
+    >>> times, gaps = np.linspace(0.0, 0.1, 11), np.array([0.06, 0.055] + [0.05] * 9)
+    >>> first_rest(times, gaps, np.ones(11, bool), REST_SPEED_M_S, REST_WINDOW_S)
+    (2, 7)
     """
     import numpy as np
 

@@ -96,7 +96,13 @@ class FeatureTable:
 
 
 def table_of(rows: Sequence[Features]) -> FeatureTable:
-    """Return the table of these features, which must agree in names and units. ValueError if they do not."""
+    """Return the table of these features, one row for each; a classifier explains one trial by a table of one row.
+
+    Raises ValueError if they differ in names or units.
+
+    >>> table_of([Features(names=("p_first",), values=(0.05,), units=("m",))]).values
+    array([[0.05]])
+    """
     import numpy as np
 
     if not rows:
@@ -175,5 +181,9 @@ def percent(probability: float) -> str:
 
 
 def missing(names: Iterable[str], reason: str) -> dict[str, str]:
-    """Return one reason for each of these features."""
+    """Return one reason for each of these features.
+
+    >>> missing(("f_steady", "df_dt"), "no pad felt 0.5 N")
+    {'f_steady': 'no pad felt 0.5 N', 'df_dt': 'no pad felt 0.5 N'}
+    """
     return dict.fromkeys(names, reason)

@@ -93,6 +93,14 @@ def setting(
     `NAMES_INPUT`; a setting without either is part of the set-up: two grasps that differ in it are not comparable.
 
     Raises TypeError if the declaration contradicts itself.
+
+    >>> @attrs.frozen(kw_only=True)
+    ... class GentleConfig:
+    ...     closing_speed_m_s: float = setting(
+    ...         default=0.02, unit="m/s", above=0.0, meaning="Speed of closing until both pads touch."
+    ...     )
+    >>> GentleConfig(closing_speed_m_s=0.01).closing_speed_m_s
+    0.01
     """
     if not meaning.strip():
         raise TypeError("a setting needs a meaning: say in a sentence what its value does")

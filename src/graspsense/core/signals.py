@@ -120,20 +120,36 @@ class Outcome(enum.IntEnum):
 # The same numbers as plain integers, for control laws: to a compiler, a named tuple with an enum member and one with
 # an integer are of different types.
 EFFORT: Final = 0
+"""The value of the command is an effort in N; a positive one squeezes."""
 VELOCITY: Final = 1
+"""The value of the command is the rate of the gap in m/s; a negative one closes."""
 POSITION: Final = 2
+"""The value of the command is a gap in m."""
 FORCE: Final = 3
+"""The value of the command is the force on each pad in N."""
 
 APPROACH: Final = 2
+"""The fingers close and do not touch yet; the first state of a law has this phase."""
 SQUEEZE: Final = 3
+"""Both pads touch, and the fingers still move."""
 HOLD: Final = 4
+"""The fingers are at rest on the object."""
 
 RUNNING: Final = 0
+"""The grasp goes on; every other outcome ends it."""
 STEADY: Final = 1
+"""The fingers came to rest on the object."""
 NEVER_STEADY: Final = 2
+"""Both pads touched, and the fingers did not come to rest in time."""
 NOTHING_THERE: Final = 3
+"""The fingers closed, or the time passed, without a contact."""
 TOO_WIDE: Final = 4
+"""The pads touched at once: the object is wider than the opening."""
 SIDE_IMPACT: Final = 5
+"""An edge of a fingertip touched something first."""
 ONE_FINGER: Final = 6
+"""Only one pad touched in time."""
 CRUSHED: Final = 7
+"""The force fell while the fingers closed further: the object gave way."""
 SLIPPED: Final = 8
+"""Both pads lost contact while the fingers closed further."""

@@ -11,7 +11,11 @@ def display_unit(unit: str) -> tuple[str, float]:
 
 
 def in_words(value: float, unit: str) -> str:
-    """Return a value with its unit, lengths in mm."""
+    """Return a value with its unit, lengths in mm.
+
+    >>> in_words(0.0578, "m"), in_words(3.2, "N"), in_words(0.25, "1")
+    ('57.8 mm', '3.2 N', '0.25')
+    """
     shown, factor = display_unit(unit)
     return with_unit(f"{value * factor:.4g}", shown)
 

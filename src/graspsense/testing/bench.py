@@ -113,12 +113,22 @@ class Bench(SensorBackend[None]):
 
 
 def bench(channels: Any, thing: str = "a soft thing") -> Bench:
-    """Return the bench with one of `THINGS` as the object."""
+    """Return a model gripper with these channels and one of `THINGS` as the object, to drive a controller with.
+
+    >>> sorted(THINGS)
+    ['a hard thing', 'a soft thing', 'nothing']
+    """
     return Bench(frozenset(channels), *THINGS[thing])
 
 
 def drive(controller: Controller[Any], gripper: SensorBackend[Any]) -> Grasp:
-    """Return a whole grasp of this gripper under this controller, by the runner."""
+    """Return a whole grasp of this gripper under this controller, by the runner: its outcome and its trace.
+
+    >>> from graspsense.plugin_api import create
+    >>> channels = ("gap", "velocity", "effort", "force_left", "force_right")
+    >>> drive(create("controller", "hybrid"), bench(channels, "a soft thing")).outcome.words
+    'steady'
+    """
     from graspsense.core.run_config import RunConfig
     from graspsense.core.runner import run_grasp
 

@@ -175,6 +175,11 @@ def parametrize_checks(name: str, **options: Any) -> Any:
     """Return the pytest mark that runs a test with every check of a component, as the argument `check`.
 
     The test is `def test_conformance(check): check.run()`; the options are those of `examine`.
+
+    >>> from graspsense.plugin_api import parametrize_checks
+    >>> @parametrize_checks("graspsense/knn")
+    ... def test_conformance(check):
+    ...     check.run()
     """
     import pytest
 
