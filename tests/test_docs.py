@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import click
+import numpy
 import pytest
 from test_imports import MAY_KNOW
 
@@ -76,7 +77,7 @@ HELPERS = [name for names in PAGES.HELPERS.values() for name in names if callabl
 def test_a_helper_has_an_example_that_holds(name):
     helper = getattr(plugin_api, name)
     finder = doctest.DocTestFinder(recurse=False)
-    (example,) = finder.find(helper, name, globs={**vars(sys.modules[helper.__module__])})
+    (example,) = finder.find(helper, name, globs={**vars(sys.modules[helper.__module__]), "np": numpy})
     if name != "Stillness":
         assert example.examples, f"{name} has no example in its docstring"
 

@@ -89,12 +89,10 @@ def first_rest(
 ) -> tuple[int, int] | None:
     """Return the sample at which rest begins and the first sample that shows it, or None.
 
-    Times (s), gaps (m) and the mask `shows` have shape (n,). The result is that of `watch` and `at_rest` applied to
-    each sample in turn. Only samples in `shows` can show a rest.
+    All have shape (n,); only samples in `shows` can show a rest. The same as `watch` and `at_rest` for each sample.
 
-    >>> import numpy as np
-    >>> times, gaps = np.linspace(0.0, 0.1, 11), np.array([0.06, 0.055] + [0.05] * 9)
-    >>> first_rest(times, gaps, np.ones(11, bool), REST_SPEED_M_S, REST_WINDOW_S)
+    >>> times, gaps, shows = np.arange(11) * 0.01, np.array([0.06, 0.055] + [0.05] * 9), np.ones(11, bool)
+    >>> first_rest(times, gaps, shows, REST_SPEED_M_S, REST_WINDOW_S)
     (2, 7)
     """
     import numpy as np

@@ -96,10 +96,8 @@ def setting(
 
     >>> @attrs.frozen(kw_only=True)
     ... class GentleConfig:
-    ...     closing_speed_m_s: float = setting(
-    ...         default=0.02, unit="m/s", above=0.0, meaning="Speed of closing until both pads touch."
-    ...     )
-    >>> GentleConfig(closing_speed_m_s=0.01).closing_speed_m_s
+    ...     speed_m_s: float = setting(default=0.02, unit="m/s", above=0.0, meaning="Speed of closing.")
+    >>> GentleConfig(speed_m_s=0.01).speed_m_s
     0.01
     """
     if not meaning.strip():
