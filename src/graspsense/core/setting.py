@@ -97,8 +97,7 @@ def setting(
     >>> @attrs.frozen(kw_only=True)
     ... class GentleConfig:
     ...     speed_m_s: float = setting(default=0.02, unit="m/s", above=0.0, meaning="Speed of closing.")
-    >>> GentleConfig(speed_m_s=0.01).speed_m_s
-    0.01
+    >>> assert GentleConfig(speed_m_s=0.01).speed_m_s == 0.01
     """
     if not meaning.strip():
         raise TypeError("a setting needs a meaning: say in a sentence what its value does")
