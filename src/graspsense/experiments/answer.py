@@ -28,6 +28,38 @@ def answer(summary: Summary) -> str:
     return f"{text} {_comparison(conditions, best)}"
 
 
+def headline(summary: Summary) -> str:
+    """Return the answer as a person would say it, without intervals; empty without a result."""
+    if not summary.conditions:
+        return ""
+    target = summary.conditions[0].target
+    conditions = [condition for condition in summary.conditions if condition.target == target]
+    best = max(conditions, key=lambda condition: condition.rate.mean)
+    worst = min(conditions, key=lambda condition: condition.rate.mean)
+    recognises = TARGETS[best.recognised]
+    told = f"{in_hundred(best.rate.mean)} grasps tell {recognises}"
+    if len(conditions) == 1:
+        return told
+    gap = best.minus(worst)
+    if gap is not None:
+        differs = gap.interval[0] > 0.0
+    else:
+        low, high = best.rate.interval, worst.rate.interval
+        differs = low is not None and high is not None and high[1] < low[0]
+    if differs:
+        name = _capitalised(best.name)
+        return f"{name} is best: {told}, against {in_hundred(worst.rate.mean)} with {worst.name}"
+    span = in_hundred(best.rate.mean)
+    if f"{100 * worst.rate.mean:.0f}" != f"{100 * best.rate.mean:.0f}":
+        span = f"{100 * worst.rate.mean:.0f} to {span}"
+    return f"No case is shown to be better than the others: {span} grasps tell {recognises}"
+
+
+def in_hundred(rate: float) -> str:
+    """Return a rate as a person would say it: `87 of 100`."""
+    return f"{100 * rate:.0f} of 100"
+
+
 def _comparison(conditions: Sequence[ConditionResult], best: ConditionResult) -> str:
     """Return the sentence that compares the ends of a sweep, or else the best condition with the worst."""
     ends = _ends_of_sweep(conditions)

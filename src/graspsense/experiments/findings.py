@@ -25,13 +25,14 @@ class FoundTable:
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
     numbers: int = 99
+    verdicts: tuple[int, ...] = ()
+    """Columns that say whether something holds."""
 
     def section(self, drawn: str = "") -> Section:
         """Return the section of the table; `drawn` is the picture above it."""
         body = (paragraph(self.note) if self.note else "") + drawn
-        return Section(
-            id=self.id, title=self.title, body=body + table(self.title, self.header, self.rows, self.numbers)
-        )
+        rows = table(self.title, self.header, self.rows, self.numbers, self.verdicts)
+        return Section(id=self.id, title=self.title, body=body + rows)
 
     @property
     def markdown(self) -> list[str]:
@@ -51,6 +52,8 @@ class Findings:
     """The findings. `drawn` has a picture for the id of a table; `values` go into the JSON output."""
 
     answer: str
+    headline: str = ""
+    """The answer as a person would say it, for the head of a page."""
     tables: tuple[FoundTable, ...] = ()
     notes: tuple[str, ...] = ()
     """What a reader must know besides the answer."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from graspsense.core.model import worded
-from graspsense.experiments.answer import answer
+from graspsense.experiments.answer import answer, headline
 from graspsense.experiments.findings import MARKDOWN, Findings, write_markdown
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.results import EXPERIMENT, Results
@@ -60,6 +60,7 @@ def experiment_page(summary: Summary, results: Results) -> Page:
             title=one.title,
             question=one.question,
             answer=found.answer,
+            headline=found.headline,
             beside=_failures(summary) + bullets([SIMULATED], "warning"),
             sections=(*found.page_sections(), _made_of(summary, results)),
         )
@@ -73,6 +74,7 @@ def experiment_page(summary: Summary, results: Results) -> Page:
         title=one.title,
         question=one.question,
         answer=answer(summary),
+        headline=headline(summary),
         beside=_beside(summary, best),
         sections=tuple(sections),
     )
@@ -151,7 +153,7 @@ def _rates(summary: Summary) -> Section:
         title = f"How often {TARGETS[best.recognised]} is recognised"
         body.append(f"<h3>{escape(title)}</h3>")
         picture = _picture(conditions, rows, f"{title}. Bars are 95 % intervals.")
-        body.append(pair(picture, rates_table("ExperimentCase by case", rows)))
+        body.append(pair(picture, rates_table("Case by case", rows)))
     return Section(id="rates", title="Recognition rates", body="".join(body))
 
 

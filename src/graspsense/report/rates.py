@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Final
 
@@ -36,22 +37,55 @@ class RateRow:
 
 
 ROW: Final = 34
+STEP: Final = 5.0
+"""Ends of a rate axis are multiples of this, in per cent."""
+NEARLY_WHOLE: Final = 80.0
+"""An axis that would show more than this many points shows 0 to 100 %."""
+
+
+def rate_scale(rows: Sequence[RateRow], start: float, end: float) -> AxisScale:
+    """Return the axis that shows these rates and their intervals in per cent, cut to where they are."""
+    shares = [share for row in rows for share in (row.rate, *(row.interval or ()))] or [0.0, 1.0]
+    low = max(STEP * math.floor((100 * min(shares) - 1) / STEP), 0.0)
+    high = min(STEP * math.ceil((100 * max(shares) + 1) / STEP), 100.0)
+    if high - low > NEARLY_WHOLE:
+        low, high = 0.0, 100.0
+    return AxisScale(low, high, start, end)
+
+
+def rate_axis_title(scale: AxisScale) -> str:
+    """Return the title of a rate axis, which says so where the axis is cut."""
+    cut = scale.low > 0.0 or scale.high < 100.0
+    return "recognised, in %" + (f" (axis from {scale.low:g} to {scale.high:g})" if cut else "")
+
+
+def draw_breaks(picture: Picture, scale: AxisScale, x: float, y: float, *, upright: bool) -> None:
+    """Mark the ends at which a rate axis is cut; `x` or `y` is where the axis lies."""
+    for end, place, cut in ((0, scale.start, scale.low > 0.0), (1, scale.end, scale.high < 100.0)):
+        if cut:
+            shift = 5.0 * (1 if end else -1)
+            at = (x, place - shift) if upright else (place + shift, y)
+            picture.break_mark(*at, upright=upright)
 
 
 def rates_picture(rows: Sequence[RateRow], caption: str) -> str:
     """Return a figure with a row for each rate: its name, a mark, and a bar for its interval."""
     bottom = 6.0 + ROW * len(rows)
     picture = Picture(bottom + 34)
-    scale = AxisScale(0.0, 100.0, 8.0, picture.width - 14)
-    picture.x_axis(scale, 4, bottom, "recognised, in %")
+    scale = rate_scale(rows, 16.0, picture.width - 16)
+    picture.x_axis(scale, 4, bottom, rate_axis_title(scale))
+    draw_breaks(picture, scale, 0.0, bottom, upright=False)
     for k, row in enumerate(rows):
-        y = 22.0 + ROW * k
-        ink = INKS[0] if row.strong else INKS[7]
-        picture.text(8, y - 5, f"{row.name}: {100 * row.rate:.1f} %", bold=row.strong)
-        if row.interval is not None:
-            low, high = (scale(100 * one) for one in row.interval)
-            picture.line([(low, y + 5), (high, y + 5)], ink, width=3)
-        picture.mark(scale(100 * row.rate), y + 5, ink, 0 if row.strong else 3, 4.5)
+        picture.text(8, 17.0 + ROW * k, f"{row.name}: {100 * row.rate:.1f} %", bold=row.strong)
+    with picture.plot(scale, None, 4, bottom):
+        for k, row in enumerate(rows):
+            y = 27.0 + ROW * k
+            ink = INKS[0] if row.strong else INKS[7]
+            if row.interval is not None:
+                low, high = (scale(100 * one) for one in row.interval)
+                picture.line([(low, y), (high, y)], ink, width=3)
+            words = f"{row.name}: {row.words}"
+            picture.mark(scale(100 * row.rate), y, ink, 0 if row.strong else 3, 4.5, words)
     words = "; ".join(f"{row.name} {row.words}" for row in rows)
     return figure(picture.svg(f"Recognition rates with 95 % intervals: {words}"), caption)
 
@@ -62,17 +96,21 @@ def rates_over(
     """Return a figure of rates against a number, one line a series; `guess` is the rate of guessing."""
     picture = Picture(262 + 15 * len(series))
     xs = [x for points in series.values() for x, _ in points]
-    x_scale = reaching(xs, 40, picture.width - 14)
-    y_scale = AxisScale(0.0, 100.0, 215, 24)
-    picture.y_axis(y_scale, 36, picture.width - 8, "recognised, in %")
+    x_scale = reaching(xs, 44, picture.width - 14)
+    y_scale = rate_scale([row for points in series.values() for _, row in points], 215, 24)
+    picture.y_axis(y_scale, 36, picture.width - 8, rate_axis_title(y_scale))
+    draw_breaks(picture, y_scale, 36, 0.0, upright=True)
     for x in dict.fromkeys(xs):
         picture.line([(x_scale(x), 24), (x_scale(x), 215)], GRID, width=1)
         picture.text(x_scale(x), 229, number(x), at="middle", ink=QUIET)
     picture.text((x_scale.start + x_scale.end) / 2, 245, axis, at="middle", ink=QUIET)
-    if guess is not None:
+    if guess is not None and y_scale.low <= 100 * guess <= y_scale.high:
         y = y_scale(100 * guess)
         picture.line([(36, y), (picture.width - 8, y)], QUIET, dash="3 3")
         picture.text(picture.width - 8, y - 4, "always the commonest label", at="end", ink=QUIET)
+    elif guess is not None:
+        where = "below" if 100 * guess < y_scale.low else "above"
+        caption += f" Always guessing the most frequent label, {100 * guess:.0f} %, is {where} the axis."
     told = []
     for k, (name, points) in enumerate(series.items()):
         ink, dash = INKS[k % len(INKS)], DASHES[k % len(DASHES)]
@@ -80,12 +118,13 @@ def rates_over(
         # Intervals of series at the same place stand beside each other.
         shift = 5.0 * (k - (len(series) - 1) / 2)
         places = [(x_scale(x) + shift, y_scale(100 * row.rate)) for x, row in drawn]
-        picture.line(places, ink, width=2, dash=dash)
-        for (x, y), (_, row) in zip(places, drawn, strict=True):
-            if row.interval is not None:
-                low, high = (y_scale(100 * one) for one in row.interval)
-                picture.line([(x, low), (x, high)], ink, width=2)
-            picture.mark(x, y, ink, k)
+        with picture.plot(x_scale, y_scale, 24, 215):
+            picture.line(places, ink, width=2, dash=dash)
+            for (x, y), (_, row) in zip(places, drawn, strict=True):
+                if row.interval is not None:
+                    low, high = (y_scale(100 * one) for one in row.interval)
+                    picture.line([(x, low), (x, high)], ink, width=2)
+                picture.mark(x, y, ink, k, words=f"{row.name}: {row.words}")
         y = 262.0 + 15 * k
         picture.line([(40, y - 4), (66, y - 4)], ink, width=2, dash=dash)
         picture.mark(53, y - 4, ink, k)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from html import escape
 from typing import Final
 
@@ -13,12 +14,15 @@ WIDTH: Final = 360.0
 """Of a picture, in units of which a page on a telephone shows about one a pixel: text stays readable there."""
 SIZE: Final = 11.0
 """Of text."""
-INKS: Final = ("#0b5fa5", "#b3400a", "#1b7a3d", "#7b2d8b", "#00707a", "#a8174f", "#7a5c00", "#3d3d3d")
-"""Colours that stand out from white by 4.5 to 1 and more."""
+_INKS: Final = ("#0b5fa5", "#b3400a", "#1b7a3d", "#7b2d8b", "#00707a", "#a8174f", "#7a5c00", "#3d3d3d")
+INKS: Final = tuple(f"var(--ink{k},{colour})" for k, colour in enumerate(_INKS))
+"""Colours of lines and marks: those of `page.css`, for light and dark; the fallback is for pictures without a page."""
 DASHES: Final = ("", "7 3", "2 2.5", "9 3 2 3", "4 2", "1 3", "12 3", "6 2 2 2")
 """Lines differ in these as well as in colour."""
-QUIET: Final = "#5c5c5c"
-GRID: Final = "#dcdcdc"
+TEXT: Final = "var(--text,#1a1a1a)"
+QUIET: Final = "var(--quiet,#5c5c5c)"
+GRID: Final = "var(--grid,#dcdcdc)"
+GROUND: Final = "var(--ground,#fff)"
 
 
 @frozen
@@ -69,15 +73,41 @@ class Picture:
     width: float = WIDTH
     parts: list[str] = field(factory=list, init=False)
 
-    def line(
-        self, points: Sequence[tuple[float, float]], ink: str, *, width: float = 1.5, dash: str = ""
-    ) -> None:
-        """Draw a line through these points."""
-        path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-        dashes = f' stroke-dasharray="{dash}"' if dash else ""
+    @contextmanager
+    def plot(self, x: AxisScale, y: AxisScale | None, top: float, bottom: float) -> Iterator[None]:
+        """Draw the following into a plot with these scales, whose values can be read out and zoomed on a page.
+
+        `y` is None for rows of labels. `top` and `bottom` are the edges of the plot.
+        """
+        vertical = "" if y is None else f' data-y="{_range(y)}"'
         self.parts.append(
-            f'<polyline points="{path}" fill="none" stroke="{ink}" stroke-width="{width:g}"{dashes}/>'
+            f'<g class="plot" data-x="{_range(x)}"{vertical} data-top="{top:g}" data-bottom="{bottom:g}">'
         )
+        yield
+        self.parts.append("</g>")
+
+    def line(
+        self,
+        points: Sequence[tuple[float, float]],
+        ink: str,
+        *,
+        width: float = 1.5,
+        dash: str = "",
+        name: str = "",
+    ) -> None:
+        """Draw a line through these points; the values of a line with a `name` are read out on a page."""
+        path = " ".join(f"{x:.2f},{y:.2f}" for x, y in points)
+        dashes = f' stroke-dasharray="{dash}"' if dash else ""
+        named = f' data-name="{escape(name)}"' if name else ""
+        self.parts.append(
+            f'<polyline points="{path}" fill="none" stroke="{ink}" stroke-width="{width:g}"{dashes}{named}/>'
+        )
+
+    def band(self, left: float, right: float, top: float, bottom: float, fill: str) -> None:
+        """Draw a coloured background."""
+        corners = ((left, top), (right, top), (right, bottom), (left, bottom))
+        path = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
+        self.parts.append(f'<polygon points="{path}" fill="{fill}"/>')
 
     def box(self, x: float, y: float, width: float, height: float, fill: str, edge: str = "none") -> None:
         """Draw a rectangle."""
@@ -86,24 +116,27 @@ class Picture:
             f'fill="{fill}" stroke="{edge}"/>'
         )
 
-    def mark(self, x: float, y: float, ink: str, shape: int = 0, size: float = 4.0) -> None:
-        """Draw a mark, one of four shapes."""
-        if shape % 4 == 0:
-            self.parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{size:g}" fill="{ink}"/>')
-            return
+    def mark(self, x: float, y: float, ink: str, shape: int = 0, size: float = 4.0, words: str = "") -> None:
+        """Draw a mark, one of four shapes; `words` are shown under the pointer."""
         corners = {
             1: ((-1, -1), (1, -1), (1, 1), (-1, 1)),
             2: ((0, -1.3), (1.2, 1), (-1.2, 1)),
             3: ((0, -1.4), (1.4, 0), (0, 1.4), (-1.4, 0)),
-        }[shape % 4]
-        path = " ".join(f"{x + size * dx:.1f},{y + size * dy:.1f}" for dx, dy in corners)
-        self.parts.append(f'<polygon points="{path}" fill="{ink}"/>')
+        }.get(shape % 4)
+        if corners is None:
+            drawn = f'<circle r="{size:g}" fill="{ink}"/>'
+        else:
+            path = " ".join(f"{size * dx:.1f},{size * dy:.1f}" for dx, dy in corners)
+            drawn = f'<polygon points="{path}" fill="{ink}"/>'
+        title = f"<title>{escape(words)}</title>" if words else ""
+        self.parts.append(f'<g transform="translate({x:.2f} {y:.2f})">{drawn}{title}</g>')
 
-    def dots(self, points: Sequence[tuple[float, float]], ink: str) -> None:
-        """Draw many small dots as one path."""
-        path = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in points)
+    def dots(self, points: Sequence[tuple[float, float]], ink: str, name: str = "") -> None:
+        """Draw many small dots as one path; `name` and the value of a dot are read out on a page."""
+        path = "".join(f"M{x:.2f} {y:.2f}h0" for x, y in points)
+        named = f' data-name="{escape(name)}"' if name else ""
         self.parts.append(
-            f'<path d="{path}" stroke="{ink}" stroke-width="3" stroke-linecap="round" stroke-opacity="0.6"/>'
+            f'<path d="{path}" stroke="{ink}" stroke-width="3" stroke-linecap="round" stroke-opacity="0.6"{named}/>'
         )
 
     def text(
@@ -113,7 +146,7 @@ class Picture:
         words: str,
         *,
         at: str = "start",
-        ink: str = "#1a1a1a",
+        ink: str = TEXT,
         bold: bool = False,
         size: float = SIZE,
     ) -> None:
@@ -121,29 +154,44 @@ class Picture:
         weight = ' font-weight="600"' if bold else ""
         self.parts.append(
             f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{at}" fill="{ink}" font-size="{size:g}"{weight} '
-            'paint-order="stroke" stroke="#fff" stroke-width="2.5" stroke-opacity="0.8">'
+            f'paint-order="stroke" stroke="{GROUND}" stroke-width="2.5" stroke-opacity="0.8">'
             f"{escape(words)}</text>"
         )
 
     def x_axis(self, scale: AxisScale, top: float, bottom: float, title: str) -> None:
         """Draw the ticks of a horizontal axis, with lines up to `top`, and its title below."""
+        self.parts.append(f'<g class="axis x" data-scale="{_range(scale)}" data-span="{top:g} {bottom:g}">')
         for value in scale.ticks():
             x = scale(value)
             self.line([(x, top), (x, bottom)], GRID, width=1)
             self.text(x, bottom + 13, number(value), at="middle", ink=QUIET)
+        self.parts.append("</g>")
         self.text((scale.start + scale.end) / 2, bottom + 28, title, at="middle", ink=QUIET)
 
     def y_axis(self, scale: AxisScale, left: float, right: float, title: str) -> None:
         """Draw the ticks of a vertical axis, and its title above."""
+        self.parts.append(f'<g class="axis y" data-scale="{_range(scale)}" data-span="{left:g} {right:g}">')
         for value in scale.ticks(4):
             y = scale(value)
             self.line([(left, y), (right, y)], GRID, width=1)
             self.text(left - 4, y + 4, number(value), at="end", ink=QUIET)
+        self.parts.append("</g>")
         self.text(2, min(scale.start, scale.end) - 8, title, ink=QUIET)
 
-    def svg(self, words: str) -> str:
-        """Return the picture; `words` say what it shows."""
+    def break_mark(self, x: float, y: float, *, upright: bool) -> None:
+        """Mark the end of an axis that begins or ends elsewhere than its quantity, by two slashes across it."""
+        for offset in (-2.5, 2.5):
+            dx, dy = (0.0, offset) if upright else (offset, 0.0)
+            self.line([(x - 4 + dx, y + 4 + dy), (x + 4 + dx, y - 4 + dy)], QUIET, width=1.4)
+
+    def svg(self, words: str, unit: str = "") -> str:
+        """Return the picture; `words` say what it shows, `unit` is that of the horizontal axis for values read out."""
+        read_out = f' data-unit="{escape(unit)}"' if unit else ""
         return (
             f'<svg viewBox="0 0 {self.width:g} {self.height:g}" role="img" aria-label="{escape(words)}" '
-            f'xmlns="http://www.w3.org/2000/svg">{"".join(self.parts)}</svg>'
+            f'xmlns="http://www.w3.org/2000/svg"{read_out}>{"".join(self.parts)}</svg>'
         )
+
+
+def _range(scale: AxisScale) -> str:
+    return f"{scale.low:.6g} {scale.high:.6g} {scale.start:g} {scale.end:g}"

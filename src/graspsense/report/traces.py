@@ -13,14 +13,18 @@ from graspsense.core.plugins import installed
 from graspsense.core.units import display_unit, without_underscores
 from graspsense.report.grasp_curve import GraspCurve
 from graspsense.report.html import figure, folded, panels, table
-from graspsense.report.svg import DASHES, GRID, INKS, QUIET, AxisScale, Picture, number, reaching
+from graspsense.report.svg import DASHES, INKS, QUIET, TEXT, AxisScale, Picture, number, reaching
 
 STATES: Final = 8
 """Largest number of line styles in one picture."""
 DRAWN: Final = 150
 """Largest number of dots per label; of more trials, every n-th is drawn."""
-PHASES: Final = {"approach": "#e9eff6", "squeeze": "#fbdcb4", "hold": "#c9e6cf"}
-OTHER_PHASE: Final = "#f3f3f3"
+PHASES: Final = {
+    "approach": "var(--approach,#e9eff6)",
+    "squeeze": "var(--squeeze,#fbdcb4)",
+    "hold": "var(--hold,#c9e6cf)",
+}
+OTHER_PHASE: Final = "var(--phase,#f3f3f3)"
 """Background colours of the phases of a grasp; each phase is also named."""
 
 
@@ -77,20 +81,26 @@ def _traces(name: str, grasps: Sequence[GraspCurve], axes: _Axes) -> str:
     picture.x_axis(x_scale, 40, 300, f"{grasps[0].time_words} since both pads touched")
     picture.y_axis(force, 36, picture.width - 10, "force, N")
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
-    for grasp in grasps:
-        if grasp.label not in states:
-            continue
-        k = states.index(grasp.label)
-        for column, scale in ((grasp.force_n, force), (grasp.gap_mm, gap)):
-            points = [
-                (x_scale(t), scale(v))
-                for t, v in zip(grasp.t_s, column, strict=True)
-                if t is not None and v is not None and axes.times[0] <= t <= axes.times[1]
-            ]
-            picture.line(points, INKS[k], width=1.4, dash=DASHES[k])
+    for column, unit, scale, top, bottom in (
+        ("force_n", "N", force, 40.0, 172.0),
+        ("gap_mm", "mm", gap, 210.0, 300.0),
+    ):
+        with picture.plot(x_scale, scale, top, bottom):
+            for grasp in grasps:
+                if grasp.label not in states:
+                    continue
+                k = states.index(grasp.label)
+                points = [
+                    (x_scale(t), scale(v))
+                    for t, v in zip(grasp.t_s, getattr(grasp, column), strict=True)
+                    if t is not None and v is not None and axes.times[0] <= t <= axes.times[1]
+                ]
+                state = without_underscores(grasp.label.partition(":")[2] or grasp.label)
+                named = f"{state} (trial {grasp.trial}), {unit}"
+                picture.line(points, INKS[k], width=1.4, dash=DASHES[k], name=named)
     peaks = _legend(picture, states, grasps)
     words = f"Force and gap over time for {len(grasps)} grasps of {name}: {', '.join(peaks)}"
-    return figure(picture.svg(words), f"{name}: one line per grasp.")
+    return figure(picture.svg(words, grasps[0].time_unit), f"{name}: one line per grasp.")
 
 
 def _legend(picture: Picture, states: Sequence[str], grasps: Sequence[GraspCurve]) -> list[str]:
@@ -119,32 +129,37 @@ def one_grasp(grasp: GraspCurve, caption: str) -> str:
     picture.x_axis(x_scale, 24, 280, f"{grasp.time_words} since both pads touched")
     picture.y_axis(gap, 36, picture.width - 10, "gap, mm")
     picture.y_axis(force, 36, picture.width - 10, "force, N")
-    for column, scale, ink in ((grasp.gap_mm, gap, INKS[0]), (grasp.force_n, force, INKS[1])):
+    for column, scale, ink, named, top, bottom in (
+        (grasp.gap_mm, gap, INKS[0], "gap, mm", 44.0, 140.0),
+        (grasp.force_n, force, INKS[1], "force, N", 176.0, 280.0),
+    ):
         points = [
             (x_scale(time), scale(value))
             for time, value in zip(grasp.t_s, column, strict=True)
             if time is not None and value is not None
         ]
-        picture.line(points, ink, width=2)
+        with picture.plot(x_scale, scale, top, bottom):
+            picture.line(points, ink, width=2, name=named)
     words = (
         f"One grasp of {grasp.label} over time, gap above and force below. Phases: {', '.join(durations)} "
         f"{grasp.time_unit}"
     )
-    return figure(picture.svg(words), caption)
+    return figure(picture.svg(words, grasp.time_unit), caption)
 
 
 def _phases(picture: Picture, grasp: GraspCurve, t: Sequence[float], x_scale: AxisScale) -> list[str]:
     """Draw the phases behind the lines with their legend, and return the duration of each in words."""
     start, durations = 0, []
     phases = grasp.phase
-    for k in range(1, len(phases) + 1):
-        if k < len(phases) and phases[k] == phases[start]:
-            continue
-        end = t[min(k, len(t) - 1)]
-        left, right = x_scale(t[start]), x_scale(end)
-        picture.box(left, 24, right - left, 256, PHASES.get(phases[start], OTHER_PHASE), GRID)
-        durations.append(f"{phases[start]} for {end - t[start]:.2f}")
-        start = k
+    with picture.plot(x_scale, None, 24, 280):
+        for k in range(1, len(phases) + 1):
+            if k < len(phases) and phases[k] == phases[start]:
+                continue
+            end = t[min(k, len(t) - 1)]
+            colour = PHASES.get(phases[start], OTHER_PHASE)
+            picture.band(x_scale(t[start]), x_scale(end), 24, 280, colour)
+            durations.append(f"{phases[start]} for {end - t[start]:.2f}")
+            start = k
     for k, phase in enumerate(dict.fromkeys(phases)):
         x = 36 + 80.0 * k
         picture.box(x, 322, 12, 10, PHASES.get(phase, OTHER_PHASE), QUIET)
@@ -215,10 +230,11 @@ def _feature_row(
     step = max(1, math.ceil(len(values) / DRAWN))
     # The dots of a row alternate between three heights, so that they do not hide each other.
     dots = [(scale(value), y + 4 * (i % 3 - 1)) for i, value in enumerate(values[::step])]
-    picture.dots(dots, INKS[colour % len(INKS)])
     low, middle, high = (_quantile(values, q) for q in (0.25, 0.5, 0.75))
-    picture.line([(scale(low), y), (scale(high), y)], "#1a1a1a", width=2.5)
-    picture.line([(scale(middle), y - 6), (scale(middle), y + 6)], "#1a1a1a", width=2.5)
+    with picture.plot(scale, None, y - 9, y + 9):
+        picture.dots(dots, INKS[colour % len(INKS)], label)
+        picture.line([(scale(low), y), (scale(high), y)], TEXT, width=2.5)
+        picture.line([(scale(middle), y - 6), (scale(middle), y + 6)], TEXT, width=2.5)
     return (label, str(len(values)), *(f"{value:.4g}" for value in (low, middle, high)))
 
 

@@ -54,6 +54,7 @@ def findings(summary: Summary) -> Findings:
                 title="Claims of the paper",
                 header=claimed.HEADER,
                 rows=tuple(one.cells for one in checked),
+                verdicts=(2,),
             )
         )
     grasps = _grasps_table(summary)
@@ -72,6 +73,7 @@ def findings(summary: Summary) -> Findings:
     whole = summary.planned.experiment.kind == "paper"
     return Findings(
         answer=_answer(held, checked),
+        headline=_headline(held, checked),
         tables=tuple(tables),
         notes=_notes(paper, held)
         if whole
@@ -100,6 +102,22 @@ def _answer(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
             good = sum(one.holds for one in of_claims)
             parts.append(f"{good} of {len(of_claims)} {basis} claims hold")
     return "In simulation, " + "; ".join(parts) + "." if parts else "The table shows how the grasps went."
+
+
+def _headline(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
+    """Return how much of the paper is met, as a person would say it."""
+    parts = []
+    if held:
+        parts.append(f"{sum(row.within for row in held)} of {len(held)} rates of the paper are met")
+    if checked:
+        good = sum(one.holds for one in checked)
+        claims_ = "claims hold" if not held else "of its claims hold"
+        parts.append(
+            f"{good} of {len(checked)} {claims_}"
+            if len(checked) > 1
+            else f"the paper's claim {'holds' if good else 'does not hold'}"
+        )
+    return f"In simulation, {' and '.join(parts)}" if parts else ""
 
 
 def _grasps_table(summary: Summary) -> FoundTable | None:
@@ -163,6 +181,7 @@ def _rates_table(held: Sequence[RateComparison]) -> FoundTable:
         "states whether the printed rate, from its counts, is within the 95 % interval of one more run of ours. A wide "
         "interval is easily met, so the last column compares the other way round.",
         numbers=3,
+        verdicts=(8, 9),
     )
 
 
@@ -256,7 +275,9 @@ def _calibration(summary: Summary) -> list[str]:
     picture.x_axis(x, 26, 230, "force on a pad, N")
     picture.y_axis(y, 40, picture.width - 12, "sum of the pad's cells, 1000 counts")
     for k, side in enumerate(("left", "right")):
-        picture.dots([(x(point[1]), y(point[2 + k] / 1000)) for point in points], INKS[k])
+        with picture.plot(x, y, 26, 230):
+            dots = [(x(point[1]), y(point[2 + k] / 1000)) for point in points]
+            picture.dots(dots, INKS[k], f"{side} fingertip, N and 1000 counts")
         picture.mark(40 + 120 * k, 286, INKS[k])
         picture.text(48 + 120 * k, 290, f"{side} fingertip")
     words = f"Raw sum of each pad's cells against the force on it, {len(points)} grasps of a wooden block"

@@ -13,7 +13,8 @@ from graspsense.experiments.findings import FoundTable, percent, span
 from graspsense.experiments.summary import ConditionResult
 from graspsense.experiments.trade.trade_point import Advice, TradePoint, advise, trade_points
 from graspsense.report.html import figure
-from graspsense.report.svg import DASHES, INKS, QUIET, AxisScale, Picture, reaching
+from graspsense.report.rates import RateRow, draw_breaks, rate_axis_title, rate_scale
+from graspsense.report.svg import DASHES, INKS, QUIET, Picture, reaching
 from graspsense.report.wording import TARGETS
 
 LEFT: Final = 40.0
@@ -83,26 +84,29 @@ def damage_table() -> tuple[FoundTable, list[str]]:
 
 def _picture(series: Mapping[str, Sequence[TradePoint]], axis: str, title: str) -> str:
     """Return the rates against their costs, with a line through the Pareto front of each target."""
-    costs = [point.cost for points in series.values() for point in points]
+    every = [point for points in series.values() for point in points]
     picture = Picture(262 + 15 * (len(series) + 1))
-    x = reaching(costs, LEFT, picture.width - 14)
-    y = AxisScale(0.0, 100.0, 215, 24)
-    picture.y_axis(y, LEFT - 4, picture.width - 8, "recognised, in %")
+    x = reaching([point.cost for point in every], LEFT, picture.width - 14)
+    y = rate_scale([_row(point) for point in every], 215, 24)
+    picture.y_axis(y, LEFT - 4, picture.width - 8, rate_axis_title(y))
+    draw_breaks(picture, y, LEFT - 4, 0.0, upright=True)
     picture.x_axis(x, 24, 215, axis)
     words = []
     for k, (target, points) in enumerate(series.items()):
         ink = INKS[k % len(INKS)]
         on_front = sorted((point for point in points if point.on_front), key=lambda point: point.cost)
         line = [(x(point.cost), y(100 * point.condition.rate.mean)) for point in on_front]
-        picture.line(line, ink, dash=DASHES[k % len(DASHES)])
-        for point in points:
-            place = x(point.cost)
-            interval = point.condition.rate.interval
-            if interval is not None:
-                low, high = (y(100 * rate) for rate in interval)
-                picture.line([(place, low), (place, high)], ink, width=1.2)
-            size = 4.0 if point.on_front else 1.8
-            picture.mark(place, y(100 * point.condition.rate.mean), ink, k, size)
+        with picture.plot(x, y, 24, 215):
+            picture.line(line, ink, dash=DASHES[k % len(DASHES)])
+            for point in points:
+                place = x(point.cost)
+                interval = point.condition.rate.interval
+                if interval is not None:
+                    low, high = (y(100 * rate) for rate in interval)
+                    picture.line([(place, low), (place, high)], ink, width=1.2)
+                size = 4.0 if point.on_front else 1.8
+                read_out = f"{point.name}, {target}: {point.rate_text}"
+                picture.mark(place, y(100 * point.condition.rate.mean), ink, k, size, read_out)
         legend = 262.0 + 15 * k
         picture.mark(53, legend - 4, ink, k)
         picture.text(62, legend, target)
@@ -112,3 +116,8 @@ def _picture(series: Mapping[str, Sequence[TradePoint]], axis: str, title: str) 
     )
     caption = f"{title}. Bars are 95 % intervals of the mean."
     return figure(picture.svg(f"Recognition rate against {axis}. {'; '.join(words)}"), caption)
+
+
+def _row(point: TradePoint) -> RateRow:
+    rate = point.condition.rate
+    return RateRow(name=point.name, rate=rate.mean, interval=rate.interval)

@@ -54,6 +54,7 @@ def findings(summary: Summary) -> Findings:
     values: dict[str, Any] = {part: {"advice": report.text} for part, report in reports.items()}
     return Findings(
         answer=_answer(reports),
+        headline=_headline(advice) if len(reports) == 1 else "",
         tables=tuple(tables),
         notes=tuple(notes),
         drawn={part: report.picture for part, report in reports.items() if report.picture},
@@ -71,6 +72,17 @@ def _answer(reports: dict[str, Report]) -> str:
     if len(reports) == 1:
         return next(iter(reports.values())).text
     return f"{len(reports)} trade-offs were measured. Each has its recommendation below."
+
+
+def _headline(advice: Sequence[Advice]) -> str:
+    """Return the recommendations as a person would say them."""
+    parts = [
+        f"to recognise {one.recognises}, {one.recommended.name} "
+        + ("is enough" if one.recommended is not one.best else "is best")
+        for one in advice
+    ]
+    text = "; ".join(parts)
+    return text[:1].upper() + text[1:]
 
 
 def _advice_table(advice: Sequence[Advice]) -> FoundTable:

@@ -1,0 +1,278 @@
+"""Pages in a real browser: nothing overflows or is clipped, in light and dark, and tables and pictures can be used."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import browser as browsers
+import pytest
+
+from graspsense.evaluation.confusion import confusion
+from graspsense.experiments.executors.serial import Serial
+from graspsense.experiments.experiment import read_experiment
+from graspsense.experiments.findings import FoundTable
+from graspsense.experiments.page import write_page
+from graspsense.experiments.results import Results
+from graspsense.experiments.run import run_experiment
+from graspsense.experiments.summary import summarise
+from graspsense.report.html import Page, Section, bullets, facts
+from graspsense.report.matrix import confusion_table
+from graspsense.report.rates import RateRow, rates_over, rates_picture
+
+pytestmark = pytest.mark.browser
+
+WIDTHS = (390, 1280, 1920)
+LABELS = [f"quite_a_long_name_of_a_bottle_{k}:full_and_closed" for k in range(11)]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    running = browsers.start()
+    yield running
+    running.close()
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    """A page of simulated grasps, and one whose names are long, as files by name."""
+    folder = tmp_path_factory.mktemp("pages")
+    (folder / "it.toml").write_text(
+        'title = "How hard"\nquestion = "Does it matter?"\nseeds = 2\n'
+        '[sweep]\n"controller.probing_force_n" = [17.0, 20.0]\n'
+        '[data]\nobjects = ["can:full_open", "can:empty_open", "odwalla:full_open"]\ninstances = 2\ntrials = 1\n'
+        "[judge]\nfolds = 2\ngrasps = 2\n"
+    )
+    planned, results = read_experiment(str(folder / "it.toml")), Results(folder / "out")
+    run_experiment(planned, results, Serial)
+    (folder / "long.html").write_text(long_page())
+    return {"experiment": write_page(summarise(planned, results), results), "long": folder / "long.html"}
+
+
+def long_page():
+    rates = [RateRow(name=f"case {k}", rate=0.8 + 0.01 * k, interval=(0.78, 0.93)) for k in range(10)]
+    claims = FoundTable(
+        id="claims",
+        title="Claims",
+        header=("claim", "basis", "result here", "measured, N", "criterion"),
+        rows=tuple(
+            (
+                f"claim {k} " + 6 * "of many words ",
+                "fitted",
+                "holds" if k % 3 else "does not hold",
+                f"{7 * k % 10}.5",
+                LABELS[0],
+            )
+            for k in range(10)
+        ),
+        numbers=3,
+        verdicts=(2,),
+    )
+    over = rates_over({"c45": list(enumerate(rates))}, "x", "c")
+    predicted = LABELS + LABELS[::-1] + LABELS[1:] + LABELS[:1]
+    matrix = confusion_table(confusion(LABELS * 3, predicted), "M.")
+    made = facts([("hash of " + "x" * 80, "f" * 128)]) + bullets(["/".join(LABELS)])
+    return Page(
+        kind="Experiment",
+        title="t",
+        question="q?",
+        answer=" ".join(LABELS),
+        headline=LABELS[0],
+        sections=(
+            claims.section(),
+            Section(id="rates", title="Rates", body=rates_picture(rates, "c") + over),
+            Section(id="confusion", title="Matrix", body=matrix),
+            Section(id="made", title="Provenance", body=made),
+        ),
+    ).html()
+
+
+MEASURE = """(() => {
+  const root = document.documentElement, all = (what) => [...document.querySelectorAll(what)];
+  const shown = (one) => one.getClientRects().length > 0, words = (one) => one.outerHTML.slice(0, 100);
+  const box = (one) => one.getBoundingClientRect().toJSON();
+  const outside = all("body *").filter((one) => shown(one) && !one.closest("svg, .wide, pre")
+    && box(one).right > innerWidth + 0.5).map(words);
+  const clipped = all("p, h1, h2, h3, dt, dd, li, figcaption, summary").filter((one) => shown(one)
+    && !one.closest(".wide") && one.scrollWidth > one.clientWidth + 1).map(words);
+  const texts = all("svg text").filter(shown).map((one) => {
+    const t = box(one), b = box(one.closest("svg"));
+    const out = Math.max(b.left - t.left, t.right - b.right, b.top - t.top, t.bottom - b.bottom);
+    return {words: one.textContent, size: t.height, out};
+  });
+  const style = getComputedStyle(document.body);
+  return {
+    across: root.scrollWidth, room: root.clientWidth, outside, clipped, texts, sections: all("section").map(box),
+    pictures: all("figure svg").map(box), top: box(document.querySelector(".sentence")).top,
+    widest: Math.max(...all("main table, main figure, main section").map((one) => box(one).right)),
+    ground: style.backgroundColor, text: style.color, font: parseFloat(style.fontSize),
+  };
+})()"""
+
+
+@pytest.mark.parametrize("name", ["experiment", "long"])
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("width", WIDTHS)
+def test_nothing_overflows_or_is_clipped(browser, pages, name, width, dark):
+    browser.show(pages[name], width, dark=dark)
+    browser.run("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+    found = browser.run(MEASURE)
+
+    assert found["across"] <= found["room"] <= width
+    assert found["outside"] == []
+    assert found["clipped"] == []
+    assert [one["words"] for one in found["texts"] if one["out"] > 2.0] == []
+    assert min(one["size"] for one in found["texts"]) >= 9.0
+    assert found["font"] >= 16
+    assert found["widest"] >= 0.9 * width
+    tops = [box["top"] for box in found["sections"]]
+    assert tops == sorted(tops)
+    assert (found["ground"], found["text"]) == (
+        ("rgb(20, 23, 26)", "rgb(232, 232, 232)") if dark else ("rgb(255, 255, 255)", "rgb(26, 26, 26)")
+    )
+    if name == "experiment":
+        assert found["top"] < 450
+        rows = {round(box["top"]) for box in found["pictures"]}
+        assert (len(rows) == len(found["pictures"])) is (width == 390)
+
+
+def test_a_page_runs_its_script_under_its_own_policy_and_loads_nothing(browser, pages):
+    browser.call("Network.enable")
+    browser.call("Log.enable")
+    browser.show(pages["experiment"], 1280)
+    asked = [
+        one["params"]["request"]["url"]
+        for one in browser.events
+        if one.get("method") == "Network.requestWillBeSent"
+    ]
+
+    assert browser.run("document.documentElement.className") == "scripted"
+    assert [one for one in asked if not one.endswith("report.html")] == []
+    assert [
+        one for one in browser.events if one.get("method") in ("Log.entryAdded", "Runtime.exceptionThrown")
+    ] == []
+
+
+COLUMN = (
+    "[...document.querySelectorAll('#claims tbody tr')].filter((row) => !row.hidden)"
+    ".map((row) => row.cells[3].textContent)"
+)
+
+
+def test_a_click_on_a_heading_sorts_a_table(browser, pages):
+    browser.show(pages["long"], 1280)
+    click = "document.querySelectorAll('#claims thead th button')[3].click()"
+    before = browser.run(COLUMN)
+    browser.run(click)
+    once = browser.run(COLUMN)
+    browser.run(click)
+
+    assert before != sorted(before, key=float) == once
+    assert browser.run(COLUMN) == sorted(before, key=float, reverse=True)
+    assert browser.run("document.querySelectorAll('#claims th')[3].getAttribute('aria-sort')") == "descending"
+
+
+def test_the_box_above_a_table_filters_it(browser, pages):
+    browser.show(pages["long"], 1280)
+    assert browser.run(COLUMN + ".length") == 10
+    browser.run(
+        "{const box = document.querySelector('#claims .filter input'); box.value = '✗ CLAIM';"
+        " box.dispatchEvent(new Event('input'));}"
+    )
+
+    assert browser.run(COLUMN + ".length") == 4
+    assert browser.run("document.querySelector('#claims .filter span').textContent") == "4 of 10 rows"
+
+
+BOX = "((one) => { const b = one.getBoundingClientRect(); return [b.left, b.top, b.width, b.height]; })"
+
+
+def place_in(browser, selector, across, down):
+    """Scroll a picture into view and return a place in it, by shares of its width and height."""
+    browser.run(f"document.querySelector('{selector}').scrollIntoView({{block: 'center'}})")
+    box = browser.run(f"{BOX}(document.querySelector('{selector}'))")
+    return box[0] + across * box[2], box[1] + down * box[3]
+
+
+TIP = "[...document.querySelectorAll('.tip')].filter((one) => !one.hidden).map((one) => one.textContent)"
+
+
+def test_values_are_read_out_under_the_pointer(browser, pages):
+    browser.show(pages["experiment"], 1280)
+    browser.mouse("mouseMoved", *place_in(browser, "#grasp svg", 0.75, 0.7))
+    (told,) = browser.run(TIP)
+    time, gap, force = told.split("\n")
+
+    assert re.fullmatch(r"−?[\d.]+ s", time)
+    assert 40 < float(re.fullmatch(r"gap, mm: ([\d.]+)", gap)[1]) < 90
+    assert 1 < float(re.fullmatch(r"force, N: ([\d.]+)", force)[1]) < 30
+
+    browser.show(pages["long"], 1280)
+    mark = "[...document.querySelectorAll('#rates g[transform]')].find((one) => one.querySelector('title'))"
+    browser.run(mark + ".scrollIntoView({block: 'center'})")
+    left, top, width, height = browser.run(f"{BOX}({mark})")
+    x, y = left + width / 2, top + height / 2
+    browser.mouse("mouseMoved", x + 2, y + 1)
+    assert browser.run(TIP) == ["case 0: 80.0 % (78.0 to 93.0)"]
+    browser.mouse("mouseMoved", 1, 1)
+    assert browser.run(TIP) == []
+
+
+def axis(browser):
+    texts = browser.run(
+        "[...document.querySelectorAll('#grasp g.axis.x text')].map((one) => one.textContent)"
+    )
+    return [float(one.replace("−", "-")) for one in texts]
+
+
+def test_a_drag_enlarges_a_part_of_a_picture_and_a_double_click_restores_it(browser, pages):
+    browser.show(pages["experiment"], 1280)
+    lines = "[...document.querySelectorAll('#grasp polyline[data-name]')].map((one) => one.getAttribute('points'))"
+    whole, drawn = axis(browser), browser.run(lines)
+    start, end = place_in(browser, "#grasp svg", 0.5, 0.7), place_in(browser, "#grasp svg", 0.75, 0.7)
+    browser.drag(start, end)
+    part = axis(browser)
+
+    assert max(part) - min(part) < 0.5 * (max(whole) - min(whole))
+    assert browser.run(lines) != drawn
+    assert browser.run("getComputedStyle(document.querySelector('#grasp .reset')).display") != "none"
+    browser.double_click(place_in(browser, "#grasp svg", 0.6, 0.7))
+    assert axis(browser) == whole
+    assert browser.run(lines) == drawn
+    assert browser.run("getComputedStyle(document.querySelector('#grasp .reset')).display") == "none"
+
+
+@pytest.mark.parametrize("name", ["experiment", "long"])
+def test_a_page_is_printed_light_whole_and_without_what_is_only_for_the_screen(browser, pages, name):
+    browser.show(pages[name], 720, dark=True, media="print")
+    found = browser.run(MEASURE)
+    hidden = browser.run(
+        "['nav', '.filter', '.tip', '.reset'].flatMap((what) => [...document.querySelectorAll(what)])"
+        ".filter((one) => one.getClientRects().length).length"
+    )
+
+    assert found["ground"] == "rgb(255, 255, 255)"
+    assert found["text"] == "rgb(26, 26, 26)"
+    assert found["clipped"] == []
+    assert hidden == 0
+    rows = "[...document.querySelectorAll('table.rows')].filter((one) => !one.closest('details'))"
+    assert browser.run(rows + ".every((one) => one.getBoundingClientRect().right <= innerWidth + 1)")
+    assert browser.pdf().startswith(b"%PDF-")
+
+
+@pytest.mark.skipif(
+    "GRASPSENSE_AXE" not in os.environ,
+    reason="GRASPSENSE_AXE does not name axe.min.js (npm install axe-core)",
+)
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("width", WIDTHS)
+def test_a_page_passes_an_accessibility_check(browser, pages, width, dark):
+    browser.show(pages["experiment"], width, dark=dark)
+    browser.run(Path(os.environ["GRASPSENSE_AXE"]).read_text() + ";0")
+    violations = browser.run(
+        "axe.run(document, {resultTypes: ['violations']}).then((found) => found.violations.map((one) => "
+        "[one.id, one.nodes.map((node) => node.html.slice(0, 120))]))"
+    )
+
+    assert violations == []
