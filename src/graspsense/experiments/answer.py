@@ -40,7 +40,7 @@ def headline(summary: Summary) -> str:
     told = f"{in_hundred(best.rate.mean)} grasps tell {recognises}"
     if len(conditions) == 1:
         return told
-    gap = best.minus(worst)
+    gap = best.minus(worst, comparisons=len(conditions) - 1)
     if gap is not None:
         differs = gap.interval[0] > 0.0
     else:
