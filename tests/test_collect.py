@@ -229,3 +229,174 @@ def test_the_advice_on_a_missing_model_fits_the_gripper(graspsense, tmp_path):
     assert "graspsense collect --gripper pr2 --labels" in real.stderr
     assert "graspsense train store:trials --classifier knn --out mine.json" in real.stderr
     assert "simulated" not in real.stderr
+
+
+EMULATED = ("--gripper", "pr2", "-o", "gripper.transport=emulated")
+
+
+def held(folder):
+    """Return label, object and whether it is simulated of each trial, in their order."""
+    with Store.read(folder) as store:
+        trials = [store.trial(one.id) for one in reversed(store.page())]
+    return [
+        (one.summary.label, one.record.settings["gripper"]["object"], one.summary.simulated) for one in trials
+    ]
+
+
+def test_an_emulated_pr2_grasps_what_the_label_says(collect, tmp_path):
+    done = collect(tmp_path / "t", "\n\n", each=1, more=EMULATED)
+
+    assert done.returncode == 0, done.stderr
+    assert sorted(held(tmp_path / "t")) == [
+        ("block", "block", True),
+        ("can:full_open", "can:full_open", True),
+    ]
+
+
+def test_a_label_of_an_individual_object_selects_this_object_on_an_emulated_pr2(collect, tmp_path):
+    done = collect(tmp_path / "t", "\n", labels="can:full_open#2", each=1, more=EMULATED)
+
+    assert done.returncode == 0, done.stderr
+    assert held(tmp_path / "t") == [("can:full_open", "can:full_open#2", True)]
+
+
+@pytest.mark.parametrize("gripper", [(), EMULATED], ids=["sim", "pr2"])
+@pytest.mark.parametrize("told", [("--object", "toy"), ("-o", "gripper.object=toy")], ids=["flag", "option"])
+def test_an_object_that_contradicts_a_label_is_refused(collect, tmp_path, gripper, told):
+    done = collect(tmp_path / "t", "\n", labels="block", more=(*gripper, *told))
+
+    assert done.returncode == 2
+    assert "the label block is not what the gripper holds, which is toy" in done.stderr
+    assert not (tmp_path / "t").exists()
+
+
+def test_an_object_from_a_file_can_have_any_label(collect, tmp_path):
+    scene = tmp_path / "mine.toml"
+    scene.write_text('width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 5000.0\n')
+
+    done = collect(tmp_path / "t", "\n", labels="sponge:dry", each=1, more=("--object", str(scene)))
+
+    assert done.returncode == 0, done.stderr
+    assert held(tmp_path / "t") == [("sponge:dry", str(scene), True)]
+
+
+def test_a_gripper_that_cannot_be_told_takes_the_word_of_the_operator(tmp_path):
+    from grippers import Scripted, bottle, squeezing
+
+    from graspsense.cli.collect import _label_selects_object
+    from graspsense.core.config import resolve
+
+    class Choice:
+        def create(self):
+            return Scripted(squeezing, bottle)
+
+    class Asked:
+        gripper = Choice()
+        values = resolve("default").values
+
+    assert not _label_selects_object(Asked(), ["jar:full"], object_is_named=False)
+
+
+SAVED = ("run", "--label", "block", "-o", "classifier.type=none", "--save")
+
+
+def test_run_into_a_store_with_other_settings_is_refused_before_the_grasp(graspsense, tmp_path):
+    folder = str(tmp_path / "t")
+    assert graspsense(*SAVED, folder).returncode == 0
+
+    other = graspsense(*SAVED, folder, "-o", "controller.probing_force_n=12", "--seed", "4")
+    assert other.returncode == 2
+    assert "controller.probing_force_n was 20.0 and is 12.0" in other.stderr
+    assert "add --changed if this is intended" in other.stderr
+    gripper = graspsense(*SAVED, folder, *EMULATED)
+    assert gripper.returncode == 2
+    assert (
+        "gripper.type was 'graspsense-sim-gripper/sim' and is 'graspsense-pr2-gripper/pr2'" in gripper.stderr
+    )
+    assert len(trials_in(folder)) == 1
+
+    assert graspsense(*SAVED, folder, "-o", "controller.probing_force_n=12", "--changed").returncode == 0
+    assert len(trials_in(folder)) == 2
+
+
+def test_what_is_grasped_and_what_changes_no_result_may_differ(graspsense, collect, tmp_path):
+    folder = str(tmp_path / "t")
+    assert graspsense(*SAVED, folder).returncode == 0
+
+    command = ("run", "--label", "toy", "--seed", "3", "--explain-model", "--save", folder)
+    done = graspsense(*command, "-o", "gripper.compile=never")
+    assert done.returncode == 0, done.stderr
+    assert collect(folder, "q\n").returncode == 0
+
+
+def test_collecting_into_a_store_of_runs_with_other_settings_is_refused(graspsense, collect, tmp_path):
+    folder = str(tmp_path / "t")
+    assert graspsense(*SAVED, folder).returncode == 0
+
+    done = collect(folder, "\n", more=["-o", "features.force=left"])
+
+    assert done.returncode == 2
+    assert "features.force was 'mean' and is 'left'" in done.stderr
+
+
+def test_a_setting_that_is_newer_than_the_trial_had_its_default(tmp_path):
+    from kept import SETTINGS, keep
+
+    from graspsense.core.config import resolve
+    from graspsense.store.comparable import check_settings, newest_grasp
+
+    with Store.open(tmp_path / "t") as store:
+        keep(store, settings=SETTINGS)
+        before = newest_grasp(store)
+        check_settings(store, before, resolve("default"))
+        with pytest.raises(ConfigError, match=r"controller\.ramp_s was 0\.0 and is 0\.1"):
+            check_settings(store, before, resolve("default", options=["controller.ramp_s=0.1"]))
+
+
+@pytest.mark.parametrize("label", ["my can:full", "can:full open", "can#2 b"])
+def test_a_label_with_a_space_is_refused_with_the_reason(graspsense, tmp_path, label):
+    folder = str(tmp_path / "my store")
+    for done in (
+        graspsense("run", "--label", label, "--save", folder),
+        graspsense("collect", "--labels", f"block,{label}", "--save", folder),
+        graspsense("import", "a.csv", "--label", label, "--save", folder),
+    ):
+        assert done.returncode == 2
+        assert f"{label!r} is not a label" in done.stderr
+        assert "without spaces" in done.stderr
+
+
+def test_a_store_and_files_with_spaces_in_their_names_work_everywhere(graspsense, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my lab.toml").write_text('extends = "default"\n[classifier]\ntype = "none"\n')
+    pipeline, store = ("--pipeline", "my lab.toml"), "my trials"
+
+    command = (
+        "collect",
+        *pipeline,
+        "--labels",
+        "block,toy",
+        "--each",
+        "2",
+        "--operator",
+        "A B",
+        "--save",
+        store,
+    )
+    assert graspsense(*command, answers="\n" * 4).returncode == 0
+    for command in (
+        ("trials", "list", store),
+        ("trials", "aside", f"{store}#1", "--why", "moved by hand"),
+        ("replay", f"{store}#2"),
+        ("verify", store),
+        ("recover", store),
+        ("export", store, "--to", "my table.csv"),
+        ("export", f"{store}#2", "--to", "one grasp.csv"),
+        ("train", f"store:{store}", "--out", "my model.json"),
+        ("predict", "my model.json", f"store:{store}"),
+        ("predict", "my model.json", "my table.csv"),
+        ("run", "-o", "classifier.type=c45", "-o", "classifier.model=my model.json"),
+        ("report", store, "--folds", "2"),
+    ):
+        done = graspsense(*command)
+        assert done.returncode == 0, (command, done.stderr)

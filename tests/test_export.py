@@ -13,6 +13,7 @@ from scipy.io import arff
 from graspsense.cli.main import main
 from graspsense.core.errors import ConfigError, PluginUnavailable
 from graspsense.sources.features_csv import read_labelled
+from graspsense.store.changes import set_aside
 from graspsense.store.dataset import labelled_store, read_dataset
 from graspsense.store.store import Store
 
@@ -23,7 +24,7 @@ def folder(tmp_path):
         keep(store, "can:full_open", "can#1", values=(0.066, 5.5))
         keep(store, "can:it's open", "can#2", values=(0.1 + 0.2, None))
         keep(store, None, values=(0.05, 1.0))
-        store.set_aside(keep(store), "undone")
+        set_aside(store, [keep(store)], "undone")
         keep(store, "can:full_open", "can#1", outcome="aborted", values=(None, None))
     return tmp_path / "trials"
 
@@ -51,7 +52,7 @@ def test_the_table_as_csv(folder, export, tmp_path):
 
 def test_a_csv_of_ours_is_a_table_to_learn_from(folder, export, tmp_path):
     with Store.open(folder) as store:
-        store.set_aside(3, "no label")
+        set_aside(store, [3], "no label")
     export(folder, tmp_path / "t.csv")
     found = read_labelled(
         tmp_path / "t.csv", "label", instance="instance", order="trial", features=["p_first"]
@@ -84,7 +85,7 @@ def test_an_empty_column_of_an_export_is_not_a_feature(tmp_path, export):
 
 def test_the_table_as_arff_is_read_by_scipy(folder, export, tmp_path):
     with Store.open(folder) as store:
-        store.set_aside(3, "no label")
+        set_aside(store, [3], "no label")
     assert export(folder, tmp_path / "t.arff")[0] == 0
     data, about = arff.loadarff(tmp_path / "t.arff")
     assert about.names() == ["p_first", "f_steady", "label"]

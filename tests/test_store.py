@@ -15,6 +15,7 @@ from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.store import schema
+from graspsense.store.changes import set_aside
 from graspsense.store.labels import labels_of
 from graspsense.store.recover import recover_store
 from graspsense.store.store import Store
@@ -63,7 +64,7 @@ def test_a_page_holds_the_newest_that_fit_newest_first(store):
 
 def test_what_is_set_aside_stays_but_does_not_count(store):
     first, second = keep(store), keep(store)
-    store.set_aside(first, "undone")
+    set_aside(store, [first], "undone")
     assert [one.id for one in store.page()] == [second]
     assert [(one.id, one.set_aside) for one in store.page(set_aside=True)] == [(first, "undone")]
     assert store.counts() == {("can:full_open", None): 1}
@@ -84,7 +85,7 @@ def test_a_number_that_is_not_there_says_which_are(store):
         store.trial(1)
     keep(store)
     with pytest.raises(ConfigError, match="has no trial 5: its trials are 1 to 1"):
-        store.set_aside(5, "why")
+        set_aside(store, [5], "why")
 
 
 def test_readers_read_beside_a_writer_in_another_process(store):
@@ -94,7 +95,7 @@ def test_readers_read_beside_a_writer_in_another_process(store):
         "import sys; from graspsense.store.store import Store\n"
         "with Store.read(sys.argv[1]) as store: print(len(store.page()))"
     )
-    with store._transaction() as connection:
+    with store.transaction() as connection:
         connection.execute("UPDATE trial SET set_aside = 'pending'")
         done = subprocess.run(
             [sys.executable, "-c", program, str(store.folder)], capture_output=True, text=True, timeout=300

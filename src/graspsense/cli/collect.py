@@ -8,11 +8,18 @@ from typing import TYPE_CHECKING
 
 import click
 
-from graspsense.cli.options import GRIPPER_ALONE, pipeline_options, settings_of
+from graspsense.cli.options import (
+    GRIPPER_ALONE,
+    contradiction,
+    names_object,
+    pipeline_options,
+    settings_of,
+)
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import talk
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import FrameType
 
     from graspsense.core.config import Settings
@@ -67,10 +74,10 @@ def collect(
     check(first)
     if not _has_model(first):
         options = (*options, *GRIPPER_ALONE)
-    finds = bool(first.gripper.create().objects())
+    selects = _label_selects_object(first, wanted.words, names_object(object_name, options))
 
     def settings_for(word: str, number: int) -> Settings:
-        return settings_of(pipeline, gripper, word if finds else object_name, options, number, force)
+        return settings_of(pipeline, gripper, word if selects else object_name, options, number, force)
 
     with Store.open(save) as store:
         _recover(store)
@@ -97,6 +104,21 @@ def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
         return
     for word, n in counts.items():
         click.echo(f"{word:<24}{n:>4} of {each}")
+
+
+def _label_selects_object(settings: Settings, labels: Sequence[str], object_is_named: bool) -> bool:
+    """Return whether the gripper is told to hold what the label says; a real gripper cannot be told.
+
+    Raises UsageError if the user names an object that contradicts a label.
+    """
+    from graspsense.store.labels import agrees
+
+    if not settings.gripper.create().objects():
+        return False
+    for label in labels if object_is_named else ():
+        if not agrees(settings, label):
+            raise contradiction(settings, label)
+    return not object_is_named
 
 
 def _has_model(settings: Settings) -> bool:

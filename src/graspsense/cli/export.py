@@ -41,7 +41,11 @@ def export(source: str, target: str, as_json: bool) -> None:
     if table:
         trials = export_table.trial_table(source)
         export_table.WRITERS[path.suffix](path, trials)
-        written = {"trials": len(trials.features), "features": list(trials.features.names)}
+        written = {
+            "trials": len(trials.features),
+            "features": list(trials.features.names),
+            "set_aside": trials.set_aside,
+        }
     else:
         grasp = read_recorded(source) if source.endswith(".mcap") else stored_grasp(source)
         export_trace.WRITERS[path.suffix](path, grasp)
@@ -49,6 +53,7 @@ def export(source: str, target: str, as_json: bool) -> None:
     if as_json:
         echo_json({"file": target, **written})
     else:
-        echo(
-            f"{target}: {', '.join(f'{value} {key}' for key, value in written.items() if key != 'features')}"
-        )
+        counts = ("trials", "ticks", "images")
+        echo(f"{target}: {', '.join(f'{written[key]} {key}' for key in counts if key in written)}")
+        if written.get("set_aside"):
+            echo(f"note: trials that are set aside and left out: {written['set_aside']}")

@@ -29,6 +29,7 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "replay": ("graspsense.cli.replay:replay", "Process a recording with a pipeline."),
     "recover": ("graspsense.cli.recover:recover", "Complete recordings of a killed program."),
     "verify": ("graspsense.cli.verify:verify", "Check a store or a recording for damage."),
+    "trials": ("graspsense.cli.trials:trials", "List, relabel and set aside stored trials."),
     "export": ("graspsense.cli.export:export", "Export trials or a recording."),
     "import": ("graspsense.cli.import_:import_", "Import recordings of other programs."),
     "train": ("graspsense.cli.train:train", "Train a model on labelled trials."),

@@ -56,6 +56,22 @@ def pipeline_options(command: CommandT) -> CommandT:
     return command
 
 
+def names_object(object_name: str | None, options: Sequence[str]) -> bool:
+    """Return whether these options say which object a simulated gripper holds."""
+    return object_name is not None or any(
+        one.partition("=")[0].strip() == "gripper.object" for one in options
+    )
+
+
+def contradiction(settings: Settings, label: str) -> click.UsageError:
+    """Return the error for a label that contradicts the object of a simulated gripper."""
+    return click.UsageError(
+        f"the label {label} is not what the gripper holds, which is {settings.values['gripper']['object']}: a "
+        "simulated gripper grasps what it is told, so label and object must agree. Leave --object out to grasp what "
+        "the label says"
+    )
+
+
 def settings_of(
     pipeline: str | None,
     gripper: str | None,

@@ -9,7 +9,7 @@ import click
 
 from graspsense.cli.live_rows import LiveRows
 from graspsense.cli.model_table import print_model, print_selection
-from graspsense.cli.options import pipeline_options, settings_of
+from graspsense.cli.options import contradiction, names_object, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import (
     LABEL_WIDTH,
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from graspsense.core.config import Settings
     from graspsense.core.features import Prediction
+    from graspsense.core.roles import DeviceInfo
     from graspsense.core.runner import Sink
     from graspsense.core.trial import Trial
 
@@ -40,6 +41,9 @@ EXIT_NOT_KEPT: Final = 2
 @click.option("--save", metavar="DIR", help="Store the trial and its recording in DIR.")
 @click.option(
     "--label", metavar="CLASS:STATE", help="With --save: label of the object, as in can:full_open#2."
+)
+@click.option(
+    "--changed", is_flag=True, help="With --save: accept another gripper or other settings than before."
 )
 @click.option(
     "--explain-model", is_flag=True, help="Simulated: list what every term contributed. (gripper.explain)"
@@ -56,6 +60,7 @@ def run(
     force: bool,
     save: str | None,
     label: str | None,
+    changed: bool,
     explain_model: bool,
     plot: str | None,
     dry_run: bool,
@@ -90,7 +95,7 @@ def run(
     if save is None:
         trial = grasp_with(settings, installed(), sinks=sinks)
     else:
-        trial, kept = _kept(save, label, settings, sinks)
+        trial, kept = _kept(save, label, settings, sinks, changed)
 
     if as_json:
         echo_json(trial_as_json(trial) if kept is None else {**trial_as_json(trial), "kept": kept})
@@ -124,32 +129,16 @@ def _labelled_settings(
     force: bool,
 ) -> Settings:
     """Return the settings of a grasp of what the label says, where the gripper can be told what it holds."""
+    from graspsense.store.labels import agrees, labels_of
+
+    if label is not None:
+        labels_of(label)  # what is not a label is refused as such
     settings = settings_of(pipeline, gripper, object_name, options, seed, force)
     if label is None or agrees(settings, label):
         return settings
-    if object_name is not None or any(one.startswith("gripper.object=") for one in options):
-        raise _contradiction(settings, label)
+    if names_object(object_name, options):
+        raise contradiction(settings, label)
     return settings_of(pipeline, gripper, label, options, seed, force)
-
-
-def agrees(settings: Settings, label: str) -> bool:
-    """Return whether an object with this label can be what the gripper holds.
-
-    A label contradicts the gripper only if the gripper holds a known object: an object from a file can have any label,
-    and nobody but the user knows what a real gripper holds.
-    """
-    held = str(settings.values["gripper"].get("object") or "").partition("#")[0]
-    known = {name for kind in settings.gripper.create().objects() for name in kind.full_names}
-    named = label.partition("#")[0]
-    return held == named or not known & {held, named}
-
-
-def _contradiction(settings: Settings, label: str) -> click.UsageError:
-    return click.UsageError(
-        f"--label {label} is not what the gripper holds, which is {settings.values['gripper']['object']}: a simulated "
-        "gripper grasps what it is told, so label and object must agree. Leave --object out to grasp what the label "
-        "says"
-    )
 
 
 def draw_grasp(trial: Trial, path: Path) -> None:
@@ -161,17 +150,31 @@ def draw_grasp(trial: Trial, path: Path) -> None:
 
 
 def _kept(
-    save: str, label: str | None, settings: Settings, sinks: Sequence[Sink]
+    save: str, label: str | None, settings: Settings, sinks: Sequence[Sink], changed: bool
 ) -> tuple[Trial, dict[str, Any]]:
-    """Grasp and store the trial; return it, and what to print about the stored trial."""
+    """Grasp and store the trial; return it, and what to print about the stored trial.
+
+    Unless `changed`, settings and gripper must be those of the newest grasp in the store. Raises ConfigError.
+    """
     from graspsense.core.plugins import installed
+    from graspsense.store.comparable import check_device, check_settings, newest_grasp
     from graspsense.store.labels import labels_of
     from graspsense.store.record_grasp import record_grasp
     from graspsense.store.store import Store
 
     labels = {} if label is None else labels_of(label)
     with Store.open(save) as store:
-        grasp = record_grasp(store, settings, installed(), labels=labels, origin="run", sinks=sinks)
+        before = None if changed else newest_grasp(store)
+        if before is not None:
+            check_settings(store, before, settings)
+
+        def opened(device: DeviceInfo) -> None:
+            if before is not None:
+                check_device(store, before, device)
+
+        grasp = record_grasp(
+            store, settings, installed(), labels=labels, origin="run", sinks=sinks, on_open=opened
+        )
     if grasp.number is not None:
         talk(f"kept as trial {grasp.number} in {save}")
         if grasp.counts["dropped"]:

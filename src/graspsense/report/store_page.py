@@ -19,12 +19,14 @@ from graspsense.report.html import Page, Section, bullets, facts, folded, paragr
 from graspsense.report.rates import RateRow
 from graspsense.report.traces import features_by_class, one_grasp, traces_by_class
 from graspsense.report.wording import TARGETS, control_words, protocol_words
+from graspsense.store.changes import history
 from graspsense.store.dataset import labelled_store
 from graspsense.store.store import Store
 
 if TYPE_CHECKING:
     from graspsense.core.labelled import Labelled, Target
     from graspsense.evaluation.results import Evaluation
+    from graspsense.store.changes import Change
     from graspsense.store.rows import StoredTrial, TrialSummary
 
 GRASPS: Final = 3
@@ -70,6 +72,7 @@ def store_page(
         trial = store.trial(number)
         counts = _trial_counts(store)
         curves = _curves(store)
+        changes = history(store)
     learner = select_component("classifier", classifier)
     labelled, evaluation, problem = None, None, ""
     try:
@@ -92,7 +95,7 @@ def store_page(
     sections += _measurement_sections(trial, curves)
     if labelled is not None:
         sections.append(_features_section(labelled))
-    sections.append(_provenance(folder, listed, trial, counts))
+    sections.append(_provenance(folder, listed, trial, counts, changes))
     return Page(
         kind="Store of trials",
         title=f"Grasps in {folder}",
@@ -231,7 +234,11 @@ def _features_section(labelled: Labelled) -> Section:
 
 
 def _provenance(
-    folder: str, listed: Sequence[TrialSummary], trial: StoredTrial, counts: Sequence[_TrialCount]
+    folder: str,
+    listed: Sequence[TrialSummary],
+    trial: StoredTrial,
+    counts: Sequence[_TrialCount],
+    changes: Sequence[Change],
 ) -> Section:
     total = sum(count.trials for count in counts)
     made = trial.record.provenance
@@ -264,6 +271,16 @@ def _provenance(
         facts(pairs)
         + table("Trials by label and outcome", ("label", "outcome", "state", "trials"), by_label, 3)
         + folded(newest, table(newest, header, rows))
+        + _changes(changes)
         + folded(f"Settings of trial {trial.summary.id}", code("settings", trial.record.settings_text))
     )
     return Section(id="made", title="Provenance", body=body)
+
+
+def _changes(changes: Sequence[Change]) -> str:
+    """Return the table of labels that were changed and of trials that were set aside or brought back."""
+    if not changes:
+        return ""
+    rows = [(str(one.trial), one.made_at or "unknown", one.words, one.why) for one in changes]
+    title = f"Changes after recording: {len(rows)}"
+    return folded(title, table(title, ("trial", "when", "change", "why"), rows))

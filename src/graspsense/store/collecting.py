@@ -16,9 +16,9 @@ from attrs import define, field, frozen
 from graspsense.core.errors import ConfigError, NoDevice
 from graspsense.core.signals import Outcome
 from graspsense.recording.atomic_file import SaveFailed
-from graspsense.recording.provenance import recipe
-from graspsense.recording.trial_record import DeviceRecord, without_none
-from graspsense.store.labels import labels_of
+from graspsense.store.changes import set_aside
+from graspsense.store.comparable import check_device, check_settings, newest_grasp
+from graspsense.store.labels import labels_of, word_of
 from graspsense.store.record_grasp import RecordedTrial, record_grasp
 from graspsense.store.rows import StoredTrial, TrialSummary
 from graspsense.store.store import Store
@@ -34,7 +34,6 @@ HELP: Final = (
 )
 UNDONE: Final = "undone by the operator"
 RETAKEN: Final = "repeated by the operator"
-_COMPARED: Final = ("name", "serial", "calibration")
 
 
 @frozen(kw_only=True)
@@ -172,9 +171,8 @@ class Collection:
         if last is None:
             self.say("there is no trial to undo")
             return None
-        self.store.set_aside(last.id, why)
-        number = (last.instance or "").partition("#")[2]
-        word = f"{last.label}#{number}" if number else str(last.label)
+        set_aside(self.store, [last.id], why)
+        word = word_of(last.label, last.instance) or "no label"
         self.say(f"trial {last.id}, {word}: set aside ({why})")
         return word
 
@@ -183,40 +181,15 @@ class Collection:
         return newest[0].id if newest else 0
 
     def _before(self) -> StoredTrial | None:
-        last = self.last()
-        return None if last is None or self.changed else self.store.trial(last.id)
+        return None if self.changed else newest_grasp(self.store)
 
     def _check_settings(self) -> None:
         before = self._before()
-        if before is None:
-            return
-        settings = self.settings_for(self.wanted.words[0], self.wanted.seed)
-        now, then = recipe(without_none(settings.values)), before.recipe
-        differ = [
-            f"{table}.{key} was {then.get(table, {}).get(key)!r} and is {now.get(table, {}).get(key)!r}"
-            for table in dict.fromkeys((*then, *now))
-            for key in dict.fromkeys((*then.get(table, {}), *now.get(table, {})))
-            if then.get(table, {}).get(key) != now.get(table, {}).get(key)
-        ]
-        if differ:
-            raise ConfigError(self._refusal("settings", before, differ))
+        if before is not None:
+            settings = self.settings_for(self.wanted.words[0], self.wanted.seed)
+            check_settings(self.store, before, settings)
 
     def _check_device(self, device: DeviceInfo) -> None:
         before = self._before()
-        if before is None:
-            return
-        then, now = before.record.device, DeviceRecord.of(device)
-        differ = [
-            f"{name} was {getattr(then, name)!r} and is {getattr(now, name)!r}"
-            for name in _COMPARED
-            if getattr(then, name) != getattr(now, name)
-        ]
-        if differ:
-            raise ConfigError(self._refusal("gripper", before, differ))
-
-    def _refusal(self, what: str, before: StoredTrial, differ: Sequence[str]) -> str:
-        lines = "".join(f"\n  {line}" for line in differ)
-        return (
-            f"the {what} differ from trial {before.summary.id} of the store in {self.store.folder}:{lines}\n"
-            "  Restore them, collect into another store, or add --changed if this is intended"
-        )
+        if before is not None:
+            check_device(self.store, before, device)

@@ -61,6 +61,7 @@ def labelled_store(folder: str) -> Labelled:
             (feature_set,),
         )
         ((total,),) = store.query(f"SELECT count(*) {counting}")
+        unused = _unused(store)
     numbers, labels, instances, values, before, before_sets, simulated, recipes = zip(*rows, strict=True)
     table = _unpacked_table(folder, sets[feature_set], values)
     same_before = len(set(before_sets)) == 1
@@ -77,7 +78,7 @@ def labelled_store(folder: str) -> Labelled:
             _unpacked_table(folder, sets[before_sets[0]], before) if same_before else None,
             no_before="the trials do not have the same features from before contact",
         ),
-        notes=tuple(_notes(len(rows), total, len(set(recipes)), sum(simulated))),
+        notes=tuple(_notes(len(rows), total, len(set(recipes)), sum(simulated))) + unused,
         provenance={
             "simulated": any(simulated),
             "store": str(folder),
@@ -86,6 +87,25 @@ def labelled_store(folder: str) -> Labelled:
             "components": newest.record.provenance.get("components", {}),
         },
     )
+
+
+def _unused(store: Store) -> tuple[str, ...]:
+    """Return a note on the trials that are not learned from, and one on those whose labels were changed."""
+    ((aside, aborted, unlabelled, relabelled),) = store.query(
+        f"""SELECT sum(set_aside IS NOT NULL), sum(set_aside IS NULL AND NOT ({COUNTS})),
+            sum({COUNTS} AND label IS NULL),
+            sum({COUNTS} AND id IN (SELECT trial FROM change WHERE "action" = 'relabel')) FROM trial"""
+    )
+    reasons = {"set aside": aside, "aborted or incomplete": aborted, "without a label": unlabelled}
+    notes = []
+    if any(reasons.values()):
+        text = ", ".join(f"{n} {reason}" for reason, n in reasons.items() if n)
+        notes.append(f"trials of the store that are not used: {text}")
+    if relabelled:
+        notes.append(
+            f"the labels of {relabelled} trials were changed after recording: graspsense trials history"
+        )
+    return tuple(notes)
 
 
 def _notes(used: int, total: int, recipes: int, simulated: int) -> list[str]:

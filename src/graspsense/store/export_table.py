@@ -41,6 +41,8 @@ class TrialTable:
 
     about: Mapping[str, list[Any]]
     features: FeatureTable
+    set_aside: int = 0
+    """Number of trials of the store that are not in the table, because they are set aside."""
 
 
 def trial_table(folder: str | Path) -> TrialTable:
@@ -51,8 +53,10 @@ def trial_table(folder: str | Path) -> TrialTable:
             FROM trial WHERE set_aside IS NULL ORDER BY id"""
         )
         sets = dict(store.query("SELECT id, features FROM feature_set"))
+        ((set_aside,),) = store.query("SELECT count(*) FROM trial WHERE set_aside IS NOT NULL")
     if not rows:
-        raise ConfigError(f"the store in {folder} has no trial to export")
+        aside = f" that is not set aside ({set_aside} are)" if set_aside else ""
+        raise ConfigError(f"the store in {folder} has no trial to export{aside}")
     columns = list(zip(*rows, strict=True))
     names: dict[tuple[str, str], None] = {}
     for number in dict.fromkeys(columns[-2]):
@@ -61,6 +65,7 @@ def trial_table(folder: str | Path) -> TrialTable:
     return TrialTable(
         about={name: list(column) for name, column in zip(ABOUT, columns[: len(ABOUT)], strict=True)},
         features=table,
+        set_aside=set_aside,
     )
 
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from graspsense.core.errors import ConfigError
 from graspsense.core.features import UNKNOWN
+
+if TYPE_CHECKING:
+    from graspsense.core.config import Settings
 
 _WORD: Final = re.compile(r"(?P<kind>[^\s:#,]+)(?P<state>:[^\s:#,]+)?(?P<number>#[^\s:#,]+)?")
 
@@ -28,3 +31,23 @@ def labels_of(word: str) -> dict[str, str]:
             f"{UNKNOWN!r} is not a label: it is the answer for an object that is unlike all known ones"
         )
     return {"label": label, **({"instance": match["kind"] + match["number"]} if match["number"] else {})}
+
+
+def word_of(label: str | None, instance: str | None) -> str | None:
+    """Return the text that `labels_of` takes apart into these, None if there is no label."""
+    if label is None:
+        return None
+    number = (instance or "").partition("#")[2]
+    return f"{label}#{number}" if number else label
+
+
+def agrees(settings: Settings, label: str) -> bool:
+    """Return whether an object with this label can be what the gripper holds.
+
+    A label contradicts the gripper only if the gripper holds a known object: an object from a file can have any label,
+    and nobody but the user knows what a real gripper holds.
+    """
+    held = str(settings.values["gripper"].get("object") or "").partition("#")[0]
+    known = {name for kind in settings.gripper.create().objects() for name in kind.full_names}
+    named = label.partition("#")[0]
+    return held == named or not known & {held, named}

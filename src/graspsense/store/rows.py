@@ -189,9 +189,12 @@ def decoded(summary: TrialSummary, row: EncodedRow, recording: Path) -> StoredTr
         ),
         details=json_table(detail["details"]),
     )
+    record = TrialRecord.from_sections(sections, f"trial {summary.id}")
+    current = {"label": summary.label, "instance": summary.instance}
+    labels = {**record.labels, **current}
     return StoredTrial(
         summary=summary,
-        record=evolve(TrialRecord.from_sections(sections, f"trial {summary.id}"), result=result),
+        record=evolve(record, result=result, labels={k: v for k, v in labels.items() if v is not None}),
         recording=recording,
         recording_sha256=trial["recording_sha256"],
         recording_bytes=trial["recording_bytes"],

@@ -54,6 +54,20 @@ VERSIONS: Final[tuple[tuple[str, ...], ...]] = (
         ) STRICT""",
         "CREATE INDEX trial_by_label ON trial (label, id)",
     ),
+    (
+        """CREATE TABLE change (
+            id INTEGER PRIMARY KEY,
+            trial INTEGER NOT NULL REFERENCES trial (id),
+            made_at TEXT NOT NULL,
+            "action" TEXT NOT NULL,
+            "before" TEXT,
+            "after" TEXT,
+            why TEXT NOT NULL
+        ) STRICT""",
+        "CREATE INDEX change_by_trial ON change (trial, id)",
+        """INSERT INTO change (trial, made_at, "action", why)
+            SELECT id, '', 'aside', set_aside FROM trial WHERE set_aside IS NOT NULL ORDER BY id""",
+    ),
 )
 """`trial` holds what is searched and read as a table, `detail` what is read for one trial.
 
@@ -61,7 +75,8 @@ JSON is canonical. `"values"` and `before_contact` are little-endian float64 in 
 NaN for a missing value, so a table of a hundred thousand rows is read in a fraction of a second. `settings` is TOML,
 `recipe` the hash of the settings that the grasps of one experiment share. `reason` explains the outcome; `missing` and
 `missing_before` state why features are missing. `sha256` covers all columns of both tables except `id`, `set_aside`
-and itself.
+and itself. `label` and `instance` are the current ones; the column `labels` of `detail` has those of the recording.
+`change` holds every change of them and of `set_aside` (`graspsense.store.changes`).
 """
 
 NEWEST: Final = len(VERSIONS)

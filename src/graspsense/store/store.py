@@ -152,7 +152,7 @@ class Store:
         `record` must have a device and a result. Raises SaveFailed if the row cannot be written.
         """
         row = encoded(record, recording, complete=complete)
-        with sqlite_errors(self.folder), self._transaction() as connection:
+        with self.transaction() as connection:
             columns = {
                 **row.trial,
                 "feature_set": _feature_set(connection, row.feature_set),
@@ -175,12 +175,6 @@ class Store:
             )
         return number
 
-    def set_aside(self, number: int, why: str) -> None:
-        """Set a trial aside: it stays, but is neither counted nor learned from. Raises ConfigError, SaveFailed."""
-        self.summary(number)
-        with sqlite_errors(self.folder), self._transaction() as connection:
-            connection.execute("UPDATE trial SET set_aside = ? WHERE id = ?", (why, number))
-
     def summary(self, number: int) -> TrialSummary:
         """Return the summary of a trial. Raises ConfigError if there is no trial of this number."""
         rows = self.query(f"SELECT {SUMMARY_COLUMNS} FROM trial WHERE id = ?", (number,))
@@ -193,10 +187,7 @@ class Store:
     def trial(self, number: int) -> StoredTrial:
         """Return everything that is stored of a trial. Raises ConfigError if there is no trial of this number."""
         summary = self.summary(number)
-        rows = self.query(f"{_ROW_QUERY} WHERE trial.id = ?", (number,))
-        if len(rows) != 1 or None in rows[0][2:4] or rows[0][-1] is None:
-            raise damaged(self.folder, f"trial {number} is not complete")
-        _, _, row = _encoded_row(rows[0])
+        _, row = self.encoded_row(number)
         try:
             return decoded(summary, row, self.recording_path(summary.recording))
         except DataDamaged as error:
@@ -204,6 +195,14 @@ class Store:
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError, struct.error) as error:
             problem = f"trial {number} cannot be read ({type(error).__name__}: {error})"
             raise damaged(self.folder, problem) from error
+
+    def encoded_row(self, number: int) -> tuple[str, EncodedRow]:
+        """Return the stored hash and the columns of a trial. Raises DataDamaged if there are not all of them."""
+        rows = self.query(f"{_ROW_QUERY} WHERE trial.id = ?", (number,))
+        if len(rows) != 1 or None in rows[0][2:4] or rows[0][-1] is None:
+            raise damaged(self.folder, f"trial {number} is not complete")
+        _, sha256, row = _encoded_row(rows[0])
+        return sha256, row
 
     def recording_path(self, name: str) -> Path:
         """Return the path of a recording. Raises DataDamaged if its name in the store is not valid."""
@@ -259,15 +258,20 @@ class Store:
             return self._connection.execute(sql, tuple(values)).fetchall()
 
     @contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
-        self._connection.execute("BEGIN IMMEDIATE")
-        try:
-            yield self._connection
-            self._connection.execute("COMMIT")
-        except BaseException:
-            with suppress(sqlite3.Error):
-                self._connection.execute("ROLLBACK")
-            raise
+    def transaction(self) -> Iterator[sqlite3.Connection]:
+        """Write in one transaction, for another module of this package: everything or, after an error, nothing.
+
+        Raises SaveFailed if it cannot be written.
+        """
+        with sqlite_errors(self.folder):
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield self._connection
+                self._connection.execute("COMMIT")
+            except BaseException:
+                with suppress(sqlite3.Error):
+                    self._connection.execute("ROLLBACK")
+                raise
 
 
 def stored_rows(store: Store) -> Iterator[tuple[int, str, EncodedRow]]:

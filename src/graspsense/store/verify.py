@@ -12,6 +12,7 @@ from attrs import frozen
 from graspsense.core.errors import DataDamaged, GraspsenseError
 from graspsense.recording.layout import PART
 from graspsense.recording.reader import read_recorded
+from graspsense.store.changes import inconsistencies
 from graspsense.store.opening import FILE
 from graspsense.store.recover import CUT, is_being_written
 from graspsense.store.store import Store, integrity, stored_rows
@@ -47,12 +48,13 @@ def verify_store(folder: str | Path, progress: Progress | None = None) -> Verifi
     with Store.read(folder) as store:
         problems = [f"the database: {problem}" for problem in integrity(store)]
         rows = list(stored_rows(store))
-        names = set()
+        names, changed = set(), set()
         for done, (number, sha256, row) in enumerate(rows):
             if progress is not None:
                 progress(done, len(rows))
             if sha256 != row.sha256:
                 problems.append(f"trial {number}: its row was changed after it was written")
+                changed.add(number)
             try:
                 path = store.recording_path(str(row.trial["recording"]))
             except DataDamaged as error:
@@ -62,6 +64,11 @@ def verify_store(folder: str | Path, progress: Progress | None = None) -> Verifi
             problem = _problem_of(path, str(row.trial["recording_sha256"]), row.trial["recording_bytes"])
             if problem:
                 problems.append(f"trial {number}: {problem}")
+        problems += [
+            f"trial {number}: {problem}"
+            for number, problem in inconsistencies(store).items()
+            if number not in changed
+        ]
         unfinished = []
         for path in sorted(store.recordings.iterdir() if store.recordings.is_dir() else ()):
             if path.name.endswith(PART):

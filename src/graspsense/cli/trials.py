@@ -1,0 +1,190 @@
+"""`graspsense trials`: the trials of a store, their labels, and which of them are set aside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+import click
+
+from graspsense.cli.output import echo_json
+from graspsense.cli.terminal import echo_table, talk
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from graspsense.store.changes import Change
+    from graspsense.store.rows import StoredTrial
+    from graspsense.store.store import Store
+
+CommandT = TypeVar("CommandT", bound=Callable[..., Any])
+
+HEADER: Final = ("TRIAL", "MADE", "LABEL", "INSTANCE", "OUTCOME", "GRIPPER", "STATE")
+
+_REFS = click.argument("refs", nargs=-1, required=True, metavar="DIR#NUMBER...")
+_JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+
+
+@click.group()
+def trials() -> None:
+    """List, relabel and set aside the trials of a store.
+
+    Nothing is deleted: every change is kept in the store (`history`), and can be reversed.
+    """
+
+
+@trials.command("list")
+@click.argument("folder", metavar="DIR")
+@click.option("--label", metavar="CLASS:STATE", help="Only trials with this label.")
+@click.option("--aside/--not-aside", default=None, help="Only trials that are set aside, or only the others.")
+@click.option("--limit", type=click.IntRange(min=1), default=50, show_default=True, help="Number of trials.")
+@_JSON
+def list_trials(folder: str, label: str | None, aside: bool | None, limit: int, as_json: bool) -> None:
+    """List the newest trials of the store DIR, newest first."""
+    from graspsense.store.changes import history
+    from graspsense.store.store import Store
+
+    with Store.read(folder) as store:
+        page = store.page(label=label, set_aside=aside, limit=limit)
+        changes = history(store)
+    last_relabel = {one.trial: one for one in changes if one.action == "relabel"}
+    if as_json:
+        echo_json([{**one.as_json(), "relabelled": one.id in last_relabel} for one in page])
+        return
+    rows = []
+    for one in page:
+        states = [f"set aside: {one.set_aside}" if one.set_aside is not None else ""]
+        if one.id in last_relabel:
+            states.append(last_relabel[one.id].words)
+        made = one.made_at[:16].replace("T", " ")
+        outcome = one.outcome if one.complete else f"{one.outcome}, incomplete"
+        cells = (str(one.id), made, one.label or "", one.instance or "", outcome, one.device)
+        rows.append((*cells, "; ".join(state for state in states if state)))
+    if not rows:
+        talk(f"no trial of {folder} matches")
+    echo_table(HEADER, rows)
+
+
+@trials.command()
+@_REFS
+@click.option("--label", metavar="CLASS:STATE", help="The new label: can:full_open, or can:full_open#2.")
+@click.option("--as-recorded", is_flag=True, help="Restore the label with which the trial was recorded.")
+@click.option("--why", metavar="TEXT", default="", help="Reason, kept in the history.")
+@_JSON
+def relabel(refs: Sequence[str], label: str | None, as_recorded: bool, why: str, as_json: bool) -> None:
+    """Change the label of trials; `history` shows the one before.
+
+    A trial of a simulated gripper keeps the label of the object that was simulated.
+    """
+    from graspsense.store import changes
+    from graspsense.store.labels import labels_of
+
+    if (label is None) != as_recorded:
+        raise click.UsageError("give either --label CLASS:STATE or --as-recorded")
+    labels = None if label is None else labels_of(label)
+
+    def change(store: Store, numbers: Sequence[int]) -> None:
+        if label is not None:
+            for number in numbers:
+                _refuse_contradiction(store.trial(number), label)
+        changes.relabel(store, numbers, labels, why)
+
+    _change(refs, change, as_json)
+
+
+@trials.command()
+@_REFS
+@click.option("--why", metavar="TEXT", required=True, help="Reason, shown in lists and kept in the history.")
+@_JSON
+def aside(refs: Sequence[str], why: str, as_json: bool) -> None:
+    """Set trials aside: they stay in the store, but are not counted, exported as a table, or learned from."""
+    from graspsense.store import changes
+
+    if not why.strip():
+        raise click.UsageError("--why is empty: give the reason")
+    _change(refs, lambda store, numbers: changes.set_aside(store, numbers, why), as_json)
+
+
+@trials.command()
+@_REFS
+@click.option("--why", metavar="TEXT", default="", help="Reason, kept in the history.")
+@_JSON
+def restore(refs: Sequence[str], why: str, as_json: bool) -> None:
+    """Bring trials back that were set aside."""
+    from graspsense.store import changes
+
+    _change(refs, lambda store, numbers: changes.restore(store, numbers, why), as_json)
+
+
+@trials.command("history")
+@click.argument("source", metavar="DIR|DIR#NUMBER")
+@_JSON
+def show_history(source: str, as_json: bool) -> None:
+    """Print the changes of all trials of the store DIR, or of one trial, the oldest first."""
+    from pathlib import Path
+
+    from graspsense.store.changes import history
+    from graspsense.store.store import Store
+    from graspsense.store.trial_ref import parse_trial_ref
+
+    folder, number = (source, None) if Path(source).is_dir() else parse_trial_ref(source)
+    with Store.read(folder) as store:
+        found = history(store, number)
+    if as_json:
+        echo_json([one.as_json() for one in found])
+        return
+    if not found:
+        talk("nothing was changed after recording")
+    echo_table(("TRIAL", "WHEN", "CHANGE", "WHY"), [_row(one) for one in found])
+
+
+def _row(change: Change) -> tuple[str, str, str, str]:
+    when = change.made_at[:19].replace("T", " ") or "unknown"
+    return str(change.trial), when, change.words, change.why
+
+
+def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None], as_json: bool) -> None:
+    """Change trials of one store, all or none, and print what was done to each."""
+    from graspsense.store.changes import history
+    from graspsense.store.store import Store
+    from graspsense.store.trial_ref import parse_trial_ref
+
+    found = [parse_trial_ref(ref) for ref in refs]
+    folders = {folder for folder, _ in found}
+    if len(folders) > 1:
+        raise click.UsageError(
+            f"these trials are of several stores: {', '.join(sorted(folders))}. Name those of one"
+        )
+    (folder,) = folders
+    Store.read(folder).close()  # a store that does not exist is not created
+    with Store.open(folder) as store:
+        before = len(history(store))
+        change(store, [number for _, number in found])
+        done = history(store)[before:]
+    if as_json:
+        echo_json({"store": folder, "changes": [one.as_json() for one in done]})
+        return
+    for one in done:
+        click.echo(f"trial {one.trial}: {one.words}" + (f" ({one.why})" if one.why else ""))
+
+
+def _refuse_contradiction(trial: StoredTrial, label: str) -> None:
+    """Refuse a label that contradicts the object that was simulated. Raises ConfigError."""
+    from graspsense.core.config import settings_from
+    from graspsense.core.errors import ConfigError, GraspsenseError
+    from graspsense.store.labels import agrees
+
+    recorded: Mapping[str, Mapping[str, Any]] = trial.record.settings
+    held = recorded.get("gripper", {}).get("object")
+    if not trial.summary.simulated or held is None:
+        return
+    try:
+        tables = {name: table for name, table in recorded.items() if name != "classifier"}
+        agree = agrees(settings_from(tables, f"trial {trial.summary.id}"), label)
+    except GraspsenseError:
+        return  # its gripper is not installed here
+    if not agree:
+        raise ConfigError(
+            f"trial {trial.summary.id} was simulated with {held}, so it cannot be a {label}. Set it aside, or label it "
+            "with what was simulated"
+        )

@@ -1,0 +1,173 @@
+"""Changes of stored trials: their labels, and which of them are set aside. Every change is kept, and can be reversed.
+
+A change and the trial that it changes are written in one transaction. The label as it was recorded stays in the
+recording and in the column `labels` of the table `detail`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from attrs import asdict, evolve, fields_dict, frozen
+
+from graspsense.core.errors import ConfigError
+from graspsense.store.labels import word_of
+from graspsense.store.opening import damaged
+
+if TYPE_CHECKING:
+    import sqlite3
+
+    from graspsense.store.rows import EncodedRow, TrialSummary
+    from graspsense.store.store import Store
+
+Action = Literal["relabel", "aside", "restore"]
+
+
+@frozen(kw_only=True)
+class Change:
+    """One change of a trial. `before` and `after` are labels as they are typed (`can:full_open#2`), None for no label.
+
+    `made_at` is empty for a trial that an earlier version of graspsense set aside.
+    """
+
+    id: int
+    trial: int
+    made_at: str
+    action: Action
+    before: str | None
+    after: str | None
+    why: str
+
+    @property
+    def words(self) -> str:
+        """The change in words."""
+        if self.action == "relabel":
+            return f"relabelled from {self.before or 'no label'} to {self.after or 'no label'}"
+        return "set aside" if self.action == "aside" else "brought back"
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the fields as JSON values."""
+        return asdict(self)
+
+
+COLUMNS: Final = ", ".join(f'"{name}"' for name in fields_dict(Change))
+
+
+def history(store: Store, number: int | None = None) -> list[Change]:
+    """Return the changes of a trial, or of all trials, the oldest first. Raises ConfigError for an unknown trial."""
+    if number is not None:
+        store.summary(number)
+    where = "" if number is None else "WHERE trial = ? "
+    values = () if number is None else (number,)
+    rows = store.query(f"SELECT {COLUMNS} FROM change {where}ORDER BY id", values)
+    return [Change(**dict(zip(fields_dict(Change), row, strict=True))) for row in rows]
+
+
+def set_aside(store: Store, numbers: Sequence[int], why: str) -> None:
+    """Set trials aside: they stay in the store, but are neither counted nor learned from.
+
+    Raises ConfigError, before anything is changed, if a trial does not exist or is set aside already; SaveFailed.
+    """
+
+    def change(connection: sqlite3.Connection, trial: TrialSummary) -> None:
+        if trial.set_aside is not None:
+            raise ConfigError(f"trial {trial.id} is set aside already: {trial.set_aside}")
+        connection.execute("UPDATE trial SET set_aside = ? WHERE id = ?", (why, trial.id))
+        _keep(connection, trial.id, "aside", None, None, why)
+
+    _for_each(store, numbers, change)
+
+
+def restore(store: Store, numbers: Sequence[int], why: str) -> None:
+    """Bring trials back that were set aside.
+
+    Raises ConfigError, before anything is changed, if a trial does not exist or is not set aside; SaveFailed.
+    """
+
+    def change(connection: sqlite3.Connection, trial: TrialSummary) -> None:
+        if trial.set_aside is None:
+            raise ConfigError(f"trial {trial.id} is not set aside")
+        connection.execute("UPDATE trial SET set_aside = NULL WHERE id = ?", (trial.id,))
+        _keep(connection, trial.id, "restore", None, None, why)
+
+    _for_each(store, numbers, change)
+
+
+def relabel(store: Store, numbers: Sequence[int], labels: Mapping[str, str] | None, why: str) -> None:
+    """Give trials the labels that `labels_of` returned, or with None those that they were recorded with.
+
+    Raises ConfigError, before anything is changed, if a trial does not exist or has this label already; SaveFailed,
+    DataDamaged.
+    """
+
+    def change(connection: sqlite3.Connection, trial: TrialSummary) -> None:
+        sha256, row = store.encoded_row(trial.id)
+        if sha256 != row.sha256:
+            raise damaged(store.folder, f"the row of trial {trial.id} was changed after it was written")
+        wanted = json.loads(row.detail["labels"]) if labels is None else labels
+        label, instance = wanted.get("label"), wanted.get("instance")
+        if (label, instance) == (trial.label, trial.instance):
+            raise ConfigError(f"trial {trial.id} has the label {word_of(label, instance) or 'none'} already")
+        changed: EncodedRow = evolve(row, trial={**row.trial, "label": label, "instance": instance})
+        connection.execute(
+            "UPDATE trial SET label = ?, instance = ?, sha256 = ? WHERE id = ?",
+            (label, instance, changed.sha256, trial.id),
+        )
+        before, after = word_of(trial.label, trial.instance), word_of(label, instance)
+        _keep(connection, trial.id, "relabel", before, after, why)
+
+    _for_each(store, numbers, change)
+
+
+def inconsistencies(store: Store) -> dict[int, str]:
+    """Return the trials whose label or state does not follow from their recording and their changes, and why."""
+    labels: dict[int, str | None] = {}
+    aside: dict[int, bool] = {}
+    for one in history(store):
+        if one.action == "relabel":
+            labels[one.trial] = one.after
+        else:
+            aside[one.trial] = one.action == "aside"
+    problems = {}
+    rows = store.query(
+        "SELECT id, label, instance, set_aside, labels FROM trial JOIN detail ON detail.trial = trial.id ORDER BY id"
+    )
+    for number, label, instance, why, recorded in rows:
+        try:
+            first = json.loads(recorded)
+            expected = labels.get(number, word_of(first.get("label"), first.get("instance")))
+        except (ValueError, AttributeError):
+            problems[number] = "its recorded labels cannot be read"
+            continue
+        if word_of(label, instance) != expected:
+            problems[number] = f"its label is not the one of its history ({expected or 'none'})"
+        elif (why is not None) != aside.get(number, False):
+            problems[number] = "its history does not say that it was set aside or brought back"
+    return problems
+
+
+def _for_each(
+    store: Store, numbers: Sequence[int], change: Callable[[sqlite3.Connection, TrialSummary], None]
+) -> None:
+    """Change all these trials in one transaction, or none of them."""
+    with store.transaction() as connection:
+        for number in dict.fromkeys(numbers):
+            change(connection, store.summary(number))
+
+
+def _keep(
+    connection: sqlite3.Connection,
+    trial: int,
+    action: Action,
+    before: str | None,
+    after: str | None,
+    why: str,
+) -> None:
+    made_at = datetime.now(UTC).isoformat(timespec="milliseconds")
+    connection.execute(
+        'INSERT INTO change (trial, made_at, "action", "before", "after", why) VALUES (?, ?, ?, ?, ?, ?)',
+        (trial, made_at, action, before, after, why),
+    )

@@ -1,0 +1,260 @@
+"""Labels of stored trials are changed, and trials are set aside and brought back, with a history that is kept."""
+
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+
+import pytest
+from attrs import evolve
+from kept import BENCH, keep
+
+from graspsense.cli.main import main
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.report.store_page import store_page
+from graspsense.store import changes
+from graspsense.store.dataset import labelled_store
+from graspsense.store.export_table import trial_table
+from graspsense.store.labels import labels_of
+from graspsense.store.store import Store
+from graspsense.store.verify import verify_store
+
+REAL = evolve(BENCH, simulated=False)
+
+
+@pytest.fixture
+def store(tmp_path):
+    with Store.open(tmp_path / "my trials") as store:
+        yield store
+
+
+@pytest.fixture
+def run(capsys):
+    """Return a function that runs the command line and returns its exit code and what it printed."""
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main([str(one) for one in arguments])
+        return (ended.value.code, *capsys.readouterr())
+
+    return run
+
+
+def labels(store):
+    return [(one.id, one.label, one.instance) for one in reversed(store.page(set_aside=None))]
+
+
+def test_a_relabelled_trial_has_its_new_label_everywhere_and_the_store_is_intact(store, run):
+    for _ in range(2):
+        keep(store, "can:full_open", "can#2", device=REAL)
+    keep(store, "toy", device=REAL)
+
+    code, out, _ = run(
+        "trials", "relabel", f"{store.folder}#2", "--label", "can:empty_open#3", "--why", "was empty"
+    )
+
+    assert (code, out) == (0, "trial 2: relabelled from can:full_open#2 to can:empty_open#3 (was empty)\n")
+    assert labels(store)[1] == (2, "can:empty_open", "can#3")
+    assert store.trial(2).record.labels == {"label": "can:empty_open", "instance": "can#3"}
+    assert labelled_store(str(store.folder)).labels == ("can:full_open", "can:empty_open", "toy")
+    assert any("labels of 1 trials were changed" in one for one in labelled_store(str(store.folder)).notes)
+    assert store.counts() == {("can:full_open", "can#2"): 1, ("can:empty_open", "can#3"): 1, ("toy", None): 1}
+    assert verify_store(store.folder).problems == ()
+    code, out, _ = run("trials", "list", store.folder)
+    assert "relabelled from can:full_open#2 to can:empty_open#3" in out
+    page = store_page(str(store.folder)).html()
+    assert "relabelled from can:full_open#2 to can:empty_open#3" in page
+    assert "was empty" in page
+
+
+def test_a_label_is_restored_as_it_was_recorded_also_none(store, run):
+    keep(store, "can:full_open", "can#2", device=REAL)
+    keep(store, None, device=REAL)
+    before = [store.trial(number).record for number in (1, 2)]
+
+    for label in ("toy", "can:empty_open#9"):
+        assert run("trials", "relabel", f"{store.folder}#1", f"{store.folder}#2", "--label", label)[0] == 0
+    assert run("trials", "relabel", f"{store.folder}#1", f"{store.folder}#2", "--as-recorded")[0] == 0
+
+    assert [store.trial(number).record for number in (1, 2)] == before
+    assert [(one.before, one.after) for one in changes.history(store, 2)] == [
+        (None, "toy"),
+        ("toy", "can:empty_open#9"),
+        ("can:empty_open#9", None),
+    ]
+    assert verify_store(store.folder).problems == ()
+
+
+def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(store, run, tmp_path):
+    for label in ("can:full_open", "can:empty_open") * 3:
+        keep(store, label)
+    refs = [f"{store.folder}#{number}" for number in (1, 4)]
+
+    assert run("trials", "aside", *refs, "--why", "the bench was moved")[0] == 0
+
+    assert labelled_store(str(store.folder)).order == (2, 3, 5, 6)
+    assert "trials of the store that are not used: 2 set aside" in labelled_store(str(store.folder)).notes
+    for command in ("train", "evaluate"):
+        out = ["--out", str(tmp_path / "m.json")] if command == "train" else ["--folds", "2"]
+        assert "2 set aside" in "".join(map(str, run(command, f"store:{store.folder}", *out)))
+    code, _, err = run("export", store.folder, "--to", tmp_path / "a.csv")
+    assert code == 0
+    assert "set aside and left out: 2" in err
+    assert len((tmp_path / "a.csv").read_text().splitlines()) == 5
+    listed = json.loads(run("trials", "list", store.folder, "--aside", "--json")[1])
+    assert [(one["id"], one["set_aside"]) for one in listed] == [
+        (4, "the bench was moved"),
+        (1, "the bench was moved"),
+    ]
+
+    assert run("trials", "restore", *refs, "--why", "it was not")[0] == 0
+
+    assert labelled_store(str(store.folder)).order == (1, 2, 3, 4, 5, 6)
+    told = json.loads(run("trials", "history", store.folder, "--json")[1])
+    assert [(one["trial"], one["action"], one["why"]) for one in told] == [
+        (1, "aside", "the bench was moved"),
+        (4, "aside", "the bench was moved"),
+        (1, "restore", "it was not"),
+        (4, "restore", "it was not"),
+    ]
+    assert verify_store(store.folder).problems == ()
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        (("aside", "#1", "#9", "--why", "x"), "has no trial 9: its trials are 1 to 2"),
+        (("aside", "#1", "#2", "--why", "x"), "trial 2 is set aside already: earlier"),
+        (("restore", "#2", "#1"), "trial 1 is not set aside"),
+        (("relabel", "#2", "#1", "--label", "toy"), "trial 1 has the label toy already"),
+        (("relabel", "#1", "--label", "my toy"), "'my toy' is not a label"),
+        (("relabel", "#1"), "give either --label CLASS:STATE or --as-recorded"),
+        (("aside", "#1", "--why", " "), "--why is empty"),
+        (("aside", "1", "--why", "x"), "write DIR#NUMBER"),
+    ],
+    ids=str,
+)
+def test_a_change_that_is_wrong_for_one_trial_changes_none(store, run, command, says):
+    keep(store, "toy", device=REAL)
+    keep(store, "block", device=REAL)
+    changes.set_aside(store, [2], "earlier")
+    before = (labels(store), changes.history(store))
+
+    refs = [f"{store.folder}{word}" if word.startswith("#") else word for word in command]
+    code, _, err = run("trials", *refs)
+
+    assert code == 2
+    assert says in err
+    assert (labels(store), changes.history(store)) == before
+
+
+def test_a_simulated_trial_keeps_the_label_of_its_object(store, run):
+    keep(store, "can:empty_open")  # simulated with can:full_open
+
+    code, _, err = run("trials", "relabel", f"{store.folder}#1", "--label", "block")
+    assert code == 2
+    assert "trial 1 was simulated with can:full_open, so it cannot be a block" in err
+    assert run("trials", "relabel", f"{store.folder}#1", "--label", "can:full_open")[0] == 0
+
+
+def test_commands_on_a_folder_without_a_store_create_none(run, tmp_path):
+    code, _, err = run("trials", "aside", f"{tmp_path / 'typo'}#1", "--why", "x")
+
+    assert code == 2
+    assert "there is no store in" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+KILLED = """
+import sys, time
+from contextlib import contextmanager
+from graspsense.store import changes
+from graspsense.store.store import Store
+
+store = Store.open(sys.argv[1])
+whole = store.transaction
+
+@contextmanager
+def slow():
+    with whole() as connection:
+        yield connection
+        print("before the commit", flush=True)
+        sys.stdin.read()
+
+store.transaction = slow
+changes.relabel(store, [1, 2], {"label": "block"}, "killed")
+"""
+
+
+def test_a_process_that_is_killed_within_a_change_leaves_the_store_as_it_was(store):
+    keep(store, "toy", device=REAL)
+    keep(store, "toy", device=REAL)
+
+    with subprocess.Popen(
+        [sys.executable, "-c", KILLED, str(store.folder)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout.readline() == "before the commit\n"
+        os.kill(process.pid, signal.SIGKILL)
+
+    assert [label for _, label, _ in labels(store)] == ["toy", "toy"]
+    assert changes.history(store) == []
+    assert verify_store(store.folder).problems == ()
+    changes.relabel(store, [1], labels_of("block"), "again")
+    assert [label for _, label, _ in labels(store)] == ["block", "toy"]
+
+
+@pytest.mark.parametrize(
+    ("statement", "says"),
+    [
+        ("DELETE FROM change", "its label is not the one of its history (toy)"),
+        ("UPDATE change SET \"after\" = 'ball'", "its label is not the one of its history (ball)"),
+        (
+            "UPDATE trial SET set_aside = 'x'",
+            "its history does not say that it was set aside or brought back",
+        ),
+    ],
+)
+def test_verify_finds_a_label_or_a_state_that_no_change_explains(store, statement, says):
+    keep(store, "toy", device=REAL)
+    changes.relabel(store, [1], labels_of("block"), "")
+    store._connection.execute(statement)
+
+    assert verify_store(store.folder).problems == (f"trial 1: {says}",)
+
+
+def test_a_row_that_somebody_else_changed_is_not_made_valid_by_a_new_label(store):
+    keep(store, "toy", device=REAL)
+    store._connection.execute("UPDATE trial SET outcome = 'slipped'")
+
+    with pytest.raises(DataDamaged, match="changed after it was written"):
+        changes.relabel(store, [1], labels_of("block"), "")
+
+
+def test_a_store_of_the_first_version_keeps_what_was_set_aside_in_it(tmp_path):
+    with Store.open(tmp_path / "old") as store:
+        keep(store)
+        keep(store)
+    connection = sqlite3.connect(tmp_path / "old" / "store.sqlite")
+    connection.executescript(
+        "DROP TABLE change; UPDATE trial SET set_aside = 'undone by the operator' WHERE id = 1; PRAGMA user_version = 1"
+    )
+    connection.close()
+
+    with Store.read(tmp_path / "old") as store:
+        (change,) = changes.history(store)
+        assert (change.trial, change.words, change.why) == (1, "set aside", "undone by the operator")
+        assert [one.id for one in store.page()] == [2]
+    assert verify_store(tmp_path / "old").problems == ()
+
+
+def test_a_store_in_which_everything_is_set_aside_says_so(store, run, tmp_path):
+    keep(store)
+    changes.set_aside(store, [1], "x")
+
+    with pytest.raises(ConfigError, match=r"no trial to export that is not set aside \(1 are\)"):
+        trial_table(store.folder)
