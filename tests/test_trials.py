@@ -99,9 +99,9 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
     for command in ("train", "evaluate"):
         out = ["--out", str(tmp_path / "m.json")] if command == "train" else ["--folds", "2"]
         assert "2 set aside" in "".join(map(str, run(command, f"store:{store.folder}", *out)))
-    code, _, err = run("export", store.folder, "--to", tmp_path / "a.csv")
+    code, told, _ = run("export", store.folder, "--to", tmp_path / "a.csv")
     assert code == 0
-    assert "set aside and left out: 2" in err
+    assert "set aside and left out: 2" in told
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 5
     listed = json.loads(run("trials", "list", store.folder, "--aside", "--json")[1])
     assert [(one["id"], one["set_aside"]) for one in listed] == [
@@ -112,8 +112,8 @@ def test_trials_that_are_set_aside_are_not_used_until_they_are_brought_back(stor
     assert run("trials", "restore", *refs, "--why", "it was not")[0] == 0
 
     assert labelled_store(str(store.folder)).order == (1, 2, 3, 4, 5, 6)
-    told = json.loads(run("trials", "history", store.folder, "--json")[1])
-    assert [(one["trial"], one["action"], one["why"]) for one in told] == [
+    history = json.loads(run("trials", "history", store.folder, "--json")[1])
+    assert [(one["trial"], one["action"], one["why"]) for one in history] == [
         (1, "aside", "the bench was moved"),
         (4, "aside", "the bench was moved"),
         (1, "restore", "it was not"),
