@@ -54,7 +54,9 @@ HERE: Final = Path(__file__).parent
 HELD: Final = 0.05
 """Peak and rms may differ by this share."""
 BASE: Final = SimConfig(sensor="ideal", spread=False, transmission="straight", moving_mass_kg=100.0)
-SMOOTH: Final = evolve(BASE, skin_n_m=math.inf, coulomb_n=0.0, breakaway_n=0.0, load_share=0.0)
+SMOOTH: Final = evolve(
+    BASE, pad_stiffness_n_m=math.inf, coulomb_n=0.0, breakaway_n=0.0, load_friction_coefficient=0.0
+)
 """Rigid covers and no friction."""
 
 
@@ -169,7 +171,7 @@ def stiffness_and_mass(quick: bool) -> Iterator[Row]:
     """By steps, with friction that is greater at rest, and by exact maps, with friction that is not."""
     stiffnesses = (1e2, 1e4, 1e6, 1e9) if quick else (1.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9)
     ratios = (1e-3, 1e3) if quick else (1e-6, 1e-3, 1.0, 1e3)
-    rubs = evolve(BASE, moving_mass_kg=1.0, skin_n_m=math.inf, damping_n_s_m=20.0, coulomb_n=0.5)
+    rubs = evolve(BASE, moving_mass_kg=1.0, pad_stiffness_n_m=math.inf, damping_n_s_m=20.0, coulomb_n=0.5)
     for config in (evolve(rubs, breakaway_n=0.6), evolve(rubs, breakaway_n=0.5)):
         for stiffness in stiffnesses:
             for ratio in ratios:
@@ -190,7 +192,7 @@ def stiffness_and_mass(quick: bool) -> Iterator[Row]:
 
 def thin_object(quick: bool) -> Iterator[Row]:
     """What is thin or light is met and borne: with all effort there is after friction, or while it is thrown back."""
-    config = evolve(BASE, skin_n_m=math.inf)
+    config = evolve(BASE, pad_stiffness_n_m=math.inf)
     for width in (1e-5, 1e-3):
         for speed in (0.01, 0.2):
             spec = object_of(("elastic", {"k1_n_m": 1e6}), width_m=width)

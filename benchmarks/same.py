@@ -211,10 +211,10 @@ def scene_files(count: int, folder: Path) -> list[dict[str, Any]]:
         keys = (
             "open_gap_m",
             "damping_n_s_m",
-            "skin_n_m",
-            "skin_damping_n_s_m",
-            "skin_creep_n_m",
-            "skin_creep_s",
+            "pad_stiffness_n_m",
+            "pad_damping_n_s_m",
+            "pad_creep_n_m",
+            "pad_creep_s",
         )
         config = {key: float(getattr(scene.config, key)) for key in keys} | {"sensor": "ideal"}
         scenes.append({"file": str(path), "config": config, "speed_m_s": scene.speed_m_s})

@@ -121,10 +121,10 @@ def scene_of(number: int) -> Scene:
         spread=False,
         open_gap_m=spec.width_m + 2.0 * abs(spec.offset_m) + min(max(speed, 3e-3), 0.02),
         damping_n_s_m=log(1.0, 100.0),
-        skin_n_m=log(1e4, 1e5),
-        skin_damping_n_s_m=0.0 if rng.random() < 0.5 else log(1.0, 1e3),
-        skin_creep_n_m=0.0 if rng.random() < 0.5 else log(1e3, 3e4),
-        skin_creep_s=log(1e-3, 1e3),
+        pad_stiffness_n_m=log(1e4, 1e5),
+        pad_damping_n_s_m=0.0 if rng.random() < 0.5 else log(1.0, 1e3),
+        pad_creep_n_m=0.0 if rng.random() < 0.5 else log(1e3, 3e4),
+        pad_creep_s=log(1e-3, 1e3),
     )
     return Scene(number=number, spec=spec, config=config, speed_m_s=speed)
 

@@ -45,10 +45,10 @@ CONFIG = SimConfig(
     moving_mass_kg=M,
     coulomb_n=0.0,
     breakaway_n=0.0,
-    load_share=0.0,
+    load_friction_coefficient=0.0,
     damping_n_s_m=B,
     open_gap_m=OPEN_M,
-    skin_n_m=math.inf,
+    pad_stiffness_n_m=math.inf,
 )
 
 

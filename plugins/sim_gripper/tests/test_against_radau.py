@@ -113,9 +113,9 @@ def test_the_reference_is_what_radau_finds(terms, cover):
         moving_mass_kg=MASS,
         coulomb_n=COULOMB,
         breakaway_n=COULOMB,
-        load_share=LOAD,
+        load_friction_coefficient=LOAD,
         damping_n_s_m=B,
-        skin_n_m=cover,
+        pad_stiffness_n_m=cover,
         open_gap_m=0.06,
     )
     spec = ObjectSpec(name="radau", width_m=0.05, friction=0.0, terms=tuple(terms.items()))

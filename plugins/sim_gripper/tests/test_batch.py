@@ -154,7 +154,7 @@ def job(controller=HYBRID, **more):
 
 def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit():
     run = RunConfig(hold_s=math.inf, grasp_timeout_s=0.01, opening_timeout_s=0.1)
-    odd = job(config=SimConfig(skin_n_m=math.inf, noise_counts=0.0, step_s=1e-4), run=run)
+    odd = job(config=SimConfig(pad_stiffness_n_m=math.inf, noise_counts=0.0, step_s=1e-4), run=run)
     names = [*catalogue(), *shipped_scenes(), "none"]
     with PlainProcess(Scenes(odd)) as process:
         apart = process.run(names, np.arange(len(names)))

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import pytest
 
-from graspsense_sim_gripper.compiled.compose import Composition, bind_reachable, composed_move, grasp_loop
+from graspsense_sim_gripper.binding import bind_reachable
+from graspsense_sim_gripper.compiled.compose import Composition, composed_move, grasp_loop
 from graspsense_sim_gripper.terms.elastic import elastic
 
 

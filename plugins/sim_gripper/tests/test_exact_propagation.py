@@ -27,13 +27,13 @@ FRICTION = SimConfig(
     moving_mass_kg=100.0,
     coulomb_n=7.0,
     breakaway_n=7.0,
-    load_share=0.5,
+    load_friction_coefficient=0.5,
     damping_n_s_m=10.0,
     open_gap_m=0.0505,
     fidelity="full",
 )
-FREE = {"coulomb_n": 0.0, "breakaway_n": 0.0, "load_share": 0.0}
-RIGID = {"skin_n_m": math.inf}
+FREE = {"coulomb_n": 0.0, "breakaway_n": 0.0, "load_friction_coefficient": 0.0}
+RIGID = {"pad_stiffness_n_m": math.inf}
 
 ELASTIC = ("elastic", {"k1_n_m": 1e4})
 MAXWELL = ("maxwell", {"k_n_m": 3e3, "tau_s": 0.05})
@@ -94,11 +94,11 @@ SCENES = {
     "liquid": ({}, object_of(ELASTIC, LOSS, LIQUID)),
     "foam": ({}, object_of(FOAM)),
     "bare surface": (RIGID, object_of(SURFACE)),
-    "damped pads": ({"skin_damping_n_s_m": 50.0}, object_of(ELASTIC, MAXWELL)),
-    "creeping pads": ({"skin_creep_n_m": 2e4, "skin_creep_s": 0.1}, object_of(ELASTIC, MAXWELL)),
-    "both": ({"skin_creep_n_m": 2e4, "skin_damping_n_s_m": 50.0}, object_of(ELASTIC, SLOSH)),
+    "damped pads": ({"pad_damping_n_s_m": 50.0}, object_of(ELASTIC, MAXWELL)),
+    "creeping pads": ({"pad_creep_n_m": 2e4, "pad_creep_s": 0.1}, object_of(ELASTIC, MAXWELL)),
+    "both": ({"pad_creep_n_m": 2e4, "pad_damping_n_s_m": 50.0}, object_of(ELASTIC, SLOSH)),
     "lag": ({"drive_lag_s": 0.02}, object_of(ELASTIC, MAXWELL)),
-    "constant friction": ({"load_share": 0.0}, object_of(ELASTIC)),
+    "constant friction": ({"load_friction_coefficient": 0.0}, object_of(ELASTIC)),
     "friction of the load": ({"coulomb_n": 0.0, "breakaway_n": 0.0}, object_of(ELASTIC, MAXWELL)),
     "no friction": (FREE, object_of(ELASTIC, MAXWELL)),
     "held": ({}, object_of(ELASTIC, MAXWELL, held=True)),
@@ -129,7 +129,7 @@ def test_it_agrees_with_time_steps_of_a_tight_tolerance(name):
 
 
 def test_a_released_object_recovers_while_the_fingers_stand_fully_open():
-    config = evolve(FRICTION, skin_creep_n_m=2e4, skin_creep_s=2.0)
+    config = evolve(FRICTION, pad_creep_n_m=2e4, pad_creep_s=2.0)
     spec = object_of(("maxwell", {"k_n_m": 3e3, "tau_s": 0.8}), ("elastic", {"k1_n_m": 5e3}))
     efforts = [25.0] * 400 + [-30.0] * 1200
     states = [along(config, spec, efforts, exact=exact, speed_m_s=0.02)[-1] for exact in (True, False)]
@@ -171,7 +171,7 @@ def test_it_agrees_with_an_ode_solver_while_sliding_and_stuck(pads):
     stuck = int(np.argmax(speed == 0.0))
     assert 50 < stuck < 500
     assert np.all(speed[stuck:] == 0.0)
-    skins = 0.5 * config.skin_n_m if pads else 0.0
+    skins = 0.5 * config.pad_stiffness_n_m if pads else 0.0
     k, (k_m, tau) = 1e4, (3e3, 0.05)
     mass, weight, damping = 1e3 * 0.03 * 1e-6 / 3e-4, 1e3 * 9.80665 * 1e-6 / 3e-4, None
     damping = 8.0 * math.pi * 1e-3 * 0.03 * (1e-6 / 3e-4) / 3e-4
@@ -256,7 +256,7 @@ def test_a_damped_oscillator_after_the_contact(stiffness):
 
 
 def test_it_slides_the_distance_of_its_kinetic_energy_over_friction_and_stops():
-    config = evolve(FRICTION, load_share=0.0, damping_n_s_m=0.0, open_gap_m=0.08)
+    config = evolve(FRICTION, load_friction_coefficient=0.0, damping_n_s_m=0.0, open_gap_m=0.08)
     closure, _, speed, _ = along(config, object_of(ELASTIC), [0.0] * 600, speed_m_s=0.03)
     # v^2 m / (2 c), and exactly no further.
     assert closure[-1] - (0.05 - 0.08) == pytest.approx(0.03**2 * 100.0 / (2.0 * 7.0), rel=1e-9)
@@ -283,7 +283,7 @@ def test_below_breakaway_the_fingers_do_not_creep():
     # The branch relaxes, and friction holds the fingers.
     assert (state.motion.gap_m, state.motion.revolutions) == (before.motion.gap_m, before.motion.revolutions)
     assert state.motion.speed_rev_s == 0.0
-    pads = 0.5 * FRICTION.skin_n_m
+    pads = 0.5 * FRICTION.pad_stiffness_n_m
     assert state.contact.left_n == pytest.approx(
         (0.05 - state.motion.gap_m) / (1.0 / pads + 1.0 / 1e4), rel=1e-9
     )
@@ -292,10 +292,10 @@ def test_below_breakaway_the_fingers_do_not_creep():
 def test_stick_and_slip_follow_a_relaxing_branch_to_the_limit_of_friction():
     """A branch relaxes while the effort of the drive rises slowly: the fingers stick and slip until nothing moves."""
     spec = object_of(ELASTIC, ("maxwell", {"k_n_m": 1e4, "tau_s": 0.2}))
-    config = evolve(FRICTION, load_share=0.0, moving_mass_kg=1.0, drive_lag_s=0.1)
+    config = evolve(FRICTION, load_friction_coefficient=0.0, moving_mass_kg=1.0, drive_lag_s=0.1)
     closure, force, speed, state = along(config, spec, [60.0] * 8000, speed_m_s=0.02)
     assert force[-1] == pytest.approx(60.0 - 7.0, rel=1e-6)
-    assert closure[-1] == pytest.approx(53.0 / (0.5 * FRICTION.skin_n_m) + 53.0 / 1e4, rel=1e-6)
+    assert closure[-1] == pytest.approx(53.0 / (0.5 * FRICTION.pad_stiffness_n_m) + 53.0 / 1e4, rel=1e-6)
     assert (speed == 0.0).any()
     assert state.step.unresolved == 0
 
@@ -308,8 +308,8 @@ def test_stick_and_slip_follow_a_relaxing_branch_to_the_limit_of_friction():
     [
         (RIGID, (ELASTIC, MAXWELL)),
         ({}, (ELASTIC, MAXWELL)),
-        ({"skin_damping_n_s_m": 50.0}, (ELASTIC, LOSS)),
-        ({"skin_n_m": 2e4}, (("elastic", {"k1_n_m": 1e8}), ("loss", {"damping_n_s_m": 1e6}))),
+        ({"pad_damping_n_s_m": 50.0}, (ELASTIC, LOSS)),
+        ({"pad_stiffness_n_m": 2e4}, (("elastic", {"k1_n_m": 1e8}), ("loss", {"damping_n_s_m": 1e6}))),
     ],
 )
 def test_without_a_drive_stored_energy_does_not_increase(change, terms):
@@ -328,7 +328,7 @@ def test_without_a_drive_stored_energy_does_not_increase(change, terms):
             if setup.plant.object.pads.stiffness_n_m < math.inf and state.contact.left_n > 0
             else 0.0
         )
-        stored = k * d * d + q * q / arm + (0.5 * config.skin_n_m * cover * cover if cover else 0.0)
+        stored = k * d * d + q * q / arm + (0.5 * config.pad_stiffness_n_m * cover * cover if cover else 0.0)
         return 0.5 * (100.0 * v * v + stored)
 
     before, first = energy(), energy()

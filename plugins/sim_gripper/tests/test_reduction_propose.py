@@ -75,13 +75,13 @@ def test_what_is_left_out_costs_no_more_than_may_be_given_away(name, accuracy):
 
 
 def test_strong_dampers_are_stepped_by_the_l_stable_scheme():
-    rigid = evolve(CONFIG, skin_n_m=math.inf)
+    rigid = evolve(CONFIG, pad_stiffness_n_m=math.inf)
     assert decided(SHELL, config=rigid)[1].steps.scheme == 0
     assert decided(SHELL, ("loss", {"damping_n_s_m": 1e6}), config=rigid)[1].steps.scheme == 1
 
 
 def test_a_contact_too_stiff_for_the_tick_is_said_to_be():
-    rigid = evolve(CONFIG, skin_n_m=math.inf)
+    rigid = evolve(CONFIG, pad_stiffness_n_m=math.inf)
     soft, hard = (decided(("elastic", {"k1_n_m": k}), config=rigid)[1].contact for k in (1e5, 1e9))
     assert (soft.decision, hard.decision) == ("peak resolved", "peak not resolved")
     assert hard.number > 1.0
@@ -104,7 +104,7 @@ def test_instances_share_the_model_of_their_kind():
     problem = problem_of(SimConfig(sensor="ideal"), find("odwalla:empty_open"))
     model = propose(problem, grip_of(problem))
     one, other = (instantiate(problem, model, seed) for seed in (1, 2))
-    kept = [[term.kept for term in setup.plant.object.terms] for setup in (one, other)]
+    kept = [[term.active for term in setup.plant.object.terms] for setup in (one, other)]
     assert kept[0] == kept[1]
     assert one.plant.steps == other.plant.steps == model.steps
     assert one.terms != other.terms

@@ -151,7 +151,7 @@ def stiff(tmp_path):
     """Return a config, and the force (N) that its reference meets at a tick of the approach."""
     scene = tmp_path / "stiff.toml"
     scene.write_text(STIFF)
-    config = evolve(CONFIG, object=str(scene), accuracy=0.003, open_gap_m=0.06, skin_n_m=3e4)
+    config = evolve(CONFIG, object=str(scene), accuracy=0.003, open_gap_m=0.06, pad_stiffness_n_m=3e4)
     reference = evolve(config, fidelity="reference")
     # No threshold above it changes it.
     felt = course(reference, 5.0).left_n
@@ -192,7 +192,7 @@ def test_every_object_of_the_catalogue_has_a_model_of_ordinary_steps():
 def test_forced_steps_and_contacts_beyond_the_tick_are_not_verified():
     for config in (evolve(CONFIG, step_s=1e-4), evolve(CONFIG, scheme="implicit")):
         assert selected(config, thing(SHELL), hybrid()).verification is None
-    hard = selected(evolve(CONFIG, skin_n_m=math.inf), thing(("elastic", {"k1_n_m": 1e9})), hybrid())
+    hard = selected(evolve(CONFIG, pad_stiffness_n_m=math.inf), thing(("elastic", {"k1_n_m": 1e9})), hybrid())
     assert (hard.contact.decision, hard.verification) == ("peak not resolved", None)
 
 

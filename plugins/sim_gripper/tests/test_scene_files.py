@@ -116,7 +116,9 @@ def pressed(config, effort_n, seconds, **changes):
 
 def test_an_object_held_fast_is_pressed_by_the_finger_that_meets_it_first(scene):
     text = "width_m = 0.06\noffset_m = 0.002\n{}[[terms]]\ntype = 'elastic'\nk1_n_m = 2000.0\n"
-    config = SimConfig(spread=False, coulomb_n=0.0, breakaway_n=0.0, load_share=0.0, damping_n_s_m=1000.0)
+    config = SimConfig(
+        spread=False, coulomb_n=0.0, breakaway_n=0.0, load_friction_coefficient=0.0, damping_n_s_m=1000.0
+    )
     _, fast = pressed(config, 10.0, 6.0, scene=scene(text.format("held = true\n")))
     end = fast[-1]
     # Each half is twice as stiff as the whole; effort is the mean of the two pads.
@@ -144,10 +146,12 @@ def test_a_drive_that_lags_gives_its_effort_as_a_first_order_rise(scene):
 
 def test_covers_that_creep_give_way_and_covers_that_damp_lower_no_force_at_rest(scene):
     hard = scene("width_m = 0.03\n[[terms]]\ntype = 'rigid'\nhertz_n_m15 = 1e10\n")
-    plain = SimConfig(spread=False, coulomb_n=0.0, breakaway_n=0.0, load_share=0.0, damping_n_s_m=2000.0)
+    plain = SimConfig(
+        spread=False, coulomb_n=0.0, breakaway_n=0.0, load_friction_coefficient=0.0, damping_n_s_m=2000.0
+    )
     creeping = SimConfig(
-        spread=False, coulomb_n=0.0, breakaway_n=0.0, load_share=0.0, damping_n_s_m=2000.0,
-        skin_creep_n_m=1e5, skin_creep_s=0.5, skin_damping_n_s_m=500.0,
+        spread=False, coulomb_n=0.0, breakaway_n=0.0, load_friction_coefficient=0.0, damping_n_s_m=2000.0,
+        pad_creep_n_m=1e5, pad_creep_s=0.5, pad_damping_n_s_m=500.0,
     )  # fmt: skip
     _, stiff = pressed(plain, 20.0, 20.0, scene=hard)
     _, soft = pressed(creeping, 20.0, 20.0, scene=hard)

@@ -427,7 +427,7 @@ def test_the_importance_of_a_spring_and_a_damper_is_their_force():
 
 
 def test_a_term_that_does_not_fit_together_is_refused_where_it_is_declared():
-    with pytest.raises(TypeError, match="no named tuple"):
+    with pytest.raises(TypeError, match="not a named tuple"):
         Term(name="odd", summary="", params=dict, law=elastic)
     with pytest.raises(TypeError, match="no field"):
         Term(name="odd", summary="", params=Elastic, law=elastic, positive=("tau_s",))

@@ -118,7 +118,7 @@ def first_call(*, slp_vectorize: bool = False) -> Iterator[None]:
     `slp_vectorize`: have independent operations on neighbouring numbers compiled to vector instructions, which pays for
     products of matrices and only lengthens other code.
 
-    Raises NotCompilable where numba refuses, with the file and line that it names.
+    Raises NotCompilable if numba refuses, with the file and line that it names.
     """
     import numba
     from numba.core.errors import NumbaError, UnsupportedBytecodeError

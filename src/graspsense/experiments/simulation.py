@@ -50,7 +50,7 @@ def trade_simulation(
 ) -> SimulationTrade:
     """Grasp each scene with each seed in every variant that the gripper offers.
 
-    Raises ConfigError where the gripper cannot trade accuracy for time, UnknownName for a scene it does not know.
+    Raises ConfigError if the gripper cannot trade accuracy for time, UnknownName for a scene it does not know.
     """
     backend = settings.gripper.create()
     variants = backend.variants() if isinstance(backend, BatchBackend) else ()

@@ -101,7 +101,7 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
     def open(self, seed: int) -> DeviceInfo:
         """Read the recording and describe it; the seed has no effect.
 
-        Raises ConfigError where there is no such file, DataDamaged where it is not what it claims to be.
+        Raises ConfigError if there is no such file, DataDamaged if it is not what it claims to be.
         """
         kind, name = kind_and_name(self.config.recording)
         recording = KINDS[kind](name)

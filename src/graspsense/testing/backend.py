@@ -630,7 +630,7 @@ def says_when_it_is_not_there(subject: Subject) -> None:
             f"not there, open raised {named(error)}: raise NoDevice with what to try"
         ) from error
     else:
-        raise CheckFailed("open succeeded where no gripper is: raise NoDevice where nothing answers")
+        raise CheckFailed("open succeeded where no gripper is: raise NoDevice if nothing answers")
     finally:
         backend.close()
     took = time.perf_counter() - began

@@ -267,7 +267,7 @@ def refuses_what_is_no_model(subject: Subject) -> None:
             ) from error
         raise CheckFailed(
             f"from_json takes a model with the keys {', '.join(model) or 'none'}: look at what is given, and raise "
-            "ValueError where it is no model"
+            "ValueError if it is no model"
         )
 
 

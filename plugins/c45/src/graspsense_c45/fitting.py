@@ -37,8 +37,8 @@ def fit(
 
     held_out: rows of the table for reduced-error pruning; by default those that J48 would hold out.
 
-    Raises ValueError where rows are held out for another pruning, and where no row is left to grow on.
-    Raises ModuleNotFoundError where `engine` is "fast" and that engine is not installed.
+    Raises ValueError if rows are held out for another pruning, and where no row is left to grow on.
+    Raises ModuleNotFoundError if `engine` is "fast" and that engine is not installed.
     """
     if options.pruning == "reduced_error":
         return _fit_held_out(table, options, held_out, engine)

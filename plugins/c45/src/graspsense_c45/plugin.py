@@ -195,7 +195,7 @@ class C45(Classifier[C45Config]):
         return to_document(self._fitted())
 
     def from_json(self, model: Mapping[str, Any]) -> None:
-        """Load the tree that `to_json` returned. Raises ValueError where `model` is not a stored tree."""
+        """Load the tree that `to_json` returned. Raises ValueError if `model` is not a stored tree."""
         from graspsense_c45.stored import from_document
 
         self._tree = from_document(dict(model))

@@ -52,7 +52,7 @@ def to_json(tree: Tree) -> str:
 
 
 def from_json(text: str | bytes) -> Tree:
-    """Return the tree in a JSON text. Raises StoredTreeError where the text is not a stored tree."""
+    """Return the tree in a JSON text. Raises StoredTreeError if the text is not a stored tree."""
     try:
         document = json.loads(text)
     except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -61,7 +61,7 @@ def from_json(text: str | bytes) -> Tree:
 
 
 def from_document(document: Any) -> Tree:
-    """Return the tree in JSON values. Raises StoredTreeError where they are not a stored tree of this version."""
+    """Return the tree in JSON values. Raises StoredTreeError if they are not a stored tree of this version."""
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise StoredTreeError(f"not a stored tree: 'format' must be {FORMAT!r}")
     if document.get("version") != VERSION:

@@ -61,7 +61,7 @@ def make_table(
 
 
 def check_values(schema: Schema, x: Reals) -> None:
-    """Raise ValueError where a value is infinite or not an index of a declared value in a nominal column."""
+    """Raise ValueError if a value is infinite or not an index of a declared value in a nominal column."""
     # A sum is finite unless one of its terms is not, or it overflows: the usual case takes one pass.
     with np.errstate(over="ignore", invalid="ignore"):
         suspicious = not np.isfinite(x.sum())

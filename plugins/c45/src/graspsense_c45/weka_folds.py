@@ -79,7 +79,7 @@ def hold_out(labels: ArrayLike, n_folds: int) -> Indices:
     """Return the rows that J48 -R -N n_folds holds out: the last stratified fold. No seed enters, only the order of
     rows.
 
-    Raises ValueError where there are fewer rows than folds.
+    Raises ValueError if there are fewer rows than folds.
     """
     given = _cuttable(labels, n_folds)
     order = stratify(given, n_folds)
@@ -92,7 +92,7 @@ def stratified_folds(labels: ArrayLike, n_folds: int = 10, seed: int = 1) -> lis
 
     labels: a hashable label for each row.
 
-    Raises ValueError where there are fewer rows than folds.
+    Raises ValueError if there are fewer rows than folds.
     """
     given = _cuttable(labels, n_folds)
     random = JavaRandom(seed)

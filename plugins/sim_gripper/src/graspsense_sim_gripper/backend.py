@@ -26,8 +26,9 @@ from graspsense.plugin_api import (
     maker,
     tare,
 )
+from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.build import CELL_OFFSET, EFFORT_LIMIT_N, build, device_info, instantiate
-from graspsense_sim_gripper.compiled.compose import INTERPRETED, Composition, bind_reachable, composed_move
+from graspsense_sim_gripper.compiled.compose import INTERPRETED, Composition, composed_move
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.exact.discretise import discretise
@@ -99,7 +100,7 @@ class SimBackend(BatchBackend[SimConfig]):
     def open(self, seed: int) -> DeviceInfo:
         """Prepare the grasp that the config and the seed describe.
 
-        Raises UnknownName for an unknown object, ConfigError where no model has the accuracy asked for.
+        Raises UnknownName for an unknown object, ConfigError if no model has the accuracy asked for.
         """
         problem = build(self.config, self.config.object)
         self._reduction = None

@@ -23,7 +23,7 @@ from graspsense.plugin_api import (
     gap_and_rate,
     revolutions_at,
 )
-from graspsense_sim_gripper.compiled.compose import all_kept, uncompressed
+from graspsense_sim_gripper.compiled.compose import all_active, uncompressed
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
 from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance
@@ -51,10 +51,11 @@ CELL_OFFSET: Final = (3300.0, 250.0)
 UNLOADED: Final = (CELL_OFFSET[0],) * CELLS
 EVEN_WEIGHTS: Final = (1.0 / 15.0,) * 15
 """The part of the force on each cell where there is no object."""
+_SENSOR_SETTINGS: Final = ("noise_counts", "pad_period_s", "pad_cells", "pad_delay_s")
 _NOT_OF_THE_MODEL: Final[dict[str, Any]] = {
     field.name: field.default
     for field in fields(SimConfig)
-    if field.name in ("object", "explain", "compile") or field.name.startswith(("pad_", "noise_"))
+    if field.name in ("object", "explain", "compile", *_SENSOR_SETTINGS)
 } | {"sensor": "ideal"}
 """Settings on which a reduced model does not depend, as its trial grasps have them."""
 
@@ -177,13 +178,13 @@ def _plant(
         drive = drive._replace(friction=friction)
     if instance is None:
         # Thinner than the closed gap, so that no finger ever touches it.
-        model = ObjectModel(-1.0, 0.0, gripper.pads, all_kept(()))
+        model = ObjectModel(-1.0, 0.0, gripper.pads, all_active(()))
         at_rest, offset = uncompressed(()), 0.0
     else:
         model = ObjectModel(
             width_m=instance.width_m,
             table_friction_n=instance.table_n,
-            terms=all_kept(instance.terms),
+            terms=all_active(instance.terms),
             pads=gripper.pads,
             held=1 if instance.spec.held else 0,
         )
@@ -213,7 +214,7 @@ def _gripper(config: SimConfig) -> _Gripper:
             coulomb_n=float(config.coulomb_n),
             breakaway_n=max(float(config.breakaway_n), float(config.coulomb_n)),
             stribeck_m_s=float(config.stribeck_m_s),
-            load_friction_coefficient=float(config.load_share),
+            load_friction_coefficient=float(config.load_friction_coefficient),
             damping_n_s_m=float(config.damping_n_s_m),
         ),
         closed_rev=revolutions_at(link, 0.0),
@@ -221,10 +222,10 @@ def _gripper(config: SimConfig) -> _Gripper:
         lag_s=float(config.drive_lag_s),
     )
     pads = PadCompliance(
-        stiffness_n_m=0.5 * float(config.skin_n_m),
-        damping_n_s_m=0.5 * float(config.skin_damping_n_s_m),
-        branch_n_m=0.5 * float(config.skin_creep_n_m),
-        branch_tau_s=float(config.skin_creep_s),
+        stiffness_n_m=0.5 * float(config.pad_stiffness_n_m),
+        damping_n_s_m=0.5 * float(config.pad_damping_n_s_m),
+        branch_n_m=0.5 * float(config.pad_creep_n_m),
+        branch_tau_s=float(config.pad_creep_s),
     )
     motion = Motion(drive.open_rev, 0.0, *gap_and_rate(link, drive.open_rev))
     return _Gripper(drive, pads, Steps(step_tolerance(config.accuracy)), motion)

@@ -123,7 +123,7 @@ class SimConfig:
         plausible=(1e-7, 1.0),
         meaning="Speed over which friction falls from static to Coulomb (an assumption).",
     )
-    load_share: float = setting(
+    load_friction_coefficient: float = setting(
         default=0.5,
         minimum=0.0,
         plausible=(0.0, 20.0),
@@ -143,7 +143,7 @@ class SimConfig:
         maximum=0.09,
         meaning="Gap of the open fingers.",
     )
-    skin_n_m: float = setting(
+    pad_stiffness_n_m: float = setting(
         default=3e4,
         unit="N/m",
         above=0.0,
@@ -151,19 +151,19 @@ class SimConfig:
         plausible=(10.0, math.inf),
         meaning="Stiffness of one fingertip's pad: 1e4 to 1e5 N/m (an assumption); inf: rigid.",
     )
-    skin_damping_n_s_m: float = setting(
+    pad_damping_n_s_m: float = setting(
         default=0.0,
         unit="N s/m",
         minimum=0.0,
         meaning="Damper parallel to the spring of the pad.",
     )
-    skin_creep_n_m: float = setting(
+    pad_creep_n_m: float = setting(
         default=0.0,
         unit="N/m",
         minimum=0.0,
         meaning="Stiffness of a Maxwell branch parallel to the spring of the pad, which makes it creep.",
     )
-    skin_creep_s: float = setting(
+    pad_creep_s: float = setting(
         default=0.3,
         unit="s",
         above=0.0,

@@ -58,7 +58,7 @@ class DaskCluster:
     def run(self, tasks: Sequence[Task]) -> Iterator[TaskResult]:
         """Do them, a task whose worker died once more at the end and alone.
 
-        Raises ExecutorLost where the scheduler goes, ConfigError where versions differ.
+        Raises ExecutorLost if the scheduler goes, ConfigError where versions differ.
         """
         self._compare()
         self._seen = time.monotonic()
@@ -123,7 +123,7 @@ class DaskCluster:
     def _settle(self) -> None:
         """Wait until the workers have been the same for a while: none is dying of the task before.
 
-        Raises ExecutorLost where there are none for long.
+        Raises ExecutorLost if there are none for long.
         """
         before: set[str] = set()
         while True:
@@ -135,7 +135,7 @@ class DaskCluster:
             time.sleep(SETTLING_S)
 
     def _first(self, futures: Sequence[Any]) -> Any:
-        """Wait for one of these to be done and return it. Raises ExecutorLost where nobody is left to do it."""
+        """Wait for one of these to be done and return it. Raises ExecutorLost if nobody is left to do it."""
         distributed = self._distributed
         while True:
             with suppress(TimeoutError, distributed.TimeoutError):
@@ -144,7 +144,7 @@ class DaskCluster:
             self._watch()
 
     def _watch(self) -> None:
-        """Look after scheduler and workers. Raises ExecutorLost where nobody is left to do anything."""
+        """Look after scheduler and workers. Raises ExecutorLost if nobody is left to do anything."""
         if self._client.status != "running":
             raise ExecutorLost(_GONE)
         if self._cluster is not None and len(self._cluster.workers) < self._wanted:

@@ -34,7 +34,7 @@ class Processes:
         self._running: list[_Worker] = []
 
     def run(self, tasks: Sequence[Task]) -> Iterator[TaskResult]:
-        """Do them, as many at once as there are workers. Raises ExecutorLost where no worker starts."""
+        """Do them, as many at once as there are workers. Raises ExecutorLost if no worker starts."""
         waiting = deque(tasks)
         attempts: dict[str, int] = {}
         starts_lost = 0

@@ -33,7 +33,13 @@ class ModelErrorSettings(CostSettings):
 
     error: float = field(default=0.0, validator=ge(-0.9))
     """Relative error of the gripper settings named in `of`, in the model for training."""
-    of: tuple[str, ...] = ("coulomb_n", "breakaway_n", "load_share", "rotor_kg_m2", "skin_n_m")
+    of: tuple[str, ...] = (
+        "coulomb_n",
+        "breakaway_n",
+        "load_friction_coefficient",
+        "rotor_kg_m2",
+        "pad_stiffness_n_m",
+    )
     learned_on: Mapping[str, Any] = field(factory=dict)
     """Further gripper settings of the model for training, such as `accuracy`."""
 

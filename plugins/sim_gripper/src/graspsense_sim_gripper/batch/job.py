@@ -63,7 +63,7 @@ class FinishedGrasp:
 
     @property
     def trace(self) -> Trace:
-        """The trace. Raises ValueError where traces are not kept."""
+        """The trace. Raises ValueError if traces are not kept."""
         if self.kept is None:
             raise ValueError("no traces were asked for: run_many(..., traces=True) keeps them")
         return self.kept

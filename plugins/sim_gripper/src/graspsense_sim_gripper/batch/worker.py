@@ -145,7 +145,7 @@ def _job(greeting: dict[str, Json]) -> Job:
 
 
 def _named(controller: Controller[Any]) -> tuple[str, dict[str, Json]]:
-    """Return the controller's name and settings. Raises ValueError where it does not follow from these alone."""
+    """Return the controller's name and settings. Raises ValueError if it does not follow from these alone."""
     name, values = recipe_of("controller", controller)
     twin = create("controller", name, **values)
     # As text, for NaN is not equal to itself.

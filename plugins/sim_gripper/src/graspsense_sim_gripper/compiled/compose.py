@@ -1,19 +1,18 @@
 """Composing the functions of a scene: the sum of its terms, the plant that presses it, and the loop of a grasp.
 
-A generic function names its parts as globals, and `bind` (of `graspsense.plugin_api`) fills them in. `bind_reachable`
-does that wherever a part is named in the functions that a function calls, at any depth. Everything composed here runs
-as it is in the interpreter, and `compiled.jit` compiles it.
+A generic function names its parts as globals, and `binding.bind_reachable` fills them in wherever the function or what
+it calls reads them. Everything composed here runs as it is in the interpreter, and `compiled.jit` compiles it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
-from types import FunctionType
-from typing import Any, Final, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import Frame, bind, maker, tick
+from graspsense_sim_gripper.binding import Constructors, bind_reachable
 from graspsense_sim_gripper.dynamics.contact import BalanceSearch, ObjectModel, PadLoad, solve_contact
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
@@ -26,15 +25,11 @@ from graspsense_sim_gripper.stepping.converge import refine_until_converged
 from graspsense_sim_gripper.stepping.implicit import SpeedSearch
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start
 from graspsense_sim_gripper.stepping.tr_bdf2 import Stage
+from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
 from graspsense_sim_gripper.terms.registry import find_term, laws_of
-from graspsense_sim_gripper.terms.remainder import Kept, Remainder
+from graspsense_sim_gripper.terms.switchable import Switchable
 from graspsense_sim_gripper.terms.term import NO_STATE, Law
 
-Part = Any
-"""A function, constant or class that a composed function reads as a global."""
-Constructors = Mapping[Any, Part]
-"""Classes of named tuples, each with the function that creates them."""
-FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 TermStates = Any
 """A tuple with a state of its own type for each term."""
 TermParams = Any
@@ -51,49 +46,6 @@ INTERPRETED: Final[Constructors] = {
     )
 }
 """Named tuples that a tick creates, each with a constructor that the interpreter runs in half the time."""
-
-
-def bind_reachable(
-    function: FunctionT, parts: Mapping[str, Part], constructors: Constructors | None = None
-) -> FunctionT:
-    """Return a copy of `function` in which it, and every function that it calls, sees these parts as its globals.
-
-    A part replaces the global of its name wherever that is read. A class among the keys of `constructors` is replaced
-    by its value wherever that is read, whatever its name. Functions that reach neither stay as they are, and so do the
-    parts themselves. Raises TypeError for a part that nothing reads.
-    """
-    unread = set(parts)
-    bound: FunctionT = _bound(function, parts, constructors or {}, unread, {})
-    if unread:
-        raise TypeError(f"nothing that {function.__qualname__} calls names a part {sorted(unread)}")
-    return bound
-
-
-def _bound(
-    function: Part,
-    parts: Mapping[str, Part],
-    constructors: Constructors,
-    unread: set[str],
-    done: dict[int, Part],
-) -> Part:
-    if id(function) in done:
-        return done[id(function)]
-    replaced = {}
-    for name in function.__code__.co_names:
-        if name not in function.__globals__:
-            continue
-        value = function.__globals__[name]
-        if name in parts:
-            replaced[name] = parts[name]
-            unread.discard(name)
-        elif isinstance(value, FunctionType):
-            called = _bound(value, parts, constructors, unread, done)
-            if called is not value:
-                replaced[name] = called
-        elif isinstance(value, type) and value in constructors:
-            replaced[name] = constructors[value]
-    done[id(function)] = bind(function, **replaced) if replaced else function
-    return done[id(function)]
 
 
 # ------------------------------------------------------------------------------------------ the object's terms
@@ -161,9 +113,9 @@ def sum_of(laws: Sequence[Law]) -> Law:
     return bind(_sum_of_more, first=laws[0], second=laws[1], third=laws[2], rest=sum_of(laws[3:]))
 
 
-def all_kept(terms: Sequence[Any]) -> tuple[Kept, ...]:
+def all_active(terms: Sequence[Any]) -> tuple[Switchable, ...]:
     """Return the parameters of these terms as the sum of `laws_of` takes them: all kept, and nothing lumped."""
-    return (Kept(0, Remainder(0.0, 0.0)), *(Kept(1, params) for params in terms))
+    return (Switchable(0, LumpedSpringDamper(0.0, 0.0)), *(Switchable(1, params) for params in terms))
 
 
 def uncompressed(kinds: Sequence[str]) -> ContactState:

@@ -67,7 +67,7 @@ def compiled_loop(composition: Composition, step: ControllerStep) -> Callable[..
 def compiling(composition: Composition) -> Iterator[None]:
     """Call a compiled loop inside this context where that may compile it: threads then wait for each other.
 
-    Otherwise each would compile the same. Raises NotCompilable where numba refuses.
+    Otherwise each would compile the same. Raises NotCompilable if numba refuses.
     """
     with _COMPILING, first_call(slp_vectorize=composition.shape is not None):
         yield

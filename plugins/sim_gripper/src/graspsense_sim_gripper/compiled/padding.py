@@ -22,7 +22,7 @@ from graspsense_sim_gripper.objects.library import catalogue
 from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.sensing import PadCells
 from graspsense_sim_gripper.terms.registry import find_term, in_order
-from graspsense_sim_gripper.terms.remainder import Kept
+from graspsense_sim_gripper.terms.switchable import Switchable
 
 TermState = Any
 """The state of a term: a named tuple of the term's own type."""
@@ -31,11 +31,11 @@ TermState = Any
 class Filler(NamedTuple):
     """What fills the place of a term that an object does not have: unused parameters, and the state at rest."""
 
-    params: Kept
+    params: Switchable
     state: TermState
 
 
-NOTHING: Final = Filler(Kept(0, None), None)
+NOTHING: Final = Filler(Switchable(0, None), None)
 
 
 class PaddedLayout(NamedTuple):
@@ -54,7 +54,7 @@ def layout_of(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> Padded
         return _with_kinds(setup.kinds, kinds)
     if is_common(setup.kinds):
         return _with_kinds(setup.kinds, common_kinds())
-    return _with_kept(setup.kinds, tuple([term.kept for term in setup.plant.object.terms[1:]]))
+    return _with_kept(setup.kinds, tuple([term.active for term in setup.plant.object.terms[1:]]))
 
 
 @cache
@@ -145,7 +145,7 @@ def _with_kept(own: tuple[str, ...], kept: tuple[int, ...]) -> PaddedLayout:
 def _filler(kind: str) -> Filler:
     _, term = find_term(kind)
     # Compiled code distinguishes types: floats, as all its parameters.
-    return Filler(Kept(0, term.params(*(1.0 for _ in term.params._fields))), term.at_rest)
+    return Filler(Switchable(0, term.params(*(1.0 for _ in term.params._fields))), term.at_rest)
 
 
 def _as_arrays(cells: PadCells) -> PadCells:

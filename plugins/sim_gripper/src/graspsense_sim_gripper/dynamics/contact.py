@@ -23,14 +23,14 @@ FORCE_ATOL_N: Final = 1e-9
 FORCE_RTOL: Final = 1e-11
 """Absolute and relative tolerance of the balance of forces."""
 LENGTH_RTOL: Final = 1e-14
-"""Further tolerance, relative to the force of the pads if the object gave way nowhere: the rounding of lengths."""
+"""Additional tolerance for the rounding of lengths, relative to the force of the pads against a rigid object."""
 ARGUMENT_RTOL: Final = 4e-16
-"""A bracket that is narrower than this, relative to its place, holds no further number."""
+"""Relative width of a bracket below which it contains no further floating-point number."""
 MIN_SLOPE_N_M: Final = 1e-9
 MIN_SLOPE_SHARE: Final = 1e-3
 """The least slope of the balance with which a secant step is taken, absolute and relative to the pads' stiffness."""
 CONTACT_TOL_M: Final = 1e-10
-"""A contact is located to this."""
+"""Tolerance with which a contact is located."""
 RECOVERED_M: Final = 1e-12
 """A compression of less than this is the rounding of the search: the object has recovered its shape."""
 
@@ -59,7 +59,7 @@ class ObjectModel(NamedTuple):
     held: int = 0
     """1: the object is held fast. The finger that touches first then presses it instead of pushing it."""
     overshoots: int = 1
-    """0: a released object recovers its shape and never swings beyond it, so that nothing can happen meanwhile."""
+    """0: a released object recovers its shape without overshoot, so it cannot touch the fingers again meanwhile."""
 
 
 class PadLoad(NamedTuple):
@@ -80,9 +80,9 @@ class BalanceSearch(NamedTuple):
     last_n: float
     """Force of the object at `last_m`."""
     slope_n_m: float
-    """Stiffness of the object, as the secant has it."""
+    """Stiffness of the object by the secant."""
     total_n_m: float
-    """That of the balance: of the object and the pads."""
+    """Stiffness of the balance: of the object and the pads."""
     lower_m: float
     upper_m: float
     n: int
@@ -98,7 +98,7 @@ class _Creep(NamedTuple):
     ramp_n_m: float
     """Stiffness of the branch against the change of that rate from its mean to the end."""
     damper_n_s_m: float
-    """What resists the rate at the end."""
+    """Damping coefficient of the rate at the end."""
     free_pad_m: float
     """Compression of the pads at the end if nothing pressed them."""
 
@@ -111,7 +111,7 @@ def _unbound(params: Any, states: Any, d0: float, d1: float, h: float, v1: float
 
 
 object_force: Callable[[Any, Any, float, float, float, float], tuple[float, Any]] = _unbound
-"""The law of the whole object, which the composition of the scene binds."""
+"""The law of the whole object; the composition of a scene binds it."""
 
 
 def solve_contact(

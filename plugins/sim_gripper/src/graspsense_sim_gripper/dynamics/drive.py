@@ -22,9 +22,9 @@ from graspsense.plugin_api import ScrewLinkage
 from graspsense_sim_gripper.dynamics.state import PlantState
 
 STRIBECK_SPEEDS: Final = 4.5
-"""At so many times the Stribeck speed less than 2e-9 of the excess is left, and it counts as zero."""
+"""Multiple of the Stribeck speed beyond which the excess is below 2e-9 of its maximum and counts as zero."""
 ARREST_M_S: Final = 1e-8
-"""A drive that is slower than this and slowing down stands still."""
+"""A decelerating drive that is slower than this comes to rest."""
 
 
 class Friction(NamedTuple):
@@ -50,11 +50,11 @@ class Drive(NamedTuple):
     closed_rev: float
     open_rev: float
     lag_s: float = 0.0
-    """Time constant with which the force follows the command; 0: at once."""
+    """Time constant with which the force follows the command; 0: without delay."""
 
 
 def stribeck_excess(friction: Friction, velocity_m_s: float) -> tuple[float, float, float]:
-    """Return by how much friction exceeds Coulomb friction at this speed of the gap, and two derivatives of that.
+    """Return the excess of friction over Coulomb friction at this speed of the gap, and its first two derivatives.
 
     The excess is in N, its first derivative with respect to the speed in N s/m, the second in N s2/m2.
     """

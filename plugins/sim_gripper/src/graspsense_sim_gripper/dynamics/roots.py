@@ -6,13 +6,13 @@ import math
 from typing import Final
 
 MAX_ITERATIONS: Final = 100
-"""Evaluations after which a search ends with what it has."""
+"""Maximum number of evaluations of a search."""
 
 
 def bracketed_secant(
     x: float, value: float, last_x: float, slope: float, lower: float, upper: float
 ) -> float:
-    """Return the next argument: that of the secant, or where it leaves the bracket that of bisection.
+    """Return the next argument: that of the secant, or that of bisection if the secant leaves the bracket.
 
     `lower` and `upper` are the nearest arguments known to lie below and above the root, or infinite. While one of them
     is infinite, a secant that leaves the bracket is replaced by a step of twice the last length.

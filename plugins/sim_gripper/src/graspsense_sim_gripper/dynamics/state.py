@@ -26,17 +26,17 @@ class ContactState(NamedTuple):
     compression_m: float
     force_n: float
     slope_n_m: float
-    """Stiffness that the last solution met, with which the next one begins."""
+    """Stiffness at the last solution, with which the next search begins."""
     states: Any
     """The states of the object's terms, in the order of the terms."""
     pad_m: float = 0.0
-    """Compression of the two pads in series. Kept up to date only where the pads creep or damp."""
+    """Compression of the two pads in series. Updated only if the pads creep or have damping."""
     branch_n: float = 0.0
     """Force of the pads' Maxwell branch."""
     rate_m_s: float = 0.0
     """Mean rate of the compression over the last step."""
     span_s: float = math.inf
-    """Duration of the last step; inf: the last step says nothing about the rate."""
+    """Duration of the last step; inf if that step gives no information about the rate."""
 
 
 class Contact(NamedTuple):
@@ -57,7 +57,7 @@ class Contact(NamedTuple):
 
 
 class StepState(NamedTuple):
-    """What the step control remembers between steps."""
+    """The state of the step control between steps."""
 
     next_s: float = math.inf
     """Length of the next step that the error of the last one allows."""
@@ -74,6 +74,6 @@ class PlantState(NamedTuple):
     contact: Contact
     step: StepState = StepState()
     effort_n: float = 0.0
-    """Force of the drive at the moment, where it lags behind the command."""
+    """Current force of the drive, if it lags behind the command."""
     peak_n: float = 0.0
-    """Greatest force on a pad so far."""
+    """Largest force on a pad so far."""

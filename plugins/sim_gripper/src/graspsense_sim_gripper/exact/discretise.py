@@ -14,8 +14,8 @@ from graspsense_sim_gripper.exact.propagate import ExactPlant, workspace_size
 from graspsense_sim_gripper.exact.tables import Tables, listed_tables_of, tables_of
 from graspsense_sim_gripper.exact.term_states import n_numbers
 from graspsense_sim_gripper.problem import GraspSetup
+from graspsense_sim_gripper.terms.lumped import linear as lumped_form
 from graspsense_sim_gripper.terms.registry import find_term
-from graspsense_sim_gripper.terms.remainder import linear as lumped_form
 from graspsense_sim_gripper.terms.term import LinearForm, OwnContact
 
 
@@ -78,19 +78,19 @@ def _forms(setup: GraspSetup) -> list[tuple[str, LinearForm | OwnContact | None]
     """Return the kinds of the terms that the model keeps, with their linear forms."""
     lumped, *terms = setup.plant.object.terms
     forms: list[tuple[str, LinearForm | OwnContact | None]] = []
-    if lumped.kept == 1:
+    if lumped.active == 1:
         forms.append(("", lumped_form(lumped.params)))
     forms += [
         (kind, _form(kind, term.params))
         for kind, term in zip(setup.kinds, terms, strict=True)
-        if term.kept == 1
+        if term.active == 1
     ]
     return forms
 
 
 @lru_cache(maxsize=256)
 def _form(kind: str, params: Any) -> LinearForm | OwnContact | None:
-    """Return a term's linear form. Raises TypeError where it has other states than the law."""
+    """Return a term's linear form. Raises TypeError if it has other states than the law."""
     term = find_term(kind)[1]
     form = term.linear(params)
     if form is None:

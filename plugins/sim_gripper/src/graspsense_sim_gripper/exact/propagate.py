@@ -20,10 +20,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from types import FunctionType
 from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import bind
+from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.dynamics.contact import RECOVERED_M
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
 from graspsense_sim_gripper.exact.expm import MAX_BISECTIONS
@@ -104,8 +104,10 @@ def bind_move(
         "bound_by_modes": bind(_product, ROWS=n_outputs, COLUMNS=2 * n, FROM=dx, TO=bound, OF_MAGNITUDE=1),
     }
     pack, unpack = term_state_functions(kinds)
-    parts = {**constants, **products, "pack": pack, "unpack": unpack, "step_move": step_move}
-    bound_move: Callable[[Any, PlantState, float, float], PlantState] = _bind_called(move, parts, {})
+    # DX is read by the products only.
+    parts = {name: place for name, place in constants.items() if name != "DX"}
+    parts |= {**products, "pack": pack, "unpack": unpack, "step_move": step_move}
+    bound_move: Callable[[Any, PlantState, float, float], PlantState] = bind_reachable(move, parts)
     return bound_move
 
 
@@ -138,21 +140,6 @@ def _constants(shape: Shape) -> dict[str, int]:
     }
 
 
-def _bind_called(function: Any, parts: dict[str, Any], done: dict[str, Any]) -> Any:
-    """Return a copy of `function` in which it, and the functions of this module that it calls, see these parts."""
-    if function.__name__ not in done:
-        names = {name: function.__globals__.get(name) for name in function.__code__.co_names}
-        called = {
-            name: _bind_called(value, parts, done)
-            for name, value in names.items()
-            if name not in parts and isinstance(value, FunctionType) and value.__module__ == __name__
-        }
-        done[function.__name__] = bind(
-            function, **called, **{name: parts[name] for name in names.keys() & parts}
-        )
-    return done[function.__name__]
-
-
 # --------------------------------------------------------------------------------------------------------- a tick
 
 
@@ -173,7 +160,7 @@ OUTPUT_ROWS = MAP_ROWS = PROJECTION_ROWS = 0
 """Rows of the tables, with the padding."""
 TERM_STATES = 0
 """The place of the first state of a term in x."""
-X0 = X1 = Y0 = BOUND = DX = 0
+X0 = X1 = Y0 = BOUND = 0
 ROWS = COLUMNS = FROM = TO = 0
 """Of a product: the shape of the matrix, and the places of its operand and result."""
 OF_CHANGE = OF_MAGNITUDE = 0

@@ -107,14 +107,14 @@ unpack_others: Any = _unpack_none
 
 
 def _pack(terms: Any, states: Any, vector: Vector, at: int) -> int:
-    if terms[0].kept == 1:
+    if terms[0].active == 1:
         at = pack_term(states[0], vector, at)
     return pack_others(terms[1:], states[1:], vector, at)  # type: ignore[no-any-return]
 
 
 def _unpack(terms: Any, states: Any, vector: Vector, at: int) -> tuple[Any, int]:
     state = states[0]
-    if terms[0].kept == 1:
+    if terms[0].active == 1:
         state, at = unpack_term(states[0], vector, at)
     others, at = unpack_others(terms[1:], states[1:], vector, at)
     return (state, *others), at

@@ -71,7 +71,7 @@ def object_kinds() -> tuple[ObjectKind, ...]:
 def split_number(name: str) -> tuple[str, int | None]:
     """Return the name without the number of its instance, and that number; `can:full_open#3` is one particular can.
 
-    Raises UnknownName where the text after `#` is not a whole number.
+    Raises UnknownName if the text after `#` is not a whole number.
     """
     plain, mark, number = name.partition("#")
     if not mark:

@@ -59,7 +59,7 @@ class ReductionCache:
         self._lock = threading.Lock()
 
     def key(self, problem: Problem, controller: GraspController) -> Key:
-        """Return the key of the model for a problem under a controller. Raises TypeError where there is no object."""
+        """Return the key of the model for a problem under a controller. Raises TypeError if there is no object."""
         if problem.spec is None:
             raise TypeError("where there is no object there is no model to reduce")
         spec = problem.spec

@@ -12,8 +12,9 @@ from graspsense_sim_gripper.dynamics.contact import ObjectModel
 from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction
 from graspsense_sim_gripper.stepping.scheme import PlantParams
+from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
 from graspsense_sim_gripper.terms.registry import find_term
-from graspsense_sim_gripper.terms.remainder import Kept, Remainder
+from graspsense_sim_gripper.terms.switchable import Switchable
 from graspsense_sim_gripper.terms.term import WorkingPoint
 
 Candidate = tuple[str, ObjectModel]
@@ -28,13 +29,13 @@ def without_term(
 ) -> Iterator[Candidate]:
     """Yield the model with term `i` dropped, then with each of the term's limits."""
     params = model.terms[i + 1].params
-    yield DROPPED, _with(model, i, Kept(0, params), 0.0, 0.0)
+    yield DROPPED, _with(model, i, Switchable(0, params), 0.0, 0.0)
     for limit in find_term(kinds[i])[1].limits(params, point):
         if limit.params == params and limit.spring_n_m == 0.0 and limit.damper_n_s_m == 0.0:
             continue
-        term = Kept(0, params)
+        term = Switchable(0, params)
         if limit.params is not None:
-            term = Kept(1, params._make(float(value) for value in limit.params))
+            term = Switchable(1, params._make(float(value) for value in limit.params))
         yield limit.name, _with(model, i, term, limit.spring_n_m, limit.damper_n_s_m)
 
 
@@ -71,10 +72,12 @@ def reduce_model(model: ObjectModel, kinds: Sequence[str], reduction: Reduction)
     return model._replace(overshoots=1 if reduction.oscillates else 0)
 
 
-def _with(model: ObjectModel, i: int, term: Kept, spring_n_m: float, damper_n_s_m: float) -> ObjectModel:
+def _with(
+    model: ObjectModel, i: int, term: Switchable, spring_n_m: float, damper_n_s_m: float
+) -> ObjectModel:
     """Return the model with another term `i`, and with more of the spring and damper that limits leave."""
     before = model.terms[0].params
     spring, damper = before.spring_n_m + spring_n_m, before.damper_n_s_m + damper_n_s_m
-    lumped = Kept(1 if spring > 0.0 or damper > 0.0 else 0, Remainder(spring, damper))
+    lumped = Switchable(1 if spring > 0.0 or damper > 0.0 else 0, LumpedSpringDamper(spring, damper))
     terms = (lumped, *model.terms[1 : i + 1], term, *model.terms[i + 2 :])
     return model._replace(terms=terms)

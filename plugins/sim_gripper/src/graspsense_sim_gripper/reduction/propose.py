@@ -28,7 +28,7 @@ from graspsense_sim_gripper.reduction.levels import (
 )
 from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction, TermDecision
 from graspsense_sim_gripper.reduction.probe import Grip, damping, stiffness
-from graspsense_sim_gripper.stepping.scheme import EXPLICIT, MEAN_FORCE, STIFF, Steps
+from graspsense_sim_gripper.stepping.scheme import MEAN_FORCE, TR_BDF2, VERLET, Steps
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import NO_STATE, WorkingPoint, no_rates
 
@@ -41,13 +41,13 @@ CONVERGED: Final = 1e-7
 """A reference halves the steps of a tick until speed and force change by less than this part of the accuracy."""
 STIFFEST_N_M: Final = 1e6
 """Peak forces on contacts up to this stiff agree with their reference."""
-SCHEMES: Final = {EXPLICIT: "Verlet", STIFF: "TR-BDF2", MEAN_FORCE: "mean force"}
+SCHEMES: Final = {VERLET: "Verlet", TR_BDF2: "TR-BDF2", MEAN_FORCE: "mean force"}
 
 
 def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | None = None) -> Grip:
     """Return the nominal object as it is gripped with this force, after the fingers touch it at this speed.
 
-    What the settings expect of the grasp takes precedence over these. Raises TypeError where there is no object.
+    What the settings expect of the grasp takes precedence over these. Raises TypeError if there is no object.
     """
     config, setup = problem.model_config, _nominal(problem)
     drive = setup.plant.drive
@@ -86,7 +86,7 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = UNVERIFIED) -> Red
         contact=contact,
         error=error,
         oscillates=any(
-            reduced.kept == 1 and _oscillates(kind, full.params, grip.point)
+            reduced.active == 1 and _oscillates(kind, full.params, grip.point)
             for kind, full, reduced in zip(grip.kinds, grip.model.terms[1:], model.terms[1:], strict=True)
         ),
         level=level,
@@ -108,16 +108,16 @@ def _nominal(problem: Problem) -> GraspSetup:
 def _scheme(accuracy: float, damping_rate: float, frequency: float, dt_s: float, has_friction: bool) -> int:
     """Return the scheme for these rates (1/s)."""
     if damping_rate * dt_s > 1.0:
-        return STIFF
+        return TR_BDF2
     # With Verlet the energy of an oscillation varies by a share of it, which shows only where nothing dissipates it.
     undamped = frequency * (6.0 * step_tolerance(accuracy)) ** (2.0 / 3.0) / 4.0
-    return MEAN_FORCE if damping_rate < undamped and not has_friction else EXPLICIT
+    return MEAN_FORCE if damping_rate < undamped and not has_friction else VERLET
 
 
 def _with_settings(steps: Steps, config: SimConfig) -> Steps:
     """Return the steps as the settings modify them."""
     if config.scheme != "auto":
-        steps = steps._replace(scheme=(steps.scheme or STIFF) if config.scheme == "implicit" else EXPLICIT)
+        steps = steps._replace(scheme=(steps.scheme or TR_BDF2) if config.scheme == "implicit" else VERLET)
     if config.step_s is not None:
         steps = steps._replace(tolerance=math.inf, longest_s=float(config.step_s))
     if config.fidelity == "reference":

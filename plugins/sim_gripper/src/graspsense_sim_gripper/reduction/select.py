@@ -61,7 +61,7 @@ def select(
     `compiled`: run the trial grasps compiled, where the controller can be compiled; `padding`: the kinds of terms with
     which that code is padded, by default as in a batch. Both change times only.
 
-    Raises ConfigError where no model has the accuracy asked for, TypeError where there is no object.
+    Raises ConfigError if no model has the accuracy asked for, TypeError if there is no object.
     """
     key = _SELECTED.key(problem, controller)
     reduction = _SELECTED.get(key)

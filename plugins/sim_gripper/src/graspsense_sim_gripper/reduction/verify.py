@@ -45,7 +45,7 @@ from graspsense_sim_gripper.reduction.candidates import reduced
 from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.sensing import Bias, PadBuffers
-from graspsense_sim_gripper.stepping.scheme import EXPLICIT, Steps
+from graspsense_sim_gripper.stepping.scheme import VERLET, Steps
 
 MAX_SECONDS: Final = 40.0
 """The longest trial grasp, and the longest approach in it."""
@@ -152,7 +152,7 @@ class TrialGrasps:
     def _closed_in(self, setup: GraspSetup, from_open: bool) -> tuple[_Stage, bool]:
         """Return the grasp shortly before the first contact, or where it ended, and whether it came to the contact."""
         # No short steps, as nothing happens.
-        steps = setup.plant.steps._replace(scheme=EXPLICIT, longest_s=math.inf)
+        steps = setup.plant.steps._replace(scheme=VERLET, longest_s=math.inf)
         reach = setup.plant.object.width_m + 2.0 * abs(setup.state.contact.offset_m)
         state, link = setup.state, setup.plant.drive.link
         if not from_open:
@@ -228,7 +228,7 @@ class TrialGrasps:
 def trial_grasps(
     problem: Problem, controller: GraspController, *, compiled: bool, padding: tuple[str, ...] | None
 ) -> TrialGrasps:
-    """Return the trial grasps of a problem. Raises TypeError where there is no object."""
+    """Return the trial grasps of a problem. Raises TypeError if there is no object."""
     if problem.nominal is None:
         raise TypeError("where there is no object there is nothing to grasp")
     law, run = controller.controller, evolve(controller.run, hold_s=min(controller.run.hold_s, MAX_HOLD_S))

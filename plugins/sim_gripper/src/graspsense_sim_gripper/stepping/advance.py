@@ -1,4 +1,4 @@
-"""The plant over a tick: the loop over the steps of a tick, and what a tick needs beside it."""
+"""The plant over a tick: the loop over its steps."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from graspsense_sim_gripper.stepping.control import (
 from graspsense_sim_gripper.stepping.events import first
 from graspsense_sim_gripper.stepping.mean_force import mean_force
 from graspsense_sim_gripper.stepping.scheme import (
-    EXPLICIT,
-    STIFF,
+    TR_BDF2,
+    VERLET,
     Attempt,
     PlantParams,
     Start,
@@ -39,7 +39,7 @@ LAG_PIECES: Final = 4
 MAX_LAG_PIECES: Final = 1000
 """Pieces per time constant in which the force of a drive that lags is constant, and how many there are at most."""
 REST_SHARE: Final = 1e-12
-"""A remainder of the tick below this share of it is rounding."""
+"""Fraction of the tick below which what is left of it is rounding."""
 
 
 def move(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
@@ -51,7 +51,7 @@ def move(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> 
         h = dt / n_pieces
     for _ in range(n_pieces):
         if lag > 0.0:
-            # The exact first-order response, of which each piece has the mean.
+            # The exact first-order response; each piece has its mean.
             decay, difference = math.exp(-h / lag), state.effort_n - effort_n
             mean = effort_n + difference * phi1(h / lag, decay)
             motion, contact, step, _, peak = state
@@ -88,9 +88,9 @@ def take_steps(params: PlantParams, state: PlantState, effort_n: float, dt: floa
 def take_step(
     params: PlantParams, state: PlantState, effort_n: float, h: float, left_s: float, forced: bool
 ) -> tuple[PlantState, float]:
-    """Return the plant after an attempted step of `h`, and how long it was: 0 where the step was rejected.
+    """Return the plant after an attempted step of `h`, and its duration: 0 if it was rejected.
 
-    Fingers that stand still do so for the longest step, as a rule for all that is left of the tick. `forced`: the step
+    If the fingers stand still, the step is as long as possible, usually the rest of the tick. `forced`: the step
     is accepted whatever its error.
     """
     drive, _, steps = params
@@ -105,7 +105,7 @@ def take_step(
         after_step = StepState(step.next_s, step.n_steps + 1, step.unresolved)
     else:
         attempt = attempt_of(params, start, effort_n, h)
-        if steps.scheme != EXPLICIT and h > MIN_STEP_S and not forced:
+        if steps.scheme != VERLET and h > MIN_STEP_S and not forced:
             fraction = first(params, start, attempt)
             if fraction > 0.0:
                 retry = StepState(h * fraction, step.n_steps, step.unresolved)
@@ -122,27 +122,27 @@ def take_step(
 
 
 def rests(drive: Drive, state: PlantState, effort_n: float) -> bool:
-    """Return whether fingers that stand still go on doing so, and nothing relaxes between them."""
+    """Return whether fingers at rest remain so, with nothing that relaxes between them."""
     return state.contact.touched == 0 and is_held(drive, state, effort_n)
 
 
 def _standing(start: Start) -> Attempt:
-    """Return the start of a step at rest, after no time."""
+    """Return an attempt of no duration: the start of the step, at rest."""
     revolutions, _, gap, jacobian = start.motion
     return Attempt(Motion(revolutions, 0.0, gap, jacobian), start.contact, 0.0, 0.0, 0.0)
 
 
 def attempt_of(params: PlantParams, start: Start, effort_n: float, h: float) -> Attempt:
     """Return a step of `h` by the scheme of these parameters."""
-    if params.steps.scheme == EXPLICIT:
+    if params.steps.scheme == VERLET:
         return verlet(params, start, effort_n, h)
-    if params.steps.scheme == STIFF:
+    if params.steps.scheme == TR_BDF2:
         return tr_bdf2(params, start, effort_n, h)
     return mean_force(params, start, effort_n, h)
 
 
 def _without_reversal(start: Start, attempt: Attempt) -> Attempt:
-    """Return the attempt with speed zero where the motion has reversed: friction turns round there."""
+    """Return the attempt with speed zero if the motion has reversed, because friction changes its sign there."""
     revolutions, speed, gap, jacobian = attempt.motion
     if speed * start.direction > 0.0:
         return attempt
@@ -161,7 +161,7 @@ def _completed(
     revolutions, speed, gap, _ = motion
     left, right, touched = contact.left, contact.right, contact.touched
     if touched == 1 or gap <= start.reach_m:
-        # Released and recovered, the object is as it was before the first contact.
+        # A released object that has recovered its shape is in the state before the first contact.
         shape = abs(left.compression_m) + abs(left.pad_m) + abs(right.compression_m)
         separated = gap > start.reach_m and contact.left_n + contact.right_n == 0.0
         touched = 0 if separated and shape <= RECOVERED_M else 1

@@ -1,7 +1,7 @@
-"""A tick of motion without an event in which nothing is pressed, in one step. Most ticks of a grasp are such.
+"""A tick in one step: motion without an event in which no object is compressed. Most ticks of a grasp are of this kind.
 
 Nothing is touched; or a finger pushes the object across the table; or a released object recovers its shape, which no
-sensor feels. The step is of third order in the speed: half of the acceleration's change is added, linearised in the
+sensor measures. The step is of third order in the speed: half of the acceleration's change is added, linearised in the
 speed (friction, damping) and in the position (Jacobian of the linkage). Friction and linkage are then evaluated once
 each, and neither waits for the other.
 """
@@ -21,7 +21,7 @@ SHAPE_SCALE_M: Final = 1e-3
 
 
 def coast(params: PlantParams, state: PlantState, effort_n: float, h: float) -> tuple[bool, PlantState]:
-    """Return whether a tick of `h` is such motion, and the plant after it."""
+    """Return whether a tick of `h` is of this kind, and the plant after it."""
     motion, contact, step, given, peak = state
     reach, pending = params.object.width_m + 2.0 * abs(contact.offset_m), contact.pending_s
     if contact.touched == 1:
@@ -35,7 +35,7 @@ def coast(params: PlantParams, state: PlantState, effort_n: float, h: float) -> 
     if contact.touched == 1:
         left_n, right_n, offset, touched, left, right, _ = contact
         if load > 0.0:
-            # The finger takes the object along, towards the middle.
+            # The finger pushes the object towards the middle.
             pushed = 0.5 * (motion1.gap_m - reach)
             offset = pushed if offset >= 0.0 else -pushed
         contact = Contact(left_n, right_n, offset, touched, left, right, pending)

@@ -1,7 +1,7 @@
 """Step control: from the error of a step to its acceptance and the length of the next one.
 
 The elementary controller of Hairer, Norsett and Wanner (Solving Ordinary Differential Equations I, II.4), for errors
-that go with the third power of the step.
+that are proportional to the third power of the step.
 """
 
 from __future__ import annotations
@@ -19,45 +19,45 @@ from graspsense_sim_gripper.stepping.scheme import (
 )
 
 SAFETY: Final = 0.9
-"""Factor on the step that would have just the error that is allowed."""
+"""Factor on the step whose error would be the tolerance."""
 MIN_FACTOR: Final = 0.2
-"""Least ratio of a step to the one before."""
+"""Smallest ratio of a step to the one before."""
 MAX_FACTOR: Final = 9.0
-"""Greatest ratio, which an error below `SMALL_ERROR` allows."""
+"""Largest ratio, which an error below `SMALL_ERROR` allows."""
 SMALL_ERROR: Final = 1e-3
 """SAFETY times the inverse cube root of this is `MAX_FACTOR`."""
 EXPONENT: Final = -1.0 / 3.0
-"""The error of a step goes with the third power of its length."""
+"""The error of a step is proportional to the third power of its length."""
 FREE_GROWTH: Final = 4.0
-"""Greatest ratio of a step to the last one while nothing is touched."""
+"""Largest ratio of a step to the last one while nothing is touched."""
 MIN_STEP_S: Final = 1e-10
-"""A step of this length is accepted whatever its error, which is then rounding."""
+"""Length at which a step is accepted regardless of its error, which is then rounding."""
 LONG_STEP_S: Final = 10.0
-"""A step that is longer than this is not limited any more."""
+"""Longer steps are not limited any more."""
 CONTACT_STEP_S: Final = 0.01
 """Length of the first step after a contact, for a tolerance of 1."""
 MIN_CONTACT_STEP_S: Final = 1e-8
-"""Least length of that step: over a shorter one the rate of a compression is mostly rounding."""
+"""Smallest length of that step; over a shorter one the rate of a compression is mostly rounding."""
 MAX_STEPS: Final = 20_000
-"""Greatest number of steps in a tick. What is left of the tick is then one step, whatever its error."""
+"""Largest number of steps in a tick. The rest of the tick is then one step, regardless of its error."""
 TIME_RTOL: Final = 1e-9
-"""A remainder of a tick that exceeds the step by less than this is one step."""
+"""The rest of a tick is one step if it exceeds the length of a step by less than this fraction."""
 
 
 def next_length(steps: Steps, step: StepState, left_s: float, n_steps: int) -> tuple[float, bool]:
-    """Return the length of the next step of a tick of which `left_s` is left, and whether its error does not count."""
+    """Return the length of the next step if `left_s` of the tick is left, and whether it is accepted in any case."""
     h = min(step.next_s, steps.longest_s)
     forced = n_steps >= MAX_STEPS
     if forced or left_s <= h * (1.0 + TIME_RTOL):
         h = left_s
     elif left_s < 2.0 * h:
-        # Two equal steps instead of one and a short remainder.
+        # Two equal steps instead of a full and a short one.
         h = 0.5 * left_s
     return h, forced
 
 
 def relative_error(steps: Steps, start: Start, attempt: Attempt) -> float:
-    """Return the error of a step relative to the one that is allowed; 0 where no error is estimated."""
+    """Return the error of a step relative to the tolerance, 0 if no error is estimated."""
     if attempt.speed_error_m_s + attempt.force_error_n <= 0.0:
         return 0.0
     before, after = start.motion, attempt.motion
@@ -77,7 +77,7 @@ def relative_error(steps: Steps, start: Start, attempt: Attempt) -> float:
 def accept(error: float, h: float, last: StepState, growth: float, forced: bool) -> tuple[bool, StepState]:
     """Return whether a step of `h` with this relative error is accepted, and the state of the control after it.
 
-    `growth`: greatest ratio of the next step to this one. `forced`: the step is accepted whatever its error.
+    `growth`: largest ratio of the next step to this one. `forced`: the step is accepted regardless of its error.
     """
     step, n, unresolved = last
     if error == 0.0:
@@ -87,7 +87,7 @@ def accept(error: float, h: float, last: StepState, growth: float, forced: bool)
     allowed = h * max(SAFETY * error**EXPONENT, MIN_FACTOR) if error > SMALL_ERROR else MAX_FACTOR * h
     proposed = min(allowed, growth * h)
     if error <= 1.0:
-        # A step that an event or the end of the tick has cut does not shorten the next one.
+        # A step that was shortened by an event or by the end of the tick does not shorten the next one.
         step = proposed if h >= step else max(proposed, step, min(allowed, growth * step))
         return True, StepState(step, n + 1, unresolved)
     if h > MIN_STEP_S and not forced:

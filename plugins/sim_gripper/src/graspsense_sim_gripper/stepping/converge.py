@@ -12,9 +12,9 @@ from graspsense_sim_gripper.stepping.scheme import FORCE_SCALE_N, SPEED_SCALE_M_
 
 MAX_HALVINGS: Final = 4
 ERROR_RATIO: Final = 0.125
-"""Ratio of the errors of a step and of one half as long."""
+"""Ratio of the error of a step to that of a step of half the length."""
 MIN_TOLERANCE: Final = 1e-8
-"""Halving asks for no tolerance below this. The error of a step is then rounding, which shorter steps make worse."""
+"""Smallest tolerance that halving uses. Below it the error of a step is rounding, which shorter steps increase."""
 
 
 def refine_until_converged(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
@@ -37,7 +37,7 @@ def refine_until_converged(params: PlantParams, state: PlantState, effort_n: flo
         if (
             steps.settle <= 0.0
             or n_halvings == MAX_HALVINGS
-            # Half as long they would be too many, and too short to be of use.
+            # Steps of half the length would be too many, and too short to be of use.
             or 4 * n > MAX_STEPS
             or (after.contact.touched == 0 and after.motion.speed_rev_s == 0.0)
         ):
@@ -50,12 +50,12 @@ def refine_until_converged(params: PlantParams, state: PlantState, effort_n: flo
 
 
 def _alike(before: PlantState, after: PlantState, share: float) -> bool:
-    """Return whether speed, force and shapes differ by no more than this share."""
+    """Return whether speed, force and shapes agree within this relative tolerance."""
     speed0 = before.motion.speed_rev_s * before.motion.jacobian_m_rev
     speed1 = after.motion.speed_rev_s * after.motion.jacobian_m_rev
     force0 = before.contact.left_n + before.contact.right_n
     force1 = after.contact.left_n + after.contact.right_n
-    # No force tells of a released object's shape until the object strikes the fingers again.
+    # The shape of a released object affects no force until the object touches the fingers again.
     left0, left1 = before.contact.left.compression_m, after.contact.left.compression_m
     right0, right1 = before.contact.right.compression_m, after.contact.right.compression_m
     return (

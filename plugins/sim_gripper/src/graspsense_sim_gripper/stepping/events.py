@@ -1,7 +1,7 @@
 """Events that end a step: a contact, an end of the travel, a reversal, the release of the object.
 
-After an event the equation of motion is another one, so no step goes beyond it. The explicit scheme knows its path in
-advance and ends at the event (`drift`). An implicit scheme goes beyond it, and `first` says by how much.
+The equation of motion changes at an event, so no step goes beyond it. The explicit scheme knows its path in advance and
+ends at the event (`drift`). For an implicit scheme, `first` returns the fraction of the step at which the event lies.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def drift(params: PlantParams, start: Start, h: float) -> tuple[Motion, float]:
         gap1 = min(gap1, meeting)
     end = end_of_travel(drive, direction)
     if (revolutions1 - end) * direction > 0.0:
-        # The object is pressed as far as the travel goes, and no further.
+        # The object is compressed up to the end of the travel.
         t = min(max(t * (end - revolutions) / (revolutions1 - revolutions), 0.0), t)
         revolutions1 = end
         gap1, jacobian1 = gap_and_rate(drive.link, end)
@@ -51,7 +51,7 @@ def drift(params: PlantParams, start: Start, h: float) -> tuple[Motion, float]:
 
 
 def first(params: PlantParams, start: Start, attempt: Attempt) -> float:
-    """Return the fraction of an implicit step after which an event lies inside it, by the secant; 0: there is none."""
+    """Return the fraction of an implicit step at which an event lies, by the secant; 0 if there is none."""
     revolutions, speed, gap, jacobian = start.motion
     revolutions1, speed1, gap1, jacobian1 = attempt.motion
     direction, meeting = start.direction, start.meeting_m

@@ -1,4 +1,4 @@
-"""What the implicit schemes share: the search for the speed at the end of a step, and the error of the force."""
+"""Common parts of the implicit schemes: the search for the speed at the end of a step, and the error of the force."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from graspsense_sim_gripper.stepping.scheme import SPEED_SCALE_M_S, Start
 SPEED_RTOL: Final = 1e-11
 """Tolerance of the search, relative to the scale of the speed."""
 ARGUMENT_RTOL: Final = 1e-14
-"""The secant through two speeds that are closer than this is rounding."""
+"""Difference of two speeds below which their secant is rounding."""
 FIRST_STEP: Final = 1e-5
-"""The second speed that is tried differs from the first by this share of the scale."""
+"""Difference of the first two speeds that are tried, as a fraction of the scale."""
 MIN_SLOPE: Final = 0.1
 """The slope is 1 plus what the forces add to it, which is positive but where friction falls with the speed."""
 SLOWEST_SHARE: Final = 1e-3

@@ -1,8 +1,8 @@
-"""A step by the mean of the force along its path: a discrete gradient, of second order, which keeps the energy.
+"""A discrete-gradient step with the mean of the force along its path: of second order, and energy-conserving.
 
-For what swings and is hardly damped: what the speed gains is the work done on the path, so that the energy of a swing
-does not drift (McLachlan, Quispel and Robidoux, Phil. Trans. R. Soc. A 357, 1999). The mean is Simpson's, exact for a
-force that is a polynomial of third degree in the position.
+It suits lightly damped oscillations: the change of the kinetic energy equals the work on the path, so that the energy
+of an oscillation does not drift (McLachlan, Quispel and Robidoux, Phil. Trans. R. Soc. A 357, 1999). The mean is
+Simpson's rule, exact for a force that is a polynomial of third degree in the position.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from graspsense_sim_gripper.stepping.implicit import (
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start
 
 MIN_ACCELERATION: Final = 1e-300
-"""Keeps a quotient of zeros from being one."""
+"""Added to a divisor, so that it is never 0."""
 
 
 def mean_force(params: PlantParams, start: Start, effort_n: float, h: float) -> Attempt:
@@ -36,7 +36,7 @@ def mean_force(params: PlantParams, start: Start, effort_n: float, h: float) -> 
         v1 = search.speed_rev_s
         contact1, middle_rate, rate1 = start.contact, rate0, rate0
         for half in range(2):
-            # To the middle of the path and on to its end, at the mean speed.
+            # To the middle of the path, then to its end, at the mean speed.
             middle_rate, part = rate1, 0.5 * (half + 1)
             v = speed + part * (v1 - speed)
             revolutions1 = revolutions + part * h * 0.5 * (speed + v1)

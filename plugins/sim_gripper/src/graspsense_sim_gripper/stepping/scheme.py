@@ -1,4 +1,4 @@
-"""What every scheme of a step is given and returns.
+"""The interface of the integration schemes.
 
 A scheme is a function `scheme(params, start, effort_n, h) -> Attempt`. It does not decide whether its step is accepted.
 """
@@ -18,13 +18,13 @@ from graspsense_sim_gripper.dynamics.drive import (
 )
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
 
-EXPLICIT: Final = 0
-STIFF: Final = 1
+VERLET: Final = 0
+TR_BDF2: Final = 1
 MEAN_FORCE: Final = 2
 """The schemes: velocity Verlet, TR-BDF2, and the discrete gradient (see the modules of these names)."""
 SPEED_SCALE_M_S: Final = 1e-3
 FORCE_SCALE_N: Final = 1.0
-"""Errors are relative to the speed and the force, or to these where they are smaller."""
+"""Errors are relative to the speed and the force, or to these values if those are smaller."""
 
 
 class Steps(NamedTuple):
@@ -32,18 +32,18 @@ class Steps(NamedTuple):
 
     tolerance: float
     """Error of a step, relative to force and speed, beyond which it is rejected."""
-    scheme: int = EXPLICIT
+    scheme: int = VERLET
     longest_s: float = math.inf
     settle: float = 0.0
-    """Relative change of speed and force that is left when the steps of a tick are halved; 0: they are not halved."""
+    """Relative change of speed and force at which the halving of steps ends; 0: steps are not halved."""
     growth: float = 2.0
-    """Greatest ratio of a step to the last one while something is touched.
+    """Largest ratio of a step to the last one while something is touched.
 
     After a contact at time t_c a step is then at most (growth - 1) (t - t_c) long, however short the first one was."""
 
 
 class PlantParams(NamedTuple):
-    """What does not change during a grasp: the drive, the object, and how a tick is divided into steps."""
+    """The constants of a grasp: the drive, the object, and how a tick is divided into steps."""
 
     drive: Drive
     object: ObjectModel
@@ -51,27 +51,27 @@ class PlantParams(NamedTuple):
 
 
 class Start(NamedTuple):
-    """The state before a step, with what every scheme derives from it."""
+    """The state before a step, with the quantities that every scheme needs."""
 
     motion: Motion
     contact: Contact
     direction: float
-    """+1: the gap opens, or would; -1: it closes."""
+    """+1 if the gap opens, or would without friction; -1 if it closes."""
     acceleration: float
     """rev/s2"""
     reach_m: float
-    """The gap at which the finger that is nearer to the object touches it."""
+    """The gap at which the nearer finger touches the object."""
     meeting_m: float
-    """The gap of the next contact: `reach_m`, or that of the other finger where one touches already."""
+    """The gap of the next contact: `reach_m`, or that of the other finger if one touches already."""
 
 
 class Attempt(NamedTuple):
-    """What a scheme returns: the state after the step, and estimates of its errors."""
+    """The result of a scheme: the state after the step, and estimates of its errors."""
 
     motion: Motion
     contact: Contact
     duration_s: float
-    """Shorter than the step that was asked for where the scheme itself ends at an event."""
+    """Shorter than the requested step if the scheme itself ends at an event."""
     speed_error_m_s: float
     force_error_n: float
 
@@ -97,7 +97,7 @@ def start_of(params: PlantParams, state: PlantState, effort_n: float) -> Start:
 
 
 def comes_to_rest(start: Start) -> bool:
-    """Return whether the drive stands still from here on, being slow and slowing down."""
+    """Return whether the drive comes to rest, because it is slow and decelerates."""
     slowing = start.acceleration * start.direction < 0.0
     return slowing and abs(start.motion.speed_rev_s * start.motion.jacobian_m_rev) < ARREST_M_S
 

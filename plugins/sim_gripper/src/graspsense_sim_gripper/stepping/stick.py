@@ -1,4 +1,4 @@
-"""A drive that friction holds: the fingers stand still while the object relaxes between them, until they slip."""
+"""Sticking: friction holds the drive while the object relaxes between the fingers, until they slip."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from graspsense_sim_gripper.stepping.scheme import PlantParams
 
 SLIP_ITERATIONS: Final = 6
 SLIP_TOL_N: Final = 1e-6
-"""The breakaway force is exceeded by at most this when the fingers begin to slip."""
+"""Largest excess over the breakaway force when the fingers begin to slip."""
 SLIP_AIM_N: Final = 5e-7
-"""The search for that moment aims at half of it, so that the fingers do slip."""
+"""The search for that time aims at half of the excess, so that the fingers do slip."""
 MIN_MARGIN_N: Final = 1e-9
-"""Fingers that are closer than this to slipping are not searched for it."""
+"""Distance to slipping below which the time is not searched."""
 MIN_SHARE: Final = 1e-6
-"""Least share of the step to which the search shortens it."""
+"""Smallest fraction to which the search shortens the step."""
 
 
 def stick(params: PlantParams, state: PlantState, effort_n: float, h: float) -> tuple[PlantState, float]:

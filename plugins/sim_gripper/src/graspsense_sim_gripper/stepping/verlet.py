@@ -1,4 +1,4 @@
-"""Velocity Verlet: a kick, a drift and a kick. Explicit, of second order, with one evaluation of the object's force.
+"""Velocity Verlet (kick, drift, kick): explicit, of second order, with one evaluation of the force of the object.
 
 Swope, Andersen, Berens and Wilson, J. Chem. Phys. 76, 1982. A step ends at the first event on its path. Its error is
 estimated from the change of the acceleration.
@@ -18,18 +18,18 @@ from graspsense_sim_gripper.stepping.scheme import SPEED_SCALE_M_S, Attempt, Pla
 ROUNDING: Final = 4e-16
 """Relative rounding of a compression."""
 SEARCH_ROUNDING: Final = 4.0
-"""Times the tolerance of a balance of forces: what two such balances may differ by."""
+"""Multiple of the tolerance of the force balance by which two solutions can differ."""
 
 
 def verlet(params: PlantParams, start: Start, effort_n: float, h: float) -> Attempt:
-    """Return the state after a step of `h`, or at the first event before."""
+    """Return the state after a step of `h`, or at the first event within it."""
     drive = params.drive
     _, speed, _, _ = start.motion
     drifted, t = drift(params, start, h)
     revolutions1, speed1, gap1, jacobian1 = drifted
     contact1, meets = start.contact, False
     if contact1.touched == 1 or gap1 <= start.reach_m:
-        # What is touched only now has been touched for no time; but rigid pads transmit the force of a damper at once.
+        # A contact that begins now has lasted no time, but rigid pads transmit the force of a damper immediately.
         meets = contact1.touched == 0
         contact1 = pad_forces(params.object, contact1, gap1, -speed1 * jacobian1, 0.0 if meets else t, False)
     load1 = 0.5 * (contact1.left_n + contact1.right_n)

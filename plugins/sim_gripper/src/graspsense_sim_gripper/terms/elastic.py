@@ -15,19 +15,19 @@ class Elastic(NamedTuple):
 
 
 def stiffened(params: Elastic, d: float) -> float:
-    """Return what the shell's stiffening adds at a compression (N)."""
+    """Return the cubic part of the force (N) at a compression."""
     return params.k3_n_m3 * d * d * d
 
 
 def elastic(
     params: Elastic, state: NoState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, NoState]:
-    """Return the shell's force."""
+    """Return the force of the shell."""
     return params.k1_n_m * d1 + stiffened(params, d1), state
 
 
 def limits(params: Elastic, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return the spring that it is at small compressions."""
+    """Return the linear spring k1, the limit of small compressions."""
     return (Limit("spring", spring_n_m=params.k1_n_m),)
 
 

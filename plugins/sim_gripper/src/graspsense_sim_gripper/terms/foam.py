@@ -9,12 +9,12 @@ from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, Wor
 
 
 class Foam(NamedTuple):
-    """A power law, `force_n` (d / `at_m`)^`exponent`, with two Maxwell arms beside it; an arm of 0 N/m is none."""
+    """A power law, `force_n` (d / `at_m`)^`exponent`, beside two Maxwell branches; a branch of 0 N/m is absent."""
 
     force_n: float
     at_m: float
     exponent: float
-    """1: a spring; sponges 1.5 to 3, as their cells close."""
+    """1 for a linear spring; 1.5 to 3 for sponges, whose cells close."""
     arm1_n_m: float = 0.0
     tau1_s: float = 1.0
     arm2_n_m: float = 0.0
@@ -22,7 +22,7 @@ class Foam(NamedTuple):
 
 
 class FoamState(NamedTuple):
-    """The forces of the arms, N."""
+    """The forces of the branches, N."""
 
     arm1_n: float
     arm2_n: float
@@ -30,7 +30,7 @@ class FoamState(NamedTuple):
 
 def power(params: Foam, d: float) -> float:
     """Return the force (N) of the power law at a compression."""
-    # Odd in d, so that a search that strays below zero still finds its way back.
+    # Odd in d, so that a search that leaves the domain d >= 0 converges back to it.
     force: float = params.force_n * (abs(d) / params.at_m) ** params.exponent
     return force if d >= 0.0 else -force
 
@@ -38,7 +38,7 @@ def power(params: Foam, d: float) -> float:
 def foam(
     params: Foam, state: FoamState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, FoamState]:
-    """Return the force; the arms are springs and dampers on the compression, so that they never give work back."""
+    """Return the force of the power law and the branches."""
     force = power(params, d1)
     if params.arm1_n_m == 0.0 and params.arm2_n_m == 0.0:
         return force, state
@@ -48,13 +48,13 @@ def foam(
 
 
 def rates(params: Foam, at: WorkingPoint) -> tuple[Rate, ...]:
-    """Return the arms' 1 / tau."""
+    """Return 1 / tau of each branch."""
     arms = ((params.arm1_n_m, params.tau1_s), (params.arm2_n_m, params.tau2_s))
     return tuple(Rate("relaxes", 1.0 / tau) for stiffness, tau in arms if stiffness > 0.0)
 
 
 def limits(params: Foam, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return it without its arms, each a damper or a spring by what is nearer."""
+    """Return the power law alone; each branch becomes a spring if it is slow, or a damper if it is fast."""
     spring = damper = 0.0
     for stiffness, tau in ((params.arm1_n_m, params.tau1_s), (params.arm2_n_m, params.tau2_s)):
         if tau > at.seconds:
@@ -72,7 +72,7 @@ def linear(params: Foam) -> LinearForm | None:
     form = LinearForm(params.force_n / params.at_m)
     if params.arm1_n_m == 0.0 and params.arm2_n_m == 0.0:
         return form
-    # An arm that is none needs not be followed as fast as it is.
+    # An absent branch must not determine the length of the steps.
     first, second = (
         1.0 / tau if stiffness > 0.0 else 0.0
         for stiffness, tau in ((params.arm1_n_m, params.tau1_s), (params.arm2_n_m, params.tau2_s))
@@ -87,7 +87,7 @@ def linear(params: Foam) -> LinearForm | None:
 
 TERM = Term(
     name="foam",
-    summary="power law with two Maxwell arms",
+    summary="power law with two Maxwell branches",
     params=Foam,
     law=foam,
     at_rest=FoamState(0.0, 0.0),

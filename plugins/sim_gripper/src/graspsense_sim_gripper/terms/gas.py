@@ -164,7 +164,7 @@ def beyond(state: GasState) -> str:
 
 TERM = Term(
     name="gas",
-    summary="trapped gas with the wall's bulge, a vent and heat to the walls",
+    summary="trapped gas with a compliant wall, a vent and heat exchange",
     params=Gas,
     law=gas,
     at_rest=GasState(0.0),

@@ -12,16 +12,16 @@ GRAVITY_M_S2: Final = 9.80665
 
 
 class Liquid(NamedTuple):
-    """A wall that displaces `area_m2` a metre presses liquid up a neck; the wall's bulge gives way first.
+    """A wall that displaces `area_m2` per metre of compression presses liquid up a neck, in series with its own bulge.
 
-    At the compression the column in the neck is a mass rho L A^2 / A_n on a spring rho g A^2 / A_n and a damper
-    8 pi mu L A^2 / A_n^2 (Poiseuille), behind the spring A^2 / C_w of the bulge.
+    Expressed at the compression, the column in the neck is a mass rho L A^2 / A_n on a spring rho g A^2 / A_n and a
+    damper 8 pi mu L A^2 / A_n^2 (Poiseuille), in series with the spring A^2 / C_w of the bulge.
     """
 
     area_m2: float
     neck_m2: float
     column_m: float
-    """Length of liquid that moves in the neck."""
+    """Length L of the liquid column in the neck."""
     bulge_m3_pa: float
     density_kg_m3: float = 1000.0
     viscosity_pa_s: float = 1e-3
@@ -48,7 +48,7 @@ def _seen(params: Liquid) -> _AtCompression:
 def liquid(
     params: Liquid, state: OscillatorState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, OscillatorState]:
-    """Return the force of the liquid's pressure on the wall; exact for a straight path."""
+    """Return the force of the pressure on the wall; exact if the compression changes at a constant rate."""
     mass, k, damping, wall = _seen(params)
     if h > 0.0:
         pull = wall / mass
@@ -58,13 +58,13 @@ def liquid(
 
 
 def rates(params: Liquid, at: WorkingPoint) -> tuple[Rate, ...]:
-    """Return the natural frequency of the column behind the wall, and how fast its motion dies out."""
+    """Return the natural frequency of the column behind the wall, and the decay rate of its motion."""
     mass, k, damping, wall = _seen(params)
     return (Rate("swings", math.sqrt((k + wall) / mass)), Rate("relaxes", 0.5 * damping / mass))
 
 
 def limits(params: Liquid, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return what it is where the column follows at once, and where it does not move."""
+    """Return the limits of a column that follows immediately, and of one that does not move."""
     _, k, damping, wall = _seen(params)
     return (
         Limit("column that follows", None, k * wall / (k + wall), damping),
@@ -73,7 +73,7 @@ def limits(params: Liquid, at: WorkingPoint) -> tuple[Limit, ...]:
 
 
 def linear(params: Liquid) -> LinearForm:
-    """Return the column's motion behind the wall."""
+    """Return the motion of the column behind the wall."""
     mass, k, damping, wall = _seen(params)
     return LinearForm(
         spring_n_m=wall,
@@ -86,7 +86,7 @@ def linear(params: Liquid) -> LinearForm:
 
 TERM = Term(
     name="liquid",
-    summary="liquid pressed up a neck: weight, viscosity and inertia behind the wall's bulge",
+    summary="liquid pressed up a neck: weight, viscosity and inertia, in series with the bulge of the wall",
     params=Liquid,
     law=liquid,
     at_rest=OscillatorState(0.0, 0.0),

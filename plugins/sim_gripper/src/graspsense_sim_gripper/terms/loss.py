@@ -1,4 +1,4 @@
-"""What the contents of a container dissipate."""
+"""Dissipation by the contents of a container."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from graspsense_sim_gripper.terms.term import Limit, LinearForm, NoState, Term, 
 
 
 class Loss(NamedTuple):
-    """What the contents dissipate: a damper on the compression. Fitted, not derived (see the catalogue)."""
+    """A damper on the compression that represents the contents. Its value is fitted (see the catalogue)."""
 
     damping_n_s_m: float
 
 
 def loss(params: Loss, state: NoState, d0: float, d1: float, h: float, v1: float) -> tuple[float, NoState]:
-    """Return the damper's force."""
+    """Return the force of the damper."""
     return params.damping_n_s_m * v1, state
 
 
 def limits(params: Loss, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return the damper that it is."""
+    """Return the damper, which is exact."""
     return (Limit("damper", damper_n_s_m=params.damping_n_s_m),)
 
 
 def linear(params: Loss) -> LinearForm:
-    """Return the damper that it is."""
+    """Return the damper, which is exact."""
     return LinearForm(0.0, params.damping_n_s_m)
 
 

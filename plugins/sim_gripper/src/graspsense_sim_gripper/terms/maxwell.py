@@ -1,4 +1,4 @@
-"""A viscoelastic branch."""
+"""A viscoelastic (Maxwell) branch."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Maxwell(NamedTuple):
 
 
 class MaxwellState(NamedTuple):
-    """The branch's force."""
+    """The force of the branch."""
 
     force_n: float
 
@@ -25,7 +25,7 @@ class MaxwellState(NamedTuple):
 def maxwell(
     params: Maxwell, state: MaxwellState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, MaxwellState]:
-    """Return the branch's force, exact where the rate of compression changes evenly: q' = k d' - q / tau."""
+    """Return the force q of q' = k d' - q / tau; exact if the rate of compression changes linearly."""
     x = h / params.tau_s
     decay = math.exp(-x)
     late = phi_ramp(x, decay)
@@ -39,7 +39,7 @@ def rates(params: Maxwell, at: WorkingPoint) -> tuple[Rate, ...]:
 
 
 def limits(params: Maxwell, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return what it is where it relaxes at once, and where it does not relax."""
+    """Return the damper of a branch that relaxes immediately, and the spring of one that does not relax."""
     return (
         Limit("damper", damper_n_s_m=params.k_n_m * params.tau_s),
         Limit("spring", spring_n_m=params.k_n_m),
@@ -47,7 +47,7 @@ def limits(params: Maxwell, at: WorkingPoint) -> tuple[Limit, ...]:
 
 
 def linear(params: Maxwell) -> LinearForm:
-    """Return q' = k d' - q / tau, the force q."""
+    """Return the linear form q' = k d' - q / tau with the force q."""
     return LinearForm(
         rates=((-1.0 / params.tau_s,),), by_compression=(0.0,), by_speed=(params.k_n_m,), force=(1.0,)
     )

@@ -1,4 +1,4 @@
-"""A mass on a spring and a damper under a force that rises evenly: its exact motion, which three terms share."""
+"""The exact motion of a damped oscillator under a force that changes linearly, used by three terms."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class OscillatorState(NamedTuple):
-    """Where the mass stands (m) and how fast it moves (m/s)."""
+    """Position (m) and velocity (m/s) of the mass."""
 
     y_m: float
     v_m_s: float
@@ -18,8 +18,7 @@ def moved(
 ) -> OscillatorState:
     """Return the motion after `h` seconds of y'' + 2 a y' + w2 y = u0 + u1 t.
 
-    `damping` is a (1/s, not negative) and `square` w2 (1/s2, greater than 0). Exact at any `h`, whichever is
-    larger.
+    `damping` is a (1/s, not negative) and `square` w2 (1/s2, positive). Exact for any `h`, underdamped or overdamped.
     """
     a, w2 = damping, square
     slope = u1 / w2
@@ -33,7 +32,7 @@ def moved(
         odd = decay * math.sin(w * h) / w
     elif rest < -1e-12 * w2:
         w = math.sqrt(-rest)
-        # The slow root as a quotient: as a difference it is lost in rounding.
+        # The slow root as a quotient: a difference would lose it by cancellation.
         slow, fast = math.exp(-w2 / (a + w) * h), math.exp(-(a + w) * h)
         even = 0.5 * (slow + fast)
         odd = 0.5 * (slow - fast) / w

@@ -1,4 +1,4 @@
-"""Which terms there are: ours, and those that other distributions bring through `graspsense_sim_terms`."""
+"""The known terms: those of this package, and those that plugins provide by the hook `graspsense_sim_terms`."""
 
 from __future__ import annotations
 
@@ -21,21 +21,22 @@ from graspsense_sim_gripper.terms import (
     surface,
     worn,
 )
-from graspsense_sim_gripper.terms.remainder import remainder, where_kept
+from graspsense_sim_gripper.terms.lumped import lumped
+from graspsense_sim_gripper.terms.switchable import switched
 from graspsense_sim_gripper.terms.term import Law, Term
 
 TERMS: Final[dict[str, Term]] = {
     module.TERM.name: module.TERM
     for module in (elastic, rigid, maxwell, gas, loss, foam, snap, worn, surface, liquid, slosh)
 }
-"""Our terms by name. Scenes list theirs in this order, whatever order a file has: one composition, one compile."""
+"""The terms of this package, in the order that every object uses, so that equal terms are compiled once."""
 
 HOOK: Final = "graspsense_sim_terms"
 
 
 @cache
 def _foreign() -> dict[str, Term]:
-    """Return other distributions' terms by qualified name, in its order."""
+    """Return the terms of plugins by qualified name, sorted."""
     found: dict[str, Term] = {}
     for distribution, terms in collect(HOOK):
         try:
@@ -44,7 +45,7 @@ def _foreign() -> dict[str, Term]:
             given = [terms]
         for one in given:
             if not isinstance(one, Term):
-                warnings.warn(f"{HOOK} of {distribution} gave {one!r}, which is no Term", stacklevel=2)
+                warnings.warn(f"{HOOK} of {distribution} gave {one!r}, which is not a Term", stacklevel=2)
             elif f"{distribution}/{one.name}" in found:
                 warnings.warn(f"{HOOK} of {distribution} gave two terms {one.name!r}", stacklevel=2)
             else:
@@ -53,10 +54,10 @@ def _foreign() -> dict[str, Term]:
 
 
 def find_term(name: str) -> tuple[str, Term]:
-    """Return the term of this name, with the name that is its only one.
+    """Return the unique name of a term, and the term.
 
-    Ours have short names. Others' are `distribution/name`; the short name does where nobody else has it. Raises
-    UnknownName.
+    The unique name of a plugin's term is `distribution/name`; its short name is accepted if no other plugin uses it.
+    Raises UnknownName.
     """
     if name in TERMS:
         return name, TERMS[name]
@@ -67,13 +68,13 @@ def find_term(name: str) -> tuple[str, Term]:
     if len(matching) == 1:
         return matching[0], foreign[matching[0]]
     if matching:
-        raise UnknownName(f"term {name!r} is of several distributions: write one of {', '.join(matching)}")
+        raise UnknownName(f"several distributions have a term {name!r}: write one of {', '.join(matching)}")
     known = [*TERMS, *foreign]
     raise UnknownName(f"no term {name!r}. Known: {', '.join(known)}.{suggestion(name, known)}")
 
 
 def in_order(names: Sequence[str]) -> list[int]:
-    """Return the places of these names in the canonical order: ours as above, then others' by name."""
+    """Return the indices that sort these names: the terms of this package in their order, then those of plugins."""
     ours = list(TERMS)
     return sorted(
         range(len(names)),
@@ -82,8 +83,8 @@ def in_order(names: Sequence[str]) -> list[int]:
 
 
 def laws_of(names: Sequence[str]) -> list[Law]:
-    """Return the laws of an object of these terms, as its parts are kept: what limits leave over, then each term's.
+    """Return the laws of an object with these terms: that of the lumped spring and damper, then that of each term.
 
-    Their parameters are `Kept`. Raises UnknownName.
+    The parameters of each are `Switchable`. Raises UnknownName.
     """
-    return [bind(where_kept, law=one) for one in (remainder, *(find_term(name)[1].law for name in names))]
+    return [bind(switched, law=one) for one in (lumped, *(find_term(name)[1].law for name in names))]

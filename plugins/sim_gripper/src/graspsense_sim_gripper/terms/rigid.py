@@ -9,12 +9,12 @@ from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 
 
 class Rigid(NamedTuple):
-    """A rigid body felt through its Hertz contact, K d^1.5; above the crush force it breaks for good."""
+    """A rigid body with a Hertz contact, K d^1.5; above the crush force it breaks permanently."""
 
     hertz_n_m15: float
     crush_force_n: float = math.inf
     broken_n_m: float = 0.0
-    """Stiffness of what is left."""
+    """Stiffness after it has broken."""
 
 
 class RigidState(NamedTuple):
@@ -25,14 +25,14 @@ class RigidState(NamedTuple):
 
 def hertz(params: Rigid, d: float) -> float:
     """Return the force (N) of the contact at a compression."""
-    # Odd in d, so that a search that strays below zero still finds its way back.
+    # Odd in d, so that a search that leaves the domain d >= 0 converges back to it.
     return params.hertz_n_m15 * d * math.sqrt(abs(d))
 
 
 def rigid(
     params: Rigid, state: RigidState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, RigidState]:
-    """Return the contact force; a break is felt from the next piece of path on."""
+    """Return the contact force; breaking takes effect in the next step."""
     if state.broken == 1:
         return params.broken_n_m * d1, state
     force = hertz(params, d1)
@@ -42,14 +42,14 @@ def rigid(
 
 
 def rates(params: Rigid, at: WorkingPoint) -> tuple[Rate, ...]:
-    """Return none: what has broken stays so, and what has not remembers nothing."""
+    """Return no rates: the state changes once at most."""
     del params, at
     return ()
 
 
 TERM = Term(
     name="rigid",
-    summary="rigid body through its Hertz contact, K d^1.5; breaks above its crush force",
+    summary="rigid body with a Hertz contact, K d^1.5; breaks above its crush force",
     params=Rigid,
     law=rigid,
     at_rest=RigidState(0),

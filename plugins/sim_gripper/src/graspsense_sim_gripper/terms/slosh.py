@@ -1,4 +1,4 @@
-"""Liquid that goes on swinging after the wall has moved."""
+"""Sloshing: liquid that keeps oscillating after the wall has moved."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from graspsense_sim_gripper.terms.term import LinearForm, Rate, Term, WorkingPoi
 
 
 class Slosh(NamedTuple):
-    """One lightly damped mode: a mass that hangs on the wall by a spring and a damper and is held by nothing else."""
+    """One lightly damped mode: a mass that is attached to the wall by a spring and a damper only."""
 
     mass_kg: float
-    """As seen at the compression."""
+    """Mass of the mode, expressed at the compression."""
     frequency_hz: float
     damping_ratio: float = 0.0
 
@@ -21,7 +21,7 @@ class Slosh(NamedTuple):
 def slosh(
     params: Slosh, state: OscillatorState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, OscillatorState]:
-    """Return the force with which the mass hangs back; its motion is exact for a straight path."""
+    """Return the force of the mode; exact if the compression changes at a constant rate."""
     w = 2.0 * math.pi * params.frequency_hz
     a, square = params.damping_ratio * w, w * w
     if h > 0.0:
@@ -31,13 +31,13 @@ def slosh(
 
 
 def rates(params: Slosh, at: WorkingPoint) -> tuple[Rate, ...]:
-    """Return the mode's frequency and how fast it dies out."""
+    """Return the frequency and the decay rate of the mode."""
     w = 2.0 * math.pi * params.frequency_hz
     return (Rate("swings", w), Rate("relaxes", params.damping_ratio * w))
 
 
 def linear(params: Slosh) -> LinearForm:
-    """Return the mode's motion on the wall."""
+    """Return the motion of the mass relative to the wall."""
     mass, w = params.mass_kg, 2.0 * math.pi * params.frequency_hz
     a, square = params.damping_ratio * w, w * w
     return LinearForm(
@@ -52,7 +52,7 @@ def linear(params: Slosh) -> LinearForm:
 
 TERM = Term(
     name="slosh",
-    summary="lightly damped mode of the contents that hangs on the wall",
+    summary="lightly damped mode of the contents, attached to the wall",
     params=Slosh,
     law=slosh,
     at_rest=OscillatorState(0.0, 0.0),

@@ -1,4 +1,4 @@
-"""Snap-through: a thin shell that gives way."""
+"""Snap-through of a thin shell."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Snap(NamedTuple):
 
 
 def snap(params: Snap, state: NoState, d0: float, d1: float, h: float, v1: float) -> tuple[float, NoState]:
-    """Return the shell's force, three straight branches.
+    """Return the force of the shell, which is piecewise linear in three parts.
 
-    Where the branch falls more steeply than the fingertips' covers are stiff the shell jumps across it.
+    If the falling part is steeper than the stiffness of the pads, the shell jumps across it.
     """
     k1, critical, drop, fall, k2 = params
     if d1 <= critical:

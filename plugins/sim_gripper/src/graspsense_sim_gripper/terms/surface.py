@@ -1,4 +1,4 @@
-"""A surface that gives: a mass on a spring and a damper behind the contact."""
+"""A compliant surface: a mass on a spring and a damper behind the contact."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from graspsense_sim_gripper.terms.oscillator import OscillatorState, moved
 from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
 from graspsense_sim_gripper.terms.term import Limit, LinearForm, OwnContact, Rate, Term, WorkingPoint
 
-MOST_LOOKS: Final = 64
-CLOSER: Final = 45
+MAX_CHECKS: Final = 64
+BISECTIONS: Final = 45
 LEAST_SHARE: Final = 1e-3
 
 
 class Surface(NamedTuple):
-    """A mass on a spring and a damper, met through a contact spring that can only push."""
+    """A mass on a spring and a damper, behind a contact spring that can only push."""
 
     mass_kg: float
     k_n_m: float
@@ -26,10 +26,10 @@ class Surface(NamedTuple):
 def surface(
     params: Surface, state: OscillatorState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, OscillatorState]:
-    """Return the contact's force: exact motion between contacts, each contact and parting located.
+    """Return the contact force: exact motion between contacts, with each contact and separation located in time.
 
-    It looks at the contact at least twelve times in a swing, as a light mass bounces many times in a tick, and at most
-    `MOST_LOOKS` times: whoever wants to see more swings than that takes shorter pieces.
+    A light mass can bounce many times within a step, so the contact is checked at least twelve times per oscillation,
+    but at most `MAX_CHECKS` times. Shorter steps resolve more oscillations.
     """
     mass, k, damping, contact = params
     if mass <= 0.0:
@@ -38,8 +38,8 @@ def surface(
     if h <= 0.0:
         return contact * max(d1 - state.y_m, 0.0), state
     speed = (d1 - d0) / h
-    looks = math.ceil(math.sqrt((k + contact) / mass) * h / 0.5)
-    step = h / min(max(looks, 1), MOST_LOOKS)
+    checks = math.ceil(math.sqrt((k + contact) / mass) * h / 0.5)
+    step = h / min(max(checks, 1), MAX_CHECKS)
     t = 0.0
     touching = d0 - state.y_m > 0.0 or (d0 == state.y_m and speed > state.v_m_s)
     while t < h * (1.0 - 1e-12):
@@ -49,16 +49,16 @@ def surface(
         d = d0 + speed * t
         after = moved(state, a, square, pull * d, pull * speed, ahead)
         if (d + speed * ahead - after.y_m > 0.0) != touching:
-            # Bisect for the instant at which it meets or parts.
+            # Bisect for the time of the contact or separation.
             least, most = 0.0, ahead
-            for _ in range(CLOSER):
+            for _ in range(BISECTIONS):
                 ahead = 0.5 * (least + most)
                 after = moved(state, a, square, pull * d, pull * speed, ahead)
                 if (d + speed * ahead - after.y_m > 0.0) == touching:
                     least = ahead
                 else:
                     most = ahead
-            # A graze would be met again and again at one instant.
+            # Without it, a grazing contact would be found repeatedly at the same time.
             ahead = max(most, LEAST_SHARE * step)
             after = moved(state, a, square, pull * d, pull * speed, ahead)
             touching = not touching
@@ -70,7 +70,7 @@ def surface(
 def _massless(
     params: Surface, state: OscillatorState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, OscillatorState]:
-    """Return the contact's force where the mass is none: what it stands on relaxes towards the balance."""
+    """Return the contact force without a mass: the support relaxes towards equilibrium."""
     _, k, damping, contact = params
     both = k + contact
     if damping <= 0.0:
@@ -79,7 +79,7 @@ def _massless(
     x = h * both / damping
     decay = math.exp(-x)
     late = phi_ramp(x, decay)
-    # What it lags behind the balance.
+    # Distance from equilibrium.
     share = contact / both
     behind = (share * d0 - state.y_m) * decay + share * ((d1 - d0) * (phi1(x, decay) - late) + h * v1 * late)
     y = share * d1 - behind
@@ -89,7 +89,7 @@ def _massless(
 
 
 def rates(params: Surface, at: WorkingPoint) -> tuple[Rate, ...]:
-    """Return the natural frequencies, in contact and parted."""
+    """Return the natural frequencies in contact and separated."""
     return (
         Rate("swings", math.sqrt((params.k_n_m + params.contact_n_m) / params.mass_kg)),
         Rate("swings", math.sqrt(params.k_n_m / params.mass_kg)),
@@ -97,7 +97,7 @@ def rates(params: Surface, at: WorkingPoint) -> tuple[Rate, ...]:
 
 
 def limits(params: Surface, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return what it is without its mass, with so much that it stands, and where its damper does nothing either."""
+    """Return the limits: without the mass, with a mass that does not move, and without mass and damper."""
     _, k, _, contact = params
     return (
         Limit("springs in series", spring_n_m=k * contact / (k + contact)),
@@ -107,7 +107,7 @@ def limits(params: Surface, at: WorkingPoint) -> tuple[Limit, ...]:
 
 
 def linear(params: Surface) -> OwnContact | None:
-    """Return its motion in contact and parted; without mass and damper it has none, being a spring at once."""
+    """Return the linear forms in contact and separated; None without mass and damper, where it is a plain spring."""
     mass, k, damping, contact = params
 
     def form(by: float) -> LinearForm:

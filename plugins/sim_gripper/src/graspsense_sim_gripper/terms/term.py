@@ -1,4 +1,4 @@
-"""What a term is: a part of an object's force with everything the simulator has to know of it."""
+"""The declaration of a term: a part of the force of an object, with all that the simulator needs to know about it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ PIECES: Final = 256
 
 
 class NoState(NamedTuple):
-    """The state of a term that remembers nothing."""
+    """The state of a term without a memory."""
 
 
 class WorkingPoint(NamedTuple):
-    """What a grasp does with an object: how far it compresses it, how fast, for how long, and up to what force."""
+    """The operating range of a grasp: the compression of the object, its rate, its duration and the force."""
 
     compression_m: float
     speed_m_s: float
@@ -27,27 +27,27 @@ class WorkingPoint(NamedTuple):
 
 
 class Rate(NamedTuple):
-    """How fast a state of a term goes its own way: `relaxes` (1/s) or `swings` (rad/s)."""
+    """The rate of a state of a term: it `relaxes` (1/s) or `swings` (an angular frequency, rad/s)."""
 
     what: str
     per_s: float
 
 
 class Limit(NamedTuple):
-    """What a term comes to where its states are fast or slow: a spring and a damper, or itself with other numbers."""
+    """A limit of a term for fast or slow states: a spring and a damper, or the term with other parameters."""
 
     name: str
     params: Any = None
-    """The term's own parameters there; None: it is the spring and the damper alone."""
+    """The parameters of the term in this limit; None if only the spring and the damper remain."""
     spring_n_m: float = 0.0
     damper_n_s_m: float = 0.0
 
 
 class LinearForm(NamedTuple):
-    """A term that is linear: s' = A s + b d + c d' of its states s, force k d + g d' + f s.
+    """The linear form of a term: its states s follow s' = A s + b d + c d', and its force is k d + g d' + f s.
 
-    d is the compression (m); the states are the fields of the term's state, in their order, all floats. A form
-    without `rates` leaves the state as it is.
+    d is the compression (m); the states are the fields of the state of the term in their order, all floats. A form
+    without `rates` does not change the state.
     """
 
     spring_n_m: float = 0.0
@@ -55,7 +55,7 @@ class LinearForm(NamedTuple):
     damper_n_s_m: float = 0.0
     """g, not negative"""
     rates: tuple[tuple[float, ...], ...] = ()
-    """A, a row a state"""
+    """A, one row for each state"""
     by_compression: tuple[float, ...] = ()
     """b"""
     by_speed: tuple[float, ...] = ()
@@ -65,9 +65,9 @@ class LinearForm(NamedTuple):
 
 
 class OwnContact(NamedTuple):
-    """A term with a contact of its own: linear while it touches and while it is parted, its force the same between.
+    """The linear forms of a term with an internal contact, closed and open; the force is continuous between them.
 
-    It touches where d + reach s (m) is greater than 0.
+    The contact is closed if d + reach s (m) is positive.
     """
 
     touching: LinearForm
@@ -76,25 +76,25 @@ class OwnContact(NamedTuple):
 
 
 def not_linear(params: Any) -> LinearForm | OwnContact | None:
-    """Return the linear form of a term that has none."""
+    """Return None: the term has no linear form."""
     del params
     return None
 
 
 def no_limits(params: Any, at: WorkingPoint) -> tuple[Limit, ...]:
-    """Return the limits of a term that has none: it is kept or dropped."""
+    """Return no limits: the term is either kept or dropped."""
     del params, at
     return ()
 
 
 def no_rates(params: Any, at: WorkingPoint) -> tuple[Rate, ...]:
-    """Return the rates of a term that does not give any: of one with a state nobody knows then how it moves."""
+    """Return the rates of a term that declares none: unknown if it has a state."""
     del params, at
     return ()
 
 
 def never_beyond(state: Any) -> str:
-    """Return why the law of a term does not hold, of one that always does: nothing."""
+    """Return "": the law always holds."""
     del state
     return ""
 
@@ -106,10 +106,10 @@ NO_STATE: Final = NoState()
 class Term:
     """A kind of term: its name in a scene, parameters, law, and state at rest.
 
-    `params` is a named tuple of floats; a field with a default may be left out of a scene. The law is a pure
-    function that runs in the interpreter and compiled: floats and named tuples, no closure, no `x**2`. It
-    integrates itself, stably however fast its own state is. `rates` says at a working point how fast its states
-    are. `positive` names parameters that may not be zero; none may be negative.
+    `params` is a named tuple of floats; a scene may omit a field that has a default. The law is a pure function that
+    runs both in the interpreter and compiled: floats and named tuples, no closure, no `x**2`. It integrates its own
+    state, and is stable however fast that is. `rates` gives the rates of its states at a working point. `positive`
+    names the parameters that must not be zero; none may be negative.
     """
 
     name: str
@@ -119,27 +119,27 @@ class Term:
     at_rest: Any = NO_STATE
     rates: Callable[[Any, WorkingPoint], tuple[Rate, ...]] = no_rates
     limits: Callable[[Any, WorkingPoint], tuple[Limit, ...]] = no_limits
-    """What may stand for it, cheapest first; whether it may is found by the force it then gives."""
+    """The limits that can replace the term, the cheapest first; the simulator compares the resulting forces."""
     linear: Callable[[Any], LinearForm | OwnContact | None] = not_linear
-    """Its linear form with these parameters, or None. The scene can be discretised exactly where every term has one."""
+    """Its linear form with these parameters, or None. A scene can be discretised exactly if every term has one."""
     positive: tuple[str, ...] = ()
     stiffnesses: tuple[str, ...] = ()
-    """Parameters that a thicker wall makes larger: they vary between instances."""
+    """Parameters that grow with the thickness of the wall; they vary between instances."""
     beyond: Callable[[Any], str] = never_beyond
-    """Told a state, why its law was pressed beyond what it describes; empty where it was not."""
+    """Returns why a state is outside of the range of the law, "" if it is not."""
 
     def __attrs_post_init__(self) -> None:
         fields = getattr(self.params, "_fields", None)
         if fields is None:
-            raise TypeError(f"term {self.name!r}: params is {self.params!r}, which is no named tuple")
+            raise TypeError(f"term {self.name!r}: params is {self.params!r}, which is not a named tuple")
         strangers = {*self.positive, *self.stiffnesses} - set(fields)
         if strangers:
             raise TypeError(f"term {self.name!r}: {self.params.__name__} has no field {sorted(strangers)}")
 
     def importance(self, params: Any, at: WorkingPoint) -> float:
-        """Return the greatest force (N) it would add on the way to this working point, by its own law.
+        """Return the largest force (N) of the law on a path to this working point.
 
-        The way is as fast as the working point says and then stands there for what is left of its time.
+        The compression increases at the rate of the working point, and is then held for the rest of its duration.
         """
         if at.compression_m <= 0.0 or at.speed_m_s <= 0.0:
             return 0.0

@@ -1,4 +1,4 @@
-"""How much gas an opening lets through."""
+"""The flow of gas through an opening."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from typing import Final
 
 AIR_KG_M3: Final = 1.2
 DISCHARGE: Final = 0.6
-"""Of a sharp-edged opening (any text on orifice meters)."""
+"""Discharge coefficient of a sharp-edged opening (textbooks on orifice meters)."""
 LAMINAR_BELOW_PA: Final = 1.0
-"""The flow through an opening is viscous below about a pascal."""
+"""Pressure below which the flow is mainly viscous, about a pascal."""
 
 
 def conductance(opening_m2: float, rise_pa: float) -> float:
-    """Return flow over pressure (m3/s/Pa) of an opening (m2, greater than 0) at this pressure across it.
+    """Return the conductance (m3/s/Pa) of an opening (m2, positive): flow over pressure difference.
 
-    Viscous and inertial losses add up, p = R q + B q |q| with B = rho / (2 (C_d A)^2), and R is such that the
-    two are alike at about `LAMINAR_BELOW_PA`: straight through zero, a square root far from it.
+    Viscous and inertial losses add up: p = R q + B q |q| with B = rho / (2 (C_d A)^2). R is chosen so that both are
+    equal at about `LAMINAR_BELOW_PA`. The flow is then linear near zero, and a square root of the pressure far from it.
     """
     viscous, inertial = _losses(opening_m2)
     return 2.0 / (viscous + math.sqrt(viscous * viscous + 4.0 * inertial * abs(rise_pa)))
 
 
 def vented(opening_m2: float, driven_pa: float, spent_pa_s_m3: float) -> tuple[float, float]:
-    """Return what an opening leaves of a pressure, and its conductance there.
+    """Return the pressure that remains with an opening, and the conductance at that pressure.
 
-    Its flow q leaves p = `driven_pa` - `spent_pa_s_m3` q, which with the losses above is a quadratic in q.
+    The flow q reduces the pressure to p = `driven_pa` - `spent_pa_s_m3` q; with the losses above, q solves a quadratic.
     """
     viscous, inertial = _losses(opening_m2)
     linear = viscous + spent_pa_s_m3

@@ -9,10 +9,10 @@ from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 
 
 class Worn(NamedTuple):
-    """An elastic shell that softens and stays dented as it is worked.
+    """An elastic shell that softens and keeps a dent as work is done on it.
 
     Damage D = 1 - exp(-W / wear_j) of the work W done on it while it is pressed in, `earlier_j` of which was done
-    before this grasp. The damage takes the share `softening` D from its stiffness and leaves a set of `set_m` D:
+    before this grasp. The damage reduces the stiffness by the fraction `softening` D and leaves a set of `set_m` D:
     force (1 - softening D) (k1 e + k3 e^3) with e = d - set_m D. The law was fixed before any grasp of a worn
     bottle was simulated.
     """
@@ -35,7 +35,7 @@ class WornState(NamedTuple):
 def worn(
     params: Worn, state: WornState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, WornState]:
-    """Return the shell's force at the damage that this piece of path leaves."""
+    """Return the force of the shell with the damage at the end of the step."""
     work = state.work_j
     force = _force(params, work, d1)
     if d1 > d0:
@@ -52,14 +52,14 @@ def _force(params: Worn, work_j: float, d: float) -> float:
 
 
 def rates(params: Worn, at: WorkingPoint) -> tuple[Rate, ...]:
-    """Return how fast it wears, work done per second over `wear_j`."""
+    """Return the rate of wear: the work per second over `wear_j`."""
     force, _ = worn(params, WornState(0.0, 0.0), 0.0, at.compression_m, 1.0, 0.0)
     return (Rate("wears", max(force, 0.0) * at.speed_m_s / params.wear_j),)
 
 
 TERM = Term(
     name="worn",
-    summary="elastic shell that softens and stays dented with the work done on it",
+    summary="elastic shell that softens and keeps a dent with the work done on it",
     params=Worn,
     law=worn,
     at_rest=WornState(0.0, 0.0),

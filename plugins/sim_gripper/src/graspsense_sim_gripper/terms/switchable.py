@@ -1,0 +1,28 @@
+"""A term that can be switched off by a parameter.
+
+All reduced models of an object are therefore one composition, which is compiled once.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from graspsense_sim_gripper.terms.lumped import lumped
+from graspsense_sim_gripper.terms.term import Law
+
+
+class Switchable(NamedTuple):
+    """The parameters of a term, and whether it is active (1) or switched off (0)."""
+
+    active: int
+    params: Any
+
+
+law: Law = lumped
+
+
+def switched(term: Switchable, state: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
+    """Return the force and the new state of `law` if the term is active, otherwise no force and the old state."""
+    if term.active == 0:
+        return 0.0, state
+    return law(term.params, state, d0, d1, h, v1)
