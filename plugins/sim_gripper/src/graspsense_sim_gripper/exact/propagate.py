@@ -105,7 +105,7 @@ def bind_move(
     }
     pack, unpack = term_state_functions(kinds)
     # DX is read by the products only.
-    parts = {name: place for name, place in constants.items() if name != "DX"}
+    parts: dict[str, Any] = {name: place for name, place in constants.items() if name != "DX"}
     parts |= {**products, "pack": pack, "unpack": unpack, "step_move": step_move}
     bound_move: Callable[[Any, PlantState, float, float], PlantState] = bind_reachable(move, parts)
     return bound_move
