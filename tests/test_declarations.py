@@ -19,6 +19,8 @@ from graspsense.core.plugins.declaration import config_of
 from graspsense.core.step_params import params_of
 from graspsense.core.wiring import check
 from graspsense.plugin_api import (
+    EFFORT,
+    VELOCITY,
     Channel,
     Classifier,
     Controller,
@@ -161,6 +163,16 @@ def test_the_parameters_of_a_law_are_the_numbers_of_its_config():
     assert type(params_of(LawConfig())) is type(params)
 
 
+def test_the_kind_that_a_law_sends_is_one_of_its_parameters():
+    @frozen(kw_only=True)
+    class TwoKindsConfig:
+        sends: Literal["effort", "velocity"] = "effort"
+        speed_m_s: float = 0.02
+
+    assert params_of(TwoKindsConfig())._asdict() == {"speed_m_s": 0.02, "sends": EFFORT}
+    assert params_of(TwoKindsConfig(sends="velocity")).sends == VELOCITY
+
+
 def settings(plugins, fingers):
     return settings_from(
         {
@@ -199,6 +211,7 @@ def test_the_wiring_knows_the_channels_of_the_fitted_fingers():
         "  controller graspsense-test/law needs the channel 'force_left' in N, which gripper "
         "graspsense-test/fingers does not have with these settings (it has: gap, velocity). Choose another"
     )
+    assert "or other settings of [gripper]: its channels depend on them" in str(error.value)
     hand = plugins.find("sensor-backend", "fingers")
     assert hand.channels_vary()
     assert [one.name for one in hand.declared().channels] == ["gap", "velocity"]

@@ -301,7 +301,8 @@ class Controller(ABC, Generic[ConfigT]):
     def params(self) -> Any:
         """Return the parameters of `step`, a named tuple of floats and integers.
 
-        By default these are the numbers of the config, under the names that they have there.
+        By default these are the numbers of the config, under the names that they have there, and for a law with several
+        kinds of command the number of the kind that `sends` names.
         """
         return params_of(self.config)
 

@@ -13,11 +13,14 @@ from typing import Any
 
 import attrs
 
+from graspsense.core.entries import KINDS
+
 
 def params_of(config: Any) -> Any:
     """Return the numbers of a config as a named tuple: each setting that is a float, an int or a bool.
 
-    A bool becomes 0 or 1; settings of other types are left out. Raises TypeError if `config` is not an attrs object.
+    A bool becomes 0 or 1. The key `sends` of a law with several kinds of command becomes the number of the kind, such
+    as `VELOCITY`. Settings of other types are left out. Raises TypeError if `config` is not an attrs object.
     """
     cls = type(config)
     attrs.resolve_types(cls)
@@ -28,6 +31,8 @@ def params_of(config: Any) -> Any:
         for field in attrs.fields(cls)
         if field.type in numbers
     }
+    if "sends" in attrs.fields_dict(cls):
+        values["sends"] = KINDS.index(config.sends)
     return _type_of(f"{cls.__name__}({','.join(values)})")(*values.values())
 
 

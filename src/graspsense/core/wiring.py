@@ -31,6 +31,8 @@ def check(settings: Settings) -> None:
 def _channel_misfits(gripper: SelectedComponent, user: SelectedComponent) -> Iterator[str]:
     given: dict[str, Channel] = {channel.name: channel for channel in gripper.declared.channels}
     provider, choose = _named(gripper.component), _choose(gripper.component, user.component)
+    if gripper.component.channels_vary():
+        choose += f", or other settings of [{gripper.component.table}]: its channels depend on them"
     for wanted in user.declared.requires:
         needs = f"{_named(user.component)} needs the channel {_described(wanted)}"
         have = given.get(wanted.name)
