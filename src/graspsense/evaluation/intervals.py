@@ -36,16 +36,6 @@ def percentages(interval: Interval | None) -> str:
     return "no interval" if interval is None else f"{100 * interval[0]:.1f} to {100 * interval[1]:.1f} %"
 
 
-def percentage(share: float) -> str:
-    """Return a share in per cent."""
-    return f"{100 * share:.1f} %"
-
-
-def percentages(interval: Interval | None) -> str:
-    """Return an interval of shares in per cent."""
-    return "no interval" if interval is None else f"{100 * interval[0]:.1f} to {100 * interval[1]:.1f} %"
-
-
 @frozen
 class RecognitionRate:
     """A number of correct trials out of `n`, with its 95 % interval.
