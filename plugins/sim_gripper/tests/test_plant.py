@@ -248,9 +248,10 @@ def test_what_is_let_go_at_first_comes_back_from_the_tick_on_in_which_it_was(dam
     states = (NoState(), NoState())
     pressed, _ = law(params, states, 1e-3, 1e-3, 1e-3, 0.0)
     before = ContactState(1e-3, pressed, 0.0, states, 0.0, 0.0)
-    after = bind_reachable(solve_contact, {"object_force": law})(
+    after, unbalanced = bind_reachable(solve_contact, {"object_force": law})(
         ObjectModel(0.05, 0.0, PadCompliance(), params), before, -1e-4, -1.0, 1e-3
     )
+    assert unbalanced == 0
     assert after.force_n == 0.0
     assert after.compression_m < 1e-3
     rate = (after.compression_m - 1e-3) / 1e-3
@@ -484,7 +485,8 @@ def test_covers_and_object_carry_one_force_however_stiff_they_are(stiffness, ski
     body = ObjectModel(0.05, 0.0, PadCompliance(skins), (params,))
     now = ContactState(0.0, 0.0, 0.0, (state,), 0.0, 0.0)
     for closure in (1e-6, 1e-4, 5e-3, 1e-2, 5e-3, 1e-4, -1e-3, -0.02, 1e-5, 3e-3):
-        now = search(body, now, closure, 0.0, 1e-3)
+        now, unbalanced = search(body, now, closure, 0.0, 1e-3)
+        assert unbalanced == 0
         felt, _ = law(params, state, 0.0, now.compression_m, 1e-3, now.compression_m / 1e-3)
         if closure > 0.0:
             assert now.force_n == pytest.approx(felt, rel=1e-6, abs=1e-6)

@@ -253,7 +253,10 @@ def test_a_worn_shell_is_softer_and_dented_by_as_much_as_its_law_says():
     used = fresh._replace(earlier_j=0.5)
     damage = 1.0 - math.exp(-1.0)
     force, _ = worn(used, TERMS["worn"].at_rest, 0.01, 0.01, 1e-3, 0.0)
-    assert force == pytest.approx((1.0 - 0.4 * damage) * 2000.0 * (0.01 - 0.002 * damage))
+    # Compression is counted from the dented surface, so that no part of the object is under tension there.
+    assert force == pytest.approx((1.0 - 0.4 * damage) * 2000.0 * 0.01)
+    assert TERMS["worn"].dent(used) == pytest.approx(0.002 * damage)
+    assert worn(used, TERMS["worn"].at_rest, 0.0, 0.0, 1e-3, 0.0)[0] == 0.0
     # Each squeeze finds it a little further gone, by the work of the squeezes before.
     state, found = TERMS["worn"].at_rest, []
     for _ in range(3):

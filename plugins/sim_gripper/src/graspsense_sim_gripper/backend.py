@@ -236,7 +236,7 @@ def _model_report(state: PlantState, kinds: Sequence[str]) -> dict[str, Any]:
     return {
         "simulated": True,
         "true_peak_force_n": state.peak_n,
-        "resolved": state.step.unresolved == 0,
+        "resolved": state.step.unresolved + state.contact.unbalanced == 0,
         "broken": any(getattr(term, "broken", 0) == 1 for term in contact.left.states),
         "beyond": "; ".join(warnings),
     }

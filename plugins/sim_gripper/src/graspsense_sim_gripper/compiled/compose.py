@@ -36,7 +36,7 @@ TermParams = Any
 """A tuple with parameters of its own type for each term."""
 PlantMove = Callable[[Any, PlantState, float, float], PlantState]
 """Takes the plant's model, its state, the effort and the length of the tick."""
-ContactSolver = Callable[[ObjectModel, ContactState, float, float, float], ContactState]
+ContactSolver = Callable[[ObjectModel, ContactState, float, float, float], tuple[ContactState, int]]
 
 INTERPRETED: Final[Constructors] = {
     kind: maker(kind)

@@ -26,6 +26,14 @@ LENGTH_RTOL: Final = 1e-14
 """Additional tolerance for the rounding of lengths, relative to the force of the pads against a rigid object."""
 ARGUMENT_RTOL: Final = 4e-16
 """Relative width of a bracket below which it contains no further floating-point number."""
+SECANT_ITERATIONS: Final = 20
+"""From here on a bracketed search bisects: the secant gains little where a law has a corner or an infinite slope."""
+FIRST_REACH_M: Final = 1e-3
+REACH_FACTOR: Final = 4.0
+"""Without a bracket the search goes no further from its start than this multiple of the last distance, or than the
+first value. Where the slope is not known yet a secant would go kilometres away, where no law holds."""
+UNBALANCED_RTOL: Final = 1e-6
+"""A search that ends with forces further apart than this, relative to the force or to 1 N, has not converged."""
 MIN_SLOPE_N_M: Final = 1e-9
 MIN_SLOPE_SHARE: Final = 1e-3
 """The least slope of the balance with which a secant step is taken, absolute and relative to the pads' stiffness."""
@@ -116,24 +124,25 @@ object_force: Callable[[Any, Any, float, float, float, float], tuple[float, Any]
 
 def solve_contact(
     model: ObjectModel, now: ContactState, closure_m: float, speed_m_s: float, h: float
-) -> ContactState:
+) -> tuple[ContactState, int]:
     """Return the object after the fingers have come to `closure_m` within `h`, closing at `speed_m_s` at the end.
 
-    Where the force would be tensile, object and pads are separated and recover freely.
+    Where the force would be tensile, object and pads are separated and recover freely. The second value is 1 if the
+    search for the balance of forces has not converged.
     """
     if model.pads.stiffness_n_m < math.inf:
-        return _press_through_pads(model, now, closure_m, speed_m_s, h) if h > 0.0 else now
+        return _press_through_pads(model, now, closure_m, speed_m_s, h) if h > 0.0 else (now, 0)
     d0, force0, slope, states0, pad0, branch0, rate0, _ = now
     force, states = object_force(model.terms, states0, d0, closure_m, h, speed_m_s)
     # A finger that is still behind where the object stood presses it only if the object has not recovered so far.
     if force >= 0.0 and (force <= 0.0 or force0 > 0.0 or closure_m >= d0):
-        return ContactState(closure_m, force, slope, states, pad0, branch0, rate0, math.inf)
-    return _release_from_rigid_pads(model, now, force, closure_m, speed_m_s, h) if h > 0.0 else now
+        return ContactState(closure_m, force, slope, states, pad0, branch0, rate0, math.inf), 0
+    return _release_from_rigid_pads(model, now, force, closure_m, speed_m_s, h) if h > 0.0 else (now, 0)
 
 
 def _release_from_rigid_pads(
     model: ObjectModel, now: ContactState, force_n: float, closure_m: float, speed_m_s: float, h: float
-) -> ContactState:
+) -> tuple[ContactState, int]:
     """Return the object that rigid pads at `closure_m` would pull with `force_n`: separated, or pressed after all."""
     d0, force0, slope, states0, _, branch0, _, _ = now
     load = PadLoad(0.0, 0.0, d0, h)
@@ -145,15 +154,22 @@ def _release_from_rigid_pads(
         d1 = closure_m
         force, states = object_force(model.terms, states0, d0, d1, h, speed_m_s)
         if force >= 0.0:
-            return ContactState(
+            pressed = ContactState(
                 d1, force, search.slope_n_m, states, now.pad_m, branch0, now.rate_m_s, math.inf
             )
+            return pressed, 0
         total = _release_slope(search.slope_n_m, force, force0, d0, closure_m)
         _, last, last_n, slope, _, lower, upper, n = search
         search = BalanceSearch(d0 - force0 / total, last, last_n, slope, total, lower, upper, n)
         search, force, states = _balance(model.terms, now, load, search, h)
     d1 = search.compression_m
-    return ContactState(d1, 0.0, search.slope_n_m, states, 0.0, branch0, (d1 - d0) / h, math.inf)
+    free = ContactState(d1, 0.0, search.slope_n_m, states, 0.0, branch0, (d1 - d0) / h, math.inf)
+    return free, _unbalanced(force, 0.0)
+
+
+def _unbalanced(force_n: float, pads_n: float) -> int:
+    """Return 1 if the force of the object is not that of the pads, or not a number."""
+    return 0 if abs(force_n - pads_n) <= UNBALANCED_RTOL * max(abs(force_n), 1.0) else 1
 
 
 def _release_slope(slope: float, force: float, force0: float, d0: float, closure_m: float) -> float:
@@ -167,7 +183,7 @@ def _release_slope(slope: float, force: float, force0: float, d0: float, closure
 
 def _press_through_pads(
     model: ObjectModel, now: ContactState, closure_m: float, speed_m_s: float, h: float
-) -> ContactState:
+) -> tuple[ContactState, int]:
     """Return the object behind compliant pads: pressed or separated, whichever of the two is consistent."""
     pads = model.pads
     d0, force0, slope, _, pad0, branch0, rate0, span = now
@@ -197,18 +213,18 @@ def _press_through_pads(
             break
         pressed, n_changes = not pressed, n_changes + 1
         over, base = h, d0
-    rate = (d1 - d0) / h
+    rate, unbalanced = (d1 - d0) / h, _unbalanced(force, c - k * d1)
     if not pressed:
         pad = creep.free_pad_m
         branch = branch0 * creep.decay + (creep.mean_n_m + creep.ramp_n_m) * (pad - pad0)
-        return ContactState(d1, 0.0, slope, states, pad, branch, rate, math.inf)
+        return ContactState(d1, 0.0, slope, states, pad, branch, rate, math.inf), unbalanced
     span = h if force0 > 0.0 else math.inf
     if not creeps:
-        return ContactState(d1, force, slope, states, pad0, branch0, rate, span)
+        return ContactState(d1, force, slope, states, pad0, branch0, rate, span), unbalanced
     pad = closure_m - d1
     branch = branch0 * creep.decay + creep.mean_n_m * (pad - pad0)
     branch += creep.ramp_n_m * h * (speed_m_s - (d1 - base) / over)
-    return ContactState(d1, force, slope, states, pad, branch, rate, span)
+    return ContactState(d1, force, slope, states, pad, branch, rate, span), unbalanced
 
 
 def _creep(pads: PadCompliance, now: ContactState, h: float) -> _Creep:
@@ -245,7 +261,14 @@ def _balance(
             upper = d1
         else:
             lower = d1
-        d2 = bracketed_secant(d1, miss, last, total, lower, upper)
+        reach = max(FIRST_REACH_M, REACH_FACTOR * abs(d1 - d0))
+        if lower == -math.inf or upper == math.inf:
+            d2 = bracketed_secant(d1, miss, last, total, lower, upper)
+            d2 = min(max(d2, d1 - reach), d1 + reach)
+        elif n > SECANT_ITERATIONS:
+            d2 = 0.5 * (lower + upper)
+        else:
+            d2 = bracketed_secant(d1, miss, last, total, lower, upper)
         if d2 == d1 or not upper - lower > ARGUMENT_RTOL * abs(d1):
             break
         last, last_n, d1 = d1, force, d2
@@ -259,7 +282,7 @@ def pad_forces(
 
     `still`: the fingers did not move. The time that the contact was behind (`pending_s`) is made up for.
     """
-    left_n, right_n, offset, touched, left, right, pending = contact
+    left_n, right_n, offset, touched, left, right, pending, unbalanced = contact
     table_n, h = model.table_friction_n, h + pending
     closure = model.width_m - gap_m
     left1_n = right1_n = 0.0
@@ -290,12 +313,13 @@ def pad_forces(
             ):
                 # The contact has only just begun: a damper of the pad has acted since then and no longer.
                 span = half_closure / speed_m_s
-            half = solve_contact(model, half, half_closure, speed_m_s, span)
+            half, missed = solve_contact(model, half, half_closure, speed_m_s, span)
+            unbalanced += missed
         if side == 0:
             left = half
         else:
             right = half
     if model.held == 1:
-        return Contact(left.force_n, right.force_n, offset, touched, left, right, 0.0)
+        return Contact(left.force_n, right.force_n, offset, touched, left, right, 0.0, unbalanced)
     left1_n, right1_n = max(left.force_n, left1_n), max(left.force_n, right1_n)
-    return Contact(left1_n, right1_n, offset, touched, left, right, 0.0)
+    return Contact(left1_n, right1_n, offset, touched, left, right, 0.0, unbalanced)

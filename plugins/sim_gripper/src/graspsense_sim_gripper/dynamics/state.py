@@ -54,6 +54,8 @@ class Contact(NamedTuple):
     """The half at the right finger of an object that is held fast; otherwise unused."""
     pending_s: float = 0.0
     """Time since the release for which the recovery of the object's shape has not been computed yet."""
+    unbalanced: int = 0
+    """Searches for the balance of forces that have not converged so far."""
 
 
 class StepState(NamedTuple):

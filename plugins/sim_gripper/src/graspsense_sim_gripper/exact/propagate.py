@@ -314,7 +314,7 @@ def _store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_
     )
     # An object that is held on the centre line has two halves in the same state.
     right = left if model.held == 1 else contact.right
-    return Contact(force, force, contact.offset_m, touched, left, right, 0.0)
+    return Contact(force, force, contact.offset_m, touched, left, right, 0.0, contact.unbalanced)
 
 
 # --------------------------------------------------------------------------------------------------------- events

@@ -10,6 +10,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense_sim_gripper.objects.spec import ObjectSpec, TermParams
+from graspsense_sim_gripper.terms.registry import find_term
 
 GRAVITY_M_S2: Final = 9.80665
 PAD_CELLS: Final = 15
@@ -58,9 +59,10 @@ def sample(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None
         )
         for params, is_stiffness in spec.nominal_terms
     )
+    dents = (find_term(kind)[1].dent(params) for kind, params in zip(spec.kinds, terms, strict=True))
     return Instance(
         spec=spec,
-        width_m=spec.width_m + spec.width_spread_m * clipped[1],
+        width_m=spec.width_m + spec.width_spread_m * clipped[1] - max(dents, default=0.0),
         offset_m=spec.offset_m + spec.offset_spread_m * clipped[2],
         share=min(spec.share + spec.share_spread * clipped[3], 1.0),
         table_n=spec.friction * spec.mass_kg * GRAVITY_M_S2,

@@ -87,7 +87,7 @@ def forces_along(model: ObjectModel, kinds: Sequence[str], path: ProbePath) -> I
     press = contact_solver(tuple(kinds))
     contact, before = uncompressed(kinds), 0.0
     for closure, t, speed in zip(path.closures, path.times, path.speeds, strict=True):
-        contact = press(model, contact, closure, speed, t - before)
+        contact, _ = press(model, contact, closure, speed, t - before)
         yield contact.force_n
         before = t
 
@@ -101,11 +101,11 @@ def stiffness(grip: Grip, dt_s: float) -> tuple[float, float]:
     for k, (closure, t, speed) in enumerate(zip(path.closures, path.times, path.speeds, strict=True)):
         if speed == 0.0:
             break
-        contact, before = press(model, contact, closure, speed, t - before), t
+        (contact, _), before = press(model, contact, closure, speed, t - before), t
         if k % 4 < 3:
             continue
         # The force after a tick further on, compared with that after a tick at rest.
-        rests, further = (press(model, contact, closure + m, 0.0, dt_s).force_n for m in (0.0, further_m))
+        rests, further = (press(model, contact, closure + m, 0.0, dt_s)[0].force_n for m in (0.0, further_m))
         largest = max(largest, (further - rests) / further_m)
     # A surface that is struck responds before the parts behind it give way.
     touch = path.closures[0]

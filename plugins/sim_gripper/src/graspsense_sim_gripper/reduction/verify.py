@@ -1,7 +1,7 @@
 """Trial grasps of the nominal object, in one reduced model after another.
 
 A trial grasp has ideal sensors, and goes from the open fingers to the release under the controller that is to grasp the
-object. The approach is the same for every model and is simulated once.
+object. In the approach nothing but the steps differs between models, so it is simulated once for each step tolerance.
 """
 
 from __future__ import annotations
@@ -105,8 +105,8 @@ class TrialGrasps:
     padding: tuple[str, ...] | None
     """The kinds with which compiled code is padded; None: as in a batch."""
     _records: dict[Any, GraspRecord] = field(factory=dict, init=False)
-    _start: _Stage | None = field(default=None, init=False)
-    """Shortly before the first contact."""
+    _starts: dict[float, _Stage] = field(factory=dict, init=False)
+    """The grasp shortly before the first contact, by the step tolerance of the approach."""
 
     def record(self, reduction: Reduction, force_n: float = 0.0, travel: float = 0.0) -> GraspRecord:
         """Return the grasp in this model, with these errors of what the controller reads (see `Sensitivity`)."""
@@ -130,9 +130,10 @@ class TrialGrasps:
 
     def _grasp(self, reduction: Reduction, force_n: float, travel: float) -> GraspRecord:
         setup = reduced(self.setup, reduction)
-        if self._start is None:
-            self._start = self._approach(setup)
-        start = self._start
+        tolerance = setup.plant.steps.tolerance
+        if tolerance not in self._starts:
+            self._starts[tolerance] = self._approach(setup)
+        start = self._starts[tolerance]
         bias = Bias(force_n, travel, setup.plant.object.width_m)
         setup = evolve(setup, sensor=setup.sensor._replace(bias=bias))
         until = start.progress.loop.ticks + self._max_ticks()

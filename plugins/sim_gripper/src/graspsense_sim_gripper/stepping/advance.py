@@ -165,10 +165,10 @@ def _completed(
         shape = abs(left.compression_m) + abs(left.pad_m) + abs(right.compression_m)
         separated = gap > start.reach_m and contact.left_n + contact.right_n == 0.0
         touched = 0 if separated and shape <= RECOVERED_M else 1
-        peak = max(peak, left.force_n, right.force_n)
+        peak = max(peak, contact.left_n, contact.right_n)
     if touched != contact.touched:
-        left_n, right_n, offset, _, _, _, pending = contact
-        contact = Contact(left_n, right_n, offset, touched, left, right, pending)
+        left_n, right_n, offset, _, _, _, pending, unbalanced = contact
+        contact = Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
     if (revolutions >= drive.open_rev and speed >= 0.0) or (revolutions <= drive.closed_rev and speed <= 0.0):
         end = drive.open_rev if revolutions >= drive.open_rev else drive.closed_rev
         gap, jacobian = gap_and_rate(drive.link, end)

@@ -33,12 +33,12 @@ def coast(params: PlantParams, state: PlantState, effort_n: float, h: float) -> 
     if not coasts or motion1.gap_m <= reach:
         return False, state
     if contact.touched == 1:
-        left_n, right_n, offset, touched, left, right, _ = contact
+        left_n, right_n, offset, touched, left, right, _, unbalanced = contact
         if load > 0.0:
             # The finger pushes the object towards the middle.
             pushed = 0.5 * (motion1.gap_m - reach)
             offset = pushed if offset >= 0.0 else -pushed
-        contact = Contact(left_n, right_n, offset, touched, left, right, pending)
+        contact = Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
     next_s, n, unresolved = step
     return True, PlantState(motion1, contact, StepState(next_s, n + 1, unresolved), given, peak)
 

@@ -35,5 +35,5 @@ def stick(params: PlantParams, state: PlantState, effort_n: float, h: float) -> 
         if margin1 >= -SLIP_TOL_N or margin < MIN_MARGIN_N or t < MIN_SHARE * h:
             break
         t = max(t * (margin + SLIP_AIM_N) / (margin - margin1), min(t, MIN_STEP_S))
-    peak = max(peak, after.left.force_n, after.right.force_n)
+    peak = max(peak, after.left_n, after.right_n)
     return PlantState(Motion(revolutions, 0.0, gap, jacobian), after, step, given, peak), t

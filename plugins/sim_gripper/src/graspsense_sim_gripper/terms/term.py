@@ -99,6 +99,12 @@ def never_beyond(state: Any) -> str:
     return ""
 
 
+def not_dented(params: Any) -> float:
+    """Return the dent (m) of a term that earlier use has not deformed."""
+    del params
+    return 0.0
+
+
 NO_STATE: Final = NoState()
 
 
@@ -127,6 +133,8 @@ class Term:
     """Parameters that grow with the thickness of the wall; they vary between instances."""
     beyond: Callable[[Any], str] = never_beyond
     """Returns why a state is outside of the range of the law, "" if it is not."""
+    dent: Callable[[Any], float] = not_dented
+    """By how much (m) earlier use has made the object thinner. Compression is counted from the dented surface on."""
 
     def __attrs_post_init__(self) -> None:
         fields = getattr(self.params, "_fields", None)

@@ -12,8 +12,9 @@ class Worn(NamedTuple):
     """An elastic shell that softens and keeps a dent as work is done on it.
 
     Damage D = 1 - exp(-W / wear_j) of the work W done on it while it is pressed in, `earlier_j` of which was done
-    before this grasp. The damage reduces the stiffness by the fraction `softening` D and leaves a set of `set_m` D:
-    force (1 - softening D) (k1 e + k3 e^3) with e = d - set_m D. The law was fixed before any grasp of a worn
+    before this grasp. The damage reduces the stiffness by the fraction `softening` D and leaves a dent of `set_m` D.
+    The dent D0 of the earlier work makes the object thinner (`dent`). Compression is counted from the dented surface:
+    force (1 - softening D) (k1 e + k3 e^3) with e = d - set_m (D - D0). The law was fixed before any grasp of a worn
     bottle was simulated.
     """
 
@@ -45,10 +46,16 @@ def worn(
 
 
 def _force(params: Worn, work_j: float, d: float) -> float:
-    damage = 1.0 - math.exp(-(params.earlier_j + work_j) / params.wear_j)
-    pressed = d - params.set_m * damage
-    left = 1.0 - min(params.softening, 1.0) * damage
+    before = math.exp(-params.earlier_j / params.wear_j)
+    after = before * math.exp(-work_j / params.wear_j)
+    pressed = d - params.set_m * (before - after)
+    left = 1.0 - min(params.softening, 1.0) * (1.0 - after)
     return left * (params.k1_n_m * pressed + params.k3_n_m3 * pressed * pressed * pressed)
+
+
+def dent(params: Worn) -> float:
+    """Return how deep (m) the earlier work has dented it."""
+    return params.set_m * (1.0 - math.exp(-params.earlier_j / params.wear_j))
 
 
 def rates(params: Worn, at: WorkingPoint) -> tuple[Rate, ...]:
@@ -64,6 +71,7 @@ TERM = Term(
     law=worn,
     at_rest=WornState(0.0, 0.0),
     rates=rates,
+    dent=dent,
     positive=("k1_n_m", "wear_j"),
     stiffnesses=("k1_n_m", "k3_n_m3"),
 )

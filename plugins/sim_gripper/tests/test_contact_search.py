@@ -1,0 +1,87 @@
+"""The search for the balance of forces at the contact: it ends where a law is awkward, and says so where it cannot."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from graspsense_sim_gripper.build import unverified_setup
+from graspsense_sim_gripper.compiled.compose import bind_reachable, sum_of, uncompressed
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, solve_contact
+from graspsense_sim_gripper.dynamics.state import ContactState
+from graspsense_sim_gripper.objects.library import find
+from graspsense_sim_gripper.terms.foam import Foam, foam
+from graspsense_sim_gripper.terms.term import NoState
+from graspsense_sim_gripper.terms.worn import Worn, WornState, worn
+
+SCENE = """
+summary = "a shell that earlier squeezes have dented by 12 mm"
+width_m = 0.06
+mass_kg = 0.03
+share = 0.42
+[[terms]]
+type = "worn"
+k1_n_m = 2200.0
+k3_n_m3 = 0.0
+wear_j = 0.1
+softening = 0.9
+set_m = 0.014
+earlier_j = 0.2
+"""
+
+
+def solver(law):
+    return bind_reachable(solve_contact, {"object_force": sum_of([law])})
+
+
+def untouched(state):
+    return ContactState(0.0, 0.0, 0.0, (state,), 0.0, 0.0)
+
+
+@pytest.mark.parametrize("pads_n_m", [1.5e4, math.inf])
+@pytest.mark.parametrize("closure_m", [1e-9, 1e-7, 1e-5])
+def test_the_first_touch_of_a_worn_shell_compresses_it_by_no_more_than_the_fingers_close(closure_m, pads_n_m):
+    # A law that pulls at its free surface had the search end where the shell was 14 mm deep and worn by 2 J.
+    shell = Worn(2200.0, 0.0, 0.1, 0.9, 0.014, earlier_j=0.2)
+    body = ObjectModel(0.06, 0.0, PadCompliance(pads_n_m), (shell,))
+    after, unbalanced = solver(worn)(body, untouched(WornState(0.0, 0.0)), closure_m, 0.01, 1e-3)
+    assert unbalanced == 0
+    assert 0.0 < after.compression_m <= closure_m
+    assert after.states[0].work_j <= 2200.0 * closure_m**2
+
+
+def test_a_dented_object_is_thinner_by_its_dent(tmp_path):
+    file = tmp_path / "dented.toml"
+    file.write_text(SCENE)
+    spec = find(str(file))
+    setup = unverified_setup(SimConfig(object=str(file), spread=False, sensor="ideal"), spec, 0)
+    assert setup.plant.object.width_m == pytest.approx(0.06 - 0.014 * (1.0 - math.exp(-2.0)))
+
+
+@pytest.mark.parametrize("exponent", [0.3, 8.0])
+def test_a_power_law_with_a_steep_end_is_balanced(exponent):
+    law = Foam(10.0, 0.01, exponent)
+    body = ObjectModel(0.06, 0.0, PadCompliance(1.5e4), (law,))
+    now, search = untouched(uncompressed(["foam"]).states[1]), solver(foam)
+    for closure in (1e-9, 1e-6, 1e-4, 3e-3, 1e-2, 2e-3, 1e-5):
+        now, unbalanced = search(body, now, closure, 0.0, 1e-3)
+        assert unbalanced == 0
+        assert now.force_n == pytest.approx(1.5e4 * (closure - now.compression_m), rel=1e-5, abs=1e-6)
+
+
+def jumps(params, state, d0, d1, h, v1):
+    """Force that nowhere equals that of the pads: it jumps from 0 to 100 N."""
+    return (100.0 if d1 > 1e-3 else 0.0), state
+
+
+def not_a_number(params, state, d0, d1, h, v1):
+    return math.nan, state
+
+
+@pytest.mark.parametrize("law", [jumps, not_a_number])
+def test_a_search_without_a_balance_is_counted(law):
+    body = ObjectModel(0.06, 0.0, PadCompliance(1.5e4), (NoState(),))
+    _, unbalanced = solver(law)(body, untouched(NoState()), 3e-3, 0.0, 1e-3)
+    assert unbalanced == 1
