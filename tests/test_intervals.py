@@ -90,7 +90,7 @@ def counted(counts, trials=8):
 @pytest.mark.parametrize("instances", [6, 12])
 @pytest.mark.parametrize("correlation", [0.1, 0.3])
 def test_the_interval_over_instances_covers_where_that_of_the_trials_does_not(instances, correlation):
-    """benchmarks/coverage.py prints the whole table."""
+    """benchmarks/interval_coverage.py prints the whole table."""
     rng = np.random.default_rng(0)
     rate, size, runs = 0.85, (1 - correlation) / correlation, 400
     covered = by_trials = 0

@@ -1,6 +1,6 @@
 """Coverage of the 95 % intervals of recognition rates: how often they contain the true rate.
 
-    python benchmarks/coverage.py [--repeats 2000]
+    python benchmarks/interval_coverage.py [--repeats 2000]
 
 The first table draws the rate of each instance from a beta distribution and its trials from that rate. `correlation` is
 that of two trials of the same instance. It compares the interval that graspsense prints (`graspsense`) with Wilson's of
