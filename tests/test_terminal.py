@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
@@ -119,3 +120,126 @@ def test_json_is_the_same_in_a_terminal_and_in_a_pipe():
 
     assert json.loads(shown.text) == json.loads(piped.stdout)
     assert not shown.coloured
+
+
+def outcome_colours(shown):
+    """Return the colour codes before each of these words in what the terminal received."""
+    return {
+        word: re.search(r"((?:\x1b\[[0-9;]*m)+)" + word, shown.raw) is not None
+        for word in ("steady", "odwalla:full_closed", "trained on simulated")
+    }
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_a_grasp_fits_the_terminal_with_outcome_prediction_and_warning_in_colour(width):
+    shown = in_terminal(["run", "--explain-model"], width)
+
+    assert shown.code == 0
+    assert max(map(len, shown.lines)) <= width
+    assert all(outcome_colours(shown).values())
+    assert not re.search(r"[0-9] m(/s)?\b(?! )", shown.text), "lengths are in mm"
+    assert "100%" not in shown.text
+    assert re.search(r"about 9\d %: \d+ of \d+ training", shown.text)
+
+
+def test_one_unit_for_lengths_and_results_on_stdout_when_piped():
+    ran = subprocess.run([*COMMAND, "run"], capture_output=True, text=True, check=True)
+
+    assert not re.search(r"[0-9] m(/s)?\b", ran.stdout + ran.stderr)
+    assert "warning     trained on simulated grasps" in ran.stdout
+    assert "outcome     steady" in ran.stdout
+    assert "\x1b" not in ran.stdout + ran.stderr
+    tested = re.findall(r"^ +(?:\S+ \S+ < )?(\w+) = ", ran.stdout, re.MULTILINE)
+    assert len(tested) == len(set(tested)), "each feature has one range"
+
+
+@pytest.fixture
+def csv(tmp_path):
+    path = tmp_path / "grasps.csv"
+    lines = ["what,thing,p_first [m],f_steady [N]"]
+    for i in range(48):
+        kind, state = ("can", "jar")[i % 2], ("full", "empty")[(i // 2) % 2]
+        width, force = (
+            (0.066 if kind == "can" else 0.055) + 1e-5 * i,
+            (9.0 if state == "full" else 4.0) + 0.01 * i,
+        )
+        lines.append(f"{kind}:{state},{kind}{i % 6},{width:.5f},{force:.3f}")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_evaluate_says_its_verdict_first_and_fits_the_terminal(csv, width):
+    shown = in_terminal(["evaluate", str(csv), "--label", "what", "--instance", "thing"], width)
+
+    assert shown.code == 0
+    said = " ".join(shown.text.split())
+    assert re.match(
+        r"c45 recognises the object and its state in 100.0 % of 48 trials of \S+grasps.csv \(95 %: ", said
+    )
+    assert "This is better than always giving the most frequent label (25.0 %)." in said
+    assert "The width alone gives" in said
+    assert "before contact was not measured" in said
+    assert said.index("The width alone") < said.index("PROTOCOL") if width == 140 else True
+    # The name of the file is one word, which is not broken.
+    assert all(len(line) <= width for line in shown.lines if str(csv) not in line)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_predictions_fit_the_terminal_and_count_their_training_trials(csv, tmp_path, width):
+    model = tmp_path / "m.json"
+    subprocess.run(
+        [*COMMAND, "train", csv, "--label", "what", "--instance", "thing", "--out", model],
+        capture_output=True,
+        check=True,
+    )
+    shown = in_terminal(["predict", str(model), str(csv)], width)
+
+    assert shown.code == 0
+    assert max(map(len, shown.lines)) <= width
+    assert "can:full" in shown.text
+    assert "93 %" in shown.text
+    assert "100 %" not in shown.text
+    assert "mm" in shown.text
+    assert not re.search(r"[0-9] m\b", shown.text)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_list_of_experiments_says_how_long_each_takes(width):
+    shown = in_terminal(["experiment"], width)
+
+    assert shown.code == 0
+    assert max(map(len, shown.lines)) <= width
+    listed = subprocess.run([*COMMAND, "experiment"], capture_output=True, text=True, check=True).stdout
+    rows = listed.partition("\n\n")[0].splitlines()[1:]
+    assert len(rows) > 30
+    for row in rows:
+        assert re.match(r"\w+ +\d[\d.]* (s|min|h)  ", row), row
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_a_dry_run_of_an_experiment_is_a_summary(tmp_path, width):
+    options = ["experiment", "probing_force", "-o", "seeds=10000", "--dry-run", "--out", str(tmp_path / "e")]
+    shown = in_terminal(options, width)
+
+    assert shown.code == 0
+    assert len(shown.lines) < 20
+    said = " ".join(shown.text.split())
+    assert "30000: 3 cases with 10000 seeds" in said
+    assert "2880000 simulated grasps" in said
+    assert re.search(r"time about [\d.]+ h with \d+ processes", said)
+    assert not (tmp_path / "e").exists()
+    assert all(len(line) <= width for line in shown.lines if str(tmp_path) not in line)
+
+
+def test_collect_shows_keys_then_what_was_felt_and_what_the_model_takes_it_for(tmp_path):
+    arguments = ["collect", "--labels", "can:full_open", "--each", "1", "--save", str(tmp_path / "t")]
+    shown = in_terminal(arguments, 60, typed="\n")
+
+    assert shown.code == 0
+    said = " ".join(shown.text.split())
+    assert max(map(len, shown.lines)) <= 60
+    keys, felt, prediction = said.index("keys: Enter"), said.index("felt p_first"), said.index("prediction ")
+    assert keys < felt < prediction
+    assert re.search(r"felt p_first [\d.]+ mm, p_steady [\d.]+ mm, f_steady [\d.]+ N,", said)
+    assert re.search(r"prediction (can|naked|water|odwalla):\w+ \(about \d+ %: ", said)

@@ -16,15 +16,18 @@ from graspsense.cli.options import (
     settings_of,
 )
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import talk
+from graspsense.cli.terminal import Style, echo_entry, echo_table, talk
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from types import FrameType
 
     from graspsense.core.config import Settings
+    from graspsense.core.trial import Trial
     from graspsense.store.collecting import Collection
     from graspsense.store.store import Store
+
+_LABEL = 14
 
 
 @click.command(short_help="Collect labelled trials with an operator.")
@@ -88,10 +91,31 @@ def collect(
             settings_for=settings_for,
             ask=_ask,
             say=talk,
+            show=_show,
             changed=changed,
         )
         _run_until_stopped(collection)
         _print_counts(save, collection, as_json)
+
+
+def _show(word: str, trial: Trial) -> None:
+    """Print what was felt in a trial, and what the model takes the object for."""
+    from graspsense.core.units import in_words
+
+    features = trial.features
+    felt = ", ".join(
+        f"{name} {in_words(value, unit)}"
+        for name, value, unit in zip(features.names, features.values, features.units, strict=True)
+        if value == value
+    )
+    undefined = sum(value != value for value in features.values)
+    felt += f"{', ' if felt else ''}{undefined} not defined" if undefined else ""
+    echo_entry("  felt", felt, err=True, width=_LABEL)
+    prediction = trial.prediction
+    if prediction is not None:
+        certainty = f" ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""
+        style = Style.GOOD if prediction.label == word.partition("#")[0] else Style.CAUTION
+        echo_entry("  prediction", f"{prediction.label}{certainty}", style, err=True, width=_LABEL)
 
 
 def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
@@ -102,8 +126,8 @@ def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
             {"store": save, "trials": collection.numbers, "counts": counts, "each": each, "complete": done}
         )
         return
-    for word, n in counts.items():
-        click.echo(f"{word:<24}{n:>4} of {each}")
+    rows = [(word, f"{n} of {each}") for word, n in counts.items()]
+    echo_table(("LABEL", "TRIALS"), rows)
 
 
 def _label_selects_object(settings: Settings, labels: Sequence[str], object_is_named: bool) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -11,14 +12,17 @@ import click
 
 from graspsense.cli.options import force_option
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import echo_table, talk
+from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 
 if TYPE_CHECKING:
+    from graspsense.experiments.duration import Effort
+    from graspsense.experiments.experiment import Planned
     from graspsense.experiments.findings import Findings
     from graspsense.experiments.results import Results
     from graspsense.experiments.run import Account
     from graspsense.experiments.summary import Summary
 
+_MOST_NAMED = 8
 EXIT_INCOMPLETE = 1
 EXIT_INTERRUPTED = 130
 
@@ -75,7 +79,7 @@ def experiment(
     results = Results(Path(out or planned.name))
     make = chosen(executor, workers)
     if dry_run:
-        _plan([task.name for task in planned.tasks()], as_json)
+        _plan(planned, results, workers or os.cpu_count() or 1, as_json)
         return
     with ProgressLine() as progress:
         account = run_experiment(
@@ -122,21 +126,67 @@ def _counts(account: Account, problem: str) -> dict[str, object]:
 
 
 def _list(known: dict[str, object], as_json: bool) -> None:
+    from graspsense.experiments.duration import effort_of, measured_on
     from graspsense.experiments.experiment import read_experiment
 
-    rows = [(name, read_experiment(name).experiment.title) for name in known]
+    cores = os.cpu_count() or 1
+    planned = {name: read_experiment(name) for name in known}
+    efforts = {name: effort_of(one) for name, one in planned.items()}
     if as_json:
-        echo_json([{"name": name, "title": title} for name, title in rows])
-    else:
-        echo_table(("EXPERIMENT", "WHAT"), rows)
+        echo_json(
+            [
+                {"name": name, "title": one.experiment.title, **_effort_as_json(efforts[name])}
+                for name, one in planned.items()
+            ]
+        )
+        return
+    rows = [
+        (name, efforts[name].time_on(cores), str(efforts[name].tasks), one.experiment.title)
+        for name, one in planned.items()
+    ]
+    echo_table(("EXPERIMENT", "TIME", "TASKS", "WHAT"), rows)
+    echo(
+        f"\nTIME is an estimate for {cores} cores like {measured_on()}.\n"
+        "`graspsense experiment NAME --dry-run` says what an experiment consists of; -o seeds=2 makes it shorter."
+    )
 
 
-def _plan(names: list[str], as_json: bool) -> None:
+def _effort_as_json(effort: Effort) -> dict[str, object]:
+    return {
+        "cases": effort.cases,
+        "seeds": effort.seeds,
+        "tasks": effort.tasks,
+        "trials": effort.trials,
+        "trainings": effort.trainings,
+        "cpu_seconds": effort.seconds,
+    }
+
+
+def _plan(planned: Planned, results: Results, workers: int, as_json: bool) -> None:
+    """Print what the experiment consists of, what is done already, and how long it takes."""
+    from graspsense.experiments.duration import effort_of, measured_on
+
+    effort = effort_of(planned)
     if as_json:
-        echo_json(names)
-    else:
-        click.echo("\n".join(names))
-        click.echo(f"{len(names)} tasks")
+        echo_json({"dry_run": True, "experiment": planned.name, **_effort_as_json(effort)})
+        return
+    kind = "simulated grasps" if effort.simulated else "trials"
+    trials = "not known before the data set is read" if effort.trials is None else f"{effort.trials} {kind}"
+    echo(planned.experiment.question or planned.experiment.title, Style.HEADING)
+    echo_entry("tasks", f"{effort.tasks}: {effort.cases} cases with {effort.seeds} seeds")
+    names = [case.name for case in planned.cases if case.name]
+    if names:
+        more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+        echo_entry("cases", "; ".join(names[:_MOST_NAMED]) + more)
+    echo_entry("grasps" if effort.simulated else "trials", trials)
+    if effort.trainings:
+        echo_entry("trainings", f"{effort.trainings} models for the rates; controls add to them")
+    estimate = f"about {effort.time_on(workers)} with {workers} processes like {measured_on()}"
+    echo_entry("time", "no estimate for this kind of data" if effort.seconds is None else estimate)
+    echo_entry(
+        "results", f"in {results.folder}" + (", where there are some already" if results.any() else "")
+    )
+    echo("nothing was run")
 
 
 def _print_json(found: Summary, more: Findings | None, page: Path | None, counts: dict[str, object]) -> None:
@@ -147,36 +197,37 @@ def _print_json(found: Summary, more: Findings | None, page: Path | None, counts
 def _print(found: Summary, more: Findings | None, account: Account, page: str) -> None:
     from graspsense.experiments.answer import answer
 
-    click.echo(answer(found) if more is None else more.answer)
-    click.echo()
+    echo(answer(found) if more is None else more.answer, Style.HEADING)
+    echo()
     if more is None:
         _print_rates(found)
     else:
         for one in more.tables:
-            click.echo(one.title)
+            echo(one.title, Style.HEADING)
             echo_table(tuple(name.upper() for name in one.header), list(one.rows))
-            click.echo()
+            echo()
     for note in account.notes:
-        click.echo(f"note: {note}")
-    click.echo(account.words)
+        echo(f"note: {note}", Style.CAUTION, indent=2)
+    echo(account.words, Style.GOOD if account.complete else Style.CAUTION)
     reasons: dict[str, int] = {}
     for failure in account.failed:
         reasons[failure.reason] = reasons.get(failure.reason, 0) + 1
     for reason, times in reasons.items():
-        click.echo(f"  failed {times} times: {reason}")
+        echo(f"  failed {times} times: {reason}", Style.BAD, indent=2)
     if account.stopped:
-        click.echo(f"  stopped: {account.stopped}")
+        echo(f"  stopped: {account.stopped}", Style.BAD, indent=2)
     if not account.complete:
-        click.echo("  go on with the same command and --resume: it does what is missing and what failed")
-    click.echo(f"page        {page}")
+        echo("  go on with the same command and --resume: it does what is missing and what failed")
+    echo_entry("page", page)
 
 
 def _print_rates(found: Summary) -> None:
-    rows = []
-    for one in found.conditions:
-        interval = one.rate.interval
-        within = "no interval" if interval is None else f"{interval[0]:.3f} to {interval[1]:.3f}"
-        rows.append((one.name or "-", one.target, f"{one.rate.mean:.3f}", within, one.protocol))
+    from graspsense.evaluation.intervals import percentage, percentages
+
+    rows = [
+        (one.name or "-", one.target, percentage(one.rate.mean), percentages(one.rate.interval), one.protocol)
+        for one in found.conditions
+    ]
     if rows:
         echo_table(("CASE", "TARGET", "RATE", "95 %", "PROTOCOL"), rows)
-        click.echo()
+        echo()

@@ -350,7 +350,7 @@ class _Plan:
         if folds is None:
             return
         try:
-            trials = _number_of_trials(settings, data)
+            trials = number_of_trials(settings, data)
         except GraspsenseError as error:
             self.complaints.append(f"{self.layer.where(('data',))}: {error}")
             return
@@ -417,7 +417,7 @@ class _Plan:
                 yield LearnerSpec(name=name, type=component.qualified, config=config)
 
 
-def _number_of_trials(settings: Settings, data: TrialSource) -> int | None:
+def number_of_trials(settings: Settings, data: TrialSource) -> int | None:
     """Return the number of trials of a source, None for a data set, which would have to be read."""
     if data.kind == SIMULATED:
         return len(plan_trials(settings, groups_of(data), 0).labels)

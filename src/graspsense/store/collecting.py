@@ -28,9 +28,11 @@ if TYPE_CHECKING:
     from graspsense.core.plugins import Plugins
     from graspsense.core.roles import DeviceInfo
     from graspsense.core.runner import Sink
+    from graspsense.core.trial import Trial
 
 HELP: Final = (
-    "Enter: grasp it   u: undo the last trial   r: repeat the last trial   s: skip this object   q: stop"
+    "keys: Enter grasps it, u undoes the last trial, r repeats the last trial, s skips this object, q stops, ? shows "
+    "this"
 )
 UNDONE: Final = "undone by the operator"
 RETAKEN: Final = "repeated by the operator"
@@ -64,8 +66,8 @@ class Collection:
     """A collection of trials into a store.
 
     `settings_for(label, seed)` returns the settings of a grasp. `ask` asks the operator a question and returns the
-    answer, or None at the end of input. `say` prints a message. `changed` allows a gripper or settings that differ
-    from those of earlier trials.
+    answer, or None at the end of input. `say` prints a message, `show` what was felt in a trial of this label.
+    `changed` allows a gripper or settings that differ from those of earlier trials.
     """
 
     store: Store
@@ -74,6 +76,7 @@ class Collection:
     settings_for: Callable[[str, int], Settings]
     ask: Callable[[str], str | None]
     say: Callable[[str], None]
+    show: Callable[[str, Trial], None] = lambda word, trial: None
     changed: bool = False
     sinks: Sequence[Sink] = ()
     stopping: bool = False
@@ -106,11 +109,14 @@ class Collection:
         gripper at the first grasp, SaveFailed if a trial could not be saved.
         """
         self._check_settings()
+        self.say(HELP)
         while not self.stopping:
             word = self.following()
             if word is None:
                 break
-            answer = self.ask(f"next: {word}  ({self.counts()[word] + 1} of {self.wanted.each})  [?] ")
+            answer = self.ask(
+                f"next: {word}  ({self.counts()[word] + 1} of {self.wanted.each})  [Enter u r s q ?] "
+            )
             if answer is None or answer == "q":
                 break
             if answer == "":
@@ -152,9 +158,11 @@ class Collection:
             raise SaveFailed(grasp.problem)
         self.numbers.append(grasp.number)
         self.say(self._report(word, grasp))
+        self.show(word, grasp.trial)
+        self.say("  ".join(f"{label} {n}/{self.wanted.each}" for label, n in self.counts().items()))
 
     def _report(self, word: str, grasp: RecordedTrial) -> str:
-        trial, counts = grasp.trial, self.counts()
+        trial = grasp.trial
         counted = trial.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST)
         reason = f": {trial.reason}" if trial.reason else ""
         line = f"trial {grasp.number}, {word}: {trial.outcome.words}{reason}"
@@ -162,8 +170,7 @@ class Collection:
             line += "; it is stored, but does not count"
         if grasp.counts["dropped"]:
             line += f"; it does not count, as the recorder lost {grasp.counts['dropped']} messages"
-        so_far = "  ".join(f"{label} {n}/{self.wanted.each}" for label, n in counts.items())
-        return f"{line}\n  {so_far}"
+        return line
 
     def _undo(self, why: str) -> str | None:
         """Set the last collected trial aside and return its label, or None if there is none."""
