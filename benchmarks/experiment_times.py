@@ -64,7 +64,7 @@ def main() -> None:
         )
         lines = [
             "# Written by benchmarks/experiment_times.py: processor seconds per trial of each experiment.",
-            f'machine = "one core of {processor()}"',
+            f'processor = "{processor()}"',
             f'date = "{datetime.date.today().isoformat()}"',
             "",
             "[seconds_per_trial]",

@@ -47,7 +47,10 @@ def in_terminal(
     program: Sequence[str] = COMMAND,
     **environment: str,
 ) -> Shown:
-    """Run `graspsense ARGUMENTS` with its input, output and errors on a terminal of `width` columns."""
+    """Run `graspsense ARGUMENTS` with its input, output and errors on a terminal of `width` columns.
+
+    `typed` is typed at the first question, which ends in `?] `.
+    """
     master, slave = pty.openpty()
     ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 40, width, 0, 0))
     process = subprocess.Popen(
@@ -59,8 +62,6 @@ def in_terminal(
         start_new_session=True,
     )
     os.close(slave)
-    if typed:
-        os.write(master, typed.encode())
     received = b""
     while select.select([master], [], [], 300)[0]:
         try:
@@ -70,6 +71,9 @@ def in_terminal(
         if not part:
             break
         received += part
+        if typed and received.endswith(b"?] "):
+            os.write(master, typed.encode())
+            typed = ""
     os.close(master)
     return Shown(process.wait(), received.decode())
 

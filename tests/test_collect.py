@@ -59,7 +59,8 @@ def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(col
     assert kept[0][2] == "undone by the operator"
     assert [why for _, _, why in kept].count("repeated by the operator") == 1
     assert Counter(label for _, label, why in kept if why is None) == {"can:full_open": 2, "block": 2}
-    assert "Enter: grasp it" in done.stderr
+    assert done.stderr.startswith("keys: Enter grasps it, u undoes")
+    assert done.stderr.count("keys: ") == 2
     assert "next: block  (1 of 2)" in done.stderr
 
 

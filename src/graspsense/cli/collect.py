@@ -16,7 +16,7 @@ from graspsense.cli.options import (
     settings_of,
 )
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import Style, echo_entry, echo_table, talk
+from graspsense.cli.terminal import Style, echo_entry, talk
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -126,8 +126,8 @@ def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
             {"store": save, "trials": collection.numbers, "counts": counts, "each": each, "complete": done}
         )
         return
-    rows = [(word, f"{n} of {each}") for word, n in counts.items()]
-    echo_table(("LABEL", "TRIALS"), rows)
+    for word, n in counts.items():
+        echo_entry(word, f"{n:>4} of {each}", Style.GOOD if n >= each else None, width=24)
 
 
 def _label_selects_object(settings: Settings, labels: Sequence[str], object_is_named: bool) -> bool:

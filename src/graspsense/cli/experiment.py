@@ -146,7 +146,7 @@ def _list(known: dict[str, object], as_json: bool) -> None:
     ]
     echo_table(("EXPERIMENT", "TIME", "TASKS", "WHAT"), rows)
     echo(
-        f"\nTIME is an estimate for {cores} cores like {measured_on()}.\n"
+        f"\nTIME is for {cores} cores, {measured_on()}.\n"
         "`graspsense experiment NAME --dry-run` says what an experiment consists of; -o seeds=2 makes it shorter."
     )
 
@@ -181,7 +181,7 @@ def _plan(planned: Planned, results: Results, workers: int, as_json: bool) -> No
     echo_entry("grasps" if effort.simulated else "trials", trials)
     if effort.trainings:
         echo_entry("trainings", f"{effort.trainings} models for the rates; controls add to them")
-    estimate = f"about {effort.time_on(workers)} with {workers} processes like {measured_on()}"
+    estimate = f"about {effort.time_on(workers)} with {workers} processes, {measured_on()}"
     echo_entry("time", "no estimate for this kind of data" if effort.seconds is None else estimate)
     echo_entry(
         "results", f"in {results.folder}" + (", where there are some already" if results.any() else "")

@@ -75,9 +75,9 @@ def effort_of(planned: Planned) -> Effort:
 
 
 def measured_on() -> str:
-    """Return the machine on which the processor times were measured, and the date."""
+    """Return what the estimates rest on: the processor on which the times were measured, and the date."""
     found = _measured()
-    return f"{found['machine']}, {found['date']}"
+    return f"estimated from times measured on {found['processor']} on {found['date']}"
 
 
 def duration_in_words(seconds: float) -> str:
