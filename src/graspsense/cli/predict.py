@@ -9,7 +9,7 @@ import click
 
 from graspsense.cli.output import echo_json
 from graspsense.cli.sources import SOURCES, is_csv, source_options, trials_of
-from graspsense.cli.terminal import Style, correct_style, echo_entry, echo_table, prediction_style
+from graspsense.cli.terminal import Style, correct_style, echo, echo_entry, echo_table, prediction_style
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -80,7 +80,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
         )
         return
     _print(predictions, labels)
-    click.echo()
+    echo()
     if rate is not None:
         echo_entry("rate", f"{rate.words}; unknown counts as wrong")
     echo_entry("model", asked.in_a_line)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import echo_table, talk
+from graspsense.cli.terminal import echo, echo_table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -61,7 +61,7 @@ def list_trials(folder: str, label: str | None, aside: bool | None, limit: int, 
         cells = (str(one.id), made, one.label or "", one.instance or "", outcome, one.device)
         rows.append((*cells, "; ".join(state for state in states if state)))
     if not rows:
-        talk(f"no trial of {folder} matches")
+        echo(f"no trial of {folder} matches")
     echo_table(HEADER, rows)
 
 
@@ -134,7 +134,7 @@ def show_history(source: str, as_json: bool) -> None:
         echo_json([one.as_json() for one in found])
         return
     if not found:
-        talk("nothing was changed after recording")
+        echo("nothing was changed after recording")
     echo_table(("TRIAL", "WHEN", "CHANGE", "WHY"), [_row(one) for one in found])
 
 
@@ -165,7 +165,7 @@ def _change(refs: Sequence[str], change: Callable[[Store, Sequence[int]], None],
         echo_json({"store": folder, "changes": [one.as_json() for one in done]})
         return
     for one in done:
-        click.echo(f"trial {one.trial}: {one.words}" + (f" ({one.why})" if one.why else ""))
+        echo(f"trial {one.trial}: {one.words}" + (f" ({one.why})" if one.why else ""), indent=2)
 
 
 def _refuse_contradiction(trial: StoredTrial, label: str) -> None:
