@@ -116,7 +116,7 @@ def test_the_weights_of_the_cells_share_out_the_whole_force(patch):
 
 
 def good():
-    figure = {"value": 1.0, "reason": "because of it"}
+    figure = {"value": 1.0, "origin": "assumed", "reason": "because of it"}
     keys = (
         "width_m",
         "width_spread_m",
@@ -143,11 +143,16 @@ def good():
         (lambda t: t["width_m"].update(value=math.nan), "not a finite number"),
         (lambda t: t["width_m"].update(value=True), "not a finite number"),
         (lambda t: t["width_m"].update(value=0.0), "'width_m' must be > 0"),
-        (lambda t: t["width_m"].pop("reason"), "write { value = NUMBER, reason = TEXT }"),
+        (lambda t: t["width_m"].pop("reason"), "write { value = NUMBER, origin = ORIGIN, reason = TEXT }"),
+        (lambda t: t["width_m"].update(origin="guessed"), "'guessed' is not an origin. Known: measured"),
+        (lambda t: t["width_m"].update(origin="fitted to table_9"), "'fitted to table_9' is not an origin"),
         (lambda t: t.update(patch="round"), "patch"),
         (lambda t: t["terms"][0].update(type="spring"), "no term 'spring'. Known: elastic"),
         (lambda t: t["terms"][0].pop("damping_n_s_m"), "missing damping_n_s_m"),
-        (lambda t: t["terms"][0].update(tau_s={"value": 1.0, "reason": "none"}), "no such key 'tau_s'"),
+        (
+            lambda t: t["terms"][0].update(tau_s={"value": 1.0, "origin": "assumed", "reason": "none"}),
+            "no such key 'tau_s'",
+        ),
     ],
 )
 def test_a_faulty_entry_names_the_object_and_the_key(change, says):

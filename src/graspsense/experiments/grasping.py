@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
@@ -89,6 +90,9 @@ def measures(trace: Trace) -> dict[str, float]:
     closing = trace.phase >= int(Phase.APPROACH)
     values = {"closed_m": float(trace.gap_m[0] - np.nanmin(trace.gap_m)), **_at_contact(trace, closing)}
     held = np.flatnonzero(closing & (trace.phase <= int(Phase.HOLD)))
+    if len(held):
+        felt = 0.5 * (trace.force_left_n + trace.force_right_n)[held]
+        values["measured_peak_force_n"] = float(np.nanmax(felt)) if not np.isnan(felt).all() else math.nan
     images = np.flatnonzero(trace.pad_t_s <= trace.t_s[held[-1]]) if len(held) else held
     if len(images) > 1:
         for name, cells in (("left_counts", trace.pad_left), ("right_counts", trace.pad_right)):

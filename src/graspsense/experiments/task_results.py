@@ -132,6 +132,8 @@ class GraspRow:
     max_effort_n: float | None = None
     left_counts: float | None = None
     right_counts: float | None = None
+    measured_peak_force_n: float | None = None
+    """The greatest mean of the two pad forces that was reported."""
     true_peak_force_n: float = 0.0
     """The peak force in the model, which the pads may miss."""
     broken: bool = False

@@ -1,6 +1,7 @@
 """Labelled trials from a simulated gripper: several objects of each kind, each grasped several times.
 
-Object number i of a kind is the same in all its trials and in all its states (`odwalla:full_open#3`). Its trials differ
+Object number i of a kind is the same in all its trials and in all its states (`odwalla:full_open#3`); with
+`states_per_instance = "one"` every object is used in one state only. Its trials differ
 in its placement, in the friction of the gripper and in the noise of the sensors. All numbers and seeds follow from one
 seed s: object i has the number 1000 s + i, and trial k, counted over all trials, has the seed 1 000 000 s + k.
 """
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import Attribute, evolve, field, frozen
 
@@ -71,6 +72,8 @@ class Group:
     """Grasps of each instance in each state."""
     total: int | None = field(default=None, validator=_check_trials)
     """Grasps in total, in place of `trials`: distributed in turn over the states, then over the instances."""
+    states_per_instance: Literal["all", "one"] = "all"
+    """Whether each instance is grasped in all states, or in one only; the instances are then dealt to the states."""
 
     def with_defaults(self, kinds: Sequence[ObjectKind]) -> Group:
         """Return the group with the default objects among these kinds, if it names none."""
@@ -86,16 +89,31 @@ class Group:
                 "name objects without an instance (#3) here: --instances is the number of instances"
             )
         pairs = list(known.items())
+        n = len(pairs)
+        instances = [self._instances_of(k, pairs) for k in range(n)]
         if self.total is None:
             return [
                 PlannedTrial(label, name, i)
-                for label, name in pairs
-                for i in range(self.instances)
+                for k, (label, name) in enumerate(pairs)
+                for i in instances[k]
                 for _ in range(self.trials)
             ]
-        n = len(pairs)
-        places = sorted((k % n, (k // n) % self.instances) for k in range(self.total))
+        places = sorted(
+            (k % n, instances[k % n][(k // n) % len(instances[k % n])]) for k in range(self.total)
+        )
         return [PlannedTrial(*pairs[k], i) for k, i in places]
+
+    def _instances_of(self, k: int, pairs: Sequence[tuple[str, str]]) -> range:
+        """Return the instances that label number `k` of these is grasped of. Raises ConfigError if there are none."""
+        if self.states_per_instance == "all":
+            return range(self.instances)
+        same_class = [i for i, (label, _) in enumerate(pairs) if class_of(label) == class_of(pairs[k][0])]
+        if len(same_class) > self.instances:
+            raise ConfigError(
+                f"{self.instances} instances cannot be in one of {len(same_class)} states each: give at least "
+                f"{len(same_class)} instances"
+            )
+        return range(same_class.index(k), self.instances, len(same_class))
 
 
 @frozen(kw_only=True)

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from attrs import fields_dict, frozen
+from attrs import evolve, fields_dict, frozen
 
 from graspsense.core.errors import ConfigError, PluginUnavailable
 from graspsense.core.labelled import Labelled
@@ -126,9 +126,12 @@ def groups_of(source: TrialSource) -> tuple[Group, ...]:
     """Return the groups of simulated trials that a source describes. Raises ConfigError."""
     keys: Mapping[str, Any] = {name: getattr(source, name) for name in fields_dict(Group)}
     own = Group(**keys)
-    if source.groups and own != Group():
+    if source.groups and evolve(own, states_per_instance="all") != Group():
         raise ConfigError("trials are described both by keys of [data] and by [[data.groups]]: leave one out")
-    return source.groups or (own,)
+    groups = source.groups or (own,)
+    if source.states_per_instance == "all":
+        return groups
+    return tuple(evolve(group, states_per_instance=source.states_per_instance) for group in groups)
 
 
 def _csv(source: TrialSource) -> Labelled:

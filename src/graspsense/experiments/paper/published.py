@@ -14,8 +14,6 @@ from graspsense.core.strict import structured
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import wilson
 
-Basis = Literal["fitted", "predicted"]
-
 
 @frozen(kw_only=True)
 class PublishedRate:
@@ -25,7 +23,8 @@ class PublishedRate:
     where: str
     what: str
     printed: float
-    basis: Basis
+    about: tuple[str, ...]
+    """The results that it shares trials with; see `basis`."""
     experiment: str
     target: str
     at: Mapping[str, Any] = field(factory=dict)
@@ -33,6 +32,8 @@ class PublishedRate:
     class_: str = ""
     correct: int | None = None
     n: int | None = None
+    repeats: str = ""
+    """The id of a rate that ours is the same figure as."""
     note: str = ""
 
     @property
@@ -54,14 +55,14 @@ class PublishedMatrix:
     where: str
     labels: tuple[str, ...]
     answered_by_true: tuple[tuple[int, ...], ...]
-    true_class_is: Literal["row", "column"]
+    true_class_is: Literal["row", "column", "not stated"]
     note: str = ""
 
     @property
     def confusion(self) -> Confusion:
-        """The matrix with true labels in rows."""
+        """The matrix with true labels in rows; as printed where these are not stated."""
         printed = self.answered_by_true
-        counts = printed if self.true_class_is == "row" else tuple(zip(*printed, strict=True))
+        counts = printed if self.true_class_is != "column" else tuple(zip(*printed, strict=True))
         return Confusion(self.labels, tuple(tuple(row) for row in counts))
 
 
@@ -82,6 +83,8 @@ class Published:
     authors_tree: Lines
     inconsistencies: Lines
     fitted: FittedParameters
+    left_out: Lines
+    """What is in the paper and not compared."""
 
     def matrix(self, id_: str) -> PublishedMatrix:
         """Return a matrix by its id."""

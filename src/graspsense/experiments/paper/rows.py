@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
 from attrs import frozen
 
 from graspsense.evaluation.intervals import wilson
 from graspsense.evaluation.over_seeds import OverSeeds
-from graspsense.experiments.experiment import ExperimentCase
 from graspsense.experiments.findings import percent, span
+from graspsense.experiments.paper.basis import Basis, basis
+from graspsense.experiments.paper.cases import PROTOCOLS, Protocol, condition_result, of_protocol
 from graspsense.experiments.paper.published import Published, PublishedRate
 from graspsense.experiments.summary import ConditionResult, Summary
 
@@ -21,6 +22,9 @@ class RateComparison:
 
     published: PublishedRate
     ours: OverSeeds
+    protocol: Protocol
+    """Whether each of our bottles is used in all states or in one."""
+    basis: Basis
 
     @property
     def within(self) -> bool:
@@ -43,7 +47,8 @@ class RateComparison:
         return (
             one.where,
             one.what,
-            one.basis,
+            self.basis,
+            PROTOCOLS[self.protocol],
             percent(one.printed),
             f"{one.correct}/{one.n} = {percent(one.rate)}, {span(its)}" if its else "counts not given",
             percent(self.ours.mean),
@@ -60,7 +65,8 @@ class RateComparison:
             "id": one.id,
             "where": one.where,
             "what": one.what,
-            "basis": one.basis,
+            "basis": self.basis,
+            "each_bottle_in": PROTOCOLS[self.protocol],
             "printed": one.printed,
             "published": one.rate,
             "published_interval": None if one.interval is None else list(one.interval),
@@ -78,6 +84,7 @@ HEADER = (
     "where",
     "what",
     "basis",
+    "each bottle in",
     "printed",
     "printed counts, 95 %",
     "our mean",
@@ -89,47 +96,24 @@ HEADER = (
 
 
 def rows(summary: Summary, paper: Published) -> list[RateComparison]:
-    """Return a comparison for each published rate that there are results for."""
+    """Return a comparison for each published rate and protocol that there are results for."""
     found = []
     for one in paper.rates:
-        condition = condition_result(summary, one.experiment, one.target, one.at)
-        if condition is None:
-            continue
-        rates = of_class(condition, one.class_) if one.class_ else condition.rate
-        if rates is not None:
-            found.append(RateComparison(published=one, ours=rates))
+        for protocol in PROTOCOLS:
+            condition = condition_result(of_protocol(summary, protocol), one.experiment, one.target, one.at)
+            if condition is None or condition.case.data.states_per_instance != protocol:
+                continue
+            rates = of_class(condition, one.class_) if one.class_ else condition.rate
+            if rates is not None:
+                found.append(
+                    RateComparison(
+                        published=one,
+                        ours=rates,
+                        protocol=protocol,
+                        basis=basis(summary, one.experiment, *one.about),
+                    )
+                )
     return found
-
-
-def condition_result(
-    summary: Summary,
-    experiment: str,
-    target: str,
-    at: Mapping[str, Any] | None = None,
-    classifier: str = "c45",
-) -> ConditionResult | None:
-    """Return the condition of a case of an experiment, which may be part of another experiment; None if there is none.
-
-    `at` holds the swept values of the case, as `ExperimentCase.at`.
-    """
-    for condition in summary.conditions:
-        if (
-            is_of(condition.case, summary, experiment, at)
-            and condition.classifier == classifier
-            and condition.target == target
-        ):
-            return condition
-    return None
-
-
-def is_of(
-    case: ExperimentCase, summary: Summary, experiment: str, at: Mapping[str, Any] | None = None
-) -> bool:
-    """Return whether a case belongs to this experiment and has these swept values."""
-    wanted = at or {}
-    return (case.part or summary.planned.name) == experiment and all(
-        case.at.get(key) == value for key, value in wanted.items()
-    )
 
 
 def of_class(condition: ConditionResult, name: str) -> OverSeeds | None:
@@ -145,31 +129,30 @@ def of_class(condition: ConditionResult, name: str) -> OverSeeds | None:
     return OverSeeds(tuple(rates), n) if rates else None
 
 
-def people_beside_robot(paper: Published, robot: ConditionResult) -> list[tuple[str, ...]]:
-    """Return one row per state: people (Table VI), the robot of the paper (Table V), and ours at 23 N."""
+def people_beside_robot(paper: Published, robots: Sequence[ConditionResult]) -> list[tuple[str, ...]]:
+    """Return one row per state: people (Table VI), the robot of the paper (Table V), and ours at 23 N by protocol."""
     people, theirs = paper.matrix("table_6").confusion, paper.matrix("table_5").confusion
     found: list[tuple[str, ...]] = []
     for i, state in enumerate(people.labels):
         right, of = people.counts[i][i], sum(people.counts[i])
         k = theirs.labels.index(state)
         right2, of2 = theirs.counts[k][k], sum(theirs.counts[k])
-        rates = _of_state(robot, state)
+        ours = [_of_state(robot, state) for robot in robots]
         found.append(
             (
                 state.replace("_", " "),
                 f"{right}/{of} = {percent(right / of)} ({span(wilson(right, of))})",
                 f"{right2}/{of2} = {percent(right2 / of2)} ({span(wilson(right2, of2))})",
-                f"{percent(rates.mean)} ({span(rates.interval)})",
+                *(f"{percent(rates.mean)} ({span(rates.interval)})" for rates in ours),
             )
         )
     right, right2 = people.correct, theirs.correct
-    ours = robot.rate
     found.append(
         (
             "all",
             f"{right}/{people.n} = {percent(right / people.n)} ({span(wilson(right, people.n))})",
             f"{right2}/{theirs.n} = {percent(right2 / theirs.n)} ({span(wilson(right2, theirs.n))})",
-            f"{percent(ours.mean)} ({span(ours.interval)})",
+            *(f"{percent(robot.rate.mean)} ({span(robot.rate.interval)})" for robot in robots),
         )
     )
     return found

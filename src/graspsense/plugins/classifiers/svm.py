@@ -1,9 +1,9 @@
-"""Support vector machine with a radial kernel."""
+"""Support vector machine with a radial or a linear kernel."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import frozen
 
@@ -17,13 +17,14 @@ if TYPE_CHECKING:
 
 @frozen(kw_only=True)
 class SvmConfig(KeptConfig):
-    """Settings of the machine; the width of the kernel is `scale` of scikit-learn."""
+    """Settings of the machine; the width of the radial kernel is `scale` of scikit-learn."""
 
     c: float = setting(
         default=10.0,
         above=0.0,
         meaning="Penalty of a training trial on the wrong side; a larger one fits the data more closely.",
     )
+    kernel: Literal["rbf", "linear"] = setting(default="rbf", meaning="Radial or linear kernel.")
 
 
 class Svm(ScikitClassifier[SvmConfig]):
@@ -33,7 +34,9 @@ class Svm(ScikitClassifier[SvmConfig]):
         """Return the machine."""
         from sklearn.svm import SVC
 
-        return SVC(C=self.config.c, decision_function_shape="ovr", random_state=seed)
+        return SVC(
+            C=self.config.c, kernel=self.config.kernel, decision_function_shape="ovr", random_state=seed
+        )
 
     def shares(self, fitted: FittedEstimator, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the softmax of the decision values."""

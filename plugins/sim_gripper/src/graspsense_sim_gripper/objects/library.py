@@ -1,6 +1,6 @@
 """The objects known by name: those of the catalogue, the scenes that are shipped, and scene files of the user's.
 
-In the catalogue every figure has its reason beside it; a scene file needs none.
+In the catalogue every figure has its origin and reason beside it; a scene file needs neither.
 """
 
 from __future__ import annotations
@@ -27,6 +27,11 @@ from graspsense_sim_gripper.objects.spec import (
 
 CONTAINERS: Final = ("odwalla", "naked", "can", "water")
 """The containers of Chitta, Piccoli and Sturm (ICRA 2010), section III.E: trials are simulated with them by default."""
+ORIGINS: Final = ("measured", "datasheet", "published elsewhere", "assumed")
+"""The origins of a figure of the catalogue besides a fit."""
+FITTED_TO: Final = "fitted to "
+FITTED_RESULTS: Final = frozenset(("table_2", "table_3", "authors_tree", "section_3f", "fig_6_contact"))
+"""The published results that figures may be fitted to."""
 
 
 @cache
@@ -59,11 +64,14 @@ def shipped_scenes() -> Mapping[str, str]:
 def object_kinds() -> tuple[ObjectKind, ...]:
     """Return the kinds of the catalogue with their states, in its order, and then the shipped scenes."""
     states: dict[str, list[str]] = {}
-    for full_name in catalogue():
+    fitted_to: dict[str, frozenset[str]] = {}
+    for full_name, spec in catalogue().items():
         name, colon, state = full_name.partition(":")
         states.setdefault(name, []).extend([state] if colon else [])
+        fitted_to[name] = fitted_to.get(name, frozenset()).union(spec.fitted_to)
     kinds = [
-        ObjectKind(name=name, states=tuple(of), default=name in CONTAINERS) for name, of in states.items()
+        ObjectKind(name=name, states=tuple(of), default=name in CONTAINERS, fitted_to=fitted_to[name])
+        for name, of in states.items()
     ]
     return (*kinds, *(ObjectKind(name=name) for name in shipped_scenes() if name not in states))
 
@@ -131,14 +139,18 @@ def _read_scene(path: Path) -> ObjectSpec:
 
 
 def parse_entry(name: str, table: TomlTable) -> ObjectSpec:
-    """Return an entry of the catalogue, in which every figure has its reason and no key is left out.
+    """Return an entry of the catalogue, in which every figure has its origin and reason, and no key is left out.
 
     Raises ConfigError with the object's name and the key.
     """
     reasons: dict[str, str] = {}
+    fitted_to: set[str] = set()
 
     def figure(where: str, entry: TomlValue) -> float:
-        return _figure(where, entry, reasons)
+        value = _figure(where, entry)
+        reasons[where] = entry["reason"]
+        fitted_to.update(_fitted_to(where, entry["origin"]))
+        return value
 
     values: dict[str, TomlValue] = {"name": name}
     for key, entry in table.items():
@@ -146,7 +158,7 @@ def parse_entry(name: str, table: TomlTable) -> ObjectSpec:
             values[key] = entry if key in ("summary", "patch") else figure(f"{name}.{key}", entry)
     fields = fields_dict(ObjectSpec)
     unknown = values.keys() - fields.keys()
-    missing = fields.keys() - values.keys() - {"terms", "reasons", "offset_m", "held", "file"}
+    missing = fields.keys() - values.keys() - {"terms", "reasons", "fitted_to", "offset_m", "held", "file"}
     if unknown or missing:
         raise ConfigError(f"object {name!r}: unknown {sorted(unknown)}, missing {sorted(missing)}")
     problems: list[str] = []
@@ -159,18 +171,34 @@ def parse_entry(name: str, table: TomlTable) -> ObjectSpec:
     if problems:
         raise ConfigError("\n".join(problems))
     try:
-        return spec_with_sorted_terms({**values, "reasons": reasons}, terms)
+        return spec_with_sorted_terms(
+            {**values, "reasons": reasons, "fitted_to": tuple(sorted(fitted_to))}, terms
+        )
     except ValueError as error:
         raise ConfigError(f"object {name!r}: {error}") from error
 
 
-def _figure(where: str, entry: TomlValue, reasons: dict[str, str]) -> float:
-    if not isinstance(entry, Mapping) or set(entry) != {"value", "reason"} or not entry["reason"]:
-        raise ConfigError(f"{where}: write {{ value = NUMBER, reason = TEXT }}, not {entry!r}")
+def _figure(where: str, entry: TomlValue) -> float:
+    if not isinstance(entry, Mapping) or set(entry) != {"value", "origin", "reason"} or not entry["reason"]:
+        raise ConfigError(
+            f"{where}: write {{ value = NUMBER, origin = ORIGIN, reason = TEXT }}, not {entry!r}"
+        )
     value = entry["value"]
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ConfigError(f"{where}: {value!r} is not a finite number")
     if value < 0.0:
         raise ConfigError(f"{where}: {value!r} is negative")
-    reasons[where] = entry["reason"]
     return float(value)
+
+
+def _fitted_to(where: str, origin: TomlValue) -> list[str]:
+    """Return the published results that a figure of this origin was fitted to. Raises ConfigError."""
+    if origin in ORIGINS:
+        return []
+    results = str(origin).removeprefix(FITTED_TO).split(", ")
+    if not str(origin).startswith(FITTED_TO) or not set(results) <= FITTED_RESULTS:
+        raise ConfigError(
+            f"{where}: {origin!r} is not an origin. Known: {', '.join(ORIGINS)}, or {FITTED_TO}one or several of "
+            f"{', '.join(sorted(FITTED_RESULTS))}"
+        )
+    return results

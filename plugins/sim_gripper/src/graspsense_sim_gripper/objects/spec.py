@@ -68,6 +68,8 @@ class ObjectSpec:
     terms: tuple[TermEntry, ...] = ()
     """Kind and parameters of each term, in the canonical order."""
     reasons: Mapping[str, str] = field(factory=dict)
+    fitted_to: tuple[str, ...] = ()
+    """The published results that figures of it were fitted to, sorted."""
     file: str = ""
     """The file it was read from; empty for the catalogue."""
 
@@ -122,7 +124,7 @@ def parse_scene(text: str, name: str, where: str) -> ObjectSpec:
 
 def _scene_values(table: TomlTable, problems: list[str]) -> dict[str, TomlValue]:
     """Return the values of a scene's own keys, all but its terms."""
-    known = fields_dict(ObjectSpec).keys() - {"name", "reasons", "file"}
+    known = fields_dict(ObjectSpec).keys() - {"name", "reasons", "fitted_to", "file"}
     values: dict[str, TomlValue] = {}
     for key, entry in table.items():
         if key not in known:

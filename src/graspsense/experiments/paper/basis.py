@@ -1,0 +1,39 @@
+"""What a comparison with the paper rests on: derived from the origins of the figures of the simulated objects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final, Literal
+
+from graspsense.experiments.paper.cases import is_of
+from graspsense.experiments.summary import Summary
+from graspsense.sources.simulated import simulated_objects
+from graspsense.sources.trial_source import SIMULATED, groups_of
+
+Basis = Literal["predicted", "fitted", "built in"]
+BASES: Final[tuple[Basis, ...]] = ("predicted", "fitted", "built in")
+
+
+def basis(summary: Summary, experiment: str, *about: str) -> Basis:
+    """Return `fitted` if a figure of an object of this experiment was fitted to one of these results.
+
+    Otherwise it is `predicted`. What the model cannot but give is `built in`; that is stated where it is claimed.
+    """
+    fitted_to = {result for results in _fitted_to(summary, experiment) for result in results}
+    return "fitted" if fitted_to.intersection(about) else "predicted"
+
+
+def _fitted_to(summary: Summary, experiment: str) -> Iterator[frozenset[str]]:
+    """Yield the results that each kind of object of an experiment was fitted to."""
+    for case in summary.planned.cases:
+        if not is_of(case, summary, experiment):
+            continue
+        kinds = {kind.name: kind for kind in simulated_objects(case.settings)}
+        for source in (case.data, case.test):
+            if source is None or source.kind != SIMULATED:
+                continue
+            for group in groups_of(source):
+                for trial in group.with_defaults(tuple(kinds.values())).planned(tuple(kinds.values())):
+                    kind = kinds.get(trial.object_name.partition(":")[0])
+                    if kind is not None:
+                        yield kind.fitted_to
