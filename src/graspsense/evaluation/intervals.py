@@ -7,7 +7,7 @@ Trials of the same object (*instance*) are not independent. A rate on several in
 effective number of trials, n divided by the design effect, and the quantile of Student's t with one degree of freedom
 less than there are instances (C. Franco, R. J. A. Little, T. A. Louis and E. V. Slud, J. Surv. Stat. Methodol. 7 (2019)
 334). The design effect is the variance of the rate between instances over that of independent trials, at least 1. Of
-the intervals that `benchmarks/interval_coverage.py` compares it is the only one that covers about 95 % from six instances on.
+the intervals that `benchmarks/interval_coverage.py` compares, it alone covers about 95 % from six instances on.
 """
 
 from __future__ import annotations
