@@ -22,8 +22,9 @@ DEFAULT_CLASSIFIER: Final = "c45"
 
 SOURCES: Final = """\b
     SOURCE is one of
-      FILE.csv     a table of features, one line per trial; --label names its column
-      NAME:FOLDER  a data set that a plugin reads, such as icub:FOLDER
+      FILE.csv     a feature table, one line per trial;
+                   --label names the column of the label
+      NAME:FOLDER  a data set of a plugin, such as icub:FOLDER
       simulated    grasps of the simulated gripper
     """
 
