@@ -159,6 +159,9 @@ class SensorBackend(ABC, Generic[ConfigT]):
     def read(self, timeout_s: float) -> Reading | None:
         """Return the next frame with the last cell image, or None if none came within `timeout_s`.
 
+        With a device clock it waits for the next frame. A gripper that has to be asked is asked at multiples of the
+        period of `rate_hz`, so that the duration of an exchange does not lower the rate.
+
         Raises DeviceLost if the gripper no longer responds, RecordingEnded after the last recorded frame.
         """
 
