@@ -410,3 +410,113 @@ def test_help_imports_nothing_heavy():
     code = "import sys; from graspsense.cli.experiment import experiment; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert not {"numpy", "dask", "distributed", "matplotlib"} & set(loaded.split())
+
+
+COMPARED = """
+title = "A sweep"
+question = "Does it matter?"
+seeds = {seeds}
+
+[controller]
+probing_force_n = {force}
+
+[data]
+objects = ["can:full_open", "can:empty_open"]
+instances = 2
+trials = {trials}
+
+[judge]
+folds = 2
+controls = false
+grasps = 0
+"""
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory):
+    """Three experiments: the second has another setting than the first, the third other trials and one more seed."""
+    folder = tmp_path_factory.mktemp("compared")
+    for name, force, trials, seeds in (("weak", 14.0, 2, 2), ("strong", 20.0, 2, 2), ("more", 14.0, 3, 3)):
+        file = folder / f"{name}.toml"
+        file.write_text(COMPARED.format(force=force, trials=trials, seeds=seeds))
+        run_experiment(read_experiment(str(file)), Results(folder / name), Serial, command=f"run {name}")
+    return folder
+
+
+def test_experiments_are_compared_on_one_page(compared, run, tmp_path):
+    page = tmp_path / "page.html"
+    folders = [compared / name for name in ("weak", "strong", "more")]
+    code, out, _ = run("experiment", "compare", *folders, "--out", page)
+    _, told, _ = run("experiment", "compare", *folders, "--out", page, "--json")
+    found = json.loads(told)
+
+    assert code == 0
+    settings = {one["key"]: [one[name] for name in ("weak", "strong", "more")] for one in found["settings"]}
+    assert settings == {
+        "controller.probing_force_n": ["14", "20", "14"],
+        "data.trials": ["2", "2", "3"],
+        "experiment.seeds": ["0, 1", "0, 1", "0, 1, 2"],
+    }
+    paired, unpaired = found["differences"]
+    rates = {name: found["experiments"][name]["conditions"][0]["rate"] for name in ("weak", "strong", "more")}
+    assert paired["difference"] == pytest.approx(rates["strong"] - rates["weak"])
+    assert unpaired["difference"] == pytest.approx(rates["more"] - rates["weak"])
+    assert paired["how"] == "paired over 2 common seeds, corrected for 2 comparisons"
+    assert unpaired["how"] == "unpaired: the trials differ, corrected for 2 comparisons"
+    for one in found["differences"]:
+        assert one["interval"][0] <= one["difference"] <= one["interval"][1]
+    text = page.read_text()
+    for part in (found["headline"], "probing_force_n", "Settings that differ", "unpaired: the trials differ"):
+        assert part in text, part
+        assert part == "Settings that differ" or part in out, part
+    assert "closing_speed_m_s" not in text
+
+
+def test_each_case_is_compared_with_that_of_the_same_name(file, run, tmp_path):
+    run("experiment", file, "--out", tmp_path / "a", "--executor", "serial")
+    run("experiment", file, "--out", tmp_path / "b", "--executor", "serial", "-o", "seeds=1")
+    _, told, _ = run(
+        "experiment", "compare", tmp_path / "a", tmp_path / "b", "--out", tmp_path / "c.html", "--json"
+    )
+    found = json.loads(told)
+
+    assert [one["case"] for one in found["differences"]] == [
+        "folds 2, c45",
+        "folds 2, near",
+        "folds 4, c45",
+        "folds 4, near",
+    ]
+    for one in found["differences"]:
+        assert one["how"].startswith("unpaired: recorded trials are not paired")
+        assert one["verdict"] == "not shown to differ"
+
+
+def test_what_cannot_be_compared_is_refused_in_one_line(compared, run, tmp_path):
+    weak, strong, page = compared / "weak", compared / "strong", tmp_path / "c.html"
+    old, changed = tmp_path / "old", tmp_path / "changed"
+    for copy in (old, changed):
+        subprocess.run(["cp", "-r", strong, copy], check=True)
+    text = (old / "experiment.toml").read_text()
+    (old / "experiment.toml").write_text(text.replace("[judge]", "[judge]\nno_such_key = 1"))
+    (changed / "experiment.toml").write_text(text.replace("trials = 2", "trials = 1"))
+    for arguments, reason in (
+        ([weak], "give at least two experiments to compare"),
+        (
+            [weak, strong, compared / "weak" / "experiment.toml"],
+            "are the same experiment: name different ones",
+        ),
+        ([weak, tmp_path], "is not an experiment: there is no experiment.toml"),
+        ([weak, tmp_path / "none"], "there is no "),
+        ([weak, old], "no_such_key"),
+        ([weak, changed], "its results do not belong to its settings here. Run it again: run strong"),
+    ):
+        code, _, err = run("experiment", "compare", *arguments, "--out", page)
+        assert code == 2, arguments
+        assert reason in err
+        assert "Traceback" not in err
+        assert len(err.strip().splitlines()) == 1, err
+        assert not page.exists()
+
+
+def test_the_page_of_an_experiment_keeps_its_name_when_it_is_written_again(compared):
+    assert Results(compared / "weak").experiment().name == "weak"

@@ -6,7 +6,7 @@ import os
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -27,7 +27,21 @@ EXIT_INCOMPLETE = 1
 EXIT_INTERRUPTED = 130
 
 
-@click.command(short_help="Run or resume an experiment from a file.")
+class ExperimentCommand(click.Command):
+    """The command `experiment`, and as `experiment compare` the command that compares experiments."""
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
+    ) -> click.Context:
+        """Return the context of this command, or of the comparison if that is asked for."""
+        if args[:1] == ["compare"]:
+            from graspsense.cli.experiment_compare import compare
+
+            return compare.make_context(f"{info_name} compare", args[1:], parent, **extra)
+        return super().make_context(info_name, args, parent, **extra)
+
+
+@click.command(cls=ExperimentCommand, short_help="Run or resume an experiment from a file.")
 @click.argument("experiment", required=False, metavar="NAME|FILE")
 @click.option("--out", metavar="DIR", help="Folder for the results.  [default: NAME]")
 @click.option("--resume", is_flag=True, help="Run only the tasks that have no result in --out yet.")
@@ -62,6 +76,8 @@ def experiment(
 
     Each finished task is stored immediately. After Ctrl-C, a crash or a lost machine, --resume runs only the rest.
     Without NAME, the available experiments are listed. docs/experiments.md describes the file.
+
+    `graspsense experiment compare A B ...` compares the results of several experiments.
     """
     from graspsense.experiments.experiment import read_experiment, shipped
 

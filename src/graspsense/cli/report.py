@@ -51,12 +51,10 @@ def report(
 
     path = Path(out or folder) / NAME
     if (Path(folder) / EXPERIMENT).is_file():
-        from graspsense.experiments.experiment import read_experiment
         from graspsense.experiments.summary import summarise
 
         results = Results(Path(folder))
-        planned = read_experiment(str(results.folder / EXPERIMENT), force=True)
-        page = experiment_page(summarise(planned, results), results)
+        page = experiment_page(summarise(results.experiment(), results), results)
     else:
         with ProgressLine() as progress:
             page = store_page(

@@ -20,12 +20,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
-from attrs import frozen
+from attrs import evolve, frozen
 
 from graspsense.core.config import to_toml, toml_key, toml_value
 from graspsense.core.errors import ConfigError
 from graspsense.core.strict import plain
-from graspsense.experiments.experiment import PipelineOf, Planned
+from graspsense.experiments.experiment import PipelineOf, Planned, read_experiment
 from graspsense.experiments.task import TaskResult
 from graspsense.experiments.versions import versions
 from graspsense.recording.atomic_file import SaveFailed, write_or_replace
@@ -97,6 +97,11 @@ class Results:
         except (OSError, ValueError):
             return {}
         return found if isinstance(found, dict) else {}
+
+    def experiment(self) -> Planned:
+        """Return the experiment of the folder, under the name that it was run by. Raises ConfigError."""
+        planned = read_experiment(str(self.folder / EXPERIMENT), force=True)
+        return evolve(planned, name=str(self.provenance().get("experiment", planned.name)))
 
     @contextmanager
     def alone(self) -> Iterator[None]:

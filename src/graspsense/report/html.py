@@ -125,7 +125,7 @@ def table(
         "<tr>"
         + f'<th scope="row">{escape(row[0])}</th>'
         + "".join(
-            f"<td{kinds[k]}>{verdict(one) if k in verdicts else escape(one)}</td>"
+            f"<td{kinds[k]}>{marked(one) if k in verdicts else escape(one)}</td>"
             for k, one in enumerate(row[1:], start=1)
         )
         + "</tr>"
@@ -137,16 +137,23 @@ def table(
     )
 
 
-VERDICTS: Final = {"holds": True, "does not hold": False, "yes": True, "no": False}
-"""Words that say whether something holds."""
+VERDICTS: Final = {
+    "holds": ("✓", "good"),
+    "yes": ("✓", "good"),
+    "higher": ("▲", "good"),
+    "does not hold": ("✗", "bad"),
+    "no": ("✗", "bad"),
+    "lower": ("▼", "bad"),
+}
+"""Words that say whether something holds or is better, each with its mark and its kind of colour."""
 
 
-def verdict(words: str) -> str:
+def marked(words: str) -> str:
     """Return words that say whether something holds, with a mark and a colour; other words as they are."""
-    holds = VERDICTS.get(words)
-    if holds is None:
+    known = VERDICTS.get(words)
+    if known is None:
         return escape(words)
-    mark, kind = ("✓", "good") if holds else ("✗", "bad")
+    mark, kind = known
     return f'<span class="{kind}">{mark} {escape(words)}</span>'
 
 

@@ -1,0 +1,64 @@
+"""`graspsense experiment compare`: several experiments on one page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from graspsense.cli.output import echo_json, file_to_write
+from graspsense.cli.terminal import Style, echo, echo_table
+
+DEFAULT_PAGE = "comparison.html"
+
+
+@click.command(short_help="Compare the results of several experiments.")
+@click.argument("folders", metavar="A B ...", nargs=-1)
+@click.option(
+    "--out", metavar="FILE", default=DEFAULT_PAGE, show_default=True, callback=file_to_write, help="The page."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the comparison as JSON.")
+def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:
+    """Compare experiments: their settings, their rates, and the differences from the first one.
+
+    A, B, ... are folders that `graspsense experiment` wrote. The differences are paired by seed where both experiments
+    simulate the same trials with the same seeds.
+    """
+    from graspsense.experiments.comparison import compare_experiments
+    from graspsense.experiments.comparison_page import (
+        DIFFERENCE_HEADER,
+        RATE_HEADER,
+        comparison_page,
+        difference_rows,
+        failure_lines,
+        rate_rows,
+        settings_rows,
+    )
+    from graspsense.report.write import write_html
+
+    comparison = compare_experiments(folders)
+    write_html(Path(out), comparison_page(comparison))
+    if as_json:
+        echo_json({**comparison.as_json(), "page": out})
+        return
+    echo(comparison.headline, Style.RESULT)
+    echo()
+    for line in failure_lines(comparison):
+        echo(f"WARNING     {line}", Style.CAUTION, indent=12)
+    header, rows = settings_rows(comparison)
+    for title, columns, cells in (
+        ("What differs", header[:-1], [row[:-1] for row in rows]),
+        ("Recognition rates", RATE_HEADER, rate_rows(comparison)),
+        (
+            f"Differences from {comparison.experiments[0].name}",
+            DIFFERENCE_HEADER,
+            difference_rows(comparison),
+        ),
+    ):
+        echo(title, Style.HEADING)
+        if cells:
+            echo_table(tuple(name.upper() for name in columns), cells)
+        else:
+            echo("nothing")
+        echo()
+    echo(f"page        {out}", indent=12)

@@ -1,0 +1,344 @@
+"""Several experiments compared: the settings in which they differ, and the differences of their rates."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Any, Final
+
+from attrs import frozen
+
+from graspsense import __version__
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.strict import plain
+from graspsense.evaluation.intervals import Difference
+from graspsense.experiments.answer import in_hundred
+from graspsense.experiments.experiment import PIPELINE_TABLES, shown
+from graspsense.experiments.results import EXPERIMENT, RESULTS, Results
+from graspsense.experiments.summary import ConditionResult, Summary, summarise
+from graspsense.report.wording import TARGETS
+
+if TYPE_CHECKING:
+    from graspsense.experiments.experiment import ExperimentCase
+
+ABSENT: Final = "not set"
+NO_CASE: Final = "all trials"
+"""Name of a condition whose experiment has a single case and a single classifier."""
+
+
+@frozen(kw_only=True, eq=False)
+class FinishedExperiment:
+    """The results of one experiment: the name that tells it from the others, its folder and its summary."""
+
+    name: str
+    results: Results
+    summary: Summary
+
+
+@frozen(kw_only=True)
+class SettingDifference:
+    """A key with its value in each experiment; several values of one experiment are those of its cases."""
+
+    key: str
+    meaning: str
+    values: tuple[str, ...]
+
+
+@frozen(kw_only=True, eq=False)
+class ConditionDifference:
+    """The rate of a condition of one experiment minus that of the first; `how` says what the interval rests on."""
+
+    first: ConditionResult
+    other: ConditionResult
+    other_name: str
+    """The name of the experiment of `other`."""
+    difference: Difference
+    how: str
+
+    @property
+    def verdict(self) -> str:
+        """Whether the rate is shown to be higher or lower, in words."""
+        interval = self.difference.interval
+        if interval is None or interval[0] <= 0.0 <= interval[1]:
+            return "not shown to differ"
+        return "higher" if interval[0] > 0.0 else "lower"
+
+
+@frozen(kw_only=True, eq=False)
+class ExperimentComparison:
+    """Several experiments, the settings in which they differ, and the differences from the first of them."""
+
+    experiments: tuple[FinishedExperiment, ...]
+    settings: tuple[SettingDifference, ...]
+    differences: tuple[ConditionDifference, ...]
+
+    @property
+    def headline(self) -> str:
+        """The result as a person would say it, from the first difference."""
+        if not self.differences:
+            return f"{self.names} have no case in common"
+        one = self.differences[0]
+        first, recognises = self.experiments[0].name, TARGETS[one.first.recognised]
+        mine, theirs = in_hundred(one.first.rate.mean), in_hundred(one.other.rate.mean)
+        if one.verdict == "not shown to differ":
+            return (
+                f"{one.other_name} is not shown to recognise {recognises} better or worse than {first}: "
+                f"{theirs} grasps against {mine}"
+            )
+        return (
+            f"{one.other_name} recognises {recognises} {'more' if one.verdict == 'higher' else 'less'} often than "
+            f"{first}: {theirs} grasps against {mine}"
+        )
+
+    @property
+    def names(self) -> str:
+        """The names of the experiments, in words."""
+        *others, last = (one.name for one in self.experiments)
+        return f"{', '.join(others)} and {last}"
+
+    @property
+    def answer(self) -> str:
+        """The differences and the number of settings that differ, in a few sentences."""
+        told = [
+            f"{condition_name(one.other)}, {TARGETS[one.other.recognised]}: {one.other_name} minus "
+            f"{self.experiments[0].name} is {one.difference.words}, {one.how}."
+            for one in self.differences[:4]
+        ]
+        more = len(self.differences) - len(told)
+        if more > 0:
+            told.append(f"The table has {more} more.")
+        count = len(self.settings)
+        differ = f"{count} setting{'' if count == 1 else 's'} differ{'s' if count == 1 else ''}"
+        told.append(f"{differ if count else 'No setting differs'}.")
+        return " ".join(told)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return all of it as JSON values."""
+        return {
+            "headline": self.headline,
+            "answer": self.answer,
+            "settings": [
+                {
+                    "key": one.key,
+                    **dict(zip((e.name for e in self.experiments), one.values, strict=True)),
+                }
+                for one in self.settings
+            ],
+            "experiments": {one.name: one.summary.as_json() for one in self.experiments},
+            "differences": [
+                {
+                    "experiment": one.other_name,
+                    "minus": self.experiments[0].name,
+                    "case": one.other.name,
+                    "target": one.other.target,
+                    "difference": one.difference.value,
+                    "interval": None if one.difference.interval is None else list(one.difference.interval),
+                    "how": one.how,
+                    "verdict": one.verdict,
+                }
+                for one in self.differences
+            ],
+        }
+
+
+def condition_name(condition: ConditionResult) -> str:
+    """Return the name of a condition in a table."""
+    return condition.name or NO_CASE
+
+
+def compare_experiments(paths: Sequence[str]) -> ExperimentComparison:
+    """Read the experiments in these folders, and compare each with the first.
+
+    A path is the folder that `graspsense experiment` wrote, or a file in it. Raises ConfigError if there are fewer than
+    two, if one is given twice, is no experiment, is of another version, or has no recognition rates.
+    """
+    folders = [_folder(path) for path in paths]
+    if len(folders) < 2:
+        raise ConfigError("give at least two experiments to compare: graspsense experiment compare A B")
+    seen: dict[Path, str] = {}
+    for path, folder in zip(paths, folders, strict=True):
+        earlier = seen.setdefault(folder.resolve(), path)
+        if earlier is not path:
+            raise ConfigError(f"{earlier} and {path} are the same experiment: name different ones")
+    short = [folder.resolve().name for folder in folders]
+    names = short if len(set(short)) == len(short) else [str(folder) for folder in folders]
+    experiments = tuple(_read(name, folder) for name, folder in zip(names, folders, strict=True))
+    return ExperimentComparison(
+        experiments=experiments,
+        settings=tuple(_setting_differences(experiments)),
+        differences=tuple(_differences(experiments)),
+    )
+
+
+def _folder(path: str) -> Path:
+    """Return the folder of an experiment."""
+    given = Path(path).expanduser()
+    folder = given.parent if given.is_file() else given
+    if not given.exists():
+        raise ConfigError(f"there is no {path}: name folders that `graspsense experiment` wrote")
+    if not (folder / EXPERIMENT).is_file() or not (folder / RESULTS).is_dir():
+        raise ConfigError(
+            f"{path} is not an experiment: there is no {EXPERIMENT} with {RESULTS}/ in it. Name folders that "
+            "`graspsense experiment` wrote"
+        )
+    return folder
+
+
+def _read(name: str, folder: Path) -> FinishedExperiment:
+    results = Results(folder)
+    try:
+        summary = summarise(results.experiment(), results)
+    except (ConfigError, DataDamaged) as error:
+        first, *rest = str(error).splitlines()
+        reason = rest[0].strip() if rest and first.endswith(":") else first
+        raise ConfigError(_of_another_version(results, reason)) from error
+    if not summary.results and not summary.failed and results.any():
+        raise ConfigError(_of_another_version(results, "its results do not belong to its settings here"))
+    if not summary.conditions:
+        raise ConfigError(f"{folder} has no recognition rates to compare")
+    return FinishedExperiment(name=name, results=results, summary=summary)
+
+
+def _of_another_version(results: Results, reason: str) -> str:
+    made = results.provenance()
+    again = f". Run it again: {made['command']}" if made.get("command") else ""
+    return (
+        f"{results.folder} is of another version (graspsense {made.get('graspsense', '?')}, commit {_commit(made)}) "
+        f"and cannot be read by this one ({__version__}): {reason}{again}"
+    )
+
+
+def _setting_differences(experiments: Sequence[FinishedExperiment]) -> list[SettingDifference]:
+    """Return the keys whose values differ between the experiments."""
+    columns = [_settings(one.summary) for one in experiments]
+    meanings: dict[str, str] = {}
+    for one in experiments:
+        meanings |= _meanings(one.summary.planned.cases[0])
+    columns_made = [_circumstances(one) for one in experiments]
+    found = []
+    for each in (columns, columns_made):
+        for key in dict.fromkeys(key for column in each for key in column):
+            values = tuple(column.get(key, ABSENT) for column in each)
+            if len(set(values)) > 1:
+                found.append(SettingDifference(key=key, meaning=meanings.get(key, ""), values=values))
+    return found
+
+
+def _settings(summary: Summary) -> dict[str, str]:
+    """Return every key with its values over the cases, as text."""
+    planned = summary.planned
+    values: dict[str, dict[str, None]] = {}
+    for case in planned.cases:
+        settings = case.settings.values
+        tables: dict[str, Any] = {
+            "experiment": {"kind": case.kind},
+            **{table: settings.get(table) or {} for table in PIPELINE_TABLES},
+            "data": plain(case.data),
+            "test": {} if case.test is None else plain(case.test),
+            "judge": plain(case.judge),
+        }
+        for learner in case.learners:
+            tables[f"classifier {learner.name}"] = {"type": learner.type, **learner.config}
+        for key, value in _flat(tables).items():
+            values.setdefault(key, {})[value] = None
+    seeds = {"experiment.seeds": ", ".join(map(str, planned.seeds))}
+    return {**seeds, **{key: ", ".join(each) for key, each in values.items()}}
+
+
+def _flat(value: Any, key: str = "") -> dict[str, str]:
+    """Return the leaves of nested tables as text, by their dotted keys, without those that are not set."""
+    if isinstance(value, Mapping):
+        found: dict[str, str] = {}
+        for name, inner in value.items():
+            found |= _flat(inner, f"{key}.{name}" if key else str(name))
+        return found
+    if value is None or value == () or value == []:
+        return {}
+    if isinstance(value, list | tuple) and any(isinstance(one, Mapping) for one in value):
+        return {key: json.dumps(value)}
+    return {key: shown(value)}
+
+
+def _meanings(case: ExperimentCase) -> dict[str, str]:
+    return {
+        f"{table}.{key}": str(declared.get("meaning") or "")
+        for table in PIPELINE_TABLES
+        for key, declared in case.settings.keys(table).items()
+    }
+
+
+def _circumstances(one: FinishedExperiment) -> dict[str, str]:
+    """Return what else a result may depend on: the versions, and the commit of the code."""
+    made = one.results.provenance()
+    versions = {f"version of {name}": str(version) for name, version in (made.get("versions") or {}).items()}
+    return {**versions, "commit": _commit(made)}
+
+
+def _commit(made: Mapping[str, Any]) -> str:
+    git = (made.get("git") or {}).get("graspsense") or {}
+    return str(git.get("commit", "unknown"))[:12]
+
+
+def _differences(experiments: Sequence[FinishedExperiment]) -> list[ConditionDifference]:
+    """Return the difference of each experiment from the first, for each condition that both have."""
+    first, *others = experiments
+    pairs = [
+        (mine, theirs, other.name)
+        for other in others
+        for mine, theirs in _matched(first.summary.conditions, other.summary.conditions)
+    ]
+    found = []
+    for mine, theirs, name in pairs:
+        difference, how = _difference(theirs, mine, len(pairs))
+        found.append(
+            ConditionDifference(first=mine, other=theirs, other_name=name, difference=difference, how=how)
+        )
+    return found
+
+
+def _matched(
+    mine: Sequence[ConditionResult], theirs: Sequence[ConditionResult]
+) -> list[tuple[ConditionResult, ConditionResult]]:
+    """Return the conditions of the same name and target; if there are none, the best ones for each target."""
+    by_name = {(one.name, one.target): one for one in theirs}
+    found = [(one, by_name[one.name, one.target]) for one in mine if (one.name, one.target) in by_name]
+    if found:
+        return found
+    targets = list(dict.fromkeys(one.target for one in mine))
+    best = [
+        tuple(
+            max((one for one in side if one.target == target), key=lambda one: one.rate.mean, default=None)
+            for side in (mine, theirs)
+        )
+        for target in targets
+    ]
+    return [(a, b) for a, b in best if a is not None and b is not None]
+
+
+def _difference(one: ConditionResult, other: ConditionResult, comparisons: int) -> tuple[Difference, str]:
+    """Return the rate of one condition minus that of another, and what the interval rests on."""
+    corrected = f", corrected for {comparisons} comparisons" if comparisons > 1 else ""
+    same_trials = one.simulated and other.simulated and plain(one.case.data) == plain(other.case.data)
+    common = [seed for seed in one.rates if seed in other.rates]
+    paired = one.minus(other, comparisons) if same_trials else None
+    if paired is not None:
+        return Difference(paired.value, paired.interval), f"paired over {len(common)} common seeds{corrected}"
+    if not one.simulated or not other.simulated:
+        reason = "recorded trials are not paired"
+    elif not same_trials:
+        reason = "the trials differ"
+    else:
+        reason = f"{len(common)} common seed{'' if len(common) == 1 else 's'}, two are needed"
+    value = one.rate.mean - other.rate.mean
+    high, low = one.rate.interval, other.rate.interval
+    if high is None or low is None:
+        return Difference(value, None, "a rate has none"), f"unpaired: {reason}"
+    # Newcombe's method of squares (Stat. Med. 17, 1998, 873, method 10), widened for several comparisons.
+    wider = NormalDist().inv_cdf(1 - 0.025 / comparisons) / NormalDist().inv_cdf(0.975)
+    below = wider * math.hypot(one.rate.mean - high[0], low[1] - other.rate.mean)
+    above = wider * math.hypot(high[1] - one.rate.mean, other.rate.mean - low[0])
+    interval = (max(value - below, -1.0), min(value + above, 1.0))
+    return Difference(value, interval), f"unpaired: {reason}{corrected}"

@@ -1,0 +1,157 @@
+"""The page of a comparison of experiments."""
+
+from __future__ import annotations
+
+from html import escape
+
+from graspsense.experiments.answer import answer
+from graspsense.experiments.comparison import ExperimentComparison, condition_name
+from graspsense.experiments.page import SIMULATED
+from graspsense.report.html import Page, Section, bullets, facts, pair, paragraph, table
+from graspsense.report.rates import RateRow, rates_picture
+from graspsense.report.wording import TARGETS, protocol_words
+
+RATE_HEADER = ("experiment", "case", "recognises", "recognised", "95 % interval", "trials", "seeds")
+DIFFERENCE_HEADER = ("experiment", "case", "recognises", "points", "95 % interval", "result", "interval is")
+
+
+def comparison_page(comparison: ExperimentComparison) -> Page:
+    """Return the page."""
+    first = comparison.experiments[0].name
+    simulated = any(one.simulated for e in comparison.experiments for one in e.summary.conditions)
+    text = (
+        f"Differences are those from {first}. Where both experiments simulate the same trials with the same seeds, "
+        "they are paired by seed; otherwise the interval follows from those of both rates."
+    )
+    return Page(
+        kind="Comparison of experiments",
+        title=comparison.names,
+        question=" ".join(
+            dict.fromkeys(one.summary.planned.experiment.question for one in comparison.experiments)
+        ).strip(),
+        answer=comparison.answer,
+        headline=comparison.headline,
+        beside=paragraph(text)
+        + bullets([*failure_lines(comparison), *([SIMULATED] if simulated else [])], "warning"),
+        sections=(_settings(comparison), _rates(comparison), _differences(comparison), _made_of(comparison)),
+    )
+
+
+def failure_lines(comparison: ExperimentComparison) -> list[str]:
+    """Return a sentence for each experiment of which tasks failed or are missing."""
+    return [
+        f"{one.name}: {len(one.summary.failed)} tasks failed and {one.summary.missing} have no result; they are not "
+        "included"
+        for one in comparison.experiments
+        if one.summary.failed or one.summary.missing
+    ]
+
+
+def settings_rows(comparison: ExperimentComparison) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return header and rows of the settings that differ."""
+    header = ("setting", *(one.name for one in comparison.experiments), "meaning")
+    return header, [(one.key, *one.values, one.meaning) for one in comparison.settings]
+
+
+def rate_rows(comparison: ExperimentComparison) -> list[tuple[str, ...]]:
+    """Return the rates of all conditions, for `RATE_HEADER`."""
+    found: list[tuple[str, ...]] = []
+    for experiment in comparison.experiments:
+        for one in experiment.summary.conditions:
+            row = RateRow(name="", rate=one.rate.mean, interval=one.rate.interval)
+            found.append(
+                (
+                    experiment.name,
+                    condition_name(one),
+                    TARGETS[one.recognised],
+                    f"{100 * one.rate.mean:.1f} %",
+                    row.interval_text,
+                    str(one.rate.n),
+                    str(len(one.by_seed)),
+                )
+            )
+    return found
+
+
+def difference_rows(comparison: ExperimentComparison) -> list[tuple[str, ...]]:
+    """Return the differences from the first experiment, for `DIFFERENCE_HEADER`."""
+    found: list[tuple[str, ...]] = []
+    for one in comparison.differences:
+        interval = one.difference.interval
+        case = condition_name(one.other)
+        if one.other.name != one.first.name:
+            case = f"{case} (here) and {condition_name(one.first)} (first)"
+        found.append(
+            (
+                one.other_name,
+                case,
+                TARGETS[one.other.recognised],
+                f"{100 * one.difference.value:+.1f}",
+                "none" if interval is None else f"{100 * interval[0]:+.1f} to {100 * interval[1]:+.1f}",
+                one.verdict,
+                one.how,
+            )
+        )
+    return found
+
+
+def _settings(comparison: ExperimentComparison) -> Section:
+    header, rows = settings_rows(comparison)
+    body = paragraph(
+        "Only the settings that differ. Several values are those of the cases of an experiment."
+        if rows
+        else "No setting differs."
+    )
+    if rows:
+        body += table("Settings that differ", header, rows)
+    return Section(id="settings", title="What differs", body=body)
+
+
+def _rates(comparison: ExperimentComparison) -> Section:
+    body = []
+    conditions = [(e, one) for e in comparison.experiments for one in e.summary.conditions]
+    for target in dict.fromkeys(one.target for _, one in conditions):
+        of = [(e, one) for e, one in conditions if one.target == target]
+        best = max((one for _, one in of), key=lambda one: one.rate.mean)
+        rows = [
+            RateRow(
+                name=f"{e.name}: {condition_name(one)}",
+                rate=one.rate.mean,
+                interval=one.rate.interval,
+                strong=one is best,
+            )
+            for e, one in of
+        ]
+        title = f"How often {TARGETS[best.recognised]} is recognised"
+        protocols = dict.fromkeys(protocol_words(one.protocol) for _, one in of)
+        notes = "".join(paragraph(f"Every grasp is classified by {words}.") for words in protocols)
+        picture = rates_picture(rows, f"{title}. Bars are 95 % intervals.")
+        body.append(f"<h3>{escape(title)}</h3>{pair(picture, notes)}")
+    rates = table("Rates of all experiments", RATE_HEADER, rate_rows(comparison), 3)
+    return Section(id="rates", title="Recognition rates", body="".join(body) + rates)
+
+
+def _differences(comparison: ExperimentComparison) -> Section:
+    first = comparison.experiments[0].name
+    rows = difference_rows(comparison)
+    body = (
+        table(f"Rate minus that of {first}, in percentage points", DIFFERENCE_HEADER, rows, verdicts=(5,))
+        if rows
+        else paragraph(f"No other experiment recognises what {first} does.")
+    )
+    return Section(id="differences", title=f"Differences from {first}", body=body)
+
+
+def _made_of(comparison: ExperimentComparison) -> Section:
+    body = []
+    for one in comparison.experiments:
+        made, planned = one.results.provenance(), one.summary.planned
+        pairs = [
+            ("experiment", f"{planned.experiment.title} ({planned.name})"),
+            ("folder", str(one.results.folder)),
+            ("answer", answer(one.summary)),
+            ("command", str(made.get("command", ""))),
+            ("begun", str(made.get("begun_at", ""))),
+        ]
+        body.append(f"<h3>{escape(one.name)}</h3>{facts(pairs)}")
+    return Section(id="made", title="Provenance", body="".join(body))
