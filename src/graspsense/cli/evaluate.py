@@ -96,6 +96,8 @@ def _print(found: Evaluation) -> None:
         echo_entry("WARNING", warning, Style.CAUTION)
     echo()
     echo_entry("rate", f"{found.headline.words}, by {found.protocol}")
+    for name, part in found.by_features.items():
+        echo_entry("", f"{percentage(part.rate)} ({part.correct} of {part.n}) {name}")
     echo_entry("classifier", found.classifier)
     echo_entry("features", ", ".join(name for name, _ in found.features))
     echo_entry("unknown", f"{found.unknown.words} would be called unknown")

@@ -82,6 +82,7 @@ def evaluate(
         protocols=protocols,
         controls=measured,
         by_class=evaluator.by_class(headline.pooled),
+        by_features=evaluator.by_features(headline.pooled),
         unknown=evaluator.unknown(headline.pooled),
         learning_curve=curve,
         warnings=tuple(evaluator.warnings),
@@ -118,6 +119,7 @@ class _Evaluator:
         self.progress, self.notes = progress, notes
         self.labels = trials.labels
         self.groups = _groups(self.labels, target)
+        self._featureless = np.isnan(trials.table.values).all(axis=1)
         self.warnings: list[str] = []
         self.stratified_name = f"stratified_{k}_fold"
         self.pooled_by_protocol: dict[str, Pooled] = {}
@@ -201,8 +203,18 @@ class _Evaluator:
         return {name: self._rate_of(right, of) for name, of in sorted(rows.items())}
 
     def unknown(self, pooled: Pooled) -> RecognitionRate:
-        """Return the share of trials that the model of their fold calls unknown."""
-        return self._rate_of(pooled.unlike.tolist())
+        """Return the share of trials that the model of their fold calls unknown, or that have no feature at all."""
+        return self._rate_of((pooled.unlike | self._featureless).tolist())
+
+    def by_features(self, pooled: Pooled) -> dict[str, RecognitionRate]:
+        """Return the rates among trials with features and without any; nothing if all trials have features."""
+        if not self._featureless.any():
+            return {}
+        right = pooled.right(self.labels)
+        chosen = {"with features": ~self._featureless, "without any feature": self._featureless}
+        return {
+            name: self._rate_of(right, np.flatnonzero(of).tolist()) for name, of in chosen.items() if of.any()
+        }
 
     def _rate_of(self, right: Sequence[bool], rows: Sequence[int] | None = None) -> RecognitionRate:
         """Return the rate of these trials (default: all), with the interval that their instances allow."""

@@ -59,11 +59,16 @@ class Evaluation:
     by_class: Mapping[str, RecognitionRate]
     """The rate of the headline among the trials of each class (`class` of `class:state`)."""
     unknown: RecognitionRate
-    """Held-out trials that the model of their fold calls unknown. In all rates they count by their predicted label."""
+    """Held-out trials that the model of their fold calls unknown, or that have no feature at all.
+
+    In all rates they count by their predicted label.
+    """
     learning_curve: tuple[CurvePoint, ...]
     warnings: tuple[str, ...]
     """Findings of the controls that cast doubt on the headline."""
     notes: tuple[str, ...]
+    by_features: Mapping[str, RecognitionRate] = field(factory=dict)
+    """The rate of the headline among trials with features and without any; empty if all trials have features."""
     confusions: Mapping[str, Confusion] = field(factory=dict)
     """The confusion matrix of each protocol that was measured."""
 

@@ -61,6 +61,7 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
     notes = [
         "the data of the iCub hand have no time stamps: times are frame numbers (delta_t is in frames)",
         "metres and newtons are nominal, and relative to the first frame (docs/icub.md)",
+        "class, object and session are the same here: no rate tells whether the squeeze or the session is recognised",
     ]
     if left_out:
         notes.append(
@@ -78,6 +79,7 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
         source=f"icub:{folder}",
         table=table,
         labels=tuple(label for _, label, _ in paths),
+        no_interval="every class is one object, recorded in one session",
         no_instances="every class of this data set is a single object, so none can be held out",
         order=tuple(number for _, _, number in paths),
         **controls(
