@@ -107,7 +107,8 @@ def test_a_model_of_states_or_classes(run, csv, tmp_path):
     assert "select it with --only: can, jar" in err
     assert run("train", csv, "--label", "what", "--out", model, "--target", "state", "--only", "jar")[0] == 0
     assert json.loads(model.read_text())["target"] == "state"
-    assert run("train", csv, "--label", "what", "--out", model, "--target", "class", "--json")[0] == 0
+    again = ("train", csv, "--label", "what", "--out", model, "--target", "class", "--json")
+    assert run(*again, "--overwrite")[0] == 0
     found = json.loads(run("predict", model, csv, "--label", "what", "--json")[1])
     assert found["rate"]["rate"] > 0.9
 
@@ -256,3 +257,43 @@ def test_a_feature_set_that_raises_on_simulated_grasps_is_named(run, monkeypatch
         in err
     )
     assert "internal error" not in err
+
+
+def test_train_replaces_no_file_unless_told(run, csv, tmp_path):
+    model, kept = tmp_path / "model.json", tmp_path / "kept.csv"
+    command = ("train", csv, "--label", "what", "--out", model, "--keep", kept)
+    assert run(*command)[0] == 0
+    before = model.read_bytes(), kept.read_bytes()
+
+    code, _, err = run(*command, "--classifier", "knn")
+    assert code == 2
+    assert f"{model} already exists: name another file, or add --overwrite to replace it" in err
+    model.rename(tmp_path / "other.json")
+    assert f"{kept} already exists" in run(*command)[2]
+    (tmp_path / "other.json").rename(model)
+    assert (model.read_bytes(), kept.read_bytes()) == before
+
+    assert run(*command, "--classifier", "knn", "--overwrite")[0] == 0
+    assert model.read_bytes() != before[0]
+
+
+@pytest.mark.parametrize("option", ["--out", "--keep"])
+@pytest.mark.parametrize("disk", ["ro", "full"])
+def test_train_finds_out_before_the_grasps_that_it_cannot_write(run, mounted, tmp_path, option, disk):
+    place = mounted("size=64k")
+    if disk == "ro":
+        mounted("ro", remount=True)
+    else:
+        with pytest.raises(OSError, match="No space"):
+            (place / "filler").write_bytes(b"x" * 1_000_000)
+    files = {"--out": tmp_path / "m.json", "--keep": tmp_path / "k.csv"}
+    files[option] = place / files[option].name
+
+    code, _, err = run(
+        "train", "simulated", "--instances", "1000000", *(one for pair in files.items() for one in pair)
+    )
+
+    assert code == 2
+    assert f"{files[option]} cannot be written" in err
+    assert "grasping" not in err
+    assert not files["--out"].exists()

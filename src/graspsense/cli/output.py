@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from pathlib import Path
+from typing import Final
 
 import click
+
+_PROBE_BYTES: Final = 1 << 16
+"""Size of the file by which is tested whether a folder can be written; more than the smallest model."""
 
 
 def echo_json(value: object, long: bool = False) -> None:
@@ -20,11 +25,26 @@ def echo_json(value: object, long: bool = False) -> None:
 
 
 def file_to_write(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """Callback of an option that names a file: its folder is there, found out before minutes of work and not after."""
+    """Callback of an option that names a file: refuse a file that cannot be written, before the work and not after."""
     if value is not None and Path(value).is_dir():
         raise click.BadParameter(f"{value} is a folder: name a file in it", ctx, param)
     if value is not None and not Path(value).parent.is_dir():
         raise click.BadParameter(
             f"{value} cannot be written: there is no folder {Path(value).parent}", ctx, param
         )
+    if value is not None:
+        try:
+            with tempfile.TemporaryFile(dir=Path(value).parent) as probe:
+                probe.write(bytes(_PROBE_BYTES))
+        except OSError as error:
+            raise click.BadParameter(f"{value} cannot be written: {error.strerror}", ctx, param) from error
     return value
+
+
+def refuse_existing(*paths: str | None) -> None:
+    """Raise ConfigError if one of these files exists already."""
+    from graspsense.core.errors import ConfigError
+
+    for path in paths:
+        if path is not None and Path(path).exists():
+            raise ConfigError(f"{path} already exists: name another file, or add --overwrite to replace it")

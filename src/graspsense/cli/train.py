@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import echo_json, file_to_write
+from graspsense.cli.output import echo_json, file_to_write, refuse_existing
 from graspsense.cli.sources import (
     SOURCES,
     classifier_option,
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 @click.option(
     "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
 )
+@click.option("--overwrite", is_flag=True, help="Replace the files of --out and --keep if they exist.")
 @click.option(
     "--target",
     type=click.Choice(["both", "class", "state"]),
@@ -52,6 +53,7 @@ def train(
     source: str,
     out: str,
     keep: str | None,
+    overwrite: bool,
     target: str,
     classifier: str | None,
     as_json: bool,
@@ -66,6 +68,8 @@ def train(
     path = Path(out)
     if path.suffix != ".json":
         raise ConfigError(f"--out {out}: the name of a model's file must end in .json")
+    if not overwrite:
+        refuse_existing(out, keep)
     learner = learner_of(source, classifier, given)
     with ProgressLine() as progress:
         labelled = trials_of(source, progress, given)
@@ -77,7 +81,7 @@ def train(
         name=path.stem,
         seed=given["seed"],
         target=target,
-        provenance={"command": command_line(("keep", "as_json"))},
+        provenance={"command": command_line(("keep", "overwrite", "as_json"))},
     )
     write_model(path, model)
     if keep:
@@ -102,7 +106,7 @@ def train(
     echo(f"{out}: {model.in_a_line}", indent=2)
     echo_entry("labels", ", ".join(model.classifier.classes()))
     # In one line, so that it can be copied.
-    click.echo(f"how good    {command_line(('out', 'keep', 'as_json'), 'evaluate')}")
+    click.echo(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
 
 
 def _with_target(labelled: Labelled, target: str) -> Labelled:
