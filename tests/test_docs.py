@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import doctest
 import importlib.util
+import os
 import pkgutil
 import re
 import shlex
+import subprocess
 import sys
 from pathlib import Path
 
@@ -190,3 +192,37 @@ def test_the_navigation_has_every_page_and_no_other():
     folders = ("docs", "docs/roles", "specs", "examples/*", "plugins/*", ".")
     there = {str(path.relative_to(ROOT)) for folder in folders for path in ROOT.glob(f"{folder}/*.md")}
     assert named == there, "each page has its place in the nav of mkdocs.yml"
+
+
+def documents() -> list[Path]:
+    """Return the pages and the messages that tell users which command to type."""
+    folders = [ROOT / "docs", ROOT / "src", ROOT / "plugins", ROOT / "examples"]
+    files = [
+        path for folder in folders for path in folder.rglob("*.*") if path.suffix in (".md", ".py", ".txt")
+    ]
+    return [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *files]
+
+
+def test_no_document_calls_graspsense_by_sudo_which_does_not_find_it_in_an_environment():
+    wrong = [path.name for path in documents() if re.search(r"sudo\s+(-\S+\s+)*graspsense", path.read_text())]
+
+    assert wrong == []
+
+
+def test_the_documented_way_to_call_graspsense_as_root_finds_it_in_an_environment():
+    """`sudo` looks for a command in the folders of `secure_path` only."""
+    words = 'sudo "$(command -v graspsense)"'
+    assert sum(words in path.read_text() for path in documents()) == 3
+    like_sudo = words.replace("sudo", "env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin")
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+
+    done = subprocess.run(
+        ["sh", "-c", f"{like_sudo} --version"],
+        env={"PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("graspsense, version")

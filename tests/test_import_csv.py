@@ -58,6 +58,23 @@ def test_a_gap_in_millimetres_is_refused(squeeze):
 
 
 @pytest.mark.parametrize(
+    ("columns", "says"),
+    [
+        (
+            {"gap": "opening*-0.01"},
+            r"the gap reaches -0\.74 m, which no gripper has\. Plausible is -0\.05 to 0\.5 m",
+        ),
+        ({"force": ["F left*1000", "F right"]}, r"the force reaches .* N, .*in mN, write COLUMN\*0\.001"),
+        ({"time": "stamp ms*10"}, r"the time between lines reaches 10 s, .*in ms, write COLUMN\*0\.001"),
+    ],
+    ids=str,
+)
+def test_a_quantity_that_no_gripper_has_is_refused(squeeze, columns, says):
+    with pytest.raises(DataDamaged, match=says):
+        read_squeeze(name_of(squeeze, **columns))
+
+
+@pytest.mark.parametrize(
     ("query", "says"),
     [
         ("", "which column of .* is time"),

@@ -300,7 +300,11 @@ def test_a_plugin_that_breaks_the_rules_is_broken_and_says_which(site, body, rea
             "'accepts' has the unknown command kind 'torque'; there are effort, velocity, ",
         ),
         ('channels=(Channel("gap", "m"), Channel("gap", "m"))', "'channels' names channel 'gap' twice"),
-        ('name="Two Words"', "'name' must match regex"),
+        (
+            'name="Two Words"',
+            "'name' is 'Two Words': write small letters, digits, hyphens and underscores, a letter first, "
+            "without spaces",
+        ),
         ('target="module.Class"', "'target' must match regex"),
     ],
 )

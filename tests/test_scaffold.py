@@ -118,3 +118,11 @@ def test_a_new_gripper_grasps_with_the_default_pipeline_at_once(tmp_path, monkey
                 options=["gripper.type=lab-hand", "classifier.type=none", "controller.sends=effort"],
                 plugins=plugins,
             )
+
+
+@pytest.mark.parametrize("name", ["lab hand", "lab-hand ", " lab", "lab\thand"])
+def test_a_name_with_a_space_is_refused_with_the_reason(tmp_path, name):
+    with pytest.raises(ConfigError, match="without spaces, as in lab-hand"):
+        make(name, ["sensor-backend"], tmp_path / "made")
+
+    assert not (tmp_path / "made").exists()

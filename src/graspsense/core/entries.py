@@ -10,6 +10,7 @@ none of that; a field that is given here is for a class that does not declare it
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -55,7 +56,15 @@ def _distinct_channels(entry: object, attribute: Attribute[Any], channels: tuple
             raise ValueError(f"'{attribute.name}' names channel {name!r} twice")
 
 
-_IS_NAME: Final = [instance_of(str), matches_re(r"[a-z][a-z0-9_-]*")]
+def _is_name(entry: object, attribute: Attribute[Any], name: str) -> None:
+    if not re.fullmatch(r"[a-z][a-z0-9_-]*", name):
+        raise ValueError(
+            f"'{attribute.name}' is {name!r}: write small letters, digits, hyphens and underscores, a letter first, "
+            "without spaces, as in lab-hand"
+        )
+
+
+_IS_NAME: Final = [instance_of(str), _is_name]
 _IS_TARGET: Final = [instance_of(str), matches_re(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")]
 _IS_TARGET_OR_EMPTY: Final = [instance_of(str), matches_re(r"([A-Za-z_][\w.]*:[A-Za-z_]\w*)?")]
 _IS_RESOURCE: Final = [instance_of(str), matches_re(r"[A-Za-z_][\w.]*:[^/:][^:]*")]

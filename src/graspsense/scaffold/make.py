@@ -94,7 +94,8 @@ def make(name: str, roles: Sequence[str], folder: Path) -> list[str]:
     kinds = _kinds(roles)
     if not NAME.fullmatch(name):
         raise ConfigError(
-            f"the name {name!r} will not do: small letters, digits and single hyphens, a letter first, as in lab-hand"
+            f"the name {name!r} will not do: small letters, digits and single hyphens, a letter first, "
+            "without spaces, as in lab-hand"
         )
     part = name.removeprefix("graspsense-")
     _check_importable(name)

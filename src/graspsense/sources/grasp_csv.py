@@ -25,8 +25,14 @@ from graspsense.sources.csv_columns import CsvColumns
 
 REQUIRED: Final = ("time", "gap", "force")
 QUANTITIES: Final = (*REQUIRED, "effort", "velocity")
-MAX_GAP_M: Final = 1.0
-"""A column with a larger gap is not in metres."""
+PLAUSIBLE: Final = {
+    "gap": (-0.05, 0.5, "m", "mm"),
+    "force": (-2000.0, 2000.0, "N", "mN"),
+    "effort": (-5000.0, 5000.0, "N", "mN"),
+    "velocity": (-5.0, 5.0, "m/s", "mm/s"),
+    "time between lines": (0.0, 1.0, "s", "ms"),
+}
+"""Quantity to its plausible range, the unit of that, and the unit that a column out of range is most likely in."""
 
 
 def named(path: str, columns: Mapping[str, Sequence[str]]) -> str:
@@ -91,11 +97,10 @@ def _column(columns: CsvColumns, quantity: str, text: str) -> list[float]:
 def _recording(columns: CsvColumns, values: Mapping[str, list[list[float]]]) -> Recording:
     (times,), (gaps,), forces = values["time"], values["gap"], values["force"]
     steps = _time_steps(columns, times)
-    if max(gaps) > MAX_GAP_M:
-        raise DataDamaged(
-            f"{columns.path}: the gap reaches {max(gaps):g} m, which no gripper has. If the column is in mm, write "
-            "COLUMN*0.001"
-        )
+    for quantity, found in values.items():
+        if quantity != "time":
+            _check_plausible(columns, quantity, [value for column in found for value in column])
+    _check_plausible(columns, "time between lines", [median(steps)])
     if "velocity" in values:
         (velocities,) = values["velocity"]
     else:
@@ -113,6 +118,17 @@ def _recording(columns: CsvColumns, values: Mapping[str, list[list[float]]]) -> 
     return Recording(
         name=f"CSV {columns.path.name}", readings=readings, rate_hz=1.0 / median(steps), notes=tuple(notes)
     )
+
+
+def _check_plausible(columns: CsvColumns, quantity: str, values: Sequence[float]) -> None:
+    """Raise DataDamaged if a value is far from those of any gripper, as it is in another unit."""
+    low, high, unit, other = PLAUSIBLE[quantity]
+    extreme = max(values, key=lambda value: max(value - high, low - value))
+    if not low <= extreme <= high:
+        raise DataDamaged(
+            f"{columns.path}: the {quantity} reaches {extreme:g} {unit}, which no gripper has. Plausible is {low:g} to "
+            f"{high:g} {unit}. If the column is in {other}, write COLUMN*0.001"
+        )
 
 
 def _time_steps(columns: CsvColumns, times: Sequence[float]) -> list[float]:
