@@ -236,3 +236,13 @@ def test_every_name_of_a_door_can_be_imported(door):
         assert name in dir(door)
     with pytest.raises(AttributeError, match="has no attribute 'nosuch'"):
         door.nosuch  # noqa: B018
+
+
+def test_settings_are_read_without_the_simulator():
+    loaded = loaded_after("from graspsense.core.config import resolve; resolve('default')")
+
+    assert not {one for one in loaded if one.startswith("graspsense_sim_gripper.")} - {
+        "graspsense_sim_gripper.plugin",
+        "graspsense_sim_gripper.config",
+    }
+    assert not loaded & {"numpy", "numba", "sklearn"}

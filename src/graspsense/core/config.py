@@ -233,7 +233,10 @@ def _complaint(merged: Merged, problem: InvalidValue) -> str:
 def _choose_sent_kind(merged: Merged, controller: Component, gripper: SelectedComponent) -> None:
     """Set the key `sends` of a controller with several kinds of command, where nothing sets it."""
     try:
-        entry, accepted = controller.declared(), gripper.declared.accepts
+        entry = controller.declared()
+        accepted = getattr(gripper.component.entry, "accepts", None)
+        if accepted is None:
+            accepted = gripper.declared.accepts
     except PluginUnavailable:
         return  # The wiring check reports it.
     if not entry.alternatives or "sends" in merged.values:

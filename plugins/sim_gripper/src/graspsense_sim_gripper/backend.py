@@ -63,8 +63,6 @@ def default_controller(config: SimConfig) -> GraspController:
 class SimBackend(BatchBackend[SimConfig]):
     """A model of a PR2 gripper, its fingertips and an object."""
 
-    accepts = ("effort",)
-
     def __init__(self, config: SimConfig) -> None:
         super().__init__(config)
         self._controller: GraspController | None = None

@@ -15,6 +15,9 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
     yield SensorBackendEntry(
         name="sim",
         target="graspsense_sim_gripper.backend:SimBackend",
+        # Declared here, so that printing the settings does not import the simulator.
+        config="graspsense_sim_gripper.config:SimConfig",
+        accepts=("effort",),
         summary="A simulated PR2 gripper with fingertip arrays, squeezing an object from a catalogue",
     )
 
