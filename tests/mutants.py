@@ -155,12 +155,12 @@ def featuring(check, says, **changes):
     return keep
 
 
-@featuring("gives-what-it-declares", "make `features` and what extract returns the same")
+@featuring("returns-the-declared-features", "make `features` and what extract returns the same")
 def _(features, trace):
     return evolve(features, names=("summit",), reasons={"summit": "none"})
 
 
-@featuring("gives-what-it-declares", "peak in mN")
+@featuring("returns-the-declared-features", "peak in mN")
 def _(features, trace):
     return evolve(features, units=("mN",))
 
@@ -175,18 +175,18 @@ def _(features, trace):
     return evolve(features, values=(np.float64(features.values[0]),))
 
 
-@featuring("something-is-defined-on-a-whole-grasp", "every feature is missing")
+@featuring("a-whole-grasp-has-features", "every feature is missing")
 def _(features, trace):
     return evolve(features, values=(nan,), reasons={"peak": "too lazy"})
 
 
-@featuring("answers-every-trace", "ValueError")
+@featuring("handles-every-trace", "ValueError")
 def _(features, trace):
     trace.gap_m.max()
     return features
 
 
-@featuring("answers-a-trace-cut-anywhere", "on trace.until(")
+@featuring("handles-a-trace-that-ends-anywhere", "on trace.until(")
 def _(features, trace):
     if 0.3 < trace.t_s[-1:].sum() < 0.4:
         raise IndexError("no contact yet")
@@ -201,24 +201,24 @@ def _(features, trace):
     return evolve(features, values=(features.values[0] + next(_calls),))
 
 
-@featuring("leaves-the-trace-alone", "force_left_n.copy()")
+@featuring("does-not-change-the-trace", "force_left_n.copy()")
 def _(features, trace):
     trace.force_left_n[:] = 0.0
     return features
 
 
-@featuring("reads-what-it-declares", "add the channels that it reads to `requires`")
+@featuring("requires-what-it-reads", "add the channels that it reads to `requires`")
 def _(features, trace):
     known = trace.force_right_n[~np.isnan(trace.force_right_n)]
     return evolve(features, values=(features.values[0] + float(known.sum()),))
 
 
-@featuring("does-not-hang-on-the-start-of-the-clock", "use differences of times")
+@featuring("independent-of-the-start-of-the-clock", "use differences of times")
 def _(features, trace):
     return evolve(features, values=(features.values[0] + float(trace.t_s[-1:].sum()),))
 
 
-@featuring("chunks-do-not-matter", "the memory behind them")
+@featuring("views-and-copies-agree", "the memory behind them")
 def _(features, trace):
     whole = trace.gap_m.base if trace.gap_m.base is not None else trace.gap_m
     return evolve(features, values=(features.values[0] + len(whole),))
@@ -285,13 +285,13 @@ class Moody(Law):
         return Texts(2, 0, "calm")
 
 
-@mutant("controller", "begins-in-the-approach", "begins as APPROACH")
+@mutant("controller", "starts-in-the-approach", "begins as APPROACH")
 class Hasty(Law):
     def init(self):
         return super().init()._replace(phase=SQUEEZE)
 
 
-@ruling("types-stay", "keep one type throughout")
+@ruling("types-do-not-change", "keep one type throughout")
 def _(command, after, frame):
     return command, after._replace(gap_m=1)
 
@@ -319,7 +319,7 @@ def _(command, after, frame):
 _rng = random.Random(3)
 
 
-@ruling("same-tick-same-answer", "nothing but its arguments")
+@ruling("same-tick-same-command", "nothing but its arguments")
 def _(command, after, frame):
     return command._replace(value=command.value + _rng.random()), after
 
@@ -334,7 +334,7 @@ class Hidden(NamedTuple):
     still: Any
 
 
-@mutant("controller", "state-is-all-it-remembers", "keep everything in the state")
+@mutant("controller", "state-holds-everything", "keep everything in the state")
 class Forgetful(Law):
     @staticmethod
     def step(params, state, frame, pads):
@@ -349,24 +349,24 @@ class Forgetful(Law):
 _grasps: list[float] = []
 
 
-@ruling("two-runs-do-not-meet", "keep no state in the class")
+@ruling("grasps-are-independent", "keep no state in the class")
 def _(command, after, frame):
     _grasps.append(frame.t_s)
     return command._replace(value=command.value + 1e-6 * len(_grasps)), after
 
 
-@ruling("reads-what-it-declares", "add what it reads to `requires`")
+@ruling("requires-what-it-reads", "add what it reads to `requires`")
 def _(command, after, frame):
     return (command._replace(value=0.0) if frame.force_left_n > 1.0 else command), after
 
 
-@ruling("survives-a-silent-sensor", "NaN gives the safe result")
+@ruling("handles-frames-of-nan", "NaN gives the safe result")
 def _(command, after, frame):
     int(frame.gap_m)
     return command, after
 
 
-@ruling("phases-are-a-laws-own", "a grasp goes one way")
+@ruling("phases-are-in-order", "a grasp goes one way")
 def _(command, after, frame):
     return command, after._replace(phase=SQUEEZE if frame.t_s < 0.5 else 2)
 
@@ -404,10 +404,8 @@ def describing(check, says, **device):
 
 describing("describes-itself", "must be above 0", rate_hz=0.0)
 describing("describes-itself", "in mm/s", speed_limit_m_s=200.0)
-describing(
-    "opens-and-relaxes-by-kinds-it-takes", "of kind position", opening=Command(POSITION, 0.08, inf, inf)
-)
-describing("rate-is-what-it-says", "frames come at 1e+03 Hz", rate_hz=100.0)
+describing("opening-and-relaxing-are-accepted", "of kind position", opening=Command(POSITION, 0.08, inf, inf))
+describing("rate-is-as-declared", "frames come at 1e+03 Hz", rate_hz=100.0)
 
 
 @giving("frames-are-numbers", "gap_m of a frame is 0 of type int: write float(...)")
@@ -467,7 +465,7 @@ def _(reading):
 
 mutant(
     "sensor-backend",
-    "rate-is-what-it-says",
+    "rate-is-as-declared",
     "is declared at 5000 Hz",
     channels=channels(*(one.name for one in ENTRIES["sensor-backend"].channels), rate_hz=5000.0),
 )(Hand)
@@ -493,12 +491,12 @@ def _(reading):
     return Reading(reading.frame._replace(force_left_n=3000.0), reading.pads)
 
 
-@giving("velocity-is-the-gaps-rate", "mm where the gap moved by")
+@giving("velocity-is-the-rate-of-the-gap", "mm where the gap moved by")
 def _(reading):
     return Reading(reading.frame._replace(velocity_m_s=1000.0 * reading.frame.velocity_m_s), reading.pads)
 
 
-@giving("velocity-is-the-gaps-rate", "negative while it closes")
+@giving("velocity-is-the-rate-of-the-gap", "negative while it closes")
 def _(reading):
     return Reading(reading.frame._replace(velocity_m_s=-reading.frame.velocity_m_s), reading.pads)
 
@@ -524,7 +522,7 @@ class Unlimited(Hand):
 
 mutant(
     "sensor-backend",
-    "takes-every-kind-it-declares",
+    "accepts-every-declared-kind",
     "take it, or take 'force' out",
     accepts=("effort", "force"),
 )(
@@ -536,7 +534,7 @@ mutant(
 )
 
 
-@mutant("sensor-backend", "is-told-what-to-expect", "raise in `open` instead")
+@mutant("sensor-backend", "expect-accepts-any-controller", "raise in `open` instead")
 class Picky(Hand):
     def expect(self, controller, run):
         raise ValueError("not that one")
@@ -560,7 +558,7 @@ class Repeating(Hand):
         return (ObjectKind(name="cup"), ObjectKind(name="cup"))
 
 
-@mutant("sensor-backend", "read-keeps-its-timeout", "return None when nothing came in time")
+@mutant("sensor-backend", "read-returns-within-its-timeout", "return None when nothing came in time")
 class Sluggish(Hand):
     def read(self, timeout_s):
         reading = super().read(timeout_s)
@@ -599,7 +597,7 @@ def _(reading):
     return Reading(reading.frame._replace(edge_left_n=_rng.random()), reading.pads)
 
 
-@giving("does-a-whole-grasp", "ended as aborted")
+@giving("performs-a-whole-grasp", "ended as aborted")
 def _(reading):
     return Reading(reading.frame._replace(t_s=float(f"{reading.frame.t_s:.9f}")), "no pads")
 
@@ -610,13 +608,13 @@ class Talkative(Hand):
         return {"self": self}
 
 
-@mutant("sensor-backend", "dry-run-takes-the-same-commands", "return a SensorBackend or None")
+@mutant("sensor-backend", "dry-run-accepts-the-same-commands", "return a SensorBackend or None")
 class Understudy(Hand):
     def dry_run_backend(self):
         return "somebody"
 
 
-@mutant("sensor-backend", "says-when-it-is-lost", "turn what the driver raises into DeviceLost")
+@mutant("sensor-backend", "reports-a-lost-device", "turn what the driver raises into DeviceLost")
 class Rude(Hand):
     def read(self, timeout_s):
         reading = super().read(timeout_s) if self.config.vanishes_s == inf else Hand.read(self, timeout_s)
@@ -625,7 +623,7 @@ class Rude(Hand):
         return reading
 
 
-@mutant("sensor-backend", "says-when-it-is-lost", "never raised DeviceLost")
+@mutant("sensor-backend", "reports-a-lost-device", "never raised DeviceLost")
 class Undead(Hand):
     def open(self, seed):
         info = super().open(seed)
@@ -633,7 +631,7 @@ class Undead(Hand):
         return info
 
 
-@mutant("sensor-backend", "says-when-it-is-not-there", "open succeeded where no gripper is")
+@mutant("sensor-backend", "reports-a-missing-device", "open succeeded where no gripper is")
 class Dreaming(Hand):
     def open(self, seed):
         self.config = HandConfig(vanishes_s=self.config.vanishes_s)
@@ -662,19 +660,19 @@ class Listed(Nearest):
         return list(super().classes())
 
 
-@mutant("classifier", "probabilities-are-probabilities", "divide each row by its sum")
+@mutant("classifier", "probabilities-are-valid", "divide each row by its sum")
 class Votes(Nearest):
     def probabilities(self, table):
         return 0.5 * super().probabilities(table)
 
 
-@mutant("classifier", "probabilities-are-probabilities", "float64 of shape")
+@mutant("classifier", "probabilities-are-valid", "float64 of shape")
 class Coarse(Nearest):
     def probabilities(self, table):
         return super().probabilities(table).astype(np.float32)
 
 
-@mutant("classifier", "tells-apart-what-differs", "is the order of `classes`")
+@mutant("classifier", "separates-separable-trials", "is the order of `classes`")
 class Mixed(Nearest):
     def classes(self):
         return super().classes()[::-1]
@@ -699,14 +697,14 @@ class Raw(Nearest):
         return {**self._model, "mean": np.array(self._model["mean"])}
 
 
-@mutant("classifier", "chunks-do-not-matter", "predict each trial independently")
+@mutant("classifier", "single-trials-agree", "predict each trial independently")
 class Relative(Nearest):
     def probabilities(self, table):
         centred = evolve(table, values=table.values - 0.1 * np.nanmean(table.values, axis=0))
         return super().probabilities(centred)
 
 
-@mutant("classifier", "missing-values-have-an-answer", "fill or skip them")
+@mutant("classifier", "handles-missing-values", "fill or skip them")
 class Strict(Nearest):
     def probabilities(self, table):
         found = super().probabilities(table)
@@ -730,32 +728,32 @@ class Discriminant(Nearest):
         super().fit(table, labels, seed)
 
 
-@mutant("classifier", "explains-what-it-says", "explain says 'bottle:full_open'")
+@mutant("classifier", "explains-its-predictions", "explain says 'bottle:full_open'")
 class Stubborn(Nearest):
     def explain(self, features):
         return evolve(super().explain(features), label="bottle:full_open")
 
 
-@mutant("classifier", "explains-what-it-says", "give the reason in words and units")
+@mutant("classifier", "explains-its-predictions", "give the reason in words and units")
 class Silent(Nearest):
     def explain(self, features):
         return evolve(super().explain(features), because=())
 
 
-@mutant("classifier", "leaves-the-table-alone", "work on a copy")
+@mutant("classifier", "does-not-change-the-table", "work on a copy")
 class Filling(Nearest):
     def probabilities(self, table):
         np.nan_to_num(table.values, copy=False)
         return super().probabilities(table)
 
 
-@mutant("classifier", "refuses-what-is-no-model", "from_json takes a model")
+@mutant("classifier", "refuses-an-invalid-model", "from_json takes a model")
 class Credulous(Nearest):
     def from_json(self, model):
         self._model = {"classes": [], "mean": [], "scale": [], "centres": [], **model}
 
 
-@mutant("classifier", "refuses-what-is-no-model", "raise ValueError")
+@mutant("classifier", "refuses-an-invalid-model", "raise ValueError")
 class Crashing(Nearest):
     def from_json(self, model):
         if "centres" not in model:

@@ -52,7 +52,7 @@ def test_a_part_that_conforms(graspsense):
 
 def test_a_part_that_does_not(graspsense):
     (broken,) = [
-        one for one in MUTANTS if one.check == "reads-what-it-declares" and one.role == "feature-set"
+        one for one in MUTANTS if one.check == "requires-what-it-reads" and one.role == "feature-set"
     ]
     with IsolatedPlugins(Lab(broken.entry)):
         code, out, _ = graspsense("check", "peak", "--json")
@@ -62,7 +62,7 @@ def test_a_part_that_does_not(graspsense):
     assert found["conforms"] is False
     (failure,) = found["failures"]
     assert failure.startswith(
-        "graspsense-test/peak: reads-what-it-declares: without the channels it does not"
+        "graspsense-test/peak: requires-what-it-reads: without the channels it does not"
     )
     assert {one["state"] for one in found["results"]} == {"passed", "failed"}
 

@@ -80,19 +80,19 @@ MUTANTS = {
         HEAD + "    import numpy",
         "listing it imports numpy: in the module of the entry point import",
     ),
-    "everything-declared-is-there": (
+    "everything-declared-loads": (
         SOUND.replace("parts:Peak", "lab_nowhere:Peak"),
         "No module named 'lab_nowhere'",
     ),
-    "names-are-free": (
+    "names-are-unique": (
         SOUND.replace('"summit"', '"chitta"'),
         "the name 'chitta' is taken by graspsense/chitta: choose another name in the entry",
     ),
-    "observers-disturb-nobody": (
+    "observers-change-nothing": (
         SOUND.replace('run.labels.get("object")', 'run.labels["object"] = "mine"'),
         "an observer changed its arguments: work on a copy",
     ),
-    "probe-keeps-its-time": (
+    "probe-returns-in-time": (
         SOUND.replace("return []", "raise PermissionError('no bus')"),
         "graspsense_probe_devices raised PermissionError: no bus: return what was found",
     ),
@@ -149,12 +149,12 @@ def test_the_owner_of_a_hook_contributes_checks_of_it(site, most, state, text):
 
 def test_an_observer_that_raises_or_returns_is_caught(site):
     raising = SOUND.replace('run.labels.get("object")', "run.nothing")
-    assert "catch what may go wrong" in check(site, "observers-disturb-nobody", raising).text
+    assert "catch what may go wrong" in check(site, "observers-change-nothing", raising).text
 
 
 def test_an_observer_that_returns_something_is_caught(site):
     returning = SOUND.replace('run.labels.get("object")', "return 1")
-    assert "an observer returns nothing" in check(site, "observers-disturb-nobody", returning).text
+    assert "an observer returns nothing" in check(site, "observers-change-nothing", returning).text
 
 
 def test_every_check_of_a_distribution_has_a_mutant():

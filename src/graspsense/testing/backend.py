@@ -67,7 +67,7 @@ def describes_itself(subject: Subject) -> None:
         )
 
 
-def opens_and_relaxes_by_kinds_it_takes(subject: Subject) -> None:
+def opening_and_relaxing_are_accepted(subject: Subject) -> None:
     """The opening and the relaxing command are of kinds that it accepts."""
     info = subject.session.info
     for name, command in (("opening", info.opening), ("relaxed", info.relaxed)):
@@ -190,7 +190,7 @@ def time_runs_forward(subject: Subject) -> None:
         )
 
 
-def rate_is_what_it_says(subject: Subject) -> None:
+def rate_is_as_declared(subject: Subject) -> None:
     """Frames come at `rate_hz`, and no channel is declared with a higher rate."""
     info, frames = subject.session.info, subject.session.frames
     passed = [now.t_s - before.t_s for before, now in pairwise(frames)]
@@ -259,7 +259,7 @@ def forces_are_in_newtons(subject: Subject) -> None:
         )
 
 
-def velocity_is_the_gaps_rate(subject: Subject) -> None:
+def velocity_is_the_rate_of_the_gap(subject: Subject) -> None:
     """The sum of `velocity_m_s` over time is the change of the gap; closing is negative."""
     closing = [one.frame for one in subject.session.stages.get("closing", [])]
     if not closing or isnan(closing[0].velocity_m_s) or isnan(closing[0].gap_m):
@@ -332,7 +332,7 @@ def stays_within_its_limits(subject: Subject) -> None:
         backend.close()
 
 
-def takes_every_kind_it_declares(subject: Subject) -> None:
+def accepts_every_declared_kind(subject: Subject) -> None:
     """Each kind in `accepts` can be applied, and frames continue to come."""
     backend = subject.create()
     demand(bool(subject.entry.accepts), "`accepts` is empty: a gripper takes at least one kind of command")
@@ -364,7 +364,7 @@ def takes_every_kind_it_declares(subject: Subject) -> None:
         backend.close()
 
 
-def read_keeps_its_timeout(subject: Subject) -> None:
+def read_returns_within_its_timeout(subject: Subject) -> None:
     """`read` returns a frame or None within its time-out."""
     longest = subject.session.longest_read_s
     demand(
@@ -474,7 +474,7 @@ def same_seed_same_frames(subject: Subject) -> None:
     )
 
 
-def is_told_what_to_expect(subject: Subject) -> None:
+def expect_accepts_any_controller(subject: Subject) -> None:
     """`expect` accepts any controller before `open`, raises nothing, and does not change `open`."""
     controller, run = GentleController(kind_of(subject.entry.accepts)), RunConfig()
     backend = subject.create(**(subject.absent or {}))
@@ -521,7 +521,7 @@ def objects_can_be_grasped(subject: Subject) -> None:
         )
 
 
-def does_a_whole_grasp(subject: Subject) -> None:
+def performs_a_whole_grasp(subject: Subject) -> None:
     """The runner can perform a whole grasp: open, tare, close, hold, open again, relax."""
     kind = kind_of(subject.entry.accepts)
     grasp = run_grasp(subject.create(), GentleController(kind), RunConfig(hold_s=0.05))
@@ -550,7 +550,7 @@ def reports_plain_values(subject: Subject) -> None:
             ) from error
 
 
-def dry_run_takes_the_same_commands(subject: Subject) -> None:
+def dry_run_accepts_the_same_commands(subject: Subject) -> None:
     """The gripper of a dry run is a separate backend that accepts the same kinds of command, or there is none."""
     other = subject.create().dry_run_backend()
     if other is None:
@@ -570,7 +570,7 @@ def dry_run_takes_the_same_commands(subject: Subject) -> None:
         other.close()
 
 
-def says_when_it_is_lost(subject: Subject) -> None:
+def reports_a_lost_device(subject: Subject) -> None:
     """When unplugged, it raises DeviceLost with advice, a grasp ends as device lost, and it can be closed."""
     if subject.unplugged is None:
         raise CheckSkipped(
@@ -613,7 +613,7 @@ def _lost(backend: SensorBackend[Any], relaxed: Command, rate_hz: float) -> str:
     )
 
 
-def says_when_it_is_not_there(subject: Subject) -> None:
+def reports_a_missing_device(subject: Subject) -> None:
     """If it is not connected, `open` raises NoDevice, which says what was searched for and what to try."""
     if subject.absent is None:
         raise CheckSkipped(
@@ -642,29 +642,29 @@ CHECKS: Final = (
     *component.CHECKS,
     *checks_of(
         describes_itself,
-        opens_and_relaxes_by_kinds_it_takes,
+        opening_and_relaxing_are_accepted,
         frames_are_numbers,
         channels_follow_from_the_settings,
         channels_are_those_declared,
         time_runs_forward,
-        rate_is_what_it_says,
+        rate_is_as_declared,
         images_count_up,
         gap_is_in_metres,
         forces_are_in_newtons,
-        velocity_is_the_gaps_rate,
+        velocity_is_the_rate_of_the_gap,
         closing_closes,
         stays_within_its_limits,
-        takes_every_kind_it_declares,
-        read_keeps_its_timeout,
+        accepts_every_declared_kind,
+        read_returns_within_its_timeout,
         pads_can_be_zeroed,
         closes_in_any_state,
         same_seed_same_frames,
-        is_told_what_to_expect,
+        expect_accepts_any_controller,
         objects_can_be_grasped,
-        does_a_whole_grasp,
+        performs_a_whole_grasp,
         reports_plain_values,
-        dry_run_takes_the_same_commands,
-        says_when_it_is_lost,
-        says_when_it_is_not_there,
+        dry_run_accepts_the_same_commands,
+        reports_a_lost_device,
+        reports_a_missing_device,
     ),
 )

@@ -71,7 +71,7 @@ def classes_are_the_labels(subject: Subject) -> None:
     )
 
 
-def probabilities_are_probabilities(subject: Subject) -> None:
+def probabilities_are_valid(subject: Subject) -> None:
     """`probabilities` has a row for each trial and a column for each class, from 0 to 1; each row sums to 1."""
     fitted, table, _ = _learned(subject)
     found = fitted.probabilities(table)
@@ -89,7 +89,7 @@ def probabilities_are_probabilities(subject: Subject) -> None:
     demand(worst <= 1e-6, f"a row of probabilities misses 1 by {worst:.2g}: divide each row by its sum")
 
 
-def tells_apart_what_differs(subject: Subject) -> None:
+def separates_separable_trials(subject: Subject) -> None:
     """At least nine in ten separable training trials are predicted correctly."""
     fitted, table, labels = _learned(subject)
     classes = fitted.classes()
@@ -127,7 +127,7 @@ def survives_json(subject: Subject) -> None:
     )
 
 
-def chunks_do_not_matter(subject: Subject) -> None:
+def single_trials_agree(subject: Subject) -> None:
     """Trials predicted one by one have the same probabilities as all at once."""
     fitted, table, _ = _learned(subject)
     whole = fitted.probabilities(table)
@@ -138,7 +138,7 @@ def chunks_do_not_matter(subject: Subject) -> None:
     )
 
 
-def missing_values_have_an_answer(subject: Subject) -> None:
+def handles_missing_values(subject: Subject) -> None:
     """It handles NaN in training and prediction, a feature without values, and a trial without values."""
     table, labels = three_kinds(missing=True)
     bare = table.values.copy()
@@ -210,7 +210,7 @@ def few_trials_are_refused_or_learned(subject: Subject) -> None:
         )
 
 
-def explains_what_it_says(subject: Subject) -> None:
+def explains_its_predictions(subject: Subject) -> None:
     """`explain` returns the most probable class, with floats as probabilities and reasons in words."""
     fitted, table, _ = _learned(subject)
     for i in range(6):
@@ -237,7 +237,7 @@ def explains_what_it_says(subject: Subject) -> None:
         )
 
 
-def leaves_the_table_alone(subject: Subject) -> None:
+def does_not_change_the_table(subject: Subject) -> None:
     """Neither fit nor probabilities changes the table."""
     table, labels = three_kinds(missing=True)
     before = table.values.copy()
@@ -249,7 +249,7 @@ def leaves_the_table_alone(subject: Subject) -> None:
     )
 
 
-def refuses_what_is_no_model(subject: Subject) -> None:
+def refuses_an_invalid_model(subject: Subject) -> None:
     """`from_json` raises KeyError, TypeError, ValueError or DataDamaged for values that are not its model."""
     good = _json(_learned(subject)[0])
     demand(isinstance(good, dict) and bool(good), f"to_json gives {good!r:.80}: a dict")
@@ -282,16 +282,16 @@ CHECKS: Final = (
     *component.CLASSIFIER_CHECKS,
     *checks_of(
         classes_are_the_labels,
-        probabilities_are_probabilities,
-        tells_apart_what_differs,
+        probabilities_are_valid,
+        separates_separable_trials,
         same_seed_same_model,
         survives_json,
-        chunks_do_not_matter,
-        missing_values_have_an_answer,
+        single_trials_agree,
+        handles_missing_values,
         one_label_is_refused_or_certain,
         few_trials_are_refused_or_learned,
-        explains_what_it_says,
-        leaves_the_table_alone,
-        refuses_what_is_no_model,
+        explains_its_predictions,
+        does_not_change_the_table,
+        refuses_an_invalid_model,
     ),
 )

@@ -156,7 +156,7 @@ def state_is_numbers(subject: Subject) -> None:
     _demand_numbers(subject.create().init(), "state")
 
 
-def begins_in_the_approach(subject: Subject) -> None:
+def starts_in_the_approach(subject: Subject) -> None:
     """The first state has phase APPROACH and outcome RUNNING."""
     state = subject.create().init()
     for name, wanted, word in (("phase", APPROACH, "APPROACH"), ("outcome", RUNNING, "RUNNING")):
@@ -167,7 +167,7 @@ def begins_in_the_approach(subject: Subject) -> None:
         )
 
 
-def types_stay(subject: Subject) -> None:
+def types_do_not_change(subject: Subject) -> None:
     """No number of the state changes its type, and every state has the class of the first one."""
     for tick in ticks_of(subject):
         demand(
@@ -240,7 +240,7 @@ def commands_are_finite(subject: Subject) -> None:
                 demand(limit != -float("inf"), f"{name} of a command is -inf: give inf for no limit")
 
 
-def same_tick_same_answer(subject: Subject) -> None:
+def same_tick_same_command(subject: Subject) -> None:
     """`step` is pure: each tick, repeated in another order, gives the same command and state."""
     ticks, law = ticks_of(subject), subject.create()
     step, params = type(law).step, law.params()
@@ -253,7 +253,7 @@ def same_tick_same_answer(subject: Subject) -> None:
         )
 
 
-def state_is_all_it_remembers(subject: Subject) -> None:
+def state_holds_everything(subject: Subject) -> None:
     """Continued from a state and params that were written and read again, it gives the same commands."""
     whole = ticks_of(subject)
     resumed = fresh_ticks(subject, first=max(len(whole) // 2, 1))
@@ -264,7 +264,7 @@ def state_is_all_it_remembers(subject: Subject) -> None:
     )
 
 
-def two_runs_do_not_meet(subject: Subject) -> None:
+def grasps_are_independent(subject: Subject) -> None:
     """Two alternating grasps give the same commands as each alone: no state is shared."""
     first = ticks_of(subject)
     fresh_ticks(subject, "nothing")
@@ -275,7 +275,7 @@ def two_runs_do_not_meet(subject: Subject) -> None:
     )
 
 
-def reads_what_it_declares(subject: Subject) -> None:
+def requires_what_it_reads(subject: Subject) -> None:
     """The channels in `requires` suffice: without the others, the commands are the same."""
     full, own = ticks_of(subject), fresh_ticks(subject, channels=_required(subject))
     demand(
@@ -286,7 +286,7 @@ def reads_what_it_declares(subject: Subject) -> None:
     )
 
 
-def survives_a_silent_sensor(subject: Subject) -> None:
+def handles_frames_of_nan(subject: Subject) -> None:
     """A frame of NaN does not raise, and gives a command."""
     law = subject.create()
     step, params, state = type(law).step, law.params(), law.init()
@@ -301,7 +301,7 @@ def survives_a_silent_sensor(subject: Subject) -> None:
     demand(isinstance(command, Command), f"step returned {command!r} on a frame of NaN")
 
 
-def phases_are_a_laws_own(subject: Subject) -> None:
+def phases_are_in_order(subject: Subject) -> None:
     """The phases are APPROACH, SQUEEZE and HOLD, in this order."""
     for thing in THINGS:
         latest = APPROACH
@@ -339,17 +339,17 @@ CHECKS: Final = (
         step_is_a_plain_function,
         params_are_numbers,
         state_is_numbers,
-        begins_in_the_approach,
-        types_stay,
+        starts_in_the_approach,
+        types_do_not_change,
         commands_are_numbers,
         commands_are_of_declared_kinds,
         commands_are_finite,
-        same_tick_same_answer,
-        state_is_all_it_remembers,
-        two_runs_do_not_meet,
-        reads_what_it_declares,
-        survives_a_silent_sensor,
-        phases_are_a_laws_own,
+        same_tick_same_command,
+        state_holds_everything,
+        grasps_are_independent,
+        requires_what_it_reads,
+        handles_frames_of_nan,
+        phases_are_in_order,
         ends_every_grasp,
     ),
 )

@@ -48,7 +48,7 @@ def _same(a: Features, b: Features) -> bool:
     return repr(a) == repr(b)
 
 
-def gives_what_it_declares(subject: Subject) -> None:
+def returns_the_declared_features(subject: Subject) -> None:
     """Names and units are those of the declared features, in their order, for every trace."""
     declared = tuple((feature.name, feature.unit) for feature in subject.entry.features)
     for of, trace in {"a whole grasp": squeeze(), **odd_traces()}.items():
@@ -76,7 +76,7 @@ def values_are_floats(subject: Subject) -> None:
             )
 
 
-def something_is_defined_on_a_whole_grasp(subject: Subject) -> None:
+def a_whole_grasp_has_features(subject: Subject) -> None:
     """For a whole grasp of an elastic object, at least one feature is defined."""
     features = _features(subject, squeeze())
     demand(
@@ -86,13 +86,13 @@ def something_is_defined_on_a_whole_grasp(subject: Subject) -> None:
     )
 
 
-def answers_every_trace(subject: Subject) -> None:
+def handles_every_trace(subject: Subject) -> None:
     """Any trace (empty, short, without contact, without a channel, with gaps) gives values, or NaN with a reason."""
     for of, trace in odd_traces().items():
         _features(subject, trace, of)
 
 
-def answers_a_trace_cut_anywhere(subject: Subject) -> None:
+def handles_a_trace_that_ends_anywhere(subject: Subject) -> None:
     """`extract(trace.until(t))` works for every t, as early recognition needs it."""
     whole = squeeze()
     for k in range(CUTS):
@@ -113,7 +113,7 @@ def same_trace_same_features(subject: Subject) -> None:
         )
 
 
-def leaves_the_trace_alone(subject: Subject) -> None:
+def does_not_change_the_trace(subject: Subject) -> None:
     """`extract` does not change the trace."""
     trace = copied(squeeze())
     before = {name: getattr(trace, name).tobytes() for name in columns_of(trace)}
@@ -126,7 +126,7 @@ def leaves_the_trace_alone(subject: Subject) -> None:
     )
 
 
-def reads_what_it_declares(subject: Subject) -> None:
+def requires_what_it_reads(subject: Subject) -> None:
     """The channels in `requires` suffice: without the others, the features are the same."""
     full, own = _features(subject, squeeze()), _features(subject, _own(subject), "a grasp")
     required = {one.name for one in subject.entry.requires}
@@ -138,7 +138,7 @@ def reads_what_it_declares(subject: Subject) -> None:
     )
 
 
-def does_not_hang_on_the_start_of_the_clock(subject: Subject) -> None:
+def independent_of_the_start_of_the_clock(subject: Subject) -> None:
     """A shift of all times changes no feature beyond rounding."""
     early, late = _features(subject, squeeze()), _features(subject, shifted(squeeze(), 64.0))
     for name, a, b in zip(early.names, early.values, late.values, strict=True):
@@ -149,7 +149,7 @@ def does_not_hang_on_the_start_of_the_clock(subject: Subject) -> None:
         )
 
 
-def chunks_do_not_matter(subject: Subject) -> None:
+def views_and_copies_agree(subject: Subject) -> None:
     """A view of a longer trace gives the same features as a copy of its ticks."""
     view = squeeze().until(1.7)
     demand(
@@ -172,16 +172,16 @@ def survives_json(subject: Subject) -> None:
 CHECKS: Final = (
     *component.CHECKS,
     *checks_of(
-        gives_what_it_declares,
+        returns_the_declared_features,
         values_are_floats,
-        something_is_defined_on_a_whole_grasp,
-        answers_every_trace,
-        answers_a_trace_cut_anywhere,
+        a_whole_grasp_has_features,
+        handles_every_trace,
+        handles_a_trace_that_ends_anywhere,
         same_trace_same_features,
-        leaves_the_trace_alone,
-        reads_what_it_declares,
-        does_not_hang_on_the_start_of_the_clock,
-        chunks_do_not_matter,
+        does_not_change_the_trace,
+        requires_what_it_reads,
+        independent_of_the_start_of_the_clock,
+        views_and_copies_agree,
         survives_json,
     ),
 )

@@ -93,7 +93,7 @@ def plugin_modules_are_light(package: Package) -> None:
     )
 
 
-def everything_declared_is_there(package: Package) -> None:
+def everything_declared_loads(package: Package) -> None:
     """Every class, config, pipeline, model, reader and command that it declares can be loaded."""
     for component in package.components:
         component.config_class()
@@ -105,7 +105,7 @@ def everything_declared_is_there(package: Package) -> None:
             resource.load()
 
 
-def names_are_free(package: Package) -> None:
+def names_are_unique(package: Package) -> None:
     """No other installed distribution uses the name of one of its components or resources."""
     others: list[Any] = [
         *package.plugins.components(),
@@ -137,7 +137,7 @@ def pipelines_fit_together(package: Package) -> None:
             raise CheckFailed(f"pipeline {name}: {error}") from error
 
 
-def observers_disturb_nobody(package: Package) -> None:
+def observers_change_nothing(package: Package) -> None:
     """Observers raise nothing, return nothing, and do not change their arguments."""
     mine = [(status, name) for status in package.statuses for name in status.hooks if name in OBSERVERS]
     if not mine:
@@ -170,7 +170,7 @@ def observers_disturb_nobody(package: Package) -> None:
     )
 
 
-def probe_keeps_its_time(package: Package) -> None:
+def probe_returns_in_time(package: Package) -> None:
     """The search for devices ends in time and raises nothing, whatever is connected."""
     if not any("graspsense_probe_devices" in one.hooks for one in package.statuses):
         raise CheckSkipped("it looks for no devices")
@@ -294,12 +294,12 @@ def _built(folder: Path, scratch: Path) -> Path:
 CHECKS: Final = checks_of(
     plugins_load,
     plugin_modules_are_light,
-    everything_declared_is_there,
-    names_are_free,
+    everything_declared_loads,
+    names_are_unique,
     wheel_is_complete,
     pipelines_fit_together,
-    observers_disturb_nobody,
-    probe_keeps_its_time,
+    observers_change_nothing,
+    probe_returns_in_time,
 )
 
 
