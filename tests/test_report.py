@@ -16,7 +16,10 @@ import wayward
 from kept import keep
 
 from graspsense.cli.main import main
+from graspsense.core.plugins import installed
 from graspsense.evaluation.confusion import confusion
+from graspsense.evaluation.intervals import Difference, RecognitionRate
+from graspsense.evaluation.results import Evaluation, Measurement
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import read_experiment
 from graspsense.experiments.page import write_page
@@ -28,6 +31,7 @@ from graspsense.report.matrix import confusion_table
 from graspsense.report.rates import RateRow, rate_scale, rates_over, rates_picture
 from graspsense.report.store_page import store_page
 from graspsense.report.svg import GRID, GROUND, INKS, QUIET, TEXT, AxisScale
+from graspsense.report.verdict import headline
 from graspsense.store.store import Store
 
 VOID = {"meta", "br", "hr", "img", "input", "link"}
@@ -291,6 +295,53 @@ def test_the_page_of_a_store(tmp_path, capsys):
     assert "Trial 3: can:full_open, steady" in found.text
     assert "one line per grasp" in found.text
     assert "All trials" in found.text
+
+
+def test_features_have_their_unit_and_meaning_from_their_plugin(page):
+    text = Reader(page).text
+    (chitta,) = [one for one in installed().feature_sets() if one.name == "chitta"]
+
+    assert "Features of this grasp" in text
+    for feature in chitta.features:
+        shown = re.escape("mm" if feature.unit == "m" else feature.unit.replace("m/", "mm/"))
+        assert re.search(rf"{feature.name} (missing|-?[\d.]+ {shown}) {re.escape(feature.meaning)}", text), (
+            feature
+        )
+
+
+@pytest.mark.parametrize(
+    ("rate", "words"),
+    [(0.5, "is not shown to be more than the 50 by guessing"), (0.95, ", against 50 by guessing")],
+)
+def test_the_headline_of_an_evaluation_compares_with_guessing(rate, words):
+    right = round(rate * 100)
+    found = Evaluation(
+        classifier="x/c45 1",
+        target="both",
+        source="s",
+        features=(),
+        folds=2,
+        seed=0,
+        protocol="p",
+        headline=RecognitionRate(right, 100),
+        confusion=confusion(["a"], ["a"]),
+        by_class={},
+        protocols={},
+        controls={
+            "majority_class": Measurement(
+                what="w",
+                rate=RecognitionRate(50, 100),
+                difference=Difference(rate - 0.5, (rate - 0.6, rate - 0.4)),
+            )
+        },
+        learning_curve=(),
+        unknown=RecognitionRate(1, 100),
+        warnings=(),
+        notes=(),
+    )
+
+    assert headline(found).startswith(f"{right} of 100 grasps tell the object and its state")
+    assert headline(found).endswith(words)
 
 
 def test_the_page_of_a_store_that_cannot_be_judged(tmp_path):

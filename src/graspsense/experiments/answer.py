@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from graspsense.evaluation.over_seeds import MeanDifference
 from graspsense.experiments.summary import ConditionResult, Summary
+from graspsense.report.verdict import in_hundred
 from graspsense.report.wording import TARGETS
 
 
@@ -53,11 +54,6 @@ def headline(summary: Summary) -> str:
     if f"{100 * worst.rate.mean:.0f}" != f"{100 * best.rate.mean:.0f}":
         span = f"{100 * worst.rate.mean:.0f} to {span}"
     return f"No case is shown to be better than the others: {span} grasps tell {recognises}"
-
-
-def in_hundred(rate: float) -> str:
-    """Return a rate as a person would say it: `87 of 100`."""
-    return f"{100 * rate:.0f} of 100"
 
 
 def _comparison(conditions: Sequence[ConditionResult], best: ConditionResult) -> str:

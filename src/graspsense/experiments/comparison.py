@@ -15,10 +15,10 @@ from graspsense import __version__
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.strict import plain
 from graspsense.evaluation.intervals import Difference
-from graspsense.experiments.answer import in_hundred
 from graspsense.experiments.experiment import PIPELINE_TABLES, shown
 from graspsense.experiments.results import EXPERIMENT, RESULTS, Results
 from graspsense.experiments.summary import ConditionResult, Summary, summarise
+from graspsense.report.verdict import in_hundred
 from graspsense.report.wording import TARGETS
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from graspsense.experiments.task_results import RecognitionResult
 from graspsense.report.evaluation_sections import code, confusion_section, controls_section, tree_section
 from graspsense.report.html import Page, Section, bullets, facts, folded, pair, paragraph, table
 from graspsense.report.rates import RateRow, rates_over, rates_picture, rates_table
-from graspsense.report.traces import features_by_class, one_grasp, traces_by_class
+from graspsense.report.traces import features_by_class, features_table, one_grasp, traces_by_class
 from graspsense.report.wording import TARGETS, control_words, protocol_words
 from graspsense.report.write import write_html
 
@@ -242,9 +242,11 @@ def measurement_sections(summary: Summary, best: ConditionResult) -> list[Sectio
             f"{chosen.label}, seed {seed}.{where} The fingers close until both touch, squeeze with a set force, and "
             "hold until nothing moves."
         )
-        sections.append(
-            Section(id="grasp", title="One grasp, from the approach to rest", body=one_grasp(chosen, caption))
-        )
+        body = one_grasp(chosen, caption)
+        if result.trials is not None and chosen.trial < len(result.trials.values):
+            values = result.trials.values[chosen.trial]
+            body = pair(body, features_table("Features of this grasp", result.trials.features, values))
+        sections.append(Section(id="grasp", title="One grasp, from the approach to rest", body=body))
         text = f"Some grasps of each label from seed {seed}, drawn over each other.{where}"
         body = paragraph(text) + traces_by_class(result.grasps)
         sections.append(Section(id="traces", title="Force and gap over time", body=body))

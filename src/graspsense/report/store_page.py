@@ -10,14 +10,14 @@ from attrs import frozen
 
 from graspsense.core.config import SelectedComponent, select_component
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.units import in_words
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.recording.reader import read_recorded
 from graspsense.report.evaluation_sections import code, confusion_section, controls_section, tree_section
 from graspsense.report.grasp_curve import GraspCurve, grasp_curve
-from graspsense.report.html import Page, Section, bullets, facts, folded, paragraph, table
+from graspsense.report.html import Page, Section, bullets, facts, folded, pair, paragraph, table
 from graspsense.report.rates import RateRow
-from graspsense.report.traces import features_by_class, one_grasp, traces_by_class
+from graspsense.report.traces import features_by_class, features_table, one_grasp, traces_by_class
+from graspsense.report.verdict import headline, verdict
 from graspsense.report.wording import TARGETS, control_words, protocol_words
 from graspsense.store.changes import history
 from graspsense.store.dataset import labelled_store
@@ -89,6 +89,7 @@ def store_page(
         )
     except ConfigError as error:
         problem = str(error)
+    total = sum(count.trials for count in counts)
     sections: list[Section] = []
     if evaluation is not None and labelled is not None:
         sections += _evaluation_sections(evaluation, learner, labelled, classifier, seed)
@@ -100,7 +101,10 @@ def store_page(
         kind="Store of trials",
         title=f"Grasps in {folder}",
         question=f"Can a gripper recognise {TARGETS[target]} by touch?",
-        answer=_answer(evaluation, sum(count.trials for count in counts), problem),
+        answer=f"There are {total} grasps, but no recognition rate: {problem}."
+        if evaluation is None
+        else verdict(evaluation),
+        headline="" if evaluation is None else headline(evaluation),
         beside=_beside(evaluation, labelled, target),
         sections=tuple(sections),
     )
@@ -131,22 +135,6 @@ def _curves(store: Store) -> list[GraspCurve]:
         count[label] += 1
         curves.append(grasp_curve(trace, label, number))
     return curves
-
-
-def _answer(evaluation: Evaluation | None, total: int, problem: str) -> str:
-    if evaluation is None:
-        return f"There are {total} grasps, but no recognition rate: {problem}."
-    interval = evaluation.headline.interval
-    within = (
-        f"no interval: {evaluation.headline.no_interval}"
-        if interval is None
-        else f"95 %: {100 * interval[0]:.1f} to {100 * interval[1]:.1f}"
-    )
-    name = evaluation.classifier.partition(" ")[0].rpartition("/")[2]
-    return (
-        f"{name} recognises {TARGETS[evaluation.target]} in {100 * evaluation.headline.rate:.1f} % "
-        f"({within}) of {evaluation.headline.n} grasps."
-    )
 
 
 def _beside(evaluation: Evaluation | None, labelled: Labelled | None, target: Target) -> str:
@@ -209,11 +197,8 @@ def _measurement_sections(trial: StoredTrial, curves: Sequence[GraspCurve]) -> l
     except (ConfigError, DataDamaged) as error:
         body = paragraph(f"The recording of trial {summary.id} cannot be shown: {error}")
     features = trial.result.features
-    values = [
-        (name, "missing" if value is None else in_words(value, unit))
-        for (name, unit), value in zip(features.features, features.values, strict=True)
-    ]
-    sections = [Section(id="grasp", title="One grasp, from the approach to rest", body=body + facts(values))]
+    values = features_table(f"Features of trial {summary.id}", features.features, features.values)
+    sections = [Section(id="grasp", title="One grasp, from the approach to rest", body=pair(body, values))]
     if curves:
         text = f"The newest grasps of each label, at most {GRASPS}, drawn over each other."
         body = paragraph(text) + traces_by_class(curves)

@@ -10,7 +10,7 @@ from attrs import frozen
 
 from graspsense.core.labelled import class_of
 from graspsense.core.plugins import installed
-from graspsense.core.units import display_unit, without_underscores
+from graspsense.core.units import display_unit, in_words, without_underscores
 from graspsense.report.grasp_curve import GraspCurve
 from graspsense.report.html import figure, folded, panels, table
 from graspsense.report.svg import DASHES, INKS, QUIET, TEXT, AxisScale, Picture, number, reaching
@@ -171,7 +171,7 @@ def features_by_class(
     features: Sequence[tuple[str, str]], labels: Sequence[str], values: Sequence[Sequence[float | None]]
 ) -> str:
     """Return one figure per feature: a row per label, a dot per trial, a bar from the first to the third quartile."""
-    meanings = feature_meanings()
+    meanings = feature_meanings([name for name, _ in features])
     return panels(
         [
             _feature(name, unit, meanings.get(name, ""), labels, [row[k] for row in values])
@@ -180,13 +180,26 @@ def features_by_class(
     )
 
 
-def feature_meanings() -> dict[str, str]:
-    """Return what each feature of the installed feature sets means, in a few words."""
-    return {
-        feature.name: feature.meaning
-        for entry in installed().feature_sets()
-        for feature in entry.features or ()
-    }
+def feature_meanings(names: Sequence[str]) -> dict[str, str]:
+    """Return what each feature means, in a few words, as the installed feature sets declare it.
+
+    Of sets that share a name, the one that has all of these names counts.
+    """
+    sets = sorted(
+        installed().feature_sets(),
+        key=lambda one: set(names) <= {feature.name for feature in one.features or ()},
+    )
+    return {feature.name: feature.meaning for one in sets for feature in one.features or ()}
+
+
+def features_table(caption: str, features: Sequence[tuple[str, str]], values: Sequence[float | None]) -> str:
+    """Return the features of one grasp with their values, units and meanings."""
+    meanings = feature_meanings([name for name, _ in features])
+    rows = [
+        (name, "missing" if value is None else in_words(value, unit), meanings.get(name, ""))
+        for (name, unit), value in zip(features, values, strict=True)
+    ]
+    return table(caption, ("feature", "value", "meaning"), rows)
 
 
 def _feature(

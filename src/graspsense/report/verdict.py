@@ -15,6 +15,23 @@ def verdict(evaluation: Evaluation) -> str:
     return " ".join(filter(None, sentences))
 
 
+def headline(evaluation: Evaluation) -> str:
+    """Return the result as a person would say it, for the head of a page."""
+    told = f"{in_hundred(evaluation.headline.rate)} grasps tell {TARGETS[evaluation.target]}"
+    majority = evaluation.controls.get("majority_class")
+    if majority is None or majority.rate is None:
+        return told
+    guessing = f"{100 * majority.rate.rate:.0f} by guessing"
+    if majority.difference is None or not majority.difference.is_positive:
+        return f"{told}, which is not shown to be more than the {guessing}"
+    return f"{told}, against {guessing}"
+
+
+def in_hundred(rate: float) -> str:
+    """Return a rate as a person would say it: `87 of 100`."""
+    return f"{100 * rate:.0f} of 100"
+
+
 def _rate(evaluation: Evaluation) -> str:
     name = evaluation.classifier.partition(" ")[0].rpartition("/")[2]
     rate, source = evaluation.headline, evaluation.source
