@@ -265,10 +265,11 @@ def test_a_page_is_printed_light_whole_and_without_what_is_only_for_the_screen(b
     "GRASPSENSE_AXE" not in os.environ,
     reason="GRASPSENSE_AXE does not name axe.min.js (npm install axe-core)",
 )
+@pytest.mark.parametrize("name", ["experiment", "long"])
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 @pytest.mark.parametrize("width", WIDTHS)
-def test_a_page_passes_an_accessibility_check(browser, pages, width, dark):
-    browser.show(pages["experiment"], width, dark=dark)
+def test_a_page_passes_an_accessibility_check(browser, pages, name, width, dark):
+    browser.show(pages[name], width, dark=dark)
     browser.run(Path(os.environ["GRASPSENSE_AXE"]).read_text() + ";0")
     violations = browser.run(
         "axe.run(document, {resultTypes: ['violations']}).then((found) => found.violations.map((one) => "

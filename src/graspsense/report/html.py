@@ -161,7 +161,7 @@ def wide(label: str, body: str) -> str:
     """Return something that scrolls by itself where it is too wide, also by keyboard; `label` stands above it."""
     return (
         f'<p class="label">{escape(label)}</p>'
-        f'<div class="wide" tabindex="0" role="region" aria-label="{escape(label)}">{body}</div>'
+        f'<div class="wide" tabindex="0" role="region" aria-label="{escape(label)}, scrollable">{body}</div>'
     )
 
 
