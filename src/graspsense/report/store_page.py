@@ -89,7 +89,6 @@ def store_page(
         )
     except ConfigError as error:
         problem = str(error)
-    total = sum(count.trials for count in counts)
     sections: list[Section] = []
     if evaluation is not None and labelled is not None:
         sections += _evaluation_sections(evaluation, learner, labelled, classifier, seed)
@@ -101,9 +100,7 @@ def store_page(
         kind="Store of trials",
         title=f"Grasps in {folder}",
         question=f"Can a gripper recognise {TARGETS[target]} by touch?",
-        answer=f"There are {total} grasps, but no recognition rate: {problem}."
-        if evaluation is None
-        else verdict(evaluation),
+        answer=_answer(evaluation, sum(count.trials for count in counts), problem),
         headline="" if evaluation is None else headline(evaluation),
         beside=_beside(evaluation, labelled, target),
         sections=tuple(sections),
@@ -135,6 +132,12 @@ def _curves(store: Store) -> list[GraspCurve]:
         count[label] += 1
         curves.append(grasp_curve(trace, label, number))
     return curves
+
+
+def _answer(evaluation: Evaluation | None, total: int, problem: str) -> str:
+    if evaluation is None:
+        return f"There are {total} grasps, but no recognition rate: {problem}."
+    return verdict(evaluation)
 
 
 def _beside(evaluation: Evaluation | None, labelled: Labelled | None, target: Target) -> str:
