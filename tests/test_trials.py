@@ -258,3 +258,21 @@ def test_a_store_in_which_everything_is_set_aside_says_so(store, run, tmp_path):
 
     with pytest.raises(ConfigError, match=r"no trial to export that is not set aside \(1 are\)"):
         trial_table(store.folder)
+
+
+def test_a_store_that_is_rebuilt_from_its_recordings_says_that_its_changes_are_lost(store, run):
+    keep(store, "toy", device=REAL)
+    keep(store, "toy", device=REAL)
+    changes.relabel(store, [1], labels_of("block"), "")
+    changes.set_aside(store, [2], "x")
+    store.close()
+    for path in store.folder.glob("store.sqlite*"):
+        path.unlink()
+
+    code, _, err = run("recover", store.folder)
+
+    assert code == 0
+    assert "Labels are as recorded, and no trial is set aside" in err
+    with Store.read(store.folder) as rebuilt:
+        assert labels(rebuilt) == [(1, "toy", None), (2, "toy", None)]
+    assert "as recorded" not in run("recover", store.folder)[2]

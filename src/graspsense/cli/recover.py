@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import echo
+from graspsense.cli.terminal import echo, talk
 
 EXIT_DAMAGED = 5
 
@@ -29,7 +29,13 @@ def recover(source: str, out: str | None, as_json: bool) -> None:
         if out is not None:
             raise click.UsageError("--out is for a FILE; in a store everything has its place")
         with Store.open(source) as store:
+            rebuilt = not store.recording_names()
             found = recover_store(store)
+        if rebuilt and any(one.what == "added" for one in found):
+            talk(
+                "note: the database was built anew from the recordings. Labels are as recorded, and no trial is set "
+                "aside: repeat the changes of `graspsense trials`"
+            )
     else:
         found = [recover_file(source, out)]
     if as_json:
