@@ -107,7 +107,7 @@ def _print(found: Evaluation) -> None:
     controls = {name: one for name, one in found.controls.items() if name not in found.protocols}
     measured = {name: one for name, one in {**found.protocols, **controls}.items() if one.rate is not None}
     echo_table(
-        ("PROTOCOL OR CONTROL", "RATE", "95 %", "LOWER BY, IN POINTS", "THAN", "WHAT"),
+        ("PROTOCOL OR CONTROL", "RATE", "95 %", "LOWER BY, IN POINTS", "WHAT"),
         [_row(name, one) for name, one in measured.items()],
     )
     for name, one in {**found.protocols, **controls}.items():
@@ -138,6 +138,5 @@ def _row(name: str, measured: Measurement) -> tuple[str, ...]:
         percentage(rate.rate),
         percentages(rate.interval),
         "" if measured.difference is None else measured.difference.points,
-        measured.difference_of,
-        measured.what,
+        f"{measured.what}{f' (compared with {measured.difference_of})' if measured.difference_of else ''}",
     )

@@ -163,6 +163,7 @@ def _list(known: dict[str, object], as_json: bool) -> None:
     echo_table(("EXPERIMENT", "TIME", "TASKS", "WHAT"), rows)
     echo(
         f"\nTIME is for {cores} cores, {measured_on()}.\n"
+        "The first experiment after an installation compiles the simulator as well, about a minute in each process.\n"
         "`graspsense experiment NAME --dry-run` says what an experiment consists of; -o seeds=2 makes it shorter."
     )
 

@@ -119,8 +119,9 @@ def echo_table(
 ) -> None:
     """Print rows of text in columns; `styles` has the style of the cells of a column, by its header.
 
-    On a terminal that is too narrow, texts are wrapped within their columns. If even single words do not fit beside
-    each other, every row becomes a block with one line for each column.
+    On a terminal that is too narrow, long texts are wrapped within their columns. If there is no room for this, the
+    text of the last column stands below its row; if the others do not fit either, every row becomes a block with one
+    line for each column.
     """
     if not rows:
         return
@@ -135,12 +136,15 @@ def echo_table(
             )
             click.echo(line.rstrip())
         return
-    room = columns - _GAP * (len(header) - 1)
-    widths = _fitted(header, rows, natural, room)
-    if widths is None:
-        _echo_blocks(header, rows, styles or {})
+    styles = styles or {}
+    widths = _fitted(header, rows, natural, columns - _GAP * (len(header) - 1))
+    if widths is not None:
+        lines = [line for block in _rich_rows(header, rows, widths, right, styles, columns) for line in block]
+        _write(lines, None, err=False)
+    elif sum(natural[:-1]) + _GAP * (len(header) - 2) <= columns and natural[-1] > _SHORT:
+        _echo_text_below(header, rows, natural, right, styles, columns)
     else:
-        _echo_rich(header, rows, widths, right, styles or {}, columns)
+        _echo_blocks(header, rows, styles)
 
 
 def _wrapped(line: str, width: int, indent: int) -> list[str]:
@@ -180,27 +184,21 @@ def _all_numbers(cells: Sequence[str]) -> bool:
 def _fitted(
     header: Sequence[str], rows: Sequence[Sequence[str]], natural: Sequence[int], room: int
 ) -> list[int] | None:
-    """Return the widths of the columns within `room`, None where single words do not fit beside each other."""
-    if sum(natural) <= room:
-        return list(natural)
-    words = [max(len(word) for row in (header, *rows) for word in (row[k].split() or [""]))
-             for k in range(len(header))]  # fmt: skip
-    for least in (
-        [width if width <= _SHORT else max(word, _SHORT) for width, word in zip(natural, words, strict=True)],
-        words,
-    ):
-        spare = room - sum(least)
-        if spare < 0:
-            continue
-        widths = list(least)
-        # Short columns become as wide as they want first, so that the longest texts are wrapped.
-        order = sorted(range(len(widths)), key=lambda k: natural[k] - widths[k])
-        for done, k in enumerate(order):
-            more = min(natural[k] - widths[k], spare // (len(order) - done))
-            widths[k] += more
-            spare -= more
-        return widths
-    return None
+    """Return the widths of the columns within `room`, None if cells would have to be narrower than is readable."""
+    least = []
+    for k, width in enumerate(natural):
+        words = [len(word) for row in (header, *rows) for word in row[k].split()]
+        least.append(min(width, max(_SHORT, *words, 0)))
+    spare = room - sum(least)
+    if spare < 0:
+        return None
+    # Short columns become as wide as they want first, so that the longest texts are wrapped.
+    order = sorted(range(len(least)), key=lambda k: natural[k] - least[k])
+    for done, k in enumerate(order):
+        more = min(natural[k] - least[k], spare // (len(order) - done))
+        least[k] += more
+        spare -= more
+    return least
 
 
 def _echo_blocks(header: Sequence[str], rows: Sequence[Sequence[str]], styles: Mapping[str, StyleOf]) -> None:
@@ -212,14 +210,33 @@ def _echo_blocks(header: Sequence[str], rows: Sequence[Sequence[str]], styles: M
                 echo_entry(f"  {name.lower()}", cell, _style(styles, name, cell), width=wide)
 
 
-def _echo_rich(
+def _echo_text_below(
+    header: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    natural: Sequence[int],
+    right: Sequence[bool],
+    styles: Mapping[str, StyleOf],
+    columns: int,
+) -> None:
+    """Print the rows with the text of the last column below each."""
+    shown = [row[:-1] for row in rows]
+    title, *lines = _rich_rows(header[:-1], shown, natural[:-1], right[:-1], styles, columns)
+    _write(title, None, err=False)
+    for line, row in zip(lines, rows, strict=True):
+        _write(line, None, err=False)
+        if row[-1]:
+            echo(f"    {row[-1]}", _style(styles, header[-1], row[-1]))
+
+
+def _rich_rows(
     header: Sequence[str],
     rows: Sequence[Sequence[str]],
     widths: Sequence[int],
     right: Sequence[bool],
     styles: Mapping[str, StyleOf],
     columns: int,
-) -> None:
+) -> list[list[str]]:
+    """Return the lines of the header and of each row."""
     # Imported here: rich takes longer to import than the rest of a short command.
     from rich.console import Console
     from rich.table import Table
@@ -234,22 +251,22 @@ def _echo_rich(
         force_terminal=coloured,
         legacy_windows=False,
     )
-    table = Table(box=None, padding=(0, _GAP, 0, 0), pad_edge=False, collapse_padding=False, expand=False)
-    table.header_style = "bold" if coloured else ""
-    for name, width, number in zip(header, widths, right, strict=True):
-        table.add_column(Text(name), width=width, justify="right" if number else "left", overflow="fold")
-    for row in rows:
+    printed = []
+    for number, row in enumerate((header, *rows)):
+        table = Table(box=None, padding=(0, _GAP, 0, 0), pad_edge=False, show_header=False)
         cells: list[Any] = []
-        for name, cell in zip(header, row, strict=True):
-            style = _style(styles, name, cell)
+        for name, cell, width, at_right in zip(header, row, widths, right, strict=True):
+            table.add_column(width=width, justify="right" if at_right else "left", overflow="fold")
+            style = Style.HEADING if number == 0 else _style(styles, name, cell)
             look = (
                 "" if style is None else " ".join(filter(None, ("bold" if style.bold else "", style.value)))
             )
             cells.append(Text(cell, style=look))
         table.add_row(*cells)
-    with console.capture() as captured:
-        console.print(table)
-    _write([line.rstrip() for line in captured.get().rstrip("\n").split("\n")], None, err=False)
+        with console.capture() as captured:
+            console.print(table)
+        printed.append([line.rstrip() for line in captured.get().rstrip("\n").split("\n")])
+    return printed
 
 
 def _style(styles: Mapping[str, StyleOf], name: str, cell: str) -> Style | None:

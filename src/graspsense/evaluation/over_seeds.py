@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from attrs import frozen
 
-from graspsense.evaluation.intervals import Interval, RecognitionRate, wilson
+from graspsense.evaluation.intervals import Interval, RecognitionRate, percentage, percentages, wilson
 
 
 @frozen
@@ -59,9 +59,8 @@ class OverSeeds:
     def words(self) -> str:
         """The mean as text, with its interval."""
         if self.interval is None:
-            return f"{self.mean:.3f} (no interval{f': {self.single.no_interval}' if self.single else ''})"
-        low, high = self.interval
-        return f"{self.mean:.3f} (95 % {low:.3f} to {high:.3f})"
+            return f"{percentage(self.mean)} (no interval{f': {self.single.no_interval}' if self.single else ''})"
+        return f"{percentage(self.mean)} (95 %: {percentages(self.interval)})"
 
 
 @frozen
