@@ -1,14 +1,13 @@
-"""The extremes that the simulator has to bear: a row a case, with what must hold and whether it does. Simulated.
+"""Extreme parameters of the simulator: one row for each case, with the property that must hold. All simulated.
 
     python benchmarks/extremes.py [--quick] [--json] [--table]
 
-The fingers close at a set speed, touch, and squeeze with a constant effort for a while; no controller of a grasp is
-in it but in the rows on the sampled controller, so that what fails is the plant. A scene runs as it does for a user:
-exact maps take the ticks where it is piecewise linear (`by` then says `maps`), steps do elsewhere. The reference of a
-case is the same with every term kept and each tick in steps halved until it stands still, never maps. For contacts as
-stiff or masses as light as in the grid it is compiled, where numba is there. A squeeze there is 0.15 s long: it has
-then bounced and stands. `--table` prints the table of the documentation. `--quick` takes fewer stiffnesses and masses
-and no tick of 1e-5 s.
+The fingers close at a set speed, touch, and squeeze with a constant effort for a while. There is no controller, except
+in the rows on the sampled controller, so a failure is one of the plant. A scene runs as it does for a user: by exact
+discretisation if it is piecewise linear (as `by` says), otherwise by time steps. The reference of a case has all
+terms, and halves the steps of each tick until the result converges. For the stiff contacts and light masses of the grid
+it is compiled if numba is installed; a squeeze there lasts 0.15 s, after which the bouncing has ended. `--table` prints
+the table of the documentation. `--quick` uses fewer stiffnesses and masses, and no tick of 1e-5 s.
 """
 
 from __future__ import annotations
@@ -51,13 +50,14 @@ from graspsense_sim_gripper.terms.registry import laws_of
 Row = dict[str, Any]
 FloatArray = NDArray[np.float64]
 HERE: Final = Path(__file__).parent
+EXACT: Final = "exact discretisation"
 HELD: Final = 0.05
-"""Peak and rms may differ by this share."""
+"""Largest relative difference of peak and rms."""
 BASE: Final = SimConfig(sensor="ideal", spread=False, transmission="straight", moving_mass_kg=100.0)
 SMOOTH: Final = evolve(
     BASE, pad_stiffness_n_m=math.inf, coulomb_n=0.0, breakaway_n=0.0, load_friction_coefficient=0.0
 )
-"""Rigid covers and no friction."""
+"""Rigid pads and no friction."""
 
 
 def object_of(*terms: tuple[str, dict[str, float]], width_m: float = 0.05, **more: Any) -> ObjectSpec:
@@ -87,20 +87,20 @@ class Ready:
 
 
 def ready(config: SimConfig, spec: ObjectSpec) -> Ready:
-    """Return the plant of this scene, by exact maps where it is piecewise linear, as the backend has it."""
+    """Return the plant of this scene, discretised exactly if it is piecewise linear, as in the backend."""
     problem = problem_of(config, spec)
     reduction = propose(problem, grip_of(problem))
     setup = instantiate(problem, reduction, 0)
     params, move, by = setup.plant, plant_move(laws_of(setup.kinds)), "steps"
     exact = discretise(config, setup)
     if exact is not None:
-        params, move, by = exact[0], bind_move(setup.kinds, exact[1], move), "maps"
+        params, move, by = exact[0], bind_move(setup.kinds, exact[1], move), EXACT
     return Ready(setup=setup, reduction=reduction, params=params, move=move, by=by)
 
 
 @cache
 def _compiled(kinds: tuple[str, ...]) -> Callable[..., Any]:
-    """Return the squeeze of an object of these terms in steps, compiled where that is to be had."""
+    """Return the squeeze of an object of these terms in steps, compiled if possible."""
     plain = bind(_pressing, move=plant_move(laws_of(kinds)))
     try:
         return compile_part(plain)
@@ -117,17 +117,17 @@ def press(
     seconds: float = 0.3,
     fast: bool = False,
 ) -> tuple[FloatArray, PlantState, Ready]:
-    """Return the force at each tick, the plant at the end, and what it was. `fast`: steps are compiled."""
+    """Return the force at each tick, the plant at the end, and its set-up. `fast`: steps are compiled."""
     config = evolve(
         config,
-        # Met inside a tick of any length here: at its very end, who has touched is a matter of rounding.
+        # The contact lies inside a tick of any length used here; at the very end of a tick it would depend on rounding.
         open_gap_m=min(spec.width_m + 2.0 * abs(spec.offset_m) + 0.0537 * speed_m_s, 0.09),
         expected_speed_m_s=max(speed_m_s, 1e-6),
         expected_force_n=max(effort_n, 1.0),
     )
     plant = ready(config, spec)
     drive, state, dt = plant.setup.plant.drive, plant.setup.state, plant.setup.dt_s
-    # It comes with its speed, so that the tick of a slow controller does not blur it.
+    # The fingers start at their speed, so that the result does not depend on the tick of a slow controller.
     motion = state.motion
     state = state._replace(motion=motion._replace(speed_rev_s=-speed_m_s / motion.jacobian_m_rev))
     carrying = drive.friction.coulomb_n + drive.friction.damping_n_s_m * speed_m_s
@@ -138,12 +138,12 @@ def press(
 
 
 def rms_of(forces: FloatArray, expected: FloatArray) -> float:
-    """Return the rms of the difference of two traces, over that of the expected one (a newton at the least)."""
+    """Return the rms of the difference of two traces, relative to that of the expected one (at least 1 N)."""
     return float(np.sqrt(np.mean((forces - expected) ** 2)) / max(np.sqrt(np.mean(expected**2)), 1.0))
 
 
 def against_reference(config: SimConfig, spec: ObjectSpec, **how: Any) -> Row:
-    """Return errors of peak and trace, whether all is finite, and what the simulator says of the peak itself."""
+    """Return the errors of peak and trace, whether all is finite, and the verdict of the simulator on the peak."""
     forces, state, plant = press(config, spec, **how)
     expected, wanted, _ = press(evolve(config, fidelity="reference"), spec, **how)
     flagged = plant.reduction.contact.decision == "peak not resolved"
@@ -168,7 +168,7 @@ def light_surface(stiffness: float, ratio: float, mass_kg: float = 1.0) -> Objec
 
 
 def stiffness_and_mass(quick: bool) -> Iterator[Row]:
-    """By steps, with friction that is greater at rest, and by exact maps, with friction that is not."""
+    """By steps, with static friction above Coulomb friction, and by exact discretisation, with both equal."""
     stiffnesses = (1e2, 1e4, 1e6, 1e9) if quick else (1.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9)
     ratios = (1e-3, 1e3) if quick else (1e-6, 1e-3, 1.0, 1e3)
     rubs = evolve(BASE, moving_mass_kg=1.0, pad_stiffness_n_m=math.inf, damping_n_s_m=20.0, coulomb_n=0.5)
@@ -191,14 +191,14 @@ def stiffness_and_mass(quick: bool) -> Iterator[Row]:
 
 
 def thin_object(quick: bool) -> Iterator[Row]:
-    """What is thin or light is met and borne: with all effort there is after friction, or while it is thrown back."""
+    """Thin or light objects are not passed through, under the full effort or while they are thrown back."""
     config = evolve(BASE, pad_stiffness_n_m=math.inf)
     for width in (1e-5, 1e-3):
         for speed in (0.01, 0.2):
             spec = object_of(("elastic", {"k1_n_m": 1e6}), width_m=width)
             forces, state, _ = press(config, spec, speed_m_s=speed, seconds=0.1)
             finite = bool(np.isfinite(forces).all())
-            # Pressed flat, it is the end of travel that stops the fingers; else the spring takes up what moves.
+            # The end of travel stops fingers that flatten the object; otherwise the spring takes up the kinetic energy.
             energy_n = speed * math.sqrt(1e6 * config.moving_mass_kg)
             least = 0.8 * min(energy_n, 1e6 * width)
             yield {
@@ -223,7 +223,7 @@ SHELL: Final = ("elastic", {"k1_n_m": 2000.0})
 GAS: Final = {"area_m2": 1e-3, "area_slope_m": 0.0, "pressure_pa": 101325.0, "exponent": 1.4}
 BULGE: Final = 1e-10
 CLOSE: Final = evolve(BASE, accuracy=1e-4, fidelity="full")
-"""What approaches a limit is compared with it where the steps' own error is none."""
+"""Settings for the comparison with a limit, with negligible errors of the steps."""
 
 
 def gas(volume_m3: float, **more: float) -> ObjectSpec:
@@ -231,9 +231,9 @@ def gas(volume_m3: float, **more: float) -> ObjectSpec:
 
 
 def tends(case: str, of: Callable[[float], ObjectSpec], limit: ObjectSpec, at: float, order: float) -> Row:
-    """Return whether an object comes nearer to a limit by this order as its parameter goes to 0 (order < 0: to inf).
+    """Return whether an object converges to a limit with this order as its parameter goes to 0 (order < 0: to inf).
 
-    The difference of their traces at `at` and at half of it (order < 0: twice) gives the order that is seen.
+    The observed order follows from the differences of their traces at `at` and at half of it (order < 0: twice).
     """
     expected, _, _ = press(CLOSE, limit)
     towards = 0.5 if order > 0.0 else 2.0
@@ -250,7 +250,7 @@ def tends(case: str, of: Callable[[float], ObjectSpec], limit: ObjectSpec, at: f
 
 
 def across(case: str, of: Callable[[float], ObjectSpec], values: Sequence[float]) -> Iterator[Row]:
-    """Yield a row for each place between these values where the model changes: no jump there beyond the accuracy."""
+    """Yield a row for each value at which the reduced model changes: the result may not jump beyond the accuracy."""
 
     def made(value: float) -> tuple[str, ...]:
         return press(BASE, of(value), seconds=1e-3)[2].reduction.treatment
@@ -277,7 +277,7 @@ def across(case: str, of: Callable[[float], ObjectSpec], values: Sequence[float]
 
 
 def head_space(quick: bool) -> Iterator[Row]:
-    """Half a litre of which this share is air: less of it tends to the wall's own A^2 / C, more to the empty bottle."""
+    """A fraction of air in half a litre: little air tends to the wall's A^2 / C, much air to the empty bottle."""
     for share in (1e-3, 1e-2, 1e-1, 0.5, 1.0):
         row = against_reference(BASE, gas(5e-4 * share))
         yield {"case": "head space", "value": share, **row, "holds": row["rms_error"] <= 0.01}
@@ -287,7 +287,7 @@ def head_space(quick: bool) -> Iterator[Row]:
 
 
 def vents(quick: bool) -> Iterator[Row]:
-    """A narrow one tends to a sealed bottle by its area, a wide one, where the flow is viscous, to none by its too."""
+    """A narrow vent tends to a sealed bottle in proportion to its area; a wide one tends to no gas at all."""
     areas = (0.0, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
     for area in areas:
         row = against_reference(BASE, gas(5e-5, vent_m2=area))
@@ -297,21 +297,21 @@ def vents(quick: bool) -> Iterator[Row]:
     yield from across("vent", lambda area: gas(5e-5, vent_m2=area), areas[1:])
 
 
-def arm(tau_s: float) -> ObjectSpec:
+def branch(tau_s: float) -> ObjectSpec:
     return object_of(SHELL, ("maxwell", {"k_n_m": 1000.0, "tau_s": tau_s}))
 
 
 def relaxation(quick: bool) -> Iterator[Row]:
-    """A fast arm tends to a damper k tau, and so to nothing; a slow one to a spring."""
+    """A fast branch tends to a damper k tau, and so to nothing; a slow one to a spring."""
     times = (1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e3, 1e6, 1e9)
     for tau in times:
-        row = against_reference(BASE, arm(tau))
+        row = against_reference(BASE, branch(tau))
         yield {"case": "relaxation time", "value": tau, **row, "holds": row["rms_error"] <= 0.01}
-    yield tends("relaxation time", arm, object_of(SHELL), 1e-3, 1.0)
-    yield tends("relaxation time", arm, object_of(("elastic", {"k1_n_m": 3000.0})), 100.0, -1.0)
+    yield tends("relaxation time", branch, object_of(SHELL), 1e-3, 1.0)
+    yield tends("relaxation time", branch, object_of(("elastic", {"k1_n_m": 3000.0})), 100.0, -1.0)
     for tau in (1e-9, 1e-5, 1e-3):
         damper = object_of(SHELL, ("loss", {"damping_n_s_m": 1000.0 * tau}))
-        error = rms_of(press(CLOSE, arm(tau))[0], press(CLOSE, damper)[0])
+        error = rms_of(press(CLOSE, branch(tau))[0], press(CLOSE, damper)[0])
         yield {
             "case": "relaxation time, as the damper k tau",
             "value": tau,
@@ -319,7 +319,7 @@ def relaxation(quick: bool) -> Iterator[Row]:
             "finite": math.isfinite(error),
             "holds": error <= 0.01,
         }
-    yield from across("relaxation time", arm, times)
+    yield from across("relaxation time", branch, times)
 
 
 def energy(quick: bool) -> Iterator[Row]:
@@ -360,7 +360,7 @@ def energy(quick: bool) -> Iterator[Row]:
 
 
 def stuck(quick: bool) -> Iterator[Row]:
-    """Below breakaway nothing moves, above it something does, and what is held stays for as long as one likes."""
+    """Below breakaway the fingers do not move, above it they do, and they stay at rest for any time."""
     bottle = find("odwalla:full_closed")
     for geared, friction in ((True, 8.0), (False, 7.0)):
         for effort in (0.0, 5.0, 6.99, 8.01, 30.0, 100.0):
@@ -388,11 +388,11 @@ def stuck(quick: bool) -> Iterator[Row]:
     }
     _, held, pr2 = press(evolve(BASE, transmission="pr2"), bottle, seconds=2.0)
     yield _hold("pr2", pr2, held, 1e3)
-    # A map is for its tick, of which the longest is 0.1 s: so an hour, and 1e6 s by the plant that it hands over to.
+    # The exact discretisation has a fixed tick of at most 0.1 s: an hour with it, and 1e6 s with time steps.
     config = evolve(BASE, breakaway_n=BASE.coulomb_n, rate_hz=10.0)
-    _, held, maps = press(config, object_of(SHELL, ("maxwell", {"k_n_m": 100.0, "tau_s": 0.1})), seconds=5.0)
-    yield _hold("straight, an hour", maps, held, 0.1, 36_000)
-    steps = evolve(maps, params=maps.setup.plant, move=plant_move(laws_of(maps.setup.kinds)), by="steps")
+    _, held, exact = press(config, object_of(SHELL, ("maxwell", {"k_n_m": 100.0, "tau_s": 0.1})), seconds=5.0)
+    yield _hold("straight, an hour", exact, held, 0.1, 36_000)
+    steps = evolve(exact, params=exact.setup.plant, move=plant_move(laws_of(exact.setup.kinds)), by="steps")
     yield _hold("straight", steps, held, 1e3)
 
 
@@ -434,7 +434,7 @@ def approach(quick: bool) -> Iterator[Row]:
     speeds = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.2)
     for effort in (0.0, 20.0):
         for speed in speeds:
-            # The effort comes with the tick that follows the touch: a tick of 1e-4 s makes little of that.
+            # The effort follows at the tick after the contact; with a tick of 1e-4 s this delay is negligible.
             short = evolve(config, rate_hz=1e4)
             _, state, plant = press(short, spec, speed_m_s=speed, effort_n=effort, seconds=0.15)
             exact = effort + math.sqrt(effort**2 + speed**2 * stiffness * mass)
@@ -462,7 +462,7 @@ def approach(quick: bool) -> Iterator[Row]:
 
 
 def ticks(quick: bool) -> Iterator[Row]:
-    bottle, linear = find("odwalla:empty_open"), arm(0.1)
+    bottle, linear = find("odwalla:empty_open"), branch(0.1)
     for rate in (1e5, 1e3, 1e2, 10.0):
         if quick and rate > 1e4:
             continue
@@ -473,7 +473,7 @@ def ticks(quick: bool) -> Iterator[Row]:
 
 
 def _looped(rate_hz: float) -> Row:
-    """The sampled velocity loop: whether it is unstable is what its eigenvalues say, and no error of the plant's."""
+    """The sampled velocity loop: its stability follows from its eigenvalues, not from an error of the plant."""
     config = evolve(BASE, rate_hz=rate_hz, breakaway_n=BASE.coulomb_n, open_gap_m=0.09)
     spec = object_of(SHELL, width_m=0.01)
     gain = create("controller", "hybrid").config.velocity_gain_n_s_m

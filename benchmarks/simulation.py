@@ -1,14 +1,14 @@
-"""Our simulator beside other engines, many grasps at once, and what compiling takes. Everything is simulated.
+"""The simulator compared with other engines, many grasps at once, and the time of compiling. All is simulated.
 
     pip install -c constraints.txt -r benchmarks/requirements.txt
     python benchmarks/simulation.py [--json] [--only peers,plant,gas,many,compile] [--grasps 10000]
         [--engines mujoco,drake,scipy]
 
 Peers: `simulation_scene.py` has the scene and its exact solution, `simulation_peers.py` the other engines. A ratio
-is that of the cheapest setting of each side whose rms error of the force trace is at most as asked for, both sides
-timed in turn, the least of several: processor time of one thread, the trace recorded. Many grasps: the catalogue in
-turn, features drawn, on all cores. Compiling: all of the catalogue in a fresh process, with an empty cache and a full
-one. What was not measured is null. On a machine that does other things too, processor time is what to look at.
+is between the fastest settings of both sides whose rms error of the force trace is below a bound, both sides
+timed in turn, the least of several: processor time of one thread, with the trace recorded. Many grasps: the catalogue
+in turn, with features, on all cores. Compiling: all of the catalogue in a fresh process, with an empty cache and a full
+one. Values that were not measured are null. Only processor times are meaningful on a busy machine.
 """
 
 from __future__ import annotations
@@ -187,11 +187,11 @@ NEAREST = """
 
 
 def plant() -> dict[str, Any]:
-    """Return the PR2's own drive (rotor through the linkage, stick friction, covers) beside MuJoCo's nearest model.
+    """Return the PR2's own drive (rotor through the linkage, static friction, pads) beside MuJoCo's nearest model.
 
-    MuJoCo has the rotor's inertia as at contact, the sliding friction as joint friction, and covers and object as one
-    spring. Its solver of constraints is then at work. What it cannot have: an inertia that varies, breakaway above
-    sliding, friction that grows with the load. The error of that model is stated at a step a fiftieth of the tick.
+    MuJoCo has the rotor's inertia at contact, the sliding friction as joint friction, and pads and object as a spring,
+    and it uses its constraint solver. It cannot represent a varying inertia, static friction above sliding friction, or
+    friction that grows with the load. The error of that model is given for steps of a fiftieth of the tick.
     """
     if find_spec("mujoco") is None:
         return {"mujoco_plant": None}

@@ -217,7 +217,7 @@ class TestCommandsOfPlugins:
 
         assert ran.code == 2
         assert ran.err == (
-            "graspsense: command 'say' of lab-a 0.1 cannot be used here: command_say:command is no click command\n"
+            "graspsense: command 'say' of lab-a 0.1 cannot be used here: command_say:command is not a click command\n"
         )
 
     def test_two_of_one_name_are_an_error_naming_both(self, run):

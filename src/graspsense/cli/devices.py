@@ -24,7 +24,9 @@ def devices(timeout_s: float, as_json: bool) -> None:
     from graspsense.core.plugins import installed
 
     if timeout_s != timeout_s:
-        raise click.BadParameter("nan is no number of seconds; more than 0 is", param_hint="--timeout")
+        raise click.BadParameter(
+            "nan is not a number of seconds; give a number above 0", param_hint="--timeout"
+        )
     probes = installed().probe_devices(timeout_s)
     found = [(probe.distribution, device) for probe in probes for device in probe.found]
     failed = {probe.distribution: probe.error for probe in probes if probe.error}

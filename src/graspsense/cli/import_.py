@@ -1,4 +1,4 @@
-"""`graspsense import`: take in what somebody else recorded."""
+"""`graspsense import`: import recordings of other programs."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ EXIT_BROKEN_PIPE: Final = 141
 
 
 class Commands(click.Group):
-    """Our own commands from the table, anybody else's from their plugins when one is called."""
+    """The commands of the table, and those of plugins, which are loaded when one of them is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of our own commands."""
@@ -105,7 +105,7 @@ def _plugin_command(name: str) -> click.Command:
     if not isinstance(command, click.Command):
         raise PluginUnavailable(
             f"command {name!r} of {resource.distribution} {resource.version} cannot be used here: "
-            f"{resource.entry.target} is no click command"
+            f"{resource.entry.target} is not a click command"
         )
     return command
 
@@ -158,7 +158,7 @@ def _exit_code(arguments: list[str]) -> int:
         click.echo("interrupted", err=True)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        _give_up_stdout()  # whoever read us has gone
+        _give_up_stdout()  # the reader of the pipe has gone
         return EXIT_BROKEN_PIPE
     except Exception as error:
         return _report(error, as_json="--json" in arguments)

@@ -14,7 +14,7 @@ from graspsense.cli.terminal import can_redraw, terminal_width
 FIRST_S: Final = 2.0
 AGAIN_S: Final = 0.2
 AGAIN_IN_A_LOG_S: Final = 10.0
-"""Where stderr is no terminal every report is a line of its own, so there are fewer."""
+"""If stderr is not a terminal, every report is a separate line, so there are fewer reports."""
 BAR: Final = 24
 
 

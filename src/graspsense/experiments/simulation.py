@@ -1,4 +1,4 @@
-"""What a simulator's accuracy costs: the error of features and force trace against the time of the same grasps."""
+"""The error of features and force trace of a simulator, against the time of the same grasps."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def trade_simulation(
         try:
             felt, seconds, setup = _measured(settings, variant, names, all_seeds, tick)
         except (ArithmeticError, ValueError, ConfigError) as error:
-            # A name that nobody knows is one in the reference, too, which comes first.
+            # An unknown name fails in the reference already, which comes first.
             if reference is None:
                 raise
             points.append(_failed(variant, f"{type(error).__name__}: {error}"))

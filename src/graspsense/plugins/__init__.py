@@ -1,1 +1,1 @@
-"""The default parts, registered through the same hooks as anybody's."""
+"""The default components, registered through the same hooks as those of any plugin."""

@@ -67,7 +67,7 @@ def number(value: float) -> str:
 
 @define
 class Picture:
-    """A picture that grows by what is drawn into it."""
+    """An SVG picture under construction."""
 
     height: float
     width: float = WIDTH

@@ -1,4 +1,4 @@
-"""The gripper that is a recording: frame after frame as somebody recorded them, whatever is commanded."""
+"""A recording as a gripper: it returns the recorded frames in order, and ignores all commands."""
 
 from __future__ import annotations
 

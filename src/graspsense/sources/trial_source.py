@@ -92,7 +92,7 @@ def kind_of(source: str) -> Kind:
     if ":" in source:
         return "data set"
     raise ConfigError(
-        f"{source!r} is no source of trials: name a FILE.csv, a data set as icub:FOLDER, a store as "
+        f"{source!r} is not a source of trials: name a FILE.csv, a data set as icub:FOLDER, a store as "
         f"store:DIR, or `{SIMULATED}`"
     )
 
@@ -108,8 +108,8 @@ def labelled_trials(
 ) -> Labelled:
     """Return the trials that a source describes.
 
-    `settings` are asked for where trials are simulated, `features` where a data set draws them from recordings.
-    `seed` and `on_trace` are for the simulator. Raises ConfigError, DataDamaged.
+    `settings` is called if trials are simulated, `features` if a data set extracts features from recordings. `seed`
+    and `on_trace` are for the simulator. Raises ConfigError, DataDamaged.
     """
     if source.kind == "simulated":
         found = simulated(

@@ -177,7 +177,7 @@ def _infinite(value: float) -> bool:
 def time_runs_forward(subject: Subject) -> None:
     """`t_s` increases from frame to frame, and `dt_s` is the difference."""
     session = subject.session
-    demand(all(isfinite(frame.t_s) for frame in session.frames), "t_s of a frame is no number")
+    demand(all(isfinite(frame.t_s) for frame in session.frames), "t_s of a frame is not a number")
     for before, now in pairwise(session.frames):
         passed = now.t_s - before.t_s
         demand(
@@ -254,7 +254,7 @@ def forces_are_in_newtons(subject: Subject) -> None:
         worst = max((one for one in values if not isnan(one)), default=0.0)
         demand(
             worst <= most,
-            f"{name} comes to {worst:g} while the fingers are closed gently on a gripper of {info.effort_limit_n:g} N: "
+            f"{name} reaches {worst:g} while the fingers are closed gently on a gripper of {info.effort_limit_n:g} N: "
             "give newtons, tared (raw counts go into Pads)",
         )
 
@@ -323,7 +323,7 @@ def stays_within_its_limits(subject: Subject) -> None:
                 found = abs(getattr(frame, name))
                 demand(
                     not found > grace * limit,
-                    f"{name} comes to {found:.3g} under commands limited to {limit:g}: apply `effort_limit_n` and "
+                    f"{name} reaches {found:.3g} under commands limited to {limit:g}: apply `effort_limit_n` and "
                     "`speed_limit_m_s` of each command",
                 )
             allowed, watcher = guard(limits, watcher, frame, command)

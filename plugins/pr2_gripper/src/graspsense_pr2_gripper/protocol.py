@@ -224,7 +224,7 @@ def decode_identity(data: bytes) -> Identity:
 def micro(value: float) -> int:
     """Return a number of SI units as whole micro-units. Raises ProtocolError for what 32 bits cannot hold, NaN too."""
     if not -2147.0 <= value <= 2147.0:
-        raise ProtocolError(f"{value} cannot be sent: it is no number, or does not fit 32 bits")
+        raise ProtocolError(f"{value} cannot be sent: it is not a number, or does not fit in 32 bits")
     return round(value * 1e6)
 
 
@@ -234,7 +234,7 @@ def limit(value: float) -> int:
     Raises ProtocolError for NaN and below zero.
     """
     if not value >= 0.0:
-        raise ProtocolError(f"{value} is no limit")
+        raise ProtocolError(f"{value} is not a valid limit")
     return min(math.floor(value * 1e6), OWN_LIMIT) if value < math.inf else OWN_LIMIT
 
 

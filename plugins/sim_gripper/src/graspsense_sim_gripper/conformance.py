@@ -8,7 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import isfinite
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from graspsense_sim_gripper.terms.term import TermParams, TermState
 
 STEPS: Final = 40
 TICK_S: Final = 1e-3
@@ -34,7 +37,7 @@ def check_terms(results: Sequence[Any]) -> Iterator[str]:
                 yield defect
 
 
-def _law_defect(term: Any, params: Any) -> str:
+def _law_defect(term: Any, params: TermParams) -> str:
     """Return what is wrong with the law of a term, empty if nothing is."""
     state, called = term.at_rest, f"the law of term {term.name!r}"
     for d0, d1 in pairwise(COMPRESSIONS_M):
@@ -61,7 +64,7 @@ def _law_defect(term: Any, params: Any) -> str:
     return ""
 
 
-def _linear_defect(term: Any, params: Any) -> str:
+def _linear_defect(term: Any, params: TermParams) -> str:
     """Return where the linear form of a term differs from its law, along short straight pieces of path."""
     form = term.linear(params) if hasattr(term, "linear") else None
     if form is None:
@@ -97,7 +100,7 @@ def _linear_defect(term: Any, params: Any) -> str:
     return ""
 
 
-def _force_after(form: Any, state: Any, d0: float, speed: float, h: float) -> float:
+def _force_after(form: Any, state: TermState, d0: float, speed: float, h: float) -> float:
     """Return the force (N) of a linear form after `h` seconds at `speed`, by the midpoint rule in 50 steps."""
     pieces = 50
     step, now, d = h / pieces, [float(x) for x in state], d0

@@ -21,7 +21,7 @@ LOOKING_S: Final = 2.0
 """How often a run looks whether its scheduler and its workers are still there."""
 SETTLING_S: Final = 1.0
 WITHOUT_WORKERS_S: Final = 60.0
-"""Workers that died are started again within seconds, where somebody does so."""
+"""Time to wait for workers that died to be restarted, as a nanny does within seconds."""
 
 
 class DaskCluster:
@@ -135,7 +135,7 @@ class DaskCluster:
             time.sleep(SETTLING_S)
 
     def _first(self, futures: Sequence[Any]) -> Any:
-        """Wait for one of these to be done and return it. Raises ExecutorLost if nobody is left to do it."""
+        """Wait for one of these to be done and return it. Raises ExecutorLost if no worker is left."""
         distributed = self._distributed
         while True:
             with suppress(TimeoutError, distributed.TimeoutError):
@@ -144,11 +144,11 @@ class DaskCluster:
             self._watch()
 
     def _watch(self) -> None:
-        """Look after scheduler and workers. Raises ExecutorLost if nobody is left to do anything."""
+        """Look after scheduler and workers. Raises ExecutorLost if no worker is left."""
         if self._client.status != "running":
             raise ExecutorLost(_GONE)
         if self._cluster is not None and len(self._cluster.workers) < self._wanted:
-            # Whoever watches over a worker gives up after some deaths of it.
+            # The nanny of a worker gives up after it has died several times.
             self._cluster.scale(self._wanted)
         if self._client.nthreads():
             self._seen = time.monotonic()

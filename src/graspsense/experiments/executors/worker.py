@@ -1,6 +1,6 @@
 """A worker process: tasks as lines on standard input, what came of them as lines on what was standard output.
 
-It ends when whoever started it is gone.
+It ends when the process that started it has ended.
 """
 
 from __future__ import annotations

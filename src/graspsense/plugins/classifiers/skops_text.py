@@ -40,7 +40,7 @@ def from_text(text: str, kind: type, features: int) -> Any:
     except (ValueError, binascii.Error):
         raise
     except Exception as error:  # skops can raise anything on a broken archive
-        raise ValueError(f"it is no estimator ({type(error).__name__}: {error})") from error
+        raise ValueError(f"it is not an estimator ({type(error).__name__}: {error})") from error
     if type(estimator) is not kind or getattr(estimator, "n_features_in_", None) != features:
         raise ValueError(f"it is no {kind.__name__} of {features} features")
     for one in getattr(estimator, "estimators_", [estimator]):

@@ -186,8 +186,8 @@ def grasp_once(
     images, times = np.asarray(buffers.pads.images[:k]), np.asarray(buffers.image_times[:k])
     if job.traces and 2 * n < len(columns[0]):
         return finished(job, outcome, reason, end.plant, _trace(table.copy(), numbers.copy(), images, times))
-    # A trace that fills most of the buffers, or that only features are extracted from, is a view of them. Whoever
-    # keeps a column of it keeps those buffers, and the next grasps have new ones.
+    # A trace that fills most of the buffers, or that only features are extracted from, is a view of them.
+    # While a column of it is referenced, those buffers are kept, and the next grasps have new ones.
     references = sys.getrefcount(columns), sys.getrefcount(phases)
     done = finished(job, outcome, reason, end.plant, _trace(table, numbers, images, times))
     if on_arrays and (sys.getrefcount(columns), sys.getrefcount(phases)) != references:

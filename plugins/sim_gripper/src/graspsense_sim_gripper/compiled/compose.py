@@ -30,9 +30,9 @@ from graspsense_sim_gripper.terms.registry import find_term, laws_of
 from graspsense_sim_gripper.terms.switchable import Switchable
 from graspsense_sim_gripper.terms.term import NO_STATE, Law
 
-TermStates = Any
+TermsStates = Any
 """A tuple with a state of its own type for each term."""
-TermParams = Any
+TermsParams = Any
 """A tuple with parameters of its own type for each term."""
 PlantMove = Callable[[Any, PlantState, float, float], PlantState]
 """Takes the plant's model, its state, the effort and the length of the tick."""
@@ -52,8 +52,8 @@ INTERPRETED: Final[Constructors] = {
 
 
 def _no_terms(
-    params: TermParams, states: TermStates, d0: float, d1: float, h: float, v1: float
-) -> tuple[float, TermStates]:
+    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermsStates]:
     return 0.0, ()
 
 
@@ -64,23 +64,23 @@ rest: Law = _no_terms
 
 
 def _sum_of_1(
-    params: TermParams, states: TermStates, d0: float, d1: float, h: float, v1: float
-) -> tuple[float, TermStates]:
+    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermsStates]:
     force, state = first(params[0], states[0], d0, d1, h, v1)
     return force, (state,)
 
 
 def _sum_of_2(
-    params: TermParams, states: TermStates, d0: float, d1: float, h: float, v1: float
-) -> tuple[float, TermStates]:
+    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermsStates]:
     force1, state1 = first(params[0], states[0], d0, d1, h, v1)
     force2, state2 = second(params[1], states[1], d0, d1, h, v1)
     return force1 + force2, (state1, state2)
 
 
 def _sum_of_3(
-    params: TermParams, states: TermStates, d0: float, d1: float, h: float, v1: float
-) -> tuple[float, TermStates]:
+    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermsStates]:
     force1, state1 = first(params[0], states[0], d0, d1, h, v1)
     force2, state2 = second(params[1], states[1], d0, d1, h, v1)
     force3, state3 = third(params[2], states[2], d0, d1, h, v1)
@@ -88,8 +88,8 @@ def _sum_of_3(
 
 
 def _sum_of_more(
-    params: TermParams, states: TermStates, d0: float, d1: float, h: float, v1: float
-) -> tuple[float, TermStates]:
+    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermsStates]:
     force1, state1 = first(params[0], states[0], d0, d1, h, v1)
     force2, state2 = second(params[1], states[1], d0, d1, h, v1)
     force3, state3 = third(params[2], states[2], d0, d1, h, v1)

@@ -9,7 +9,7 @@ first, so that a term of no force changes no bit.
 from __future__ import annotations
 
 from functools import cache, lru_cache
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from attrs import evolve
@@ -23,9 +23,7 @@ from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.sensing import PadCells
 from graspsense_sim_gripper.terms.registry import find_term, in_order
 from graspsense_sim_gripper.terms.switchable import Switchable
-
-TermState = Any
-"""The state of a term: a named tuple of the term's own type."""
+from graspsense_sim_gripper.terms.term import TermState
 
 
 class Filler(NamedTuple):

@@ -16,7 +16,7 @@ from graspsense_sim_gripper.exact.term_states import n_numbers
 from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.terms.lumped import linear as lumped_form
 from graspsense_sim_gripper.terms.registry import find_term
-from graspsense_sim_gripper.terms.term import LinearForm, OwnContact
+from graspsense_sim_gripper.terms.term import LinearForm, OwnContact, TermParams
 
 
 def applicable(config: SimConfig, setup: GraspSetup) -> str:
@@ -89,7 +89,7 @@ def _forms(setup: GraspSetup) -> list[tuple[str, LinearForm | OwnContact | None]
 
 
 @lru_cache(maxsize=256)
-def _form(kind: str, params: Any) -> LinearForm | OwnContact | None:
+def _form(kind: str, params: TermParams) -> LinearForm | OwnContact | None:
     """Return a term's linear form. Raises TypeError if it has other states than the law."""
     term = find_term(kind)[1]
     form = term.linear(params)

@@ -11,12 +11,14 @@ from typing import Any, Final
 
 from graspsense.plugin_api import bind
 from graspsense_sim_gripper.terms.registry import find_term
-from graspsense_sim_gripper.terms.term import NO_STATE
+from graspsense_sim_gripper.terms.term import NO_STATE, TermState
 
 MAX_NUMBERS: Final = 4
 
-TermState = Any
-"""The state of a term: a named tuple of the term's own type."""
+TermsParams = Any
+"""A tuple with the parameters of each term, which are `Switchable`."""
+TermsStates = Any
+"""A tuple with the state of each term."""
 Vector = Any
 """The workspace of a tick: an array, or a list in the interpreter."""
 TermStateFunctions = tuple[Callable[..., int], Callable[..., Any]]
@@ -94,11 +96,11 @@ pack_term: Any = _pack0
 unpack_term: Any = _unpack0
 
 
-def _pack_none(terms: Any, states: Any, vector: Vector, at: int) -> int:
+def _pack_none(terms: TermsParams, states: TermsStates, vector: Vector, at: int) -> int:
     return at
 
 
-def _unpack_none(terms: Any, states: Any, vector: Vector, at: int) -> tuple[Any, int]:
+def _unpack_none(terms: TermsParams, states: TermsStates, vector: Vector, at: int) -> tuple[Any, int]:
     return (), at
 
 
@@ -106,13 +108,13 @@ pack_others: Any = _pack_none
 unpack_others: Any = _unpack_none
 
 
-def _pack(terms: Any, states: Any, vector: Vector, at: int) -> int:
+def _pack(terms: TermsParams, states: TermsStates, vector: Vector, at: int) -> int:
     if terms[0].active == 1:
         at = pack_term(states[0], vector, at)
     return pack_others(terms[1:], states[1:], vector, at)  # type: ignore[no-any-return]
 
 
-def _unpack(terms: Any, states: Any, vector: Vector, at: int) -> tuple[Any, int]:
+def _unpack(terms: TermsParams, states: TermsStates, vector: Vector, at: int) -> tuple[TermsStates, int]:
     state = states[0]
     if terms[0].active == 1:
         state, at = unpack_term(states[0], vector, at)

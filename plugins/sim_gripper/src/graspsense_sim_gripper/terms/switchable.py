@@ -5,23 +5,25 @@ All reduced models of an object are therefore one composition, which is compiled
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from graspsense_sim_gripper.terms.lumped import lumped
-from graspsense_sim_gripper.terms.term import Law
+from graspsense_sim_gripper.terms.term import Law, TermParams, TermState
 
 
 class Switchable(NamedTuple):
     """The parameters of a term, and whether it is active (1) or switched off (0)."""
 
     active: int
-    params: Any
+    params: TermParams
 
 
 law: Law = lumped
 
 
-def switched(term: Switchable, state: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
+def switched(
+    term: Switchable, state: TermState, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermState]:
     """Return the force and the new state of `law` if the term is active, otherwise no force and the old state."""
     if term.active == 0:
         return 0.0, state

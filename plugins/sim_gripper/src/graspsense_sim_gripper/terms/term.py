@@ -7,7 +7,11 @@ from typing import Any, Final, NamedTuple
 
 from attrs import frozen
 
-Law = Callable[[Any, Any, float, float, float, float], tuple[float, Any]]
+TermParams = Any
+"""The parameters of a term: a named tuple of its own type."""
+TermState = Any
+"""The state of a term: a named tuple of its own type."""
+Law = Callable[[TermParams, TermState, float, float, float, float], tuple[float, TermState]]
 """`law(params, state, d0, d1, h, v1) -> (force, state)`: from d0 to d1 (m) in h (s), then at v1 (m/s)."""
 
 PIECES: Final = 256
@@ -37,7 +41,7 @@ class Limit(NamedTuple):
     """A limit of a term for fast or slow states: a spring and a damper, or the term with other parameters."""
 
     name: str
-    params: Any = None
+    params: TermParams = None
     """The parameters of the term in this limit; None if only the spring and the damper remain."""
     spring_n_m: float = 0.0
     damper_n_s_m: float = 0.0
@@ -75,31 +79,31 @@ class OwnContact(NamedTuple):
     reach: tuple[float, ...]
 
 
-def not_linear(params: Any) -> LinearForm | OwnContact | None:
+def not_linear(params: TermParams) -> LinearForm | OwnContact | None:
     """Return None: the term has no linear form."""
     del params
     return None
 
 
-def no_limits(params: Any, at: WorkingPoint) -> tuple[Limit, ...]:
+def no_limits(params: TermParams, at: WorkingPoint) -> tuple[Limit, ...]:
     """Return no limits: the term is either kept or dropped."""
     del params, at
     return ()
 
 
-def no_rates(params: Any, at: WorkingPoint) -> tuple[Rate, ...]:
+def no_rates(params: TermParams, at: WorkingPoint) -> tuple[Rate, ...]:
     """Return the rates of a term that declares none: unknown if it has a state."""
     del params, at
     return ()
 
 
-def never_beyond(state: Any) -> str:
+def never_beyond(state: TermState) -> str:
     """Return "": the law always holds."""
     del state
     return ""
 
 
-def not_dented(params: Any) -> float:
+def not_dented(params: TermParams) -> float:
     """Return the dent (m) of a term that earlier use has not deformed."""
     del params
     return 0.0
@@ -122,18 +126,18 @@ class Term:
     summary: str
     params: type[Any]
     law: Law
-    at_rest: Any = NO_STATE
-    rates: Callable[[Any, WorkingPoint], tuple[Rate, ...]] = no_rates
-    limits: Callable[[Any, WorkingPoint], tuple[Limit, ...]] = no_limits
+    at_rest: TermState = NO_STATE
+    rates: Callable[[TermParams, WorkingPoint], tuple[Rate, ...]] = no_rates
+    limits: Callable[[TermParams, WorkingPoint], tuple[Limit, ...]] = no_limits
     """The limits that can replace the term, the cheapest first; the simulator compares the resulting forces."""
-    linear: Callable[[Any], LinearForm | OwnContact | None] = not_linear
+    linear: Callable[[TermParams], LinearForm | OwnContact | None] = not_linear
     """Its linear form with these parameters, or None. A scene can be discretised exactly if every term has one."""
     positive: tuple[str, ...] = ()
     stiffnesses: tuple[str, ...] = ()
     """Parameters that grow with the thickness of the wall; they vary between instances."""
-    beyond: Callable[[Any], str] = never_beyond
+    beyond: Callable[[TermState], str] = never_beyond
     """Returns why a state is outside of the range of the law, "" if it is not."""
-    dent: Callable[[Any], float] = not_dented
+    dent: Callable[[TermParams], float] = not_dented
     """By how much (m) earlier use has made the object thinner. Compression is counted from the dented surface on."""
 
     def __attrs_post_init__(self) -> None:
@@ -144,7 +148,7 @@ class Term:
         if strangers:
             raise TypeError(f"term {self.name!r}: {self.params.__name__} has no field {sorted(strangers)}")
 
-    def importance(self, params: Any, at: WorkingPoint) -> float:
+    def importance(self, params: TermParams, at: WorkingPoint) -> float:
         """Return the largest force (N) of the law on a path to this working point.
 
         The compression increases at the rate of the working point, and is then held for the rest of its duration.
