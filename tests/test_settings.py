@@ -149,7 +149,7 @@ def test_every_command_with_settings_refuses_an_implausible_one_and_names_force(
     code, _, err = run(capsys, *command, "-o", "gripper.step_s=1e-12")
 
     assert code == 2
-    assert "1e-12 s is not plausible: the plausible range is 1e-07 to 0.01 s" in err
+    assert "1e-12 s is not plausible: the plausible range is 1e-05 to 0.01 s" in err
     assert "add --force" in err
     assert list(tmp_path.iterdir()) == []
 

@@ -64,7 +64,7 @@ class SimConfig:
         default=None,
         unit="s",
         above=0.0,
-        plausible=(1e-7, 0.01),
+        plausible=(1e-5, 0.01),
         meaning="Prescribes the length of the steps, for a study; not set: as long as the accuracy allows. The time"
         " of a grasp grows as the step shrinks.",
     )
