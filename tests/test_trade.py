@@ -2,36 +2,70 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import read_experiment
 from graspsense.experiments.page import findings_of
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
-from graspsense.experiments.summary import summarise
-from graspsense.experiments.trade.front import front
+from graspsense.experiments.summary import ConditionResult, summarise
+from graspsense.experiments.task_results import ClassifierResult
 from graspsense.experiments.trade.next_squeeze import Decision, Forces, Promise, SqueezeAnswers, decide
-
-CASES = st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=1, max_size=12)
-
-
-@given(CASES)
-def test_nothing_beats_what_is_on_the_front_and_something_there_beats_the_rest(cases):
-    costs, rates = [c for c, _ in cases], [r for _, r in cases]
-    on = front(costs, rates)
-    best = [one for one, kept in zip(cases, on, strict=True) if kept]
-    assert best
-    for (cost, rate), kept in zip(cases, on, strict=True):
-        beaten = any(c <= cost and r >= rate and (c, r) != (cost, rate) for c, r in best)
-        assert beaten is not kept
+from graspsense.experiments.trade.trade_point import advise, trade_points
 
 
-def test_a_high_value_may_be_the_cheap_one():
-    assert front([1.0, 2.0], [0.5, 0.5], cheap_is_low=False) == [False, True]
+def case(name, cost, *rates, n=100):
+    """Return a case with these rates of its seeds; the rest of a condition is not needed here."""
+
+    def of(rate):
+        predicted = ["can:full"] * round(rate * n) + ["can:empty"] * (n - round(rate * n))
+        return ClassifierResult.of(
+            "c45", "state", "stratified_10_fold", ["can:full"] * n, predicted, cost=cost
+        )
+
+    return ConditionResult(
+        case=SimpleNamespace(name=name, part="", learners=()),
+        classifier="c45",
+        target="state",
+        by_seed={seed: of(rate) for seed, rate in enumerate(rates)},
+        simulated=True,
+    )
+
+
+def test_a_cheap_case_is_recommended_only_if_it_is_shown_to_lose_little():
+    best = case("strong", 3.0, 0.90, 0.91, 0.92, 0.91)
+    near = case("weak", 2.0, 0.89, 0.90, 0.90, 0.90)
+    far = case("feeble", 1.0, 0.40, 0.42, 0.41, 0.40)
+
+    found = advise(trade_points([far, near, best], True), "Force", "N")
+    assert found.recommended.name == "weak"
+    assert "of a known object (can)" in found.text
+
+    found = advise(trade_points([far, best], True), "Force", "N", "not for a robot")
+    assert found.recommended is found.best
+    assert "above those of all cheaper cases; not for a robot." in found.text
+
+
+def test_seeds_that_tell_nothing_give_no_advice():
+    best = case("strong", 2.0, 0.70, 0.95, 0.80, 0.99)
+    other = case("weak", 1.0, 0.95, 0.70, 0.90, 0.75)
+    for cases in ([other, best], [case("weak", 1.0, 0.8), case("strong", 2.0, 0.9)]):
+        points = trade_points(cases, True)
+        found = advise(points, "Force", "N")
+        assert found.recommended is None
+        assert "inconclusive" in found.text
+        assert found.cells[2] == "inconclusive"
+        assert [point.on_front for point in points] == ["yes", "not decided"]
+
+
+def test_the_front_takes_intervals_into_account_and_a_high_value_may_be_the_cheap_one():
+    high, low = case("a", 1.0, 0.9, 0.91, 0.9), case("b", 2.0, 0.5, 0.52, 0.5)
+    assert [point.on_front for point in trade_points([high, low], True)] == ["yes", "no"]
+    assert [point.on_front for point in trade_points([high, low], False)] == ["yes", "yes"]
 
 
 KNOWS = np.array([[0.98, 0.02], [0.02, 0.98]])

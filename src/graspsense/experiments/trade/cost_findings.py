@@ -37,15 +37,15 @@ def cost_report(part: str, title: str, conditions: Sequence[ConditionResult], co
     series: dict[str, Sequence[TradePoint]] = {}
     for target in dict.fromkeys(condition.target for condition in conditions):
         points = trade_points([one for one in conditions if one.target == target], cost.cheap == "low")
-        advice.append(advise(points, title, cost.axis))
+        advice.append(advise(points, title, cost.axis, cost.caution))
         rows += [
             (
                 point.name,
-                TARGETS[target],
+                advice[-1].recognises,
                 f"{point.cost:.3g}",
                 percent(point.condition.rate.mean),
                 span(point.condition.rate.interval),
-                "yes" if point.on_front else "no",
+                point.on_front,
             )
             for point in points
         ]
@@ -94,7 +94,7 @@ def _picture(series: Mapping[str, Sequence[TradePoint]], axis: str, title: str) 
     words = []
     for k, (target, points) in enumerate(series.items()):
         ink = INKS[k % len(INKS)]
-        on_front = sorted((point for point in points if point.on_front), key=lambda point: point.cost)
+        on_front = sorted((point for point in points if point.on_front != "no"), key=lambda point: point.cost)
         line = [(x(point.cost), y(100 * point.condition.rate.mean)) for point in on_front]
         with picture.plot(x, y, 24, 215):
             picture.line(line, ink, dash=DASHES[k % len(DASHES)])
@@ -104,7 +104,7 @@ def _picture(series: Mapping[str, Sequence[TradePoint]], axis: str, title: str) 
                 if interval is not None:
                     low, high = (y(100 * rate) for rate in interval)
                     picture.line([(place, low), (place, high)], ink, width=1.2)
-                size = 4.0 if point.on_front else 1.8
+                size = 4.0 if point.on_front != "no" else 1.8
                 read_out = f"{point.name}, {target}: {point.rate_text}"
                 picture.mark(place, y(100 * point.condition.rate.mean), ink, k, size, read_out)
         legend = 262.0 + 15 * k
@@ -112,7 +112,10 @@ def _picture(series: Mapping[str, Sequence[TradePoint]], axis: str, title: str) 
         picture.text(62, legend, target)
         words.append(f"{target}: " + ", ".join(f"{point.name} {point.rate_text}" for point in points))
     picture.text(
-        LEFT, 262.0 + 15 * len(series), "large, joined: on the Pareto front; small: not on it", ink=QUIET
+        LEFT,
+        262.0 + 15 * len(series),
+        "large, joined: may be on the Pareto front; small: not on it",
+        ink=QUIET,
     )
     caption = f"{title}. Bars are 95 % intervals of the mean."
     return figure(picture.svg(f"Recognition rate against {axis}. {'; '.join(words)}"), caption)

@@ -23,6 +23,8 @@ class Cost:
     """Whether low or high values are cheap."""
     axis: str = "seconds of a grasp"
     """The title of the axis."""
+    caution: str = ""
+    """A reservation that is stated with every recommendation."""
 
 
 @frozen(kw_only=True)

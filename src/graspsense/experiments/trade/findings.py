@@ -71,14 +71,18 @@ def _answer(reports: dict[str, Report]) -> str:
         return "There is no answer yet: no task has a result."
     if len(reports) == 1:
         return next(iter(reports.values())).text
-    return f"{len(reports)} trade-offs were measured. Each has its recommendation below."
+    return f"{len(reports)} trade-offs were measured. Each has its recommendation below, or says that there is none."
 
 
 def _headline(advice: Sequence[Advice]) -> str:
     """Return the recommendations as a person would say them."""
     parts = [
-        f"to recognise {one.recognises}, {one.recommended.name} "
-        + ("is enough" if one.recommended is not one.best else "is best")
+        f"to recognise {one.recognises}, "
+        + (
+            "the result is inconclusive"
+            if one.recommended is None
+            else f"{one.recommended.name} {'is best' if one.recommended is one.best else 'is enough'}"
+        )
         for one in advice
     ]
     text = "; ".join(parts)
@@ -99,6 +103,8 @@ def _advice_table(advice: Sequence[Advice]) -> FoundTable:
             "points below the best",
         ),
         rows=tuple(one.cells for one in advice),
-        note="Recommended is the cheapest case that loses less than 5 points against the best, at 95 %.",
+        note="Recommended is the cheapest case that loses less than 5 points against the best, at 95 %, corrected for "
+        "the number of cases; or the best one, if it is better than all cheaper ones. Otherwise the result is "
+        "inconclusive.",
         numbers=3,
     )

@@ -75,7 +75,7 @@ def _cells(point: TradePoint, difference: MeanDifference | None, saved: Saved | 
         "" if difference is None else " to ".join(f"{100 * x:+.1f}" for x in difference.interval),
         "" if saved is None else f"{saved[0]:+.2f}",
         "" if saved is None else " to ".join(f"{x:+.2f}" for x in saved[1]),
-        "yes" if point.on_front else "no",
+        point.on_front,
     )
 
 

@@ -2,30 +2,38 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, Literal
 
 from attrs import frozen
 
+from graspsense.core.labelled import class_of
 from graspsense.evaluation.over_seeds import MeanDifference
 from graspsense.experiments.findings import percent, span
 from graspsense.experiments.summary import ConditionResult
-from graspsense.experiments.trade.front import front
 from graspsense.report.wording import TARGETS
 
 ENOUGH: Final = 0.05
 """A case is good enough if it loses less than this against the best, at 95 %."""
 
 
+OnFront = Literal["yes", "no", "not decided"]
+
+
 @frozen(kw_only=True)
 class TradePoint:
-    """One case of a trade-off, for one target."""
+    """One case of a trade-off, for one target.
+
+    `on_front` is `no` if a case that is at most as costly has a higher rate, and `yes` if all of those have lower ones,
+    at 95 %; otherwise it is not decided.
+    """
 
     name: str
     condition: ConditionResult
     cost: float
-    on_front: bool
+    on_front: OnFront
 
     @property
     def rate_text(self) -> str:
@@ -36,70 +44,97 @@ class TradePoint:
 
 @frozen(kw_only=True)
 class Advice:
-    """The recommended case for one target.
+    """The recommended case for one target, or None if the seeds do not decide.
 
-    `loss` is the rate of the best case minus that of the recommended one, with its interval; None if the recommended
-    case is the best. `single_seed` states that differences cannot be judged.
+    `best` has the highest rate. `loss` is its rate minus that of the recommended case, corrected for all comparisons
+    with it; None if the recommended case is the best. `caution` is stated with every recommendation.
     """
 
     title: str
     axis: str
-    recommended: TradePoint
+    recommended: TradePoint | None
     best: TradePoint
     loss: MeanDifference | None = None
-    single_seed: bool = False
+    caution: str = ""
+    best_is_cheapest: bool = False
 
     @property
     def recognises(self) -> str:
-        """What is recognised, in words."""
-        return TARGETS[self.best.condition.target]
+        """What is recognised, in words, with the objects it is about."""
+        labels = self.best.condition.first.confusion.labels
+        classes = list(dict.fromkeys(class_of(label) for label in labels))
+        return f"{TARGETS[self.best.condition.target]} ({', '.join(classes)})"
 
     @property
     def text(self) -> str:
         """The recommendation in a sentence."""
+        to = f"To recognise {self.recognises}"
         best = f"{self.best.name} at {self.best.cost:.3g} {self.axis}"
-        if self.single_seed:
+        caution = f"; {self.caution}" if self.caution else ""
+        if self.recommended is None:
+            seeds = len(self.best.condition.by_seed)
             return (
-                f"To recognise {self.recognises}, {best} is best, with {self.best.rate_text}. There is a single "
-                "seed, so differences between cases cannot be judged."
+                f"{to}, the result is inconclusive: {best} has the highest rate, {self.best.rate_text}, but {seeds} "
+                f"seed{'' if seeds == 1 else 's'} show neither that a cheaper case is within 5 points of it nor that "
+                f"all are worse. No case is recommended{caution}."
             )
         if self.loss is None:
-            return (
-                f"To recognise {self.recognises}, use {best}: it has the highest rate, {self.best.rate_text}. No "
-                "cheaper case is shown to be within 5 points of it."
-            )
+            why = "no case is cheaper" if self.best_is_cheapest else "it is above those of all cheaper cases"
+            return f"{to}, use {best}: its rate is the highest, {self.best.rate_text}, and {why}{caution}."
         value, (low, high) = self.loss.value, self.loss.interval
         chosen = f"{self.recommended.name} at {self.recommended.cost:.3g} {self.axis}"
         return (
-            f"To recognise {self.recognises}, {chosen} is good enough: it has {self.recommended.rate_text}. The best, "
-            f"{best}, has {self.best.rate_text}. The loss is {100 * value:.1f} points ({100 * low:.1f} to "
-            f"{100 * high:.1f}), below the limit of 5."
+            f"{to}, {chosen} is good enough: it has {self.recommended.rate_text}. The best, {best}, has "
+            f"{self.best.rate_text}. The loss is {100 * value:.1f} points ({100 * low:.1f} to {100 * high:.1f}), below "
+            f"the limit of 5{caution}."
         )
 
     @property
     def cells(self) -> tuple[str, ...]:
         """The row of a table."""
+        best = percent(self.best.condition.rate.mean)
+        if self.recommended is None:
+            return (self.title, self.recognises, "inconclusive", "", "", best, "")
         loss = "0" if self.loss is None else f"{100 * self.loss.value:.1f}"
         return (
             self.title,
             self.recognises,
-            self.recommended.name,
+            self.recommended.name + (" (see the caution)" if self.caution else ""),
             f"{self.recommended.cost:.3g} {self.axis}",
             percent(self.recommended.condition.rate.mean),
-            percent(self.best.condition.rate.mean),
+            best,
             loss,
         )
 
 
 def trade_points(conditions: Sequence[ConditionResult], cheap_is_low: bool) -> list[TradePoint]:
     """Return the cases of one target, the cheapest first, and whether each is on the Pareto front."""
-    costs = [mean_cost(condition) for condition in conditions]
-    on_front = front(costs, [one.rate.mean for one in conditions], cheap_is_low=cheap_is_low)
-    points = [
-        TradePoint(name=_short_name(condition), condition=condition, cost=cost, on_front=on)
-        for condition, cost, on in zip(conditions, costs, on_front, strict=True)
-    ]
-    return sorted(points, key=lambda point: point.cost if cheap_is_low else -point.cost)
+    sign = 1.0 if cheap_is_low else -1.0
+    costs = [sign * mean_cost(condition) for condition in conditions]
+    points = []
+    for condition, cost in zip(conditions, costs, strict=True):
+        rivals = [
+            other
+            for other, its in zip(conditions, costs, strict=True)
+            if other is not condition and its <= cost
+        ]
+        points.append(
+            TradePoint(
+                name=_short_name(condition),
+                condition=condition,
+                cost=sign * cost,
+                on_front=_on_front(condition, rivals),
+            )
+        )
+    return sorted(points, key=lambda point: sign * point.cost)
+
+
+def _on_front(condition: ConditionResult, rivals: Sequence[ConditionResult]) -> OnFront:
+    """Compare a case with those that are at most as costly, corrected for their number."""
+    gaps = [condition.minus(rival, len(rivals)) for rival in rivals]
+    if any(gap is not None and gap.interval[1] < 0.0 for gap in gaps):
+        return "no"
+    return "yes" if all(gap is not None and gap.interval[0] > 0.0 for gap in gaps) else "not decided"
 
 
 def mean_cost(condition: ConditionResult) -> float:
@@ -108,18 +143,28 @@ def mean_cost(condition: ConditionResult) -> float:
     return math.fsum(costs) / len(costs)
 
 
-def advise(points: Sequence[TradePoint], title: str, axis: str) -> Advice:
-    """Return the cheapest case that is good enough; `points` are ordered from the cheapest."""
+def advise(points: Sequence[TradePoint], title: str, axis: str, caution: str = "") -> Advice:
+    """Return the cheapest case that is good enough; `points` are ordered from the cheapest.
+
+    The best case is recommended only if it is better than every cheaper one. Differences are corrected for the number
+    of cases that are compared with the best.
+    """
     best = max(points, key=lambda point: point.condition.rate.mean)
-    if best.condition.minus(best.condition) is None:
-        return Advice(title=title, axis=axis, recommended=best, best=best, single_seed=True)
-    for point in points:
-        if point is best:
-            break
-        loss = best.condition.minus(point.condition)
+    cheaper = list(itertools.takewhile(lambda point: point is not best, points))
+    losses = [best.condition.minus(point.condition, max(len(points) - 1, 1)) for point in cheaper]
+    for point, loss in zip(cheaper, losses, strict=True):
         if loss is not None and loss.interval[1] < ENOUGH:
-            return Advice(title=title, axis=axis, recommended=point, best=best, loss=loss)
-    return Advice(title=title, axis=axis, recommended=best, best=best)
+            return Advice(title=title, axis=axis, recommended=point, best=best, loss=loss, caution=caution)
+    decided = all(loss is not None and loss.interval[0] > 0.0 for loss in losses)
+    decided = decided and best.condition.minus(best.condition) is not None
+    return Advice(
+        title=title,
+        axis=axis,
+        recommended=best if decided else None,
+        best=best,
+        caution=caution,
+        best_is_cheapest=not cheaper,
+    )
 
 
 def _short_name(condition: ConditionResult) -> str:
