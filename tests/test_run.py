@@ -69,7 +69,7 @@ def test_nothing_there_is_an_outcome_with_reasons_and_exit_code_0():
     ("arguments", "code", "says"),
     [
         (["--gripper", "pr3"], 2, "Did you mean 'pr2'?"),
-        (["--gripper", "pr2"], 3, "looked for"),
+        (["--gripper", "pr2"], 3, "searched for"),
         (["--object", "odwala:full_open"], 2, "Did you mean 'odwalla'?"),
         (["--object", "odwalla:fool_open"], 2, "Did you mean 'full_open'?"),
         (["--gripper", "pr2", "--object", "block"], 2, "object"),
