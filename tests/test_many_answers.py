@@ -72,6 +72,6 @@ def test_predict_answers_many_without_reasons_and_says_so(rows, tmp_path, capsys
     run("train", source, "--label", "label", "--classifier", "tree", "--out", model)
     found = json.loads(run("predict", model, source, "--label", "label", "--json"))
     assert found["n"] == len(found["predictions"]) == 1200
-    assert any("none has any" in note for note in found["notes"])
+    assert any("the predictions have no reasons" in note for note in found["notes"])
     right = sum(one["label"] == one["truth"] for one in found["predictions"])
     assert found["rate"]["correct"] == right > 600

@@ -207,7 +207,7 @@ def test_run_explains_the_model_in_the_terminal_and_in_json():
     shown = CliRunner().invoke(cli, ["run", "--object", "leaking_bottle", "--explain-model"])
     assert shown.exit_code == 0
     table = shown.output[shown.output.index("model       peak force 1") :].splitlines()
-    assert table[1].split()[:2] == ["term", "peak"]
+    assert table[1].split()[:2] == ["TERM", "PEAK"]
     assert [line.split()[0] for line in table[2:4]] == ["elastic", "gas"]
     assert "relaxes in 5 s" in table[3]
     none = CliRunner().invoke(cli, ["run", "--object", "none", "--explain-model", "--json"])
