@@ -44,7 +44,12 @@ def test_the_table_of_objects_has_the_whole_catalogue():
 
 def test_the_table_of_a_scene_has_every_key():
     named = {key for row in rows("A scene of your own") for key in re.findall(r"`(\w+)`", row[0])}
-    assert named == {field.name for field in attrs.fields(ObjectSpec)} - {"name", "reasons", "fitted_to", "file"}
+    assert named == {field.name for field in attrs.fields(ObjectSpec)} - {
+        "name",
+        "reasons",
+        "fitted_to",
+        "file",
+    }
 
 
 def test_the_table_of_terms_has_every_term():

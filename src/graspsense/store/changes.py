@@ -139,7 +139,7 @@ def inconsistencies(store: Store) -> dict[int, str]:
         try:
             first = json.loads(recorded)
             expected = labels.get(number, word_of(first.get("label"), first.get("instance")))
-        except (ValueError, AttributeError):
+        except (ValueError, AttributeError, TypeError):
             problems[number] = "its recorded labels cannot be read"
             continue
         if word_of(label, instance) != expected:
