@@ -66,7 +66,7 @@ class Robotiq2F85Config:
         default=0.1,
         unit="s",
         above=0.0,
-        plausible=(1e-3, 10.0),
+        plausible=(1e-3, 120.0),
         meaning="Longest wait for a reply.",
     )
     newtons_per_ampere: float = setting(
