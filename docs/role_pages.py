@@ -198,7 +198,8 @@ def helpers_page() -> str:
 def _helper(name: str) -> list[str]:
     """Return the section on one function or named tuple: signature, meaning and example."""
     helper = getattr(plugin_api, name)
-    signature = re.sub(r"'([^']+)'", r"\1", str(inspect.signature(helper)))
+    # The quotes of annotations go, those of default values stay.
+    signature = re.sub(r"(: |-> )'([^']+)'", r"\1\2", str(inspect.signature(helper)))
     signature = re.sub(r"ForwardRef\((\w+)\)", r"\1", signature)
     meaning, _, example = (inspect.getdoc(helper) or "").partition("\n\n>>> ")
     lines = [f"### {name}", "", f"    {name}{signature}", "", re.sub(r"(?<!\n)\n(?!\n)", " ", meaning), ""]
