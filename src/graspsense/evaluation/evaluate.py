@@ -36,7 +36,7 @@ SHARES: Final = (0.1, 0.2, 0.4, 0.7, 1.0)
 """Shares of the training trials at which the learning curve is measured."""
 
 PERMUTATIONS: Final = 19
-"""Permutations of the labels: as many as p = 0.05 needs."""
+"""Number of permutations of the labels: the smallest with which p can be 0.05."""
 
 Progress = Callable[[str, int, int], None]
 

@@ -69,7 +69,7 @@ def in_order(labels: Sequence[str], order: Sequence[int], k: int) -> Folds:
 
 
 def commonest(labels: Sequence[str]) -> str:
-    """Return the most frequent label, the first by name of several."""
+    """Return the most frequent label; of several, the first in alphabetical order."""
     counts = Counter(labels)
     most = max(counts.values())
     return min(label for label, n in counts.items() if n == most)

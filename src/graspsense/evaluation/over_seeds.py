@@ -18,7 +18,7 @@ class OverSeeds:
     are at 95 %, from Student's t with one degree of freedom less than there are seeds, clipped to 0 and 1. A published
     rate is one such run, so it is compared with `prediction`. Neither interval is narrower than the Wilson interval of
     the trials (of all seeds, or of one), because a few seeds may agree by chance. With one seed, both are the interval
-    of its trials, `single` if that is given; None if these have none.
+    of its trials: that of `single` if given (None if it has none), else Wilson's.
     """
 
     rates: tuple[float, ...]

@@ -94,7 +94,7 @@ def _measured() -> Mapping[str, Any]:
     text = files("graspsense.experiments").joinpath("durations.toml").read_text(encoding="utf-8")
     values = tomllib.loads(text)
     shares, kinds = dict(values["seconds_per_trial"]), values["kinds"]
-    # A file of one's own is estimated by the experiments of the same kind that come with graspsense.
+    # An experiment from a user's file is estimated from the shipped experiments of the same kind.
     for kind in dict.fromkeys(kinds.values()):
         shares[f"kind {kind}"] = median(shares[name] for name, of in kinds.items() if of == kind)
     return {**values, "seconds_per_trial": shares}

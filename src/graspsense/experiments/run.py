@@ -17,12 +17,12 @@ from graspsense.experiments.versions import differences, versions
 from graspsense.recording.atomic_file import SaveFailed
 
 STORE_FILE = "store.sqlite"
-"""A folder with this file is a store of trials. This room may not import the store itself."""
+"""A folder with this file is a store of trials. This package may not import the store itself."""
 
 
 @frozen(kw_only=True)
 class Account:
-    """The number of tasks in total, with a result from an earlier run (`kept`), `done` in this run, and `failed`.
+    """The numbers of tasks: in `total`, `kept` from an earlier run, `done` in this run, and `failed`.
 
     `stopped` is the reason if the run ended early, and empty otherwise.
     """

@@ -36,9 +36,9 @@ SCENES: Final = (
     "block",
 )
 SCALES: Final[Mapping[str, float]] = {"m": 1e-3, "N": 1.0, "s": 0.05, "m/s": 1e-3, "N/s": 1.0}
-"""Below these an error counts as if the quantity were this."""
+"""Relative errors are relative to the reference value, or to this value of the same unit if that is larger."""
 LEAST_S: Final = 0.2
-"""A variant is run again until so much processor time is measured, so that the clock's grain counts for nothing."""
+"""A variant is run again until this much processor time is measured, so that the clock's resolution is negligible."""
 
 
 def trade_simulation(
@@ -73,7 +73,7 @@ def trade_simulation(
         try:
             felt, seconds, setup = _measured(settings, variant, names, all_seeds, tick)
         except (ArithmeticError, ValueError, ConfigError) as error:
-            # An unknown name fails in the reference already, which comes first.
+            # The reference comes first, so an unknown scene is already reported there.
             if reference is None:
                 raise
             points.append(_failed(variant, f"{type(error).__name__}: {error}"))
@@ -120,7 +120,7 @@ def _measured(
     seeds: Sequence[int],
     tick: Callable[[], None] | None,
 ) -> tuple[list[_Measured], float, float]:
-    """Return what every grasp felt, the processor time of one, and what the first ones took beyond that."""
+    """Return features and force of every grasp, the processor time of one, and the additional time of the first run."""
     ideal = {"sensor": "ideal"} if "sensor" in fields_dict(type(settings.gripper.config)) else {}
     config = evolve(settings.gripper.config, **{**ideal, **variant.settings})
     backend = settings.gripper.component.create(config)
@@ -140,7 +140,7 @@ def _measured(
         return done, time.process_time() - began
 
     with warnings.catch_warnings():
-        # That a variant runs in the interpreter is what it is here for.
+        # Some variants run in the interpreter on purpose; the warning about this is not needed.
         warnings.simplefilter("ignore")
         _, first = run(slice(None))
         done, spent = run(slice(None))

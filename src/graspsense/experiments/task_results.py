@@ -133,7 +133,7 @@ class GraspRow:
     left_counts: float | None = None
     right_counts: float | None = None
     measured_peak_force_n: float | None = None
-    """The greatest mean of the two pad forces that was reported."""
+    """The largest reported mean of the two pad forces."""
     true_peak_force_n: float = 0.0
     """The peak force in the model, which the pads may miss."""
     broken: bool = False

@@ -1,1 +1,1 @@
-"""Figures and pages: the one owner of what is drawn."""
+"""Pages, tables and figures. Everything that graspsense draws is drawn here."""

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def confusion_text(confusion: Confusion) -> list[str]:
-    """Return the matrix in lines: rows are the truth, columns the answers, which letters stand for."""
+    """Return the matrix as lines of text: rows are true labels, columns predicted ones; letters stand for labels."""
     letters = [_letter(k) for k in range(len(confusion.labels))]
     width = max(len(str(n)) for row in confusion.counts for n in row)
     width = max(width, max(map(len, letters)))
@@ -50,7 +50,7 @@ def confusion_png(confusion: Confusion, title: str, path: Path) -> None:
     axes.set_ylabel("true")
     axes.set_title(title, fontsize=9)
     try:
-        # A title is wider than a small matrix.
+        # The title may be wider than a small matrix: "tight" extends the picture to include it.
         figure.savefig(path, format="png", bbox_inches="tight")
     except OSError as error:
         raise ConfigError(f"the picture cannot be written to {path}: {error.strerror}") from error

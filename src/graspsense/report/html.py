@@ -1,7 +1,7 @@
-"""A page: one HTML file that loads nothing, prints, reads well aloud and on a phone, in light and dark.
+"""A page: one HTML file that loads nothing, for screen, phone, print and screen reader, in light and dark.
 
-Its style is `page.css`. Its only script, `page.js`, sorts and filters tables, reads values out of pictures and zooms;
-a page without it is complete.
+Its style is `page.css`. Its only script, `page.js`, sorts and filters tables, shows values under the pointer and
+zooms pictures. Without the script a page is complete.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def paragraph(text: str, kind: str = "") -> str:
 
 
 def bullets(items: Sequence[str], kind: str = "") -> str:
-    """Return a list of plain texts, nothing for none."""
+    """Return a list of plain texts; an empty text if there are none."""
     return f"<ul{_class(kind)}>{''.join(f'<li>{escape(one)}</li>' for one in items)}</ul>" if items else ""
 
 
@@ -91,17 +91,17 @@ def figure(picture: str, caption: str) -> str:
 
 
 def panels(figures: Sequence[str]) -> str:
-    """Return figures side by side where there is room."""
+    """Return figures side by side if there is room."""
     return f'<div class="panels">{"".join(figures)}</div>'
 
 
 def pair(left: str, right: str) -> str:
-    """Return two things beside each other where there is room."""
+    """Return two blocks side by side if there is room."""
     return f'<div class="pair"><div>{left}</div><div>{right}</div></div>'
 
 
 def folded(summary: str, body: str) -> str:
-    """Return something that is shown when it is asked for, and in print."""
+    """Return a block that is shown when its summary is clicked, and in print."""
     return f"<details><summary>{escape(summary)}</summary>{body}</details>"
 
 
@@ -115,7 +115,7 @@ def table(
     """Return a table of plain texts, the first cell of a row its heading; columns from `numbers` on are numbers.
 
     Cells of the columns `verdicts` get a mark and a colour, if they are among the words of `VERDICTS`. The table can be
-    sorted and filtered, and scrolls by itself where it is too wide.
+    sorted and filtered, and scrolls sideways if it is too wide.
     """
     kinds = [' class="n"' if k >= numbers and k not in verdicts else "" for k in range(len(header))]
     head = "".join(
@@ -158,7 +158,7 @@ def marked(words: str) -> str:
 
 
 def wide(label: str, body: str) -> str:
-    """Return something that scrolls by itself where it is too wide, also by keyboard; `label` stands above it."""
+    """Return a block that scrolls sideways if it is too wide, also by keyboard; `label` stands above it."""
     return (
         f'<p class="label">{escape(label)}</p>'
         f'<div class="wide" tabindex="0" role="region" aria-label="{escape(label)}, scrollable">{body}</div>'
@@ -166,7 +166,7 @@ def wide(label: str, body: str) -> str:
 
 
 def facts(pairs: Sequence[tuple[str, str]]) -> str:
-    """Return names with what they stand for."""
+    """Return a description list from pairs of a term and its description."""
     return f"<dl>{''.join(f'<dt>{escape(k)}</dt><dd>{escape(v)}</dd>' for k, v in pairs)}</dl>"
 
 

@@ -1,4 +1,4 @@
-"""A confusion matrix as a table that can be read, in which a stronger colour means more."""
+"""A confusion matrix as an HTML table. A stronger colour means a larger share."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def confusion_table(confusion: Confusion, caption: str) -> str:
-    """Return the counts; a row is what it was, a column what it was taken for, right answers are framed."""
+    """Return the counts. Rows are true labels, columns predicted ones; correct predictions are framed."""
     head = "".join(f'<th scope="col"><span>{escape(label)}</span></th>' for label in confusion.labels)
     body = []
     for i, (label, row) in enumerate(zip(confusion.labels, confusion.counts, strict=True)):

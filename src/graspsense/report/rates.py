@@ -21,16 +21,16 @@ class RateRow:
     interval: tuple[float, float] | None
     what: str = ""
     strong: bool = False
-    """Whether it is what the others are held against."""
+    """Whether it is the rate that the others are compared with."""
 
     @property
     def words(self) -> str:
-        """Return it in per cent with its interval."""
+        """The rate in per cent with its interval."""
         return f"{100 * self.rate:.1f} % ({self.interval_text})"
 
     @property
     def interval_text(self) -> str:
-        """Return the interval in per cent."""
+        """The interval in per cent."""
         if self.interval is None:
             return "no interval"
         return f"{100 * self.interval[0]:.1f} to {100 * self.interval[1]:.1f}"
@@ -40,11 +40,11 @@ ROW: Final = 34
 STEP: Final = 5.0
 """Ends of a rate axis are multiples of this, in per cent."""
 NEARLY_WHOLE: Final = 80.0
-"""An axis that would show more than this many points shows 0 to 100 %."""
+"""An axis that would span more than this many percentage points shows 0 to 100 %."""
 
 
 def rate_scale(rows: Sequence[RateRow], start: float, end: float) -> AxisScale:
-    """Return the axis that shows these rates and their intervals in per cent, cut to where they are."""
+    """Return an axis in per cent that is cut to the range of these rates and their intervals."""
     shares = [share for row in rows for share in (row.rate, *(row.interval or ()))] or [0.0, 1.0]
     low = max(STEP * math.floor((100 * min(shares) - 1) / STEP), 0.0)
     high = min(STEP * math.ceil((100 * max(shares) + 1) / STEP), 100.0)
@@ -93,7 +93,7 @@ def rates_picture(rows: Sequence[RateRow], caption: str) -> str:
 def rates_over(
     series: Mapping[str, Sequence[tuple[float, RateRow]]], axis: str, caption: str, guess: float | None = None
 ) -> str:
-    """Return a figure of rates against a number, one line a series; `guess` is the rate of guessing."""
+    """Return a figure of rates against a number, one line per series; `guess` is the rate of guessing."""
     picture = Picture(262 + 15 * len(series))
     xs = [x for points in series.values() for x, _ in points]
     x_scale = reaching(xs, 44, picture.width - 14)
@@ -115,7 +115,7 @@ def rates_over(
     for k, (name, points) in enumerate(series.items()):
         ink, dash = INKS[k % len(INKS)], DASHES[k % len(DASHES)]
         drawn = sorted(points, key=lambda point: point[0])
-        # Intervals of series at the same place stand beside each other.
+        # Each series is shifted, so that intervals at the same x do not hide each other.
         shift = 5.0 * (k - (len(series) - 1) / 2)
         places = [(x_scale(x) + shift, y_scale(100 * row.rate)) for x, row in drawn]
         with picture.plot(x_scale, y_scale, 24, 215):
@@ -142,5 +142,5 @@ def rates_table(caption: str, rows: Sequence[RateRow]) -> str:
 
 
 def rates_list(rows: Sequence[RateRow]) -> str:
-    """Return the rates with what each is in words."""
+    """Return the rates as a list that says in words what each is."""
     return facts([(row.name, f"{row.words}: {row.what}" if row.what else row.words) for row in rows])

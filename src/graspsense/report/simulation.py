@@ -16,7 +16,7 @@ HEADER: Final = ("METHOD", "FIDELITY", "STEP OR ACCURACY", "MS A GRASP", "SET-UP
 PEAK: Final = "peak force"
 TRACE: Final = "force trace, rms"
 LEAST_ERROR: Final = 1e-9
-"""Smaller errors are drawn at this value, because a logarithmic axis has no 0."""
+"""Smaller errors are drawn at this value, because a logarithmic axis cannot show 0."""
 
 
 @frozen(kw_only=True)
@@ -192,7 +192,7 @@ def _draw_curves(ax: Any, trade: SimulationTrade, quantity: str) -> dict[str, An
         )
         for p in points:
             if p not in good:
-                # On the upper edge: the error of a run without a result is larger than any number.
+                # A run without a result has an infinite error, which is drawn on the upper edge.
                 ax.plot(
                     1e3 * p.seconds,
                     1.0,

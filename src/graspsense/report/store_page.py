@@ -38,7 +38,7 @@ Progress = Callable[[str, int, int], None]
 
 @frozen
 class _TrialCount:
-    """The number of trials of one label and outcome that are set aside, or not."""
+    """The number of trials with this label and outcome that are set aside, or that are not."""
 
     label: str | None
     outcome: str
@@ -58,7 +58,7 @@ def store_page(
 ) -> Page:
     """Return the page of the store in this folder; `grasp` is the number of the trial that is shown over time.
 
-    Raises ConfigError if there is no store, no trial, or no trial of this number, DataDamaged.
+    Raises ConfigError if there is no store, no trial, or no trial of this number, and DataDamaged.
     """
     with Store.read(folder) as store:
         listed = store.page(set_aside=None, limit=LISTED)

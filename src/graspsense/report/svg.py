@@ -1,4 +1,4 @@
-"""Pictures as SVG inside a page: scales, axes and marks, each picture with words for who cannot see it."""
+"""SVG pictures for a page: scales, axes and marks. Each picture has a description for those who cannot see it."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from typing import Final
 from attrs import define, field, frozen
 
 WIDTH: Final = 360.0
-"""Of a picture, in units of which a page on a telephone shows about one a pixel: text stays readable there."""
+"""Width of a picture. On a phone a unit is about one pixel, so that text stays readable."""
 SIZE: Final = 11.0
-"""Of text."""
+"""Font size of text."""
 _INKS: Final = ("#0b5fa5", "#b3400a", "#1b7a3d", "#7b2d8b", "#00707a", "#a8174f", "#7a5c00", "#3d3d3d")
 INKS: Final = tuple(f"var(--ink{k},{colour})" for k, colour in enumerate(_INKS))
 """Colours of lines and marks: those of `page.css`, for light and dark; the fallback is for pictures without a page."""
 DASHES: Final = ("", "7 3", "2 2.5", "9 3 2 3", "4 2", "1 3", "12 3", "6 2 2 2")
-"""Lines differ in these as well as in colour."""
+"""Dash patterns of lines, which differ in these as well as in colour."""
 TEXT: Final = "var(--text,#1a1a1a)"
 QUIET: Final = "var(--quiet,#5c5c5c)"
 GRID: Final = "var(--grid,#dcdcdc)"
@@ -27,7 +27,7 @@ GROUND: Final = "var(--ground,#fff)"
 
 @frozen
 class AxisScale:
-    """A linear map from values to places in a picture."""
+    """A linear map from values to positions in a picture."""
 
     low: float
     high: float
@@ -35,12 +35,12 @@ class AxisScale:
     end: float
 
     def __call__(self, value: float) -> float:
-        """Return the place of a value, kept within the picture's range."""
+        """Return the position of a value, limited to just outside the axis."""
         share = (value - self.low) / ((self.high - self.low) or 1.0)
         return self.start + (self.end - self.start) * min(max(share, -0.02), 1.02)
 
     def ticks(self, about: int = 5) -> list[float]:
-        """Return round values within, about so many."""
+        """Return about this many round values within the range."""
         span = (self.high - self.low) or 1.0
         power = 10.0 ** math.floor(math.log10(span / about))
         step = next(one * power for one in (1, 2, 5, 10) if span / (one * power) <= about)
@@ -50,7 +50,7 @@ class AxisScale:
 
 
 def reaching(values: Sequence[float], start: float, end: float, *, zero: bool = False) -> AxisScale:
-    """Return the scale that shows all of these values, and zero where it is to be seen."""
+    """Return a scale that shows all of these values, and also zero if `zero` is set."""
     known = [one for one in values if math.isfinite(one)] or [0.0, 1.0]
     low, high = min(known), max(known)
     if zero:
@@ -60,7 +60,7 @@ def reaching(values: Sequence[float], start: float, end: float, *, zero: bool = 
 
 
 def number(value: float) -> str:
-    """Return a number as an axis has it."""
+    """Return a number as it is written at an axis."""
     text = f"{value:.4g}"
     return text.replace("-", "−") if text != "-0" else "0"
 
@@ -75,7 +75,7 @@ class Picture:
 
     @contextmanager
     def plot(self, x: AxisScale, y: AxisScale | None, top: float, bottom: float) -> Iterator[None]:
-        """Draw the following into a plot with these scales, whose values can be read out and zoomed on a page.
+        """Put what is drawn within the context into a plot with these scales, which a page can zoom and read out.
 
         `y` is None for rows of labels. `top` and `bottom` are the edges of the plot.
         """
@@ -179,7 +179,7 @@ class Picture:
         self.text(2, min(scale.start, scale.end) - 8, title, ink=QUIET)
 
     def break_mark(self, x: float, y: float, *, upright: bool) -> None:
-        """Mark the end of an axis that begins or ends elsewhere than its quantity, by two slashes across it."""
+        """Mark the end at which an axis is cut by two slashes across it."""
         for offset in (-2.5, 2.5):
             dx, dy = (0.0, offset) if upright else (offset, 0.0)
             self.line([(x - 4 + dx, y + 4 + dy), (x + 4 + dx, y - 4 + dy)], QUIET, width=1.4)

@@ -18,7 +18,7 @@ from graspsense.report.svg import DASHES, INKS, QUIET, TEXT, AxisScale, Picture,
 STATES: Final = 8
 """Largest number of line styles in one picture."""
 DRAWN: Final = 150
-"""Largest number of dots per label; of more trials, every n-th is drawn."""
+"""Largest number of dots per label. If there are more trials, every n-th is drawn."""
 PHASES: Final = {
     "approach": "var(--approach,#e9eff6)",
     "squeeze": "var(--squeeze,#fbdcb4)",

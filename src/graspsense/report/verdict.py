@@ -8,7 +8,7 @@ from graspsense.report.wording import TARGETS
 
 
 def verdict(evaluation: Evaluation) -> str:
-    """Return the rate with its interval, the comparison with guessing, and what the controls say of its origin."""
+    """Return the rate with its interval, the comparison with guessing, and what the controls say about its origin."""
     sentences = [_rate(evaluation), _against_guessing(evaluation.controls.get("majority_class"))]
     sentences.append(_before_contact(evaluation))
     sentences.append(_width(evaluation.controls.get("width_only")))

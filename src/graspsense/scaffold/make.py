@@ -120,10 +120,10 @@ def make(name: str, roles: Sequence[str], folder: Path) -> list[str]:
 
 
 def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
-    """Return what the places in the templates are filled with."""
+    """Return the values of the placeholders in the templates."""
     kinds = _kinds(roles)
     part, together = name.removeprefix("graspsense-"), _together(kinds)
-    # A law for the gripper of this package sends what that accepts, one alone what the simulated gripper accepts.
+    # The law sends a kind of command that the package's own gripper accepts, or else the simulated gripper.
     kind, command = ("effort", "EFFORT, effort, inf, 0.03")
     if "sensor-backend" in kinds:
         kind, command = ("velocity", "VELOCITY, -0.03, effort, inf")
@@ -176,7 +176,7 @@ def _kinds(roles: Sequence[str]) -> dict[str, ScaffoldKind]:
 
 
 def _together(kinds: Mapping[str, ScaffoldKind]) -> bool:
-    """Return whether the package ships a pipeline: whether a pipeline selects several of its components."""
+    """Return whether the package ships a pipeline, which it does if a pipeline can select several of its parts."""
     return sum(kind.role is not None for kind in kinds.values()) > 1
 
 
@@ -243,7 +243,7 @@ def _texts(kinds: Mapping[str, ScaffoldKind], words: Mapping[str, str]) -> dict[
 
 
 def _filled(template: str, words: Mapping[str, str]) -> str:
-    """Return a template with its places filled."""
+    """Return a template with its placeholders filled."""
     text = files("graspsense.scaffold").joinpath("templates").joinpath(template).read_text(encoding="utf-8")
     return Template(text).substitute(words)
 
@@ -278,6 +278,6 @@ def _check_free(kind: ScaffoldKind, part: str, name: str) -> None:
 
 
 def _compatible(version: str) -> str:
-    """Return the requirement on graspsense of a plugin written for this version: no minor version changes."""
+    """Return the requirement of a new plugin on graspsense: this major and minor version."""
     major, minor, *_ = version.split(".")
     return f"graspsense>={major}.{minor},<{major}.{int(minor) + 1}"

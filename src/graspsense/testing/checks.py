@@ -51,7 +51,7 @@ FLOOR: Final[Mapping[str, int]] = {
     "feature-set": 15,
     "classifier": 15,
 }
-"""Number of checks of each role that must run: a component of which most was skipped does not conform."""
+"""Least number of checks of each role that must run. A component with too many skipped checks does not conform."""
 
 
 def checks_of(*functions: Callable[[Any], None]) -> tuple[Check, ...]:
@@ -69,7 +69,7 @@ def demand(holds: bool, text: str) -> None:
 
 
 def outcome_of(check: Check, subject: Subject, expected: Mapping[str, str]) -> Result:
-    """Run one check; `expected` maps checks that are known to fail to the reason.
+    """Run one check; `expected` maps the ids of checks that are known to fail to the reasons.
 
     Any exception of the component is a failure. A check that was expected to fail and passes is a failure too.
     """

@@ -37,7 +37,7 @@ def classes_can_be_imported(subject: Subject) -> None:
 
 
 def declared_once(subject: Subject) -> None:
-    """What the class declares is not declared by the entry once more."""
+    """The entry does not repeat what the class declares."""
     twice = subject.component.declared_twice()
     demand(
         not twice,
@@ -64,7 +64,7 @@ def settings_have_types(subject: Subject) -> None:
 
 
 def settings_declare_their_meaning(subject: Subject) -> None:
-    """Every key declares its meaning, and a unit if its name ends in that of one, by `setting`."""
+    """Every key declares its meaning with `setting`, and its unit if its name ends in one."""
     for key, declaration in _all_keys(keys_of(subject.component.config_class())):
         where, name = f"key {key!r} of {subject.entry.config}", key.rpartition(".")[2]
         demand(
@@ -173,7 +173,7 @@ def summary_is_one_line(subject: Subject) -> None:
 
 
 class _Watched:
-    """Collects what this thread opens within the context. Audit hooks cannot be removed."""
+    """Collects what the process opens within the context, by an audit hook. Audit hooks cannot be removed."""
 
     _seen: list[str] | None = None
     _hooked = False

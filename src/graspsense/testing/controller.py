@@ -53,7 +53,7 @@ def ticks_of(subject: Subject, thing: str = "a soft thing") -> list[Tick]:
 def fresh_ticks(
     subject: Subject, thing: str = "a soft thing", channels: Any = None, first: int = 0
 ) -> list[Tick]:
-    """Return such ticks, computed again.
+    """Return the same ticks as `ticks_of`, computed again.
 
     Before tick `first`, if given, the state is rebuilt from plain numbers.
     """
@@ -323,7 +323,7 @@ def ends_every_grasp(subject: Subject) -> None:
     """With a soft object, a hard object and nothing, it ends the grasp by itself with a valid outcome."""
     for thing in THINGS:
         gripper = bench(_all_channels(), thing)
-        # The runner ends a controller that does not end the grasp, after three more opening times.
+        # If the controller does not end the grasp, the runner ends it after three more opening times.
         grasp = run_grasp(gripper, subject.create(), RunConfig(grasp_timeout_s=LONGEST_S))
         demand(
             grasp.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RUNNING),

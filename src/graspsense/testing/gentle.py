@@ -27,7 +27,7 @@ from graspsense.core.signals import (
 SPEED_M_S: Final = 0.01
 EFFORT_N: Final = 12.0
 EFFORT_RATE_N_S: Final = 15.0
-"""Rate at which an effort rises until the fingers move, which takes the breakaway effort."""
+"""Rate at which an effort command rises until the fingers move. They move at the breakaway effort."""
 FORCE_N: Final = 2.0
 REST_SPEED_M_S: Final = 5e-4
 REST_S: Final = 0.5
@@ -54,7 +54,8 @@ class GentleState(NamedTuple):
 def closing(kind: int, seconds: float, before_m: float, frame: Frame) -> Command:
     """Return the command of this kind that closes gently, this many seconds after the start.
 
-    `before_m` is the gap of the previous frame, because the velocity of the gripper is not yet checked.
+    `before_m` is the gap of the previous frame. The speed is computed from gaps, because the velocity channel of the
+    gripper is not yet checked.
     """
     if kind == VELOCITY:
         return Command(VELOCITY, -SPEED_M_S, EFFORT_N, inf)

@@ -304,7 +304,7 @@ CHECKS: Final = checks_of(
 
 
 def contributed_checks(package: Package) -> tuple[Check, ...]:
-    """Return the checks that other plugins contribute for the hooks of theirs that this distribution implements."""
+    """Return the checks of other plugins for those of their hooks that this distribution implements."""
     implemented = {hook for status in package.statuses for hook in status.hooks}
     return tuple(
         Check(contributed.name, contributed.entry.summary, _check_of(contributed))

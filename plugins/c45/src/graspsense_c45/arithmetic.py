@@ -5,8 +5,8 @@ not depend on them at all. Weights and ``x ln x`` terms are therefore summed as 
 the order, and the two transcendental functions are written in IEEE operations, since those of numpy and of compilers
 differ in the last bit between machines.
 
-The functions are elementwise: they accept numbers and arrays. The compiled engine compiles the same lines. Three of
-them (`select`, `mantissa_and_exponent`, `to_integer`) it replaces by their form for one number, since numba's own
+The functions are elementwise: they accept numbers and arrays. The compiled engine compiles the same lines. It
+replaces three of them (`select`, `mantissa_and_exponent`, `to_integer`) by versions for one number, since numba's own
 versions return arrays; see `depthfirst.compiled`.
 """
 
@@ -85,7 +85,7 @@ def ln(x: Real) -> Elementwise:
 def one_minus_exp(y: Real) -> Real:
     """Return ``1 - exp(y)`` for ``y <= 0``, without cancellation near 0; below -700 the value at -700.
 
-    The series of exp(r) - 1 at r = y / 1024, then ten times (1 + q)**2 - 1.
+    q is first the series of exp(r) - 1 at r = y / 1024, and is then replaced ten times by (1 + q)**2 - 1.
     """
     r = np.maximum(y, -700.0) / 1024.0
     q: Real = 1.0 / 14.0

@@ -17,9 +17,9 @@ Indices = NDArray[np.int64]
 FixedPoint = NDArray[np.int64]
 """Weights or ``x ln x`` terms as integers, in units of a power of two (see `arithmetic.Scale`)."""
 Mask = NDArray[np.bool_]
-"""One truth value an item."""
+"""One truth value per item."""
 NodeColumn = NDArray[np.int32]
-"""One integer a node or a row: a feature, a child, a number of children, the node of a row."""
+"""One integer per node or row: a feature, a child, a number of children, the node of a row."""
 SmallLabels = NDArray[Any]
 """Class indices in the smallest type that holds them."""
 AnyArray = NDArray[Any]

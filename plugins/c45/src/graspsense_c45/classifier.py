@@ -41,13 +41,11 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     laplace, binary_splits, rep_folds: see ``Options``.
     classes: the declared classes in order; a class need not occur (the number of classes enters the least weight of a
         branch). By default those that occur, sorted.
-    nominal: the nominal columns, as a boolean mask, indices or names; by default the categorical columns of a data
-    frame.
-        A value that did not occur in fitting is treated as missing.
+    nominal: the nominal columns, as a boolean mask, indices or names; by default the categorical columns of a
+        data frame. A value that did not occur in fitting is treated as missing.
     units: the units of the columns, as a mapping of names or a sequence, for paths and rules.
     random_state: with ``reduced_error`` pruning, an integer or a RandomState shuffles the rows before some are held
-    out;
-        None keeps their order, as J48 does (whose seed does not decide which rows are held out).
+        out; None keeps their order, as J48 does (whose seed does not decide which rows are held out).
     engine: ``numpy``, ``fast`` (needs the extra ``fast``) or ``auto``; the tree is the same.
 
     After fitting: ``tree_`` (a `tree.Tree`), ``classes_``, ``n_features_in_``, ``feature_names_in_`` where X has names.
@@ -181,7 +179,7 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         return to_text(self.tree_)
 
     def to_rules(self) -> tuple[Rule, ...]:
-        """Return the tree as rules, one a leaf."""
+        """Return the tree as rules, one per leaf."""
         check_is_fitted(self)
         return to_rules(self.tree_)
 
@@ -226,7 +224,7 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
     def _encode_labels(self, y: ArrayLike, n_rows: int) -> tuple[Indices, AnyArray]:
         labels = column_or_1d(y, warn=True)
         if labels.dtype.kind not in "biu":
-            # Integers are classes; the check could find nothing in them, and is slow.
+            # The check is slow, and it can find nothing wrong with integers.
             check_classification_targets(y)
         if len(labels) != n_rows:
             raise ValueError(f"{len(labels)} labels for {n_rows} rows; there must be one a row")

@@ -16,7 +16,7 @@ from graspsense_c45.arithmetic import LN2, TOLERANCE, Scale, ln, real_term, real
 from graspsense_c45.arrays import Elementwise, Mask, Real, Reals, Truth, Whole
 
 GAP = 1e-5
-"""Neighbouring values are apart where they differ by more than this, in the unit of the attribute (C45Split)."""
+"""A cut lies between neighbouring values that differ by more than this, in the unit of the attribute (C45Split)."""
 
 AVERAGE_SLACK = 1e-3
 """An attribute is eligible where its gain is at least the average gain less this, in bits (C45ModelSelection)."""
@@ -88,7 +88,8 @@ def least_units(weight: Real, weight_bits: int) -> Real:
 def midpoint(low: Real, high: Real) -> Real:
     """Return the number halfway between two values, the lower value where rounding would give the higher.
 
-    Where the sum overflows the halves are added. J48 then sends every row left and never ends (C45Split).
+    Where the sum of the values overflows, their halves are added. In that case J48 sends every row left and never
+    ends (C45Split).
     """
     middle = (low + high) / 2.0
     middle = select(np.isfinite(middle), middle, low / 2.0 + high / 2.0)

@@ -9,7 +9,7 @@ from typing import get_args
 from graspsense_c45.options import Engine
 
 WORTH_COMPILING = 1_000_000
-"""Values (rows x attributes) from which "auto" chooses the compiled engine: importing it pays from there on."""
+"""Values (rows x attributes) from which "auto" chooses the compiled engine, because importing it then pays."""
 
 _NEEDED = ("numba", "graspsense")
 """numba compiles; graspsense keeps the compiled code on disk, under a fingerprint of the code."""
@@ -34,5 +34,5 @@ def choose_fast(engine: Engine, n_values: int) -> bool:
 
 @cache
 def missing_for_fast() -> tuple[str, ...]:
-    """Return the packages that the compiled engine needs and that are not installed; then the numpy engine answers."""
+    """Return the packages that the compiled engine needs and that are not installed; with any, "auto" means numpy."""
     return tuple(name for name in _NEEDED if find_spec(name) is None)

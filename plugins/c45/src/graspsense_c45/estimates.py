@@ -35,7 +35,7 @@ class Confidence(NamedTuple):
 class Estimation(NamedTuple):
     """How errors are estimated in fixed point.
 
-    confidence: of the limit. weight_bits: of the weights that come in. bits: of the estimates, in units of
+    confidence: of the limit. weight_bits: of the given weights. bits: of the estimates, in units of
     ``2**-bits``.
     limit: the least difference of estimates that counts.
     """

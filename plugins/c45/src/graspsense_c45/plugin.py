@@ -82,12 +82,15 @@ class C45Config(ClassifierConfig):
 
 
 class C45(Classifier[C45Config]):
-    """A C4.5 tree. Where a feature is missing the prediction is a mean over all branches, by their training trials."""
+    """A C4.5 tree.
+
+    If a tested feature is missing, the prediction is a mean over all branches, weighted by their training trials.
+    """
 
     _tree: Tree | None = None
 
     def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
-        """Grow and prune a tree; the seed does not enter. Raises ValueError for data without a label."""
+        """Grow and prune a tree; the seed is not used. Raises ValueError for data without a label."""
         from graspsense_c45.fitting import fit
         from graspsense_c45.options import Options
         from graspsense_c45.schema import Attribute, Schema

@@ -103,7 +103,7 @@ def _blended(tree: Tree, x: Reals, of_nodes: Reals) -> Reals:
 
 
 def _by_completeness(x: Reals) -> tuple[Indices, Indices | None]:
-    """Return the rows without and with missing values; (nothing, None) where no value is missing."""
+    """Return the rows without and with missing values; (an empty array, None) if no value is missing."""
     # The minimum of an array with a NaN is NaN.
     if not np.isnan(x.min(initial=0.0)):
         return np.arange(0), None

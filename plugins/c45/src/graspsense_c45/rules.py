@@ -1,4 +1,4 @@
-"""A tree as rules, one a leaf, with support and probability."""
+"""A tree as rules, one per leaf, with support and probability."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Rule:
 
 
 def to_rules(tree: Tree) -> tuple[Rule, ...]:
-    """Return one rule a leaf, from left to right; of bounds on one side of an attribute the tightest is kept."""
+    """Return one rule per leaf, from left to right. Of several bounds on one side, only the tightest is kept."""
     rules = []
     stack: list[tuple[int, dict[tuple[int, str], str]]] = [(0, {})]
     while stack:

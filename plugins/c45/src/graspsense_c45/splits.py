@@ -17,7 +17,7 @@ ROOT = np.zeros(1, dtype=np.int64)
 
 @define(eq=False)
 class Splits:
-    """How the nodes of a tree split, one entry a node; node 0 is the root.
+    """How the nodes of a tree split, one entry per node; node 0 is the root.
 
     feature: the attribute that is tested, -1 at a leaf.
     threshold: of a numeric test, in the unit of the attribute; a value at most this large goes to the first child. NaN

@@ -20,7 +20,7 @@ class Table:
     values: rows x attributes, in the unit of the attribute; NaN is missing; a nominal column holds indices of values.
     labels: class indices; -1 is a missing class. The tree does not learn from such a row, but its values are candidates
         for thresholds.
-    weights: one a row, finite and not negative.
+    weights: one per row, finite and not negative.
     """
 
     schema: Schema
@@ -62,7 +62,7 @@ def make_table(
 
 def check_values(schema: Schema, x: Reals) -> None:
     """Raise ValueError if a value is infinite or not an index of a declared value in a nominal column."""
-    # A sum is finite unless one of its terms is not, or it overflows: the usual case takes one pass.
+    # If the sum is finite, so is every value. This usual case takes one pass.
     with np.errstate(over="ignore", invalid="ignore"):
         suspicious = not np.isfinite(x.sum())
     if suspicious and np.isinf(x).any():

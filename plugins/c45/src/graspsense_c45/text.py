@@ -9,7 +9,7 @@ from graspsense_c45.tree import Tree
 
 
 def to_text(tree: Tree) -> str:
-    """Return J48's text below its title: a line a branch, (weight/errors) at leaves, the numbers of leaves and nodes.
+    """Return J48's text below its title: one line per branch, (weight/errors) at leaves, numbers of leaves and nodes.
 
     With -B J48 prints all digits of a threshold; here thresholds have at most six decimals, as without -B.
     """

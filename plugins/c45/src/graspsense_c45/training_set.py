@@ -134,7 +134,10 @@ def make_training_set(table: Table, rows: Indices | None, options: Options) -> T
 
 
 def _averaged(value_counts: Indices, n_rows: int) -> Mask:
-    """Return which attributes enter the average gain: all but nominal ones of many values, if any is left."""
+    """Return which attributes enter the average gain.
+
+    Nominal attributes with many values do not, unless no other attribute is left.
+    """
     few = value_counts - criteria.MANY_VALUES * n_rows < -TOLERANCE
     averaged: Mask = (value_counts == 0) | few
     if not averaged.any():

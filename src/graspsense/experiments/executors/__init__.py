@@ -1,1 +1,1 @@
-"""Where tasks are done: in this process, in others on this machine, or on a Dask cluster."""
+"""Executors run tasks: in this process, in other processes on this machine, or on a Dask cluster."""

@@ -1,4 +1,4 @@
-"""An executor by what a user types."""
+"""Chooses the executor that `--executor` names."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ NAMES = ("serial", "processes", "dask")
 
 
 def chosen(asked: str | None, workers: int | None = None) -> Callable[[], Executor]:
-    """Return what makes the executor that is asked for; None asks for processes, or serial on one core.
+    """Return a function that makes the executor named `asked`. None stands for processes, or for serial on one core.
 
-    Raises ConfigError for what is none.
+    Raises ConfigError for an unknown name, and for fewer than one worker.
     """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if workers is not None and workers < 1:

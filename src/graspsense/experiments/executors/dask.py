@@ -1,4 +1,4 @@
-"""Tasks on a Dask cluster: one that is there already, by its scheduler's address, or a local one made for the run."""
+"""Runs tasks on a Dask cluster: an existing one, by the address of its scheduler, or a local one made for the run."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HINT: Final = 'the executor dask needs Dask: pip install "graspsense[dask]", or 
 CONNECTING_S: Final = 10.0
 WORKERS_COMING_S: Final = 30.0
 LOOKING_S: Final = 2.0
-"""How often a run looks whether its scheduler and its workers are still there."""
+"""Interval at which a run checks that its scheduler and its workers still exist."""
 SETTLING_S: Final = 1.0
 WITHOUT_WORKERS_S: Final = 60.0
 """Time to wait for workers that died to be restarted, as a nanny does within seconds."""
@@ -35,7 +35,7 @@ class DaskCluster:
         self._cluster: Any = None
         self._wanted = workers
         if address is None:
-            # One more try at once: a task may have been sent to a worker that was dying of another one.
+            # Dask retries a task once: its worker may have been dying because of another task.
             dask.config.set({"distributed.scheduler.allowed-failures": 1})
             self._cluster = self._distributed.LocalCluster(
                 n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=50
@@ -52,13 +52,13 @@ class DaskCluster:
 
     @property
     def workers(self) -> int:
-        """How many tasks its workers do at once."""
+        """Number of tasks that run at the same time."""
         return max(int(sum(self._client.nthreads().values())), 1)
 
     def run(self, tasks: Sequence[Task]) -> Iterator[TaskResult]:
-        """Do them, a task whose worker died once more at the end and alone.
+        """Run the tasks. A task whose worker died is run once more, at the end and alone.
 
-        Raises ExecutorLost if the scheduler goes, ConfigError where versions differ.
+        Raises ExecutorLost if the scheduler is lost, ConfigError if the versions of the workers differ.
         """
         self._compare()
         self._seen = time.monotonic()
@@ -68,7 +68,7 @@ class DaskCluster:
                 victims.append(task)
             else:
                 yield _done(task, text)
-        # Alone, so that only the task itself can be what ends its worker.
+        # Alone, so that no other task can be the cause if the worker dies again.
         for task, text in self._answers(victims, "alone"):
             reason = "it ended its worker, also when it was tried again alone"
             yield TaskResult.failed(task, reason) if text is None else _done(task, text)
@@ -76,23 +76,23 @@ class DaskCluster:
     def _answers(
         self, tasks: Sequence[Task], turn: Literal["first", "alone"]
     ) -> Iterator[tuple[Task, str | Exception | None]]:
-        """Yield each task with its answer, with what went wrong on the way, or None where its worker died.
+        """Yield each task with its answer, the exception that prevented it, or None if its worker died.
 
-        No more are handed in than are done at once: a worker that dies takes only those along, and answers are
-        fetched before it does.
+        Only as many tasks are submitted as can run at the same time. A worker that dies therefore loses only tasks
+        that were running, since the answers of finished tasks were fetched before.
         """
         distributed = self._distributed
         waiting = deque(tasks)
         running: dict[Any, Task] = {}
         try:
             while waiting or running:
-                # Workers may come and go meanwhile.
+                # The number of workers may change during the run.
                 at_once = 1 if turn == "alone" else self.workers
                 while waiting and len(running) < at_once:
                     if turn == "alone":
                         self._settle()
                     task = waiting.popleft()
-                    # Plain text both ways: nothing that would have to be pickled passes.
+                    # Only text is sent in both directions, so no object has to be pickled.
                     future = self._client.submit(
                         run_task,
                         task.to_text(),
@@ -107,7 +107,7 @@ class DaskCluster:
                 except distributed.KilledWorker:
                     answer = None
                 except TimeoutError:
-                    # Its worker died before the answer was fetched: it is being done once more.
+                    # Its worker died before the answer was fetched, so Dask is running it again.
                     self._watch()
                     continue
                 except (OSError, distributed.CancelledError):
@@ -121,9 +121,9 @@ class DaskCluster:
             raise ExecutorLost(f"{_GONE} ({named(error)})") from error
 
     def _settle(self) -> None:
-        """Wait until the workers have been the same for a while: none is dying of the task before.
+        """Wait until the set of workers has stopped changing, so that none is still dying because of the last task.
 
-        Raises ExecutorLost if there are none for long.
+        Raises ExecutorLost if there is no worker for too long.
         """
         before: set[str] = set()
         while True:
@@ -135,7 +135,7 @@ class DaskCluster:
             time.sleep(SETTLING_S)
 
     def _first(self, futures: Sequence[Any]) -> Any:
-        """Wait for one of these to be done and return it. Raises ExecutorLost if no worker is left."""
+        """Wait until one of these is done and return it. Raises ExecutorLost if no worker is left."""
         distributed = self._distributed
         while True:
             with suppress(TimeoutError, distributed.TimeoutError):
@@ -144,7 +144,7 @@ class DaskCluster:
             self._watch()
 
     def _watch(self) -> None:
-        """Look after scheduler and workers. Raises ExecutorLost if no worker is left."""
+        """Check scheduler and workers, and restart lost local ones. Raises ExecutorLost if none is left."""
         if self._client.status != "running":
             raise ExecutorLost(_GONE)
         if self._cluster is not None and len(self._cluster.workers) < self._wanted:
@@ -156,7 +156,7 @@ class DaskCluster:
             raise ExecutorLost(f"the Dask cluster has had no worker for {WITHOUT_WORKERS_S:g} s")
 
     def close(self) -> None:
-        """Take back what is not done, and end the cluster where it was made here."""
+        """Cancel the unfinished tasks, and stop the cluster if it was made for the run."""
         with suppress(Exception):
             self._client.cancel(self._futures, force=True)
         with suppress(Exception):
@@ -166,7 +166,7 @@ class DaskCluster:
                 self._cluster.close(timeout=5)
 
     def _compare(self) -> None:
-        """Refuse workers with other versions than this process has."""
+        """Raise ConfigError if no worker appears, or if one has other versions than this process."""
         try:
             self._client.wait_for_workers(1, timeout=WORKERS_COMING_S)
         except TimeoutError as error:
@@ -193,7 +193,7 @@ def _done(task: Task, answer: str | Exception) -> TaskResult:
 
 
 def _parts() -> tuple[Any, Any]:
-    """Return Dask's modules, imported here only: they take a second."""
+    """Return Dask's modules. They are imported only here, because the import takes a second."""
     return import_module("dask"), import_module("distributed")
 
 

@@ -1,6 +1,6 @@
-"""Tasks in other processes on this machine. JSON lines pass between them, nothing else: no pickle, no live object.
+"""Runs tasks in other processes on this machine. The processes exchange lines of JSON and no pickled objects.
 
-A worker that dies takes its task along: that task is tried once more in a new worker, then it has failed.
+If a worker dies, its task is tried once more in a new worker. If that dies too, the task has failed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from graspsense.experiments.versions import differences, versions
 
 ATTEMPTS: Final = 2
 ONE_THREAD: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-"""Libraries that would start a thread a core in every worker."""
+"""Environment variables of libraries that would otherwise start one thread per core in every worker."""
 CLOSING_S: Final = 5.0
 
 
@@ -34,7 +34,7 @@ class Processes:
         self._running: list[_Worker] = []
 
     def run(self, tasks: Sequence[Task]) -> Iterator[TaskResult]:
-        """Do them, as many at once as there are workers. Raises ExecutorLost if no worker starts."""
+        """Run the tasks, as many at the same time as there are workers. Raises ExecutorLost if no worker starts."""
         waiting = deque(tasks)
         attempts: dict[str, int] = {}
         starts_lost = 0
@@ -62,7 +62,7 @@ class Processes:
                     if task is not None:
                         attempts[task.key] = attempts.get(task.key, 0) + 1
                         if attempts[task.key] < ATTEMPTS:
-                            # Last, so that it cannot take others along before they are done.
+                            # Tried again last, in case it ends further workers.
                             waiting.append(task)
                         else:
                             yield TaskResult.failed(task, f"it ended its worker {ATTEMPTS} times ({how})")
@@ -74,7 +74,7 @@ class Processes:
                         self._start(selector)
 
     def close(self) -> None:
-        """End the workers, whatever they are doing."""
+        """Stop the workers, whatever they are doing."""
         for worker in self._running:
             worker.end()
         self._running = []
@@ -91,7 +91,7 @@ class Processes:
 
 
 class _Worker:
-    """One process, and the task that it is doing."""
+    """A worker process and the task that it is running."""
 
     def __init__(self) -> None:
         self.process = subprocess.Popen(
@@ -100,7 +100,7 @@ class _Worker:
             stdout=subprocess.PIPE,
             env={**dict.fromkeys(ONE_THREAD, "1"), **os.environ},
             bufsize=0,
-            # Ctrl-C is for this process alone, which then ends its workers.
+            # Ctrl-C reaches only the parent process, which then stops its workers.
             start_new_session=True,
         )
         assert self.process.stdout is not None
@@ -110,7 +110,7 @@ class _Worker:
         self._begun = b""
 
     def begin(self, task: Task) -> None:
-        """Send it a task. One that is gone is found out when it is read."""
+        """Send the worker a task. Whether the worker is dead is noticed when its output is read."""
         assert self.process.stdin is not None
         self.task = task
         data = memoryview(task.to_text().encode() + b"\n")
@@ -119,13 +119,13 @@ class _Worker:
                 data = data[self.process.stdin.write(data) :]
 
     def read(self) -> tuple[list[str], bool]:
-        """Return the lines that are there, and whether more may come."""
+        """Return the complete lines of its output, and whether more may follow."""
         data = os.read(self.out, 1 << 20)
         *lines, self._begun = (self._begun + data).split(b"\n")
         return [line.decode() for line in lines], bool(data)
 
     def ended(self) -> str:
-        """Wait for its end and return how it ended."""
+        """Wait until the process has ended; return its exit code or signal as text."""
         code = self.process.wait()
         self._close()
         if code >= 0:
@@ -135,7 +135,7 @@ class _Worker:
         return f"signal {-code}"
 
     def end(self) -> None:
-        """End it."""
+        """Kill the process."""
         with suppress(ProcessLookupError):
             self.process.kill()
         with suppress(subprocess.TimeoutExpired):

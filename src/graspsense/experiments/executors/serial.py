@@ -1,4 +1,4 @@
-"""Tasks one after the other, in this process: a debugger sees them, and what kills a task kills the run."""
+"""Runs tasks one after another in this process. A debugger can follow them; a crash of one ends the run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Serial:
     workers = 1
 
     def run(self, tasks: Sequence[Task]) -> Iterator[TaskResult]:
-        """Do them in their order."""
+        """Run the tasks in order."""
         for task in tasks:
             yield TaskResult.from_text(run_task(task.to_text()))
 

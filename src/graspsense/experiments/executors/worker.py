@@ -1,4 +1,4 @@
-"""A worker process: tasks as lines on standard input, what came of them as lines on what was standard output.
+"""A worker process. It reads tasks as lines from standard input and writes results as lines to standard output.
 
 It ends when the process that started it has ended.
 """
@@ -11,7 +11,7 @@ import sys
 
 def main() -> None:
     """Run tasks until the input ends."""
-    # Whatever else prints to standard output, here or in a library below, goes to standard error.
+    # Results keep the original standard output. Anything else that prints to it, also in C, goes to standard error.
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
 

@@ -1,1 +1,1 @@
-"""Chitta, Piccoli and Sturm (ICRA 2010) again: what they printed, what comes out here, and which claims hold."""
+"""Comparison with Chitta, Piccoli and Sturm (ICRA 2010): published figures, ours, and which claims hold."""

@@ -17,7 +17,7 @@ BASES: Final[tuple[Basis, ...]] = ("predicted", "fitted", "built in")
 def basis(summary: Summary, experiment: str, *about: str) -> Basis:
     """Return `fitted` if a figure of an object of this experiment was fitted to one of these results.
 
-    Otherwise it is `predicted`. What the model cannot but give is `built in`; that is stated where it is claimed.
+    Otherwise it is `predicted`. A result that follows from the structure of the model is `built in`; claims state this.
     """
     fitted_to = {result for results in _fitted_to(summary, experiment) for result in results}
     return "fitted" if fitted_to.intersection(about) else "predicted"

@@ -12,7 +12,7 @@ from graspsense.experiments.summary import ConditionResult, Summary
 
 Protocol = Literal["all", "one"]
 PROTOCOLS: Final[Mapping[Protocol, str]] = {"all": "all states", "one": "one state"}
-"""Whether each bottle is used in all states or in one, which section III.E does not tell; with words for a table."""
+"""Each bottle is used in all states, or in one; section III.E does not say which. The values are words for a table."""
 SWEPT: Final = "data.states_per_instance"
 
 

@@ -28,11 +28,11 @@ VARIANT: Final = "variant"
 PROBING_N: Final = 23.0
 CONTAINERS: Final = ("odwalla", "naked", "can", "water")
 RARELY_NOT: Final = 0.9
-"""What happens in more than this share of grasps, happens."""
+"""An event counts as happening in general if it happens in more than this share of grasps."""
 NEGLIGIBLE: Final = 0.05
 """Differences of rates below this are negligible."""
 SPLITS: Final = 0.9
-"""A feature separates two groups if one threshold assigns more than this share correctly; both weigh the same."""
+"""A feature separates two groups if one threshold assigns more than this share correctly, at equal weights."""
 
 
 @frozen(kw_only=True)

@@ -105,7 +105,7 @@ def _people_tables(summary: Summary, paper: Published) -> list[FoundTable]:
 
 
 def _answer(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
-    """Count by the strict criteria: no rate twice, and what is built into the model apart."""
+    """Return how many rates and claims are met, for each basis. No rate is counted twice."""
     parts = []
     for basis in BASES:
         of = [row for row in held if row.basis == basis and not row.published.repeats]
@@ -131,7 +131,7 @@ def _answer(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
 
 
 def _headline(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
-    """Return how much of the paper that nothing was fitted to is met, by the strict criteria and both protocols."""
+    """Return how many predicted rates and claims are met under both protocols."""
     parts = []
     met: dict[str, bool] = {}
     for row in held:

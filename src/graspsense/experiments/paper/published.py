@@ -1,4 +1,4 @@
-"""The figures that the paper prints, from `published.toml`."""
+"""The published figures of the paper, from `published.toml`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class PublishedRate:
     correct: int | None = None
     n: int | None = None
     repeats: str = ""
-    """The id of a rate that ours is the same figure as."""
+    """The id of another published rate that is compared with the same figure of ours; this one is not counted again."""
     note: str = ""
 
     @property

@@ -16,7 +16,7 @@ from graspsense.experiments.summary import ConditionResult
 from graspsense.report.wording import TARGETS
 
 ENOUGH: Final = 0.05
-"""A case is good enough if it loses less than this against the best, at 95 %."""
+"""A case is good enough if its rate is less than this below the best one, at 95 %."""
 
 
 OnFront = Literal["yes", "no", "not decided"]

@@ -31,10 +31,10 @@ def _to_integer(x: float) -> Any:
 
 
 _OPTIONS = CompileOptions(
-    # As numpy divides: by zero too.
+    # Division by zero gives inf or NaN, as in numpy.
     error_model="numpy",
     inlining=Inlining(short_code=400, long_code=2000),
-    # Counting references to the arrays that are passed to these took an eighth of the time of growing.
+    # These do not count references to their array arguments: that took an eighth of the time of growing.
     uncounted=frozenset(
         function.__code__
         for function in (

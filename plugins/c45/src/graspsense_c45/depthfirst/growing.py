@@ -28,13 +28,13 @@ from graspsense_c45.depthfirst.nodes import Nodes, RowIndices, empty_nodes, resi
 from graspsense_c45.depthfirst.scanning import Cut, Limits, Run, scan_unit, scan_weighted
 
 FIRST_CAPACITY = 256
-"""Nodes for which the first arrays have room; the room is doubled where it does not suffice."""
+"""Capacity of the first arrays, in nodes. It is doubled when it does not suffice."""
 
 
 class Columns(NamedTuple):
     """The rows, sorted for every attribute.
 
-    rows, values: attributes x rows, sorted by (node, value). labels, weights: one a row.
+    rows, values: attributes x rows, sorted by (node, value). labels, weights: one per row.
     terms: where all rows weigh 1, ``x ln x`` of 0, 1, ... rows in fixed point. steps: their differences.
     """
 
@@ -69,7 +69,7 @@ class Candidates(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Arrays that are written before they are read, for the rows of a node; `passed` has one entry a class."""
+    """Arrays that are written before they are read, for the rows of a node; `passed` has one entry per class."""
 
     goes_left: Mask
     rows: RowIndices
@@ -80,7 +80,7 @@ class Workspace(NamedTuple):
 def grow(columns: Columns, averaged: Mask, rules: Rules) -> Nodes:
     """Return the nodes of the unpruned tree, whose thresholds are midpoints; sorts `columns` by leaf.
 
-    `levelwise.growing.grow` grows the same tree; `tests/test_engines.py` holds the two equal to the bit.
+    `levelwise.growing.grow` grows the same tree; `tests/test_engines.py` checks that both agree to the bit.
     """
     n_attributes, n_rows = columns.rows.shape
     nodes = empty_nodes(FIRST_CAPACITY, rules.n_classes)
@@ -119,7 +119,7 @@ def grow(columns: Columns, averaged: Mask, rules: Rules) -> Nodes:
 def best_split(
     node: Integer, nodes: Nodes, columns: Columns, rules: Rules, candidates: Candidates, workspace: Workspace
 ) -> Integer:
-    """Return the attribute to split a node on, -1 where it stays a leaf; the cuts are left in `candidates`."""
+    """Return the attribute to split a node on, -1 if it stays a leaf; write the cuts to `candidates`."""
     counts = nodes.counts[node]
     total = counts.sum()
     weight = real_weight(total, rules.scale.weight_bits)
@@ -193,7 +193,7 @@ def split(
 def partition(rows: RowIndices, values: Reals, begin: Integer, stop: Integer, workspace: Workspace) -> None:
     """Move the rows that go left to the front of an interval; both parts keep their order."""
     goes_left, spare_rows, spare_values, _ = workspace
-    # Every row is written to both places and counted in one: a branch would often be predicted wrongly.
+    # Every row is written to both arrays, and one counter advances: a branch would often be mispredicted.
     at = begin
     kept: Integer = 0
     for i in range(begin, stop):

@@ -30,7 +30,7 @@ class Nodes(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """The rows of a training set. order: sorted by leaf. values: rows x attributes. labels, weights: one a row."""
+    """The rows of a training set. order: sorted by leaf. values: rows x attributes. labels, weights: one per row."""
 
     order: RowIndices
     values: Reals
@@ -39,7 +39,7 @@ class Rows(NamedTuple):
 
 
 def empty_nodes(capacity: int, n_classes: int) -> Nodes:
-    """Return so many leaves without rows."""
+    """Return this many leaves without rows."""
     return Nodes(
         np.full(capacity, LEAF, dtype=np.int32),
         np.full(capacity, np.nan),

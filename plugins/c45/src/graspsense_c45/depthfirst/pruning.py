@@ -43,7 +43,7 @@ class Pruning(NamedTuple):
 def collapse(nodes: Nodes, margin: Integer, slack: float) -> None:
     """Make a leaf of every node whose subtree makes hardly fewer training errors than the node as a leaf.
 
-    `levelwise.collapsing.collapse` does the same; `tests/test_engines.py` holds the two equal to the bit.
+    `levelwise.collapsing.collapse` does the same; `tests/test_engines.py` checks that both agree to the bit.
     """
     # Every node has a lower index than its children. Nodes below a new leaf are no longer reached.
     errors = np.zeros(len(nodes.feature), dtype=np.int64)
@@ -60,7 +60,7 @@ def collapse(nodes: Nodes, margin: Integer, slack: float) -> None:
 def prune(nodes: Nodes, rows: Rows, pruning: Pruning) -> None:
     """Replace subtrees by leaves or by their heaviest branch where the estimated errors grow by no more than 0.1.
 
-    `levelwise.pessimistic.prune_pessimistic` does the same; `tests/test_engines.py` holds the two equal to the bit.
+    `levelwise.pessimistic.prune_pessimistic` does the same; `tests/test_engines.py` checks that both agree to the bit.
     """
     n_nodes, n_classes = nodes.counts.shape
     errors = Errors(
@@ -76,7 +76,7 @@ def prune(nodes: Nodes, rows: Rows, pruning: Pruning) -> None:
     while len(stack) > 0:
         node = stack.pop()
         if prune_node(node, nodes, rows, pruning, errors):
-            # The node is another one now, with other rows below it: all of it is pruned again.
+            # The node has another split and other rows below it, so its whole subtree is pruned again.
             again = subtree(nodes, node)
             reassign_rows(again, nodes, rows)
             for below in again:
@@ -145,7 +145,7 @@ def increase(
         for i in range(begin, stop):
             row = rows.order[i]
             leaf = np.int64(leaf_below(nodes, heavy, rows.values, row))
-            # A leaf is noted when its first weight comes; a row of weight 0 changes nothing.
+            # A leaf is noted when the first weight joins it; a row of weight 0 changes nothing.
             if rows.weights[row] > 0:
                 if joining[leaf, -1] == 0:
                     touched.append(leaf)

@@ -1,6 +1,6 @@
 """The best cut of one attribute at one node, by a scan over its sorted rows.
 
-`levelwise.best_cuts` finds the same cut for many nodes without scanning; `tests/test_engines.py` holds the two equal.
+`levelwise.best_cuts` finds the same cut for many nodes without scanning; `tests/test_engines.py` compares the two.
 """
 
 from __future__ import annotations
@@ -54,18 +54,18 @@ def scan_unit(
 ) -> Cut:
     """Return the best cut of a node whose rows all weigh 1.
 
-    counts: rows of each class at the node. passed: zeros, one a class. terms: ``x ln x`` of 0, 1, ... rows, in fixed
+    counts: rows of each class at the node. passed: zeros, one per class. terms: ``x ln x`` of 0, 1, ... rows, in fixed
     point; steps: their differences.
     """
     rows, values, labels, begin, stop = run
     total = stop - begin
-    # The numerator without the terms of the sides: L(T), and what the rows that were passed changed.
+    # The numerator without the terms of the sides: L(T), and the changes by the rows scanned so far.
     inside = terms[total]
     best: Integer = np.int64(0)
     cut_left: Integer = np.int64(0)
     place: Integer = np.int64(-1)
     n_cuts = 0
-    # No cut is admissible in the last rows, which one side needs.
+    # No cut is admissible among the last rows, because the right side needs them.
     for i in range(begin, stop - limits.least_weight):
         k = labels[rows[i]]
         before = passed[k]

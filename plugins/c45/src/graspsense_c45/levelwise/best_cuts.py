@@ -8,7 +8,7 @@ from graspsense_c45.arrays import FixedPoint, Indices
 from graspsense_c45.criteria import is_better_cut
 
 NOT_ADMISSIBLE = -(2**62)
-"""The score of a position where no cut may be."""
+"""The score of a position at which no cut is admissible."""
 _ADMISSIBLE = -(2**60)
 
 
@@ -24,7 +24,7 @@ def best_cuts(
 
     The scan takes a cut where `criteria.is_better_cut` holds for its numerator and the best one so far. ``scores +
     offset`` are the numerators; `starts` and `lengths` are the runs, which are in order and not empty.
-    `depthfirst.scanning` scans; `tests/test_laws.py` and `tests/test_engines.py` hold the results equal.
+    `depthfirst.scanning` scans; `tests/test_laws.py` and `tests/test_engines.py` compare the results.
 
     The result is nearly always the first cut within the tolerance of the maximum. It is another one where an earlier
     cut is within the tolerance of that one; such runs are scanned.

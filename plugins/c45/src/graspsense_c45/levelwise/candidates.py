@@ -13,13 +13,13 @@ from graspsense_c45.arrays import FixedPoint, Indices, Mask, NodeColumn, Reals
 from graspsense_c45.training_set import TrainingSet
 
 NO_SPLIT = -1
-"""In place of an attribute: the node is not split."""
+"""Stands for an attribute where a node is not split."""
 
 
 class Cuts(NamedTuple):
-    """Cuts of numeric attributes, one an entry.
+    """Cuts of numeric attributes; each array has one entry per cut.
 
-    attribute, node: where. numerator: of the gain (see `criteria.gain`), in fixed point. n_cuts: admissible cuts there.
+    attribute, node: what is cut. numerator: of the gain (see `criteria.gain`), in fixed point. n_cuts: admissible cuts.
     left, known, weight: of the rows at most at the cut, of those that know the value, and of all, in fixed point.
     """
 
@@ -37,7 +37,7 @@ class CandidateSplits:
     """The best split of every attribute (rows) at every node (columns).
 
     usable: whether it may be chosen. gain, ratio: its gain and gain ratio in bits. category: for a nominal attribute,
-    the value that goes to the first child, or -1 for one child a value.
+    the value that goes to the first child, or -1 for one child per value.
     """
 
     usable: Mask

@@ -17,7 +17,7 @@ def collapse(tree: GrowingTree, training: TrainingSet, leaf_of_row: NodeColumn) 
     """Make a leaf of every node whose subtree makes hardly fewer training errors than the node as a leaf.
 
     The leaf of each row is updated. `depthfirst.pruning.collapse` does the same to a tree; `tests/test_engines.py`
-    holds the two equal to the bit.
+    checks that both agree to the bit.
     """
     errors = training.training_errors(tree.counts)
     below = errors.copy()

@@ -32,7 +32,7 @@ class NodeLevel(Protocol):
 def grow(training: TrainingSet, level: NodeLevel) -> GrowingTree:
     """Return the unpruned tree, whose thresholds are midpoints.
 
-    `depthfirst.growing.grow` grows the same tree; `tests/test_engines.py` holds the two equal to the bit.
+    `depthfirst.growing.grow` grows the same tree; `tests/test_engines.py` checks that both agree to the bit.
     """
     counts = np.bincount(training.labels, weights=training.weights, minlength=training.n_classes)
     root_counts = counts.astype(np.int64)[None, :]
@@ -69,7 +69,7 @@ def midpoints(low: Reals, high: Reals) -> Reals:
 
 
 class _Columns:
-    """The columns of a tree that is grown, one piece a level."""
+    """The columns of a growing tree, with one piece per level."""
 
     def __init__(self, root_counts: FixedPoint) -> None:
         self._n_nodes = 1

@@ -20,8 +20,8 @@ from graspsense_c45.training_set import TrainingSet
 def prune_pessimistic(tree: GrowingTree, training: TrainingSet, leaf_of_row: NodeColumn) -> None:
     """Replace subtrees by leaves or by their heaviest branch where the estimated errors grow by no more than 0.1.
 
-    `depthfirst.pruning.prune` does the same to a tree without missing values; `tests/test_engines.py` holds the two
-    equal to the bit.
+    `depthfirst.pruning.prune` does the same to a tree without missing values; `tests/test_engines.py` checks that
+    both agree to the bit.
     """
     pruner = _Pruner(tree, training, leaf_of_row)
     rows = np.arange(len(training.labels))

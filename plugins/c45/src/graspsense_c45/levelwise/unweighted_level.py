@@ -1,10 +1,10 @@
-"""A level of rows that all weigh 1 and miss no value: splitting is counting, most of it once a level.
+"""A level of rows that all weigh 1 and miss no value. Splits are found by counting, mostly once per level.
 
 Every attribute keeps its row indices sorted by (node, value), and for each of them its place in a second layout that is
 sorted by (node, class, value). In that second layout the running class counts of a node are the same for all
-attributes. What moving a row from the right to the left side changes in ``sum x ln x`` is therefore computed once a
-level, and an attribute needs a gather and a running sum. Descending keeps both orders by selection; nothing is sorted
-again.
+attributes. What moving a row from the right to the left side changes in ``sum x ln x`` is therefore computed once
+per level, and each attribute needs only a gather and a running sum. Descending keeps both orders by selection, so
+nothing is sorted again.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ JOINT_SIZE = 60_000
 
 @frozen(eq=False)
 class _Block:
-    """Some numeric attributes, one a row of each array.
+    """Some numeric attributes, one per row of each array.
 
     rows, values: sorted by (node, value). places: of each row in the layout sorted by (node, class, value).
     """
@@ -75,7 +75,7 @@ class UnweightedLevel:
         candidates.enter_cuts(cuts, training)
         for a in self._nominal.tolist():
             candidates.enter_values(a, self._value_counts(a), self._sizes, training)
-        # As large as the rows, and not needed any more.
+        # These are as large as the rows and no longer needed.
         del self._steps, self._sides, self._inside, self._node
         return candidates
 
