@@ -178,8 +178,8 @@ def helpers_page() -> str:
     lines = [
         HEAD + "# Helpers",
         "",
-        "These functions and constants of `graspsense.plugin_api` are what a component is written with. The features "
-        "and the controllers of graspsense use the same, so that all of them agree on contact and rest.",
+        "These functions and constants of `graspsense.plugin_api` are for use in components and their tests. The "
+        "features and controllers of graspsense use the same functions, so that all of them agree on contact and rest.",
         "",
     ]
     for title, names in HELPERS.items():
@@ -290,8 +290,10 @@ def _entry(cls: Any) -> list[str]:
     lines = ["| field | type | default |", "|---|---|---|"]
     attrs.resolve_types(cls)
     for one in attrs.fields(cls):
-        default = "required" if one.default is attrs.NOTHING else f"`{one.default!r}`"
-        kind = strict._kind_words(one.type).replace("graspsense.core.entries.", "").replace("|", "or")
+        empty = one.default.factory() if isinstance(one.default, attrs.Factory) else one.default
+        default = "required" if one.default is attrs.NOTHING else f"`{empty!r}`"
+        kind = re.sub(r"graspsense\.core\.entries\.|collections\.abc\.", "", strict._kind_words(one.type))
+        kind = kind.replace("|", "or")
         lines.append(f"| `{one.name}` | {_cell(kind)} | {default} |")
     return [*lines, "", _text(cls), ""]
 

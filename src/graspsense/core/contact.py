@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 CONTACT_FORCE_N: Final = 0.625
-"""tau_1 for each pad: 1000 counts above the tared zero at 1600 counts/N, as in the authors' code."""
+"""Contact threshold tau_1 of each pad: 1000 counts above the tared zero at 1600 counts/N, as in the authors' code."""
 REST_SPEED_M_S: Final = 1e-4
-"""tau_2: 0.1 mm/s, as in the authors' code."""
+"""Rest threshold tau_2: 0.1 mm/s, as in the authors' code."""
 REST_WINDOW_S: Final = 0.05
-"""Time for which the speed must stay below tau_2: a single encoder tick in 1 ms is 0.33 mm/s on the PR2."""
+"""Time for which the speed must stay below tau_2. One encoder tick in 1 ms is already 0.33 mm/s on the PR2."""
 
 FEW: Final = 8
 """Number of samples that are examined one by one before all others at once."""
@@ -50,10 +50,10 @@ def watch(
 ) -> Stillness:
     """Return the stillness after one more sample: unchanged, or starting at this sample if the gap has moved.
 
-    Call it in every tick with the time (s) and the gap (m) of the frame, the speed below which the fingers are at rest
-    (m/s), and the time for which they must be (s). The gap may differ from its value at the start of the stillness by
-    the rest speed times the window, or, if samples are further apart than the window, by the rest speed times the
-    elapsed time. A gap of NaN is never at rest.
+    Call it in every tick with the time (s) and the gap (m) of the frame, the speed below which the fingers are at
+    rest (m/s), and the time for which they must be at rest (s). The gap may differ from its value at the start of the
+    stillness by the rest speed times the window, or, if samples are further apart than the window, by the rest speed
+    times the elapsed time. A gap of NaN is never at rest.
 
     >>> still = Stillness(since_t_s=1.0, gap_m=0.05)
     >>> watch(still, 1.02, 0.05, REST_SPEED_M_S, REST_WINDOW_S)
@@ -87,9 +87,10 @@ def first_rest(
     rest_speed_m_s: float,
     rest_window_s: float,
 ) -> tuple[int, int] | None:
-    """Return the sample at which rest begins and the first sample that shows it, or None.
+    """Return the index of the sample at which rest begins and that of the first that shows it, or None.
 
-    All have shape (n,); only samples in `shows` can show a rest. The same as `watch` and `at_rest` for each sample.
+    The arrays have shape (n,). A sample shows a rest if `at_rest` is true for it, and `shows` too. The result is the
+    same as that of `watch` and `at_rest`, called for one sample after another.
 
     >>> times, gaps, shows = np.arange(11) * 0.01, np.array([0.06, 0.055] + [0.05] * 9), np.ones(11, bool)
     >>> first_rest(times, gaps, shows, REST_SPEED_M_S, REST_WINDOW_S)

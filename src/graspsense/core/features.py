@@ -127,9 +127,9 @@ class Prediction:
 
     `label` is a class, or `unknown` for a trial far outside the training data. `probabilities` sum to 1; they are empty
     if the model could not be applied. `because` is the reason in words and units, with one step in each item. `model`
-    describes in one line what the model was trained on. `support` is what the probability of the label was counted
-    from, where it is a share of training trials (those in a leaf of a tree, or the nearest): the number of trials with
-    the label, and of all.
+    describes in one line what the model was trained on. `support` is None, or two
+    numbers of training trials from which the probability of the label was computed: those with the label, and all of
+    those in the leaf of the tree, or among the nearest.
     """
 
     label: str

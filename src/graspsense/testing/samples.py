@@ -150,7 +150,7 @@ def three_kinds(trials: int = 45, missing: bool = False) -> tuple[FeatureTable, 
 
 
 def a_trial() -> Trial:
-    """Return a finished trial, for observers.
+    """Return a finished trial, to test observers with.
 
     >>> a_trial().outcome.words
     'steady'
