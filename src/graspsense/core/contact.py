@@ -89,8 +89,7 @@ def first_rest(
 ) -> tuple[int, int] | None:
     """Return the index of the sample at which rest begins and that of the first that shows it, or None.
 
-    The arrays have shape (n,). A sample shows a rest if `at_rest` is true for it, and `shows` too. The result is the
-    same as that of `watch` and `at_rest`, called for one sample after another.
+    The arrays have shape (n,). Only samples in `shows` can show a rest. `watch` and `at_rest` give the same result.
 
     >>> times, gaps, shows = np.arange(11) * 0.01, np.array([0.06, 0.055] + [0.05] * 9), np.ones(11, bool)
     >>> first_rest(times, gaps, shows, REST_SPEED_M_S, REST_WINDOW_S)
