@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -158,6 +160,13 @@ def test_one_instance_of_a_label_cannot_be_held_out():
     assert held.reason == "labels with a single instance, which cannot be held out: can:empty, can:full"
 
 
+def names_in(value):
+    """Return every key of JSON values, at any depth."""
+    if isinstance(value, list):
+        return set().union(*map(names_in, value))
+    return set(value).union(*map(names_in, value.values())) if isinstance(value, dict) else set()
+
+
 def test_the_json_is_whole_and_stable():
     labels, width, force = four_states()
     trials = labelled(labels, width, force, order=tuple(range(120)))
@@ -183,6 +192,9 @@ def test_the_json_is_whole_and_stable():
     counts, headline = found["confusion"]["counts"], found["headline"]
     assert sum(map(sum, counts)) == headline["n"] == 120
     assert sum(counts[k][k] for k in range(4)) == headline["correct"] == round(headline["rate"] * 120)
+    page = (Path(__file__).parents[1] / "docs" / "evaluation.md").read_text()
+    sample = re.search(r"^## JSON\n.*?```text\n(.*?)```", page, re.DOTALL | re.MULTILINE)[1]
+    assert set(re.findall(r'"(\w+)":', sample)) <= names_in(found) | {"stratified_10_fold"}
     # A row is the truth: every label was there thirty times.
     assert [sum(row) for row in counts] == [30] * 4
 

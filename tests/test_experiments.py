@@ -382,6 +382,7 @@ def test_an_experiment_does_not_write_into_a_store(run, file, tmp_path):
     assert code == 2
     assert "is a store of trials" in err
     assert not (tmp_path / "trials" / "report.html").exists()
+    assert run("experiment", file, "--out", tmp_path / "trials", "--dry-run")[::2] == (2, err)
 
 
 def test_a_slip_in_the_number_of_seeds_is_refused_at_once(file):
@@ -489,6 +490,19 @@ def test_each_case_is_compared_with_that_of_the_same_name(file, run, tmp_path):
     for one in found["differences"]:
         assert one["how"].startswith("unpaired: recorded trials are not paired")
         assert one["verdict"] == "not shown to differ"
+
+
+def test_a_report_of_results_with_other_settings_says_what_happened_and_what_to_do(compared, run, tmp_path):
+    changed = tmp_path / "changed"
+    subprocess.run(["cp", "-r", compared / "strong", changed], check=True)
+    text = (changed / "experiment.toml").read_text()
+    (changed / "experiment.toml").write_text(text.replace("trials = 2", "trials = 1"))
+    code, _, err = run("report", changed)
+
+    assert code == 2
+    assert "has results, but none for the settings that it has now" in err
+    assert f"graspsense experiment {changed / 'experiment.toml'} --out FOLDER" in err
+    assert not (changed / "report.html").exists()
 
 
 def test_what_cannot_be_compared_is_refused_in_one_line(compared, run, tmp_path):

@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 import pytest
 from attrs import evolve
 
-import graspsense
 from graspsense import Evaluation, Features, Prediction
 from graspsense.core.errors import PluginUnavailable
 from graspsense.evaluation.confusion import Confusion
@@ -171,16 +170,38 @@ def test_two_modules_are_enough_for_what_the_documentation_shows(path):
     }
 
 
-def test_what_the_page_on_notebooks_shows_runs(tmp_path, monkeypatch):
-    monkeypatch.setenv("MPLBACKEND", "Agg")
-    monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs/notebooks.md").read_text(), re.DOTALL)
-    names: dict = {}
+def test_a_notebook_of_what_the_page_shows_is_executed(tmp_path, monkeypatch):
+    """A kernel executes the page on notebooks; each value is shown as HTML, and the plot as a picture."""
+    nbclient, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    monkeypatch.setenv("JUPYTER_RUNTIME_DIR", str(tmp_path / "runtime"))
+    monkeypatch.delenv("MPLBACKEND", raising=False)
+    shown_alone = ["trial.trace", "trial.features", "trial.prediction"]
+    pages = re.findall(
+        r"```python\n(.*?)```", (ROOT / "docs/notebooks.md").read_text(encoding="utf-8"), re.DOTALL
+    )
+    cells = [*pages, *shown_alone, "repr(trial)"]
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
 
-    for block in blocks:
-        exec(block, names)
+    nbclient.NotebookClient(
+        notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": tmp_path}}
+    ).execute()
 
+    data = [
+        {kind: text for one in cell.outputs if "data" in one for kind, text in one.data.items()}
+        for cell in notebook.cells
+    ]
+    by_cell = dict(zip(cells, data, strict=True))
+    (trial,) = (by_cell[cell] for cell in pages if cell.endswith("trial\n"))
+    (plot,) = (by_cell[cell] for cell in pages if ".plot()" in cell)
+    (evaluation,) = (by_cell[cell] for cell in pages if cell.endswith("evaluation\n"))
+    assert "<svg" in trial["text/html"]
+    assert "predicted" in trial["text/html"]
+    assert len(plot["image/png"]) > 10_000
     assert (tmp_path / "grasp.png").stat().st_size > 10_000
-    assert repr(names["trial"]).startswith("<Trial: steady, ")
-    assert isinstance(names["evaluation"], graspsense.Evaluation)
-    assert "protocol or control" in shown(names["evaluation"])
+    assert "protocol or control" in evaluation["text/html"]
+    assert evaluation["text/plain"].startswith("<Evaluation: ")
+    assert "<svg" in by_cell["trial.trace"]["text/html"]
+    assert "p_first" in by_cell["trial.features"]["text/html"]
+    assert "odwalla:full_open" in by_cell["trial.prediction"]["text/html"]
+    assert "<Trial: steady, " in by_cell["repr(trial)"]["text/plain"]

@@ -57,7 +57,10 @@ def collect(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Prompt for the next object, grasp it and store the trial (Enter: grasp, u: undo, r: repeat, q: stop).
+    """Prompt for the next object, grasp it and store the trial.
+
+    Keys: Enter grasps the object, u undoes the last trial, r repeats the last trial, s skips this object, q stops,
+    ? shows the keys.
 
     Objects are grasped in rounds, so that no class is recorded as one batch. The command can be stopped or killed, and
     continues where it was. With a simulated gripper, the label selects the object. Answers can come from a file.

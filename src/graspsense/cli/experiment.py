@@ -88,12 +88,13 @@ def experiment(
     from graspsense.experiments.executors.choose import chosen
     from graspsense.experiments.page import findings_of
     from graspsense.experiments.results import Results
-    from graspsense.experiments.run import run_experiment
+    from graspsense.experiments.run import refuse_store, run_experiment
     from graspsense.experiments.summary import summarise
 
     planned = read_experiment(experiment, options, force=force)
     results = Results(Path(out or planned.name))
     make = chosen(executor, workers)
+    refuse_store(results.folder)
     if dry_run:
         _plan(planned, results, workers or os.cpu_count() or 1, as_json)
         return

@@ -51,10 +51,10 @@ def report(
 
     path = Path(out or folder) / NAME
     if (Path(folder) / EXPERIMENT).is_file():
-        from graspsense.experiments.summary import summarise
+        from graspsense.experiments.summary import summary_of
 
         results = Results(Path(folder))
-        page = experiment_page(summarise(results.experiment(), results), results)
+        page = experiment_page(summary_of(results), results)
     else:
         with ProgressLine() as progress:
             page = store_page(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from attrs import field, frozen
 
@@ -57,6 +58,15 @@ class Account:
         return f"{self.total} tasks: {', '.join(parts)}"
 
 
+def refuse_store(folder: Path) -> None:
+    """Raise ConfigError if `folder` is a store of trials, whose page the page of an experiment would replace."""
+    if (folder / STORE_FILE).exists():
+        raise ConfigError(
+            f"{folder} is a store of trials, and the page of an experiment would replace its own: name another "
+            "folder by --out"
+        )
+
+
 def run_experiment(
     planned: Planned,
     results: Results,
@@ -70,15 +80,11 @@ def run_experiment(
     """Run every task that has no result yet, and return the account of the run.
 
     `executor` is called only if a result is missing. Ctrl-C, the loss of the workers and a full disk stop the run; the
-    results until then are kept. Raises ConfigError if there are results already and `resume` is not set, SaveFailed if
-    nothing can be written at the start.
+    results until then are kept. Raises ConfigError if the folder is a store of trials, or has results already and
+    `resume` is not set; SaveFailed if nothing can be written at the start.
     """
     tasks = list({task.key: task for task in planned.tasks()}.values())
-    if (results.folder / STORE_FILE).exists():
-        raise ConfigError(
-            f"{results.folder} is a store of trials, and the page of an experiment would replace its own: name another "
-            "folder by --out"
-        )
+    refuse_store(results.folder)
     with results.alone():
         if results.any() and not resume:
             raise ConfigError(

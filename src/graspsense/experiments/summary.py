@@ -8,12 +8,13 @@ from typing import Any
 
 from attrs import frozen
 
+from graspsense.core.errors import ConfigError
 from graspsense.core.labelled import Target
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import RecognitionRate
 from graspsense.evaluation.over_seeds import MeanDifference, OverSeeds, mean_difference
 from graspsense.experiments.experiment import ExperimentCase, Planned
-from graspsense.experiments.results import Results
+from graspsense.experiments.results import EXPERIMENT, PIPELINES, Results
 from graspsense.experiments.task import TaskResult
 from graspsense.experiments.task_results import (
     AnyTaskResult,
@@ -235,3 +236,19 @@ def summarise(planned: Planned, results: Results) -> Summary:
         seconds=seconds,
         cpu_seconds=cpu_seconds,
     )
+
+
+def summary_of(results: Results) -> Summary:
+    """Return the summary of a folder by the experiment that lies in it.
+
+    Raises ConfigError if the folder has results and none of them is of its experiment, which was changed after the run;
+    DataDamaged if a result cannot be read.
+    """
+    summary = summarise(results.experiment(), results)
+    if not summary.results and not summary.failed and results.any():
+        raise ConfigError(
+            f"{results.folder} has results, but none for the settings that it has now: {EXPERIMENT}, {PIPELINES}/ or "
+            "graspsense itself was changed after the run. Restore the files, or run the changed experiment into "
+            f"another folder: graspsense experiment {results.folder / EXPERIMENT} --out FOLDER"
+        )
+    return summary
