@@ -26,9 +26,9 @@ from graspsense_sim_gripper.stepping.implicit import SpeedSearch
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start
 from graspsense_sim_gripper.stepping.tr_bdf2 import Stage
 from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
-from graspsense_sim_gripper.terms.registry import find_term, laws_of
+from graspsense_sim_gripper.terms.registry import find_term, laws_of, phases_of
 from graspsense_sim_gripper.terms.switchable import Switchable
-from graspsense_sim_gripper.terms.term import NO_STATE, Law
+from graspsense_sim_gripper.terms.term import NO_STATE, Law, Phase
 
 TermsStates = Any
 """A tuple with a state of its own type for each term."""
@@ -113,6 +113,28 @@ def sum_of(laws: Sequence[Law]) -> Law:
     return bind(_sum_of_more, first=laws[0], second=laws[1], third=laws[2], rest=sum_of(laws[3:]))
 
 
+def _no_phase(states: TermsStates) -> int:
+    return 0
+
+
+N_PHASES: Final = 8
+PLACE: int = 0
+phase: Phase = _no_phase
+others: Phase = _no_phase
+
+
+def _phase_and_others(states: TermsStates) -> int:
+    return phase(states[PLACE]) + N_PHASES * others(states)
+
+
+def phase_of_all(phases: Sequence[tuple[int, Phase]]) -> Phase:
+    """Return one number for the phases of these terms, each given with its place among the states."""
+    combined: Phase = _no_phase
+    for place, one in reversed(phases):
+        combined = bind(_phase_and_others, PLACE=place, phase=one, others=combined)
+    return combined
+
+
 def all_active(terms: Sequence[Any]) -> tuple[Switchable, ...]:
     """Return the parameters of these terms as the sum of `laws_of` takes them: all kept, and nothing lumped."""
     return (Switchable(0, LumpedSpringDamper(0.0, 0.0)), *(Switchable(1, params) for params in terms))
@@ -145,21 +167,22 @@ def contact_solver(kinds: tuple[str, ...]) -> ContactSolver:
 
 
 def plant_move(
-    laws: Sequence[Law], *, converges: bool = True
+    laws: Sequence[Law], phases: Sequence[tuple[int, Phase]] = (), *, converges: bool = True
 ) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
-    """Return `move` for an object whose force is the sum of these laws.
+    """Return `move` for an object whose force is the sum of these laws, with the events of `phases_of`.
 
     `converges`: whether the steps of a tick may be halved until the result no longer changes.
     """
     over_a_tick = refine_until_converged if converges else advance
-    return bind_reachable(bind(move, advance=over_a_tick), {"object_force": sum_of(laws)})
+    parts = {"object_force": sum_of(laws), "object_phase": phase_of_all(phases)}
+    return bind_reachable(bind(move, advance=over_a_tick), parts)
 
 
 @lru_cache(maxsize=64)
 def composed_move(composition: Composition, *, interpreted: bool = True) -> PlantMove:
     """Return what advances the plant by a tick; not `interpreted`: to be compiled."""
     kinds = composition.kinds
-    move: PlantMove = plant_move(laws_of(kinds), converges=composition.converges)
+    move: PlantMove = plant_move(laws_of(kinds), phases_of(kinds), converges=composition.converges)
     if composition.shape is not None:
         move = bind_move(kinds, composition.shape, move)
     return bind_reachable(move, {}, INTERPRETED) if interpreted else move

@@ -23,7 +23,7 @@ _REMAIN_CALLS: Final = {
     solve_contact.__code__: ("_release_from_rigid_pads",),
     # Seldom called: inlined, they would take registers from velocity Verlet.
     attempt_of.__code__: ("tr_bdf2", "mean_force"),
-    take_step.__code__: ("stick",),
+    take_step.__code__: ("stick", "_after_event"),
 }
 
 

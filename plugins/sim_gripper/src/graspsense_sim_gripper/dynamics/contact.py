@@ -122,6 +122,32 @@ object_force: Callable[[Any, Any, float, float, float, float], tuple[float, Any]
 """The law of the whole object; the composition of a scene binds it."""
 
 
+def _no_events(states: Any) -> int:
+    return 0
+
+
+object_phase: Callable[[Any], int] = _no_events
+"""A number that changes at the events of the terms; the composition of a scene binds it where a term has events."""
+
+
+def has_event(before: Contact, after: Contact) -> bool:
+    """Return whether a term of the object has an event between these contacts (see `Term.phase`)."""
+    return object_phase(before.left.states) != object_phase(after.left.states) or object_phase(
+        before.right.states
+    ) != object_phase(after.right.states)
+
+
+def restarted(contact: Contact) -> Contact:
+    """Return the contact after an event of a term: the rate of compression before it says nothing any more."""
+    left_n, right_n, offset, touched, left, right, pending, unbalanced = contact
+    return Contact(left_n, right_n, offset, touched, _restarted(left), _restarted(right), pending, unbalanced)
+
+
+def _restarted(half: ContactState) -> ContactState:
+    d, force, slope, states, pad, branch, rate, _ = half
+    return ContactState(d, force, slope, states, pad, branch, rate, math.inf)
+
+
 def solve_contact(
     model: ObjectModel, now: ContactState, closure_m: float, speed_m_s: float, h: float
 ) -> tuple[ContactState, int]:

@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from graspsense.plugin_api import gap_and_rate
-from graspsense_sim_gripper.dynamics.contact import RECOVERED_M
+from graspsense_sim_gripper.dynamics.contact import RECOVERED_M, has_event, restarted
 from graspsense_sim_gripper.dynamics.drive import Drive, is_held
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState
 from graspsense_sim_gripper.stepping.coast import coast
@@ -38,6 +38,8 @@ from graspsense_sim_gripper.terms.phi import phi1
 LAG_PIECES: Final = 4
 MAX_LAG_PIECES: Final = 1000
 """Pieces per time constant in which the force of a drive that lags is constant, and how many there are at most."""
+BISECTION: Final = 0.5
+"""A step that contains an event of a term is repeated with this share of its length, until it is `MIN_STEP_S` long."""
 REST_SHARE: Final = 1e-12
 """Fraction of the tick below which what is left of it is rounding."""
 
@@ -105,20 +107,31 @@ def take_step(
         after_step = StepState(step.next_s, step.n_steps + 1, step.unresolved)
     else:
         attempt = attempt_of(params, start, effort_n, h)
-        if steps.scheme != VERLET and h > MIN_STEP_S and not forced:
-            fraction = first(params, start, attempt)
+        changes = contact.touched == 1 and has_event(contact, attempt.contact)
+        if (changes or steps.scheme != VERLET) and h > MIN_STEP_S and not forced:
+            fraction = BISECTION if changes else first(params, start, attempt)
             if fraction > 0.0:
                 retry = StepState(h * fraction, step.n_steps, step.unresolved)
                 return PlantState(state.motion, contact, retry, state.effort_n, state.peak_n), 0.0
         attempt = _without_reversal(start, attempt)
-        error = relative_error(steps, start, attempt)
+        # A step across an event of a term has an error only where the force jumps, and none that shorter steps reduce.
+        error = 0.0 if changes else relative_error(steps, start, attempt)
         growth = FREE_GROWTH if contact.touched == 0 else steps.growth
         accepted, after_step = accept(error, attempt.duration_s, step, growth, forced)
         if not accepted:
             return PlantState(state.motion, contact, after_step, state.effort_n, state.peak_n), 0.0
-        if state.motion.gap_m > start.meeting_m >= attempt.motion.gap_m and steps.tolerance < math.inf:
+        meets = state.motion.gap_m > start.meeting_m >= attempt.motion.gap_m
+        if (changes or meets) and steps.tolerance < math.inf:
             after_step = after_contact(steps, after_step)
+        if changes:
+            attempt = _after_event(attempt)
     return _completed(params, state, start, attempt, after_step), attempt.duration_s
+
+
+def _after_event(attempt: Attempt) -> Attempt:
+    """Return the attempt for the steps after an event of a term."""
+    motion, contact, duration, speed_error, force_error = attempt
+    return Attempt(motion, restarted(contact), duration, speed_error, force_error)
 
 
 def rests(drive: Drive, state: PlantState, effort_n: float) -> bool:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from graspsense_sim_gripper.dynamics.contact import pad_forces
+from graspsense_sim_gripper.dynamics.contact import has_event, pad_forces, restarted
 from graspsense_sim_gripper.dynamics.drive import breakaway_friction
-from graspsense_sim_gripper.dynamics.state import Motion, PlantState
+from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
 from graspsense_sim_gripper.stepping.control import MIN_STEP_S
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 
@@ -35,5 +35,19 @@ def stick(params: PlantParams, state: PlantState, effort_n: float, h: float) -> 
         if margin1 >= -SLIP_TOL_N or margin < MIN_MARGIN_N or t < MIN_SHARE * h:
             break
         t = max(t * (margin + SLIP_AIM_N) / (margin - margin1), min(t, MIN_STEP_S))
+    if has_event(contact, after):
+        t, after = _until_event(params, contact, gap, t)
     peak = max(peak, after.left_n, after.right_n)
     return PlantState(Motion(revolutions, 0.0, gap, jacobian), after, step, given, peak), t
+
+
+def _until_event(params: PlantParams, contact: Contact, gap_m: float, h: float) -> tuple[float, Contact]:
+    """Return the time within `h` at which a term has an event while the fingers stand still, and the contact then."""
+    before, after = 0.0, h
+    while after - before > MIN_STEP_S:
+        middle = 0.5 * (before + after)
+        if has_event(contact, pad_forces(params.object, contact, gap_m, 0.0, middle, True)):
+            after = middle
+        else:
+            before = middle
+    return after, restarted(pad_forces(params.object, contact, gap_m, 0.0, after, True))

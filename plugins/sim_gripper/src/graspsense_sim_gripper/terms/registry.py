@@ -23,7 +23,7 @@ from graspsense_sim_gripper.terms import (
 )
 from graspsense_sim_gripper.terms.lumped import lumped
 from graspsense_sim_gripper.terms.switchable import switched
-from graspsense_sim_gripper.terms.term import Law, Term
+from graspsense_sim_gripper.terms.term import Law, Phase, Term, one_phase
 
 TERMS: Final[dict[str, Term]] = {
     module.TERM.name: module.TERM
@@ -88,3 +88,9 @@ def laws_of(names: Sequence[str]) -> list[Law]:
     The parameters of each are `Switchable`. Raises UnknownName.
     """
     return [bind(switched, law=one) for one in (lumped, *(find_term(name)[1].law for name in names))]
+
+
+def phases_of(names: Sequence[str]) -> list[tuple[int, Phase]]:
+    """Return the terms with events among those of `laws_of`: the place of each, and its `phase`. Raises UnknownName."""
+    terms = [find_term(name)[1] for name in names]
+    return [(i, term.phase) for i, term in enumerate(terms, 1) if term.phase is not one_phase]

@@ -32,7 +32,7 @@ def hertz(params: Rigid, d: float) -> float:
 def rigid(
     params: Rigid, state: RigidState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, RigidState]:
-    """Return the contact force; breaking takes effect in the next step."""
+    """Return the contact force; breaking takes effect after the step, which ends there (`phase`)."""
     if state.broken == 1:
         return params.broken_n_m * d1, state
     force = hertz(params, d1)
@@ -47,6 +47,11 @@ def rates(params: Rigid, at: WorkingPoint) -> tuple[Rate, ...]:
     return ()
 
 
+def phase(state: RigidState) -> int:
+    """Return whether it has broken."""
+    return state.broken
+
+
 TERM = Term(
     name="rigid",
     summary="rigid body with a Hertz contact, K d^1.5; breaks above its crush force",
@@ -54,6 +59,7 @@ TERM = Term(
     law=rigid,
     at_rest=RigidState(0),
     rates=rates,
+    phase=phase,
     positive=("hertz_n_m15",),
     stiffnesses=("hertz_n_m15", "crush_force_n"),
 )

@@ -11,6 +11,8 @@ TermParams = Any
 """The parameters of a term: a named tuple of its own type."""
 TermState = Any
 """The state of a term: a named tuple of its own type."""
+Phase = Callable[[TermState], int]
+"""`phase(state)`: which part of the law the state is in."""
 Law = Callable[[TermParams, TermState, float, float, float, float], tuple[float, TermState]]
 """`law(params, state, d0, d1, h, v1) -> (force, state)`: from d0 to d1 (m) in h (s), then at v1 (m/s)."""
 
@@ -103,6 +105,12 @@ def never_beyond(state: TermState) -> str:
     return ""
 
 
+def one_phase(state: TermState) -> int:
+    """Return 0: one law holds throughout."""
+    del state
+    return 0
+
+
 def not_dented(params: TermParams) -> float:
     """Return the dent (m) of a term that earlier use has not deformed."""
     del params
@@ -137,6 +145,11 @@ class Term:
     """Parameters that grow with the thickness of the wall; they vary between instances."""
     beyond: Callable[[TermState], str] = never_beyond
     """Returns why a state is outside of the range of the law, "" if it is not."""
+    phase: Phase = one_phase
+    """Returns which part of the law (0 to 7) the state is in, such as 1 for broken. Runs compiled, like the law.
+
+    Where it changes, law or slope of the force change at once: an event, which the simulator locates within the tick.
+    """
     dent: Callable[[TermParams], float] = not_dented
     """By how much (m) earlier use has made the object thinner. Compression is counted from the dented surface on."""
 

@@ -1,0 +1,101 @@
+"""Events of terms, such as breaking: each ends the step that it lies in, by every scheme, plain and compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from graspsense.plugin_api import create
+from graspsense_sim_gripper.build import unverified_setup
+from graspsense_sim_gripper.compiled.compose import composed_move
+from graspsense_sim_gripper.compiled.padding import composition_of
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.stepping.scheme import MEAN_FORCE, TR_BDF2, VERLET
+
+CRUSH = """
+width_m = 0.05
+[[terms]]
+type = "rigid"
+hertz_n_m15 = 2e7
+crush_force_n = 10.0
+broken_n_m = 2000.0
+"""
+FORCED = {"tolerance": math.inf, "longest_s": 1e-3}
+
+
+def pressed(terms, config=None, seconds=0.1, effort_n=60.0, held=False, **steps):
+    """Return the plant after it closed on an object from 1 mm away, and the force on a pad after each tick."""
+    config = config or SimConfig(sensor="ideal", spread=False, open_gap_m=0.051)
+    spec = ObjectSpec(name="object", width_m=0.05, terms=tuple(terms.items()), held=held)
+    setup = unverified_setup(config, spec, 0)
+    plant, state = setup.plant._replace(steps=setup.plant.steps._replace(**steps)), setup.state
+    move, forces = composed_move(composition_of(config, setup, pad=False)), []
+    for _ in range(round(seconds / 1e-3)):
+        state = move(plant, state, effort_n, 1e-3)
+        forces.append(state.contact.left_n)
+    return state, np.array(forces)
+
+
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("forced", [{}, FORCED])
+@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE])
+@pytest.mark.parametrize("pads_n_m", [3e4, math.inf])
+def test_a_rigid_body_breaks_at_its_crush_force(scheme, forced, held, pads_n_m):
+    config = SimConfig(sensor="ideal", spread=False, open_gap_m=0.051, pad_stiffness_n_m=pads_n_m)
+    body = {"rigid": {"hertz_n_m15": 1e8, "crush_force_n": 10.0, "broken_n_m": 100.0}}
+    state, forces = pressed(body, config, held=held, scheme=scheme, **forced)
+    assert state.contact.left.states[1].broken == 1
+    assert state.peak_n == pytest.approx(10.0, rel=1e-5)
+    assert state.step.unresolved + state.contact.unbalanced == 0
+    assert 0.0 < forces[-1] < 5.0
+
+
+@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE])
+def test_a_shell_snaps_at_its_critical_compression(scheme):
+    # Pads softer than the falling part of 20 kN/m, so that the shell jumps across it.
+    shell = {"snap": {"k1_n_m": 5e3, "critical_m": 2e-3, "drop_n": 8.0, "fall_m": 4e-4, "k2_n_m": 100.0}}
+    state, forces = pressed(shell, seconds=0.3, effort_n=40.0, scheme=scheme)
+    assert state.peak_n == pytest.approx(10.0, rel=1e-5)
+    assert state.contact.left.states[1].part == 2
+    assert state.step.unresolved + state.contact.unbalanced == 0
+    assert forces[-1] < 5.0
+
+
+def test_a_body_may_break_while_the_fingers_stand_still():
+    # The branch relaxes, so that the pads press the rigid body harder and harder.
+    config = SimConfig(sensor="ideal", spread=False, open_gap_m=0.051, breakaway_n=30.0)
+    terms = {
+        "rigid": {"hertz_n_m15": 2e5, "crush_force_n": 6.0, "broken_n_m": 100.0},
+        "maxwell": {"k_n_m": 2e4, "tau_s": 0.2},
+    }
+    state, _ = pressed(terms, config, 0.3, effort_n=31.0)
+    assert state.contact.left.states[1].broken == 1
+    coarse, fine = (pressed(terms, config, 0.3, effort_n=31.0, longest_s=h)[1] for h in (math.inf, 1e-5))
+    np.testing.assert_allclose(coarse, fine, rtol=0.01, atol=0.05)
+
+
+@pytest.mark.parametrize(
+    "settings", [{"accuracy": 0.1}, {}, {"compile": "always"}, {"fidelity": "reference"}]
+)
+def test_an_egg_breaks_at_its_strength(settings):
+    gripper = create("sensor-backend", "sim", sensor="ideal", spread=False, **settings)
+    done = gripper.run_many(create("controller", "force"), ["egg"], [0], workers=1)[0]
+    assert done.outcome.words == "crushed"
+    assert done.report["true_peak_force_n"] == pytest.approx(30.0, rel=1e-6)
+    assert done.report["resolved"]
+
+
+def test_a_crushing_body_has_the_accuracy_that_is_asked_for(tmp_path):
+    file = tmp_path / "crush.toml"
+    file.write_text(CRUSH)
+    forces = []
+    for settings in ({}, {"fidelity": "reference"}):
+        gripper = create("sensor-backend", "sim", sensor="ideal", spread=False, **settings)
+        done = gripper.run_many(create("controller", "hybrid"), [str(file)], [0], traces=True, workers=1)[0]
+        forces.append(done.trace.force_left_n)
+    n = min(map(len, forces))
+    error = np.sqrt(np.mean((forces[0][:n] - forces[1][:n]) ** 2) / np.mean(forces[1][:n] ** 2))
+    assert error <= 0.01
