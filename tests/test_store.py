@@ -280,6 +280,7 @@ def test_verify_finds_what_became_of_recordings(store):
     assert "bytes and had" in found.problems[1]
     assert "damaged" in found.problems[2]
     assert found.unfinished == ("loose.mcap has no row",)
+    assert verify_file(store.folder / "store.sqlite") == found
 
 
 @pytest.mark.parametrize("log", [False, True], ids=["closed", "with a log"])

@@ -195,9 +195,7 @@ def _ask(question: str) -> str | None:
     Without a terminal, the next line of the standard input is the answer.
     """
     click.echo(question, err=True, nl=False)
-    if sys.stdin is None:
-        return None
-    line = sys.stdin.readline()
-    if not sys.stdin.isatty():
+    line = "" if sys.stdin is None else sys.stdin.readline()
+    if not line or not sys.stdin.isatty():
         click.echo(line.rstrip("\n"), err=True)
     return line.strip().lower() if line else None

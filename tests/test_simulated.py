@@ -1,0 +1,60 @@
+"""Whether a trial is simulated is what the gripper declares at each opening, whatever its settings are called."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+from attrs import evolve, frozen
+from parts import CHANNELS_OF_HAND, Hand, HandConfig
+
+from graspsense import load_pipeline
+from graspsense.core.plugins import IsolatedPlugins
+from graspsense.plugin_api import CHANNELS, Channel, SensorBackend, SensorBackendEntry, hookimpl, setting
+from graspsense.store.dataset import labelled_store
+from graspsense.store.labels import labels_of
+from graspsense.store.record_grasp import record_grasp
+from graspsense.store.store import Store
+
+HERE = sys.modules[__name__]
+
+
+@frozen(kw_only=True)
+class TcpHandConfig(HandConfig):
+    object: str = setting(default="workpiece 7", meaning="What the fingers are made for.")
+    emulated: bool = setting(default=False, meaning="Whether a model answers instead of the gripper.")
+
+
+class TcpHand(Hand, SensorBackend[TcpHandConfig]):
+    channels = tuple(Channel(name, CHANNELS[name], 1000.0) for name in CHANNELS_OF_HAND)
+    accepts = ("effort",)
+
+    def objects(self):
+        return ()
+
+    def open(self, seed):
+        return evolve(super().open(seed), simulated=self.config.emulated)
+
+
+@hookimpl
+def graspsense_sensor_backends():
+    return [SensorBackendEntry(name="tcp-hand", target=f"{__name__}:TcpHand", summary="a hand on a socket")]
+
+
+GRASPSENSE_API = (1, 0)
+
+
+@pytest.mark.parametrize("emulated", [False, True], ids=["real", "emulated"])
+def test_a_trial_is_simulated_where_the_gripper_says_so_and_not_by_its_settings(
+    tmp_path, monkeypatch, emulated
+):
+    monkeypatch.setitem(sys.modules, __name__, HERE)
+    options = ["gripper.type=tcp-hand", f"gripper.emulated={str(emulated).lower()}", "classifier.type=none"]
+    with IsolatedPlugins() as plugins, Store.open(tmp_path / "trials") as store:
+        plugins.add(HERE, "lab-hand")
+        settings = load_pipeline(options=options, plugins=plugins).settings
+        for label in ("cup:full", "cup:empty"):
+            record_grasp(store, settings, plugins, labels=labels_of(label), origin="run")
+
+        assert [one.simulated for one in store.page()] == [emulated] * 2
+    assert labelled_store(str(tmp_path / "trials")).provenance["simulated"] is emulated
