@@ -32,7 +32,7 @@ def script(name):
 
 
 PAGES = script("role_pages")
-ROOMS = script("room_drawing")
+DRAWING = script("package_drawing")
 
 
 @pytest.mark.parametrize("role", PAGES.TITLES)
@@ -51,13 +51,13 @@ def test_the_page_of_the_hooks_is_what_the_code_says():
     assert written == PAGES.hooks_page(), "run: python docs/role_pages.py"
 
 
-def test_the_drawing_of_the_rooms_is_that_of_the_imports():
-    assert ROOMS.FILE.read_text() == ROOMS.drawing(), "run: python docs/room_drawing.py"
+def test_the_drawing_of_the_packages_is_that_of_the_imports():
+    assert DRAWING.FILE.read_text() == DRAWING.drawing(), "run: python docs/package_drawing.py"
 
 
-def test_no_room_imports_in_a_circle():
-    for graph in (ROOMS.host_rooms(), ROOMS.simulator_rooms()):
-        assert not ROOMS.panel(graph).against
+def test_no_package_imports_in_a_circle():
+    for graph in (DRAWING.host_subpackages(), DRAWING.simulator_subpackages()):
+        assert not DRAWING.panel(graph).against
 
 
 def architecture_rows(title):
@@ -87,12 +87,12 @@ def test_a_helper_has_an_example_that_holds(name):
 
 
 def test_the_table_of_packages_is_the_rule_that_is_enforced():
-    rooms = {name: used for name, used in MAY_KNOW.items() if not name.startswith("__")}
+    packages = {name: used for name, used in MAY_KNOW.items() if not name.startswith("__")}
     table = {row[0].strip("`"): set(re.findall(r"`(\w+)`", row[2])) for row in architecture_rows("Packages")}
-    assert table.pop("cli") == {"plugins", "plugin_api"}, "the cli may use all rooms but these"
-    rooms["cli"] |= {"plugins", "plugin_api"}
-    assert rooms.pop("cli") == rooms.keys() | {"cli"}
-    assert table == {name: used - {name} for name, used in rooms.items()}
+    assert table.pop("cli") == {"plugins", "plugin_api"}, "the cli may use all packages but these"
+    packages["cli"] |= {"plugins", "plugin_api"}
+    assert packages.pop("cli") == packages.keys() | {"cli"}
+    assert table == {name: used - {name} for name, used in packages.items()}
 
 
 def test_the_table_of_the_simulator_has_every_folder():
@@ -104,9 +104,9 @@ def test_the_table_of_the_simulator_has_every_folder():
 
 def test_an_arrow_that_follows_from_others_is_left_out_and_a_circle_shows():
     chain = {"a": {"b", "c"}, "b": {"c"}, "c": set()}
-    assert ROOMS.reduced(chain) == {"a": {"b"}, "b": {"c"}, "c": set()}
-    assert not ROOMS.panel(chain).against
-    assert ROOMS.panel({"a": {"b"}, "b": {"a"}}).against
+    assert DRAWING.reduced(chain) == {"a": {"b"}, "b": {"c"}, "c": set()}
+    assert not DRAWING.panel(chain).against
+    assert DRAWING.panel({"a": {"b"}, "b": {"a"}}).against
 
 
 def code(page, count):

@@ -43,7 +43,7 @@ MAY_KNOW = {
     "plugin_api": {"core"},
     "__init__": {"core"},
 }
-"""Room to the rooms it may import from; every room may import the package itself, for its version."""
+"""Subpackage to the subpackages it may import from; every subpackage may import the package itself, for its version."""
 
 HEAVY = {
     "numpy",
@@ -68,17 +68,21 @@ def imported(tree: ast.AST, package: str) -> Iterator[str]:
         elif isinstance(node, ast.ImportFrom):
             base = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
             module = ".".join([*base, *([node.module] if node.module else [])])
-            # `from graspsense import core` imports a room as well as `from graspsense.core import ...`.
+            # `from graspsense import core` imports a subpackage as well as `from graspsense.core import ...`.
             yield from (
                 f"{module}.{alias.name}" if module == "graspsense" else module for alias in node.names
             )
 
 
-def rooms_known(path: Path, package: str) -> set[str]:
-    """Return the rooms of graspsense that a file imports from."""
+def subpackages_known(path: Path, package: str) -> set[str]:
+    """Return the subpackages of graspsense that a file imports from."""
     names = imported(ast.parse(path.read_text()), package)
     within = (name.split(".")[1] for name in names if name.startswith("graspsense."))
-    return {room for room in within if (SOURCE / room).is_dir() or (SOURCE / f"{room}.py").is_file()}
+    return {
+        subpackage
+        for subpackage in within
+        if (SOURCE / subpackage).is_dir() or (SOURCE / f"{subpackage}.py").is_file()
+    }
 
 
 def files(folder: Path) -> list[Path]:
@@ -90,12 +94,12 @@ def distributions() -> list[Path]:
 
 
 @pytest.mark.parametrize("path", files(SOURCE), ids=lambda path: str(path.relative_to(SOURCE)))
-def test_a_room_knows_only_the_rooms_it_may(path):
+def test_a_subpackage_knows_only_the_subpackages_it_may(path):
     parts = path.relative_to(SOURCE).with_suffix("").parts
-    room = parts[0]
+    subpackage = parts[0]
     package = ".".join(["graspsense", *parts[:-1]])
 
-    assert rooms_known(path, package) <= MAY_KNOW[room]
+    assert subpackages_known(path, package) <= MAY_KNOW[subpackage]
 
 
 def test_the_rule_sees_every_way_of_importing():
@@ -118,7 +122,7 @@ def late():
     }
 
 
-def test_core_names_the_other_rooms_in_one_place_only():
+def test_core_names_the_other_subpackages_in_one_place_only():
     for path in files(SOURCE / "core"):
         strings = [
             node.value for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Constant)
@@ -128,7 +132,10 @@ def test_core_names_the_other_rooms_in_one_place_only():
 
 
 def _is_target(text: str) -> bool:
-    return any(text.startswith(f"graspsense.{room}.") for room in MAY_KNOW.keys() - {"core", "plugin_api"})
+    return any(
+        text.startswith(f"graspsense.{subpackage}.")
+        for subpackage in MAY_KNOW.keys() - {"core", "plugin_api"}
+    )
 
 
 @pytest.mark.parametrize("folder", distributions(), ids=lambda folder: folder.name)

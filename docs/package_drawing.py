@@ -1,9 +1,9 @@
-"""Draws `docs/architecture.svg` from the imports in the source: which package (room) imports from which.
+"""Draws `docs/architecture.svg` from the imports in the source: which subpackage imports from which.
 
-    python docs/room_drawing.py
+    python docs/package_drawing.py
 
-A test compares the drawing with what this gives. An arrow points from a room to a room that it imports from. An arrow
-that follows from others is left out: if A imports from B and C, and B imports from C, there is no arrow from A to C.
+A test compares the drawing with what this gives. An arrow points from a subpackage to one that it imports from. It is
+left out if it follows from others: if A imports from B and C, and B imports from C, there is no arrow from A to C.
 Imports for type checking only are not counted. Only a circle of imports has an arrow that points upwards; it is red.
 """
 
@@ -32,32 +32,36 @@ Graph = dict[str, set[str]]
 Place = tuple[float, float]
 
 
-def host_rooms() -> Graph:
-    """Return the rooms of graspsense and the distributions beside it, each with the rooms that it imports from."""
-    graph = _rooms(ROOT / "src" / HOST, HOST, leave_out={"__init__", "__main__"})
+def host_subpackages() -> Graph:
+    """Return the subpackages of graspsense and the distributions beside it, each with those that it imports from."""
+    graph = _imports_within(ROOT / "src" / HOST, HOST, leave_out={"__init__", "__main__"})
     for distributions in ("plugins/*", "examples/*"):
         sources = [path for folder in ROOT.glob(distributions) for path in folder.glob("src/**/*.py")]
-        graph[distributions] = {room for path in sorted(sources) for room in _used(path, HOST)} & graph.keys()
+        graph[distributions] = {
+            subpackage for path in sorted(sources) for subpackage in _used(path, HOST)
+        } & graph.keys()
     return graph
 
 
-def simulator_rooms() -> Graph:
-    """Return the rooms of the simulator, each with the rooms that it imports from."""
-    return _rooms(ROOT / "plugins" / "sim_gripper" / "src" / SIMULATOR, SIMULATOR, leave_out={"__init__"})
+def simulator_subpackages() -> Graph:
+    """Return the subpackages of the simulator, each with those that it imports from."""
+    return _imports_within(
+        ROOT / "plugins" / "sim_gripper" / "src" / SIMULATOR, SIMULATOR, leave_out={"__init__"}
+    )
 
 
-def _rooms(package: Path, name: str, leave_out: set[str]) -> Graph:
+def _imports_within(package: Path, name: str, leave_out: set[str]) -> Graph:
     graph: Graph = {}
     # A lazy module's stub has the imports that it does when a name is first used.
     for path in sorted([*package.rglob("*.py"), *package.rglob("*.pyi")]):
-        room = path.relative_to(package).parts[0].partition(".")[0]
-        if room not in leave_out:
-            graph.setdefault(room, set()).update(_used(path, name))
-    return {room: (used & graph.keys()) - {room} for room, used in graph.items()}
+        subpackage = path.relative_to(package).parts[0].partition(".")[0]
+        if subpackage not in leave_out:
+            graph.setdefault(subpackage, set()).update(_used(path, name))
+    return {subpackage: (used & graph.keys()) - {subpackage} for subpackage, used in graph.items()}
 
 
 def _used(path: Path, package: str) -> Iterator[str]:
-    """Yield the rooms of `package` that a file imports from, but for imports for type checking."""
+    """Yield the subpackages of `package` that a file imports from, but for imports for type checking."""
     skipped: set[int] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
@@ -77,16 +81,16 @@ def _used(path: Path, package: str) -> Iterator[str]:
 
 def reduced(graph: Graph) -> Graph:
     """Return the graph without the arrows that follow from others."""
-    reached = {room: _reached(graph, room) for room in graph}
+    reached = {subpackage: _reached(graph, subpackage) for subpackage in graph}
     return {
-        room: {
+        subpackage: {
             used
             for used in targets
             if not any(
                 used in reached[other] and other not in reached[used] for other in targets if other != used
             )
         }
-        for room, targets in graph.items()
+        for subpackage, targets in graph.items()
     }
 
 
@@ -102,19 +106,21 @@ def _reached(graph: Graph, start: str) -> set[str]:
 
 
 def levels(graph: Graph) -> dict[str, int]:
-    """Return the row of each room, counted from the bottom: one above the highest that it imports from."""
+    """Return the row of each subpackage, counted from the bottom: one above the highest that it imports from."""
     found: dict[str, int] = {}
 
-    def level(room: str, above: tuple[str, ...]) -> int:
-        if room not in found:
+    def level(subpackage: str, above: tuple[str, ...]) -> int:
+        if subpackage not in found:
             below = [
-                level(used, (*above, room)) for used in sorted(graph[room]) if used not in (*above, room)
+                level(used, (*above, subpackage))
+                for used in sorted(graph[subpackage])
+                if used not in (*above, subpackage)
             ]
-            found[room] = 1 + max(below, default=-1)
-        return found[room]
+            found[subpackage] = 1 + max(below, default=-1)
+        return found[subpackage]
 
-    for room in sorted(graph):
-        level(room, ())
+    for subpackage in sorted(graph):
+        level(subpackage, ())
     return found
 
 
@@ -124,26 +130,26 @@ class Panel:
 
     rows: tuple[tuple[str, ...], ...]
     arrows: tuple[tuple[str, ...], ...]
-    """The places that an arrow goes through, from its room to the one that it points to."""
+    """The places that an arrow goes through, from its subpackage to the one that it points to."""
     against: frozenset[tuple[str, ...]]
     """Arrows against the order of the rows."""
 
 
 def panel(graph: Graph) -> Panel:
-    """Return where the rooms of a graph are drawn."""
+    """Return where the subpackages of a graph are drawn."""
     arrows, row_of = [], levels(graph)
     rows: list[list[str]] = [[] for _ in range(max(row_of.values()) + 1)]
-    for room in sorted(graph):
-        rows[row_of[room]].append(room)
+    for subpackage in sorted(graph):
+        rows[row_of[subpackage]].append(subpackage)
     against = set()
-    for room, targets in sorted(reduced(graph).items()):
+    for subpackage, targets in sorted(reduced(graph).items()):
         for used in sorted(targets):
-            between = [f"{room}>{used}>{k}" for k in range(row_of[room] - 1, row_of[used], -1)]
-            for k, free in zip(range(row_of[room] - 1, row_of[used], -1), between, strict=True):
+            between = [f"{subpackage}>{used}>{k}" for k in range(row_of[subpackage] - 1, row_of[used], -1)]
+            for k, free in zip(range(row_of[subpackage] - 1, row_of[used], -1), between, strict=True):
                 rows[k].append(free)
-            arrow = (room, *between, used)
+            arrow = (subpackage, *between, used)
             arrows.append(arrow)
-            if row_of[room] <= row_of[used]:
+            if row_of[subpackage] <= row_of[used]:
                 against.add(arrow)
     pairs = [pair for arrow in arrows for pair in pairwise(arrow)]
     ordered = [tuple(row) for row in reversed(_ordered(rows, pairs))]
@@ -151,7 +157,7 @@ def panel(graph: Graph) -> Panel:
 
 
 def _ordered(rows: list[list[str]], pairs: list[tuple[str, str]]) -> list[list[str]]:
-    """Return the rows with each room near the mean place of those that it is connected to, which avoids crossings."""
+    """Return the rows with each subpackage near the mean place of its neighbours, which avoids crossings."""
     for sweep in range(24):
         order = range(1, len(rows)) if sweep % 2 == 0 else range(len(rows) - 2, -1, -1)
         for k in order:
@@ -171,8 +177,8 @@ def drawing() -> str:
     parts: list[str] = []
     top = 0.0
     for title, graph in (
-        ("graspsense and the distributions beside it", host_rooms()),
-        ("graspsense-sim-gripper", simulator_rooms()),
+        ("graspsense and the distributions beside it", host_subpackages()),
+        ("graspsense-sim-gripper", simulator_subpackages()),
     ):
         top = _draw(parts, panel(graph), title, top + 30)
     arrow = (
@@ -182,7 +188,7 @@ def drawing() -> str:
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {top:.0f}" width="{WIDTH}" '
         f'height="{top:.0f}" role="img" font-family="sans-serif">\n'
-        "<title>Rooms of the source, and which imports from which</title>\n"
+        "<title>Packages of the source, and which imports from which</title>\n"
         f"<defs>{arrow.format('tip', '#5c5c5c')}{arrow.format('wrong', '#c00000')}</defs>\n"
         f'<rect width="{WIDTH}" height="{top:.0f}" fill="#ffffff"/>\n' + "\n".join(parts) + "\n</svg>\n"
     )
@@ -222,7 +228,7 @@ def _width(name: str) -> float:
 
 
 def _way(places: list[Place]) -> str:
-    """Return the path of an arrow, out of the bottom of its room and into the top of the last."""
+    """Return the path of an arrow, out of the bottom of its subpackage and into the top of the last."""
     (x0, y0), *between, (x1, y1) = places
     way, x, y = f"M{x0:.1f},{y0 + BOX:.1f}", x0, y0 + BOX
     for free_x, free_y in between:
