@@ -67,6 +67,12 @@ HELPERS = {
         *("squeeze", "with_channels", "three_kinds", "a_trial"),
     ),
 }
+FURTHER = {
+    "sensor-backend": (
+        "- [A gripper on a network socket](../tcp_gripper.md) has an example with a fake server, the options of the "
+        "conformance checks, and what to do with a single force sensor.",
+    )
+}
 FLOWING: tuple[Any, ...] = (
     *(signals.Frame, signals.Pads, signals.Command, roles.Reading, roles.DeviceInfo),
     *(Trace, Features, FeatureTable, Prediction, RunInfo, GraspEvent, Trial),
@@ -87,9 +93,10 @@ def page(role: str) -> str:
             f"- `graspsense plugins new NAME --role {role}` creates a package to start from: the example below.",
             "- `graspsense plugins check NAME` checks whether a component conforms to the role.",
             "- [The tutorial](../tutorial.md) creates a package by hand.",
-            "- [What flows](signals.md) describes the values that pass between components.",
+            "- [Values and units](signals.md) describes the values that pass between components.",
             "- [Helpers](helpers.md) describes the functions and constants that a component is written with.",
             f"- The hook [{HOOKS[role]}](../hooks.md#{_anchor(role)}) declares components of this role.",
+            *(FURTHER.get(role, ())),
             "",
             *_attributes(base),
             "## Methods",
@@ -127,7 +134,7 @@ def page(role: str) -> str:
 
 def signals_page() -> str:
     """Return the page of the values that pass between the parts."""
-    lines = [HEAD + "# What flows", "", _text(signals), ""]
+    lines = [HEAD + "# Values and units", "", _text(signals), ""]
     for cls in FLOWING:
         names = getattr(cls, "_fields", None) or tuple(one.name for one in attrs.fields(cls))
         lines += [f"## {cls.__name__}", "", f"    {cls.__name__}({', '.join(names)})", "", _text(cls), ""]
@@ -287,14 +294,20 @@ def _text(thing: Any) -> str:
 
 
 def _entry(cls: Any) -> list[str]:
-    lines = ["| field | type | default |", "|---|---|---|"]
+    lines = ["| field | type | default | meaning |", "|---|---|---|---|"]
+    body = ast.parse(inspect.getsource(cls)).body[0].body  # type: ignore[attr-defined]
+    meanings = {
+        ast.unparse(one.target): " ".join(ast.literal_eval(text.value).split())
+        for one, text in pairwise(body)
+        if isinstance(one, ast.AnnAssign) and isinstance(text, ast.Expr)
+    }
     attrs.resolve_types(cls)
     for one in attrs.fields(cls):
         empty = one.default.factory() if isinstance(one.default, attrs.Factory) else one.default
         default = "required" if one.default is attrs.NOTHING else f"`{empty!r}`"
         kind = re.sub(r"graspsense\.core\.entries\.|collections\.abc\.", "", strict._kind_words(one.type))
         kind = kind.replace("|", "or")
-        lines.append(f"| `{one.name}` | {_cell(kind)} | {default} |")
+        lines.append(f"| `{one.name}` | {_cell(kind)} | {default} | {_cell(meanings[one.name])} |")
     return [*lines, "", _text(cls), ""]
 
 

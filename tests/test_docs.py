@@ -41,7 +41,7 @@ def test_the_page_of_a_role_is_what_the_code_says(role):
     assert written == PAGES.page(role), "run: python docs/role_pages.py"
 
 
-def test_the_page_of_what_flows_is_what_the_code_says():
+def test_the_page_of_values_and_units_is_what_the_code_says():
     written = (ROOT / "docs" / "roles" / "signals.md").read_text()
     assert written == PAGES.signals_page(), "run: python docs/role_pages.py"
 

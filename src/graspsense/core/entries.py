@@ -81,8 +81,11 @@ class Channel:
     """
 
     name: str = field(validator=_IS_NAME)
+    """The name of the channel."""
     unit: str = field(validator=instance_of(str))
+    """Its unit."""
     rate_hz: float = field(default=0.0, converter=float, validator=ge(0.0))
+    """The rate that a backend provides, or the least rate that a component requires (0: any rate)."""
 
     def __attrs_post_init__(self) -> None:
         unit = CHANNELS.get(self.name)
@@ -104,14 +107,21 @@ class SensorBackendEntry:
     """A gripper with its sensors. Its class declares its `channels`, and the kinds of command that it `accepts`."""
 
     name: str = field(validator=_IS_NAME)
+    """The name by which it is selected, without spaces."""
     target: str = field(validator=_IS_TARGET)
+    """The import string of the class, as in `"lab_hand.backend:LabHand"`."""
     summary: str = field(validator=instance_of(str))
+    """What it is, in one line, for `plugins list`."""
     needs: str = ""
     """What to install or do if the target cannot be imported."""
     config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
+    """The import string of the config class; empty where the class names it as the parameter of its base class."""
     channels: tuple[Channel, ...] | None = field(default=None, validator=_ARE_CHANNELS, kw_only=True)
+    """The channels that `read` delivers; None where the class declares them."""
     accepts: tuple[str, ...] | None = field(default=None, validator=_ARE_KINDS, kw_only=True)
-    """The kinds of command that it accepts: any of effort, velocity, position, force."""
+    """The kinds of command that it accepts, any of effort, velocity, position, force; None where the class
+    declares them.
+    """
 
 
 @frozen
@@ -119,13 +129,21 @@ class ControllerEntry:
     """A control law. Its class declares the channels that it `requires`, and the kinds of `commands` that it sends."""
 
     name: str = field(validator=_IS_NAME)
+    """The name by which it is selected, without spaces."""
     target: str = field(validator=_IS_TARGET)
+    """The import string of the class, as in `"lab_hand.backend:LabHand"`."""
     summary: str = field(validator=instance_of(str))
+    """What it is, in one line, for `plugins list`."""
     needs: str = ""
+    """What to install or do if the target cannot be imported."""
     config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
+    """The import string of the config class; empty where the class names it as the parameter of its base class."""
     requires: tuple[Channel, ...] | None = field(default=None, validator=_ARE_CHANNELS, kw_only=True)
+    """The channels that it needs; None where the class declares them."""
     commands: tuple[str, ...] | None = field(default=None, validator=_ARE_KINDS, kw_only=True)
-    """Command kinds it may send, unless its config says otherwise by the key `sends`."""
+    """The kinds of command that it may send, unless its config says otherwise by the key `sends`; None where
+    the class declares them.
+    """
     alternatives: tuple[str, ...] | None = field(default=None, validator=_ARE_KINDS, kw_only=True)
     """Command kinds that it can send instead, each alone.
 
@@ -143,9 +161,13 @@ class Feature:
     """
 
     name: str = field(validator=instance_of(str))
+    """The name of the feature."""
     unit: str = field(validator=instance_of(str))
+    """Its SI unit, `1` where it has none."""
     meaning: str = field(validator=and_(instance_of(str), min_len(1)))
+    """What it measures, in a few words."""
     width: bool = field(default=False, validator=instance_of(bool))
+    """Whether it is the width of the object, as the gap between the fingers shows it."""
 
 
 def _distinct_features(entry: object, attribute: Attribute[Any], features: tuple[Feature, ...]) -> None:
@@ -162,17 +184,23 @@ class FeatureSetEntry:
     """A set of features. Its class declares the channels that it `requires`, and the `features` that it returns."""
 
     name: str = field(validator=_IS_NAME)
+    """The name by which it is selected, without spaces."""
     target: str = field(validator=_IS_TARGET)
+    """The import string of the class, as in `"lab_hand.backend:LabHand"`."""
     summary: str = field(validator=instance_of(str))
+    """What it is, in one line, for `plugins list`."""
     needs: str = ""
+    """What to install or do if the target cannot be imported."""
     config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
+    """The import string of the config class; empty where the class names it as the parameter of its base class."""
     requires: tuple[Channel, ...] | None = field(default=None, validator=_ARE_CHANNELS, kw_only=True)
+    """The channels that it needs; None where the class declares them."""
     features: tuple[Feature, ...] | None = field(
         default=None,
         validator=optional(and_(deep_iterable(instance_of(Feature), instance_of(tuple)), _distinct_features)),
         kw_only=True,
     )
-    """The features in the order in which they are returned."""
+    """The features in the order in which they are returned; None where the class declares them."""
 
     @property
     def width(self) -> str | None:
@@ -185,10 +213,15 @@ class ClassifierEntry:
     """A classifier: it learns from a table of features, and predicts the object and its state."""
 
     name: str = field(validator=_IS_NAME)
+    """The name by which it is selected, without spaces."""
     target: str = field(validator=_IS_TARGET)
+    """The import string of the class, as in `"lab_hand.backend:LabHand"`."""
     summary: str = field(validator=instance_of(str))
+    """What it is, in one line, for `plugins list`."""
     needs: str = ""
+    """What to install or do if the target cannot be imported."""
     config: str = field(default="", validator=_IS_TARGET_OR_EMPTY, kw_only=True)
+    """The import string of the config class; empty where the class names it as the parameter of its base class."""
 
 
 @frozen
@@ -196,8 +229,11 @@ class PipelineEntry:
     """A pipeline file shipped inside a package: `resource` is `"package:path/inside/it.toml"`."""
 
     name: str = field(validator=_IS_NAME)
+    """The name of the pipeline, for `--pipeline`."""
     resource: str = field(validator=_IS_RESOURCE)
+    """The file in its package: `"package:path/inside/it.toml"`."""
     summary: str = field(validator=instance_of(str))
+    """What the pipeline is for, in one line."""
 
 
 @frozen
@@ -205,8 +241,11 @@ class ModelEntry:
     """A trained model shipped inside a package: `resource` is `"package:path/inside/it.json"`."""
 
     name: str = field(validator=_IS_NAME)
+    """The name of the model, for `classifier.model`."""
     resource: str = field(validator=_IS_RESOURCE)
+    """The file in its package: `"package:path/inside/it.json"`."""
     summary: str = field(validator=instance_of(str))
+    """What the model was trained on, in one line."""
 
 
 @frozen
@@ -214,9 +253,13 @@ class DatasetEntry:
     """A reader of recorded data, used as `name:FOLDER`; `target` is the function that reads them."""
 
     name: str = field(validator=_IS_NAME)
+    """The name before the colon in `name:FOLDER`."""
     target: str = field(validator=_IS_TARGET)
+    """The import string of the function that reads the data, as in `"lab_data.reader:read"`."""
     summary: str = field(validator=instance_of(str))
+    """What the data set is, in one line."""
     needs: str = ""
+    """What to install or do if the target cannot be imported."""
 
 
 @frozen
@@ -224,9 +267,13 @@ class CommandEntry:
     """A further subcommand of `graspsense`: `target` is a click command."""
 
     name: str = field(validator=_IS_NAME)
+    """The name of the subcommand."""
     target: str = field(validator=_IS_TARGET)
+    """The import string of the click command, as in `"lab_tool.cli:tool"`."""
     summary: str = field(validator=instance_of(str))
+    """What the command does, in one line, for `graspsense --help`."""
     needs: str = ""
+    """What to install or do if the target cannot be imported."""
 
 
 @frozen
@@ -238,13 +285,17 @@ class EmulatorEntry:
     """
 
     name: str = field(validator=_IS_NAME)
+    """The sensor backend that drives the device."""
     target: str = field(validator=_IS_TARGET)
+    """The import string of the function `emulate(config, wire, seed)`."""
     summary: str = field(validator=instance_of(str))
+    """What is emulated, in one line."""
     wires: tuple[str, ...] = field(validator=deep_iterable(and_(*_IS_NAME), instance_of(tuple)))
     """The interfaces of the operating system that it can use, for `--wire`; the best one first."""
     options: tuple[str, ...] = ()
     """Settings that the user's options override, as in `("gripper.transport=emulated",)`."""
     needs: str = ""
+    """What to install or do if the target cannot be imported."""
 
 
 @frozen
@@ -257,10 +308,15 @@ class ConformanceCheckEntry:
     """
 
     name: str = field(validator=_IS_NAME)
+    """The id of the check."""
     target: str = field(validator=_IS_TARGET)
+    """The import string of the function that yields the defects."""
     hook: str = field(validator=instance_of(str))
+    """The name of the hook whose results are checked."""
     summary: str = field(validator=instance_of(str))
+    """What the check requires, in one line."""
     needs: str = ""
+    """What to install or do if the target cannot be imported."""
 
 
 @frozen
@@ -268,10 +324,15 @@ class FoundDevice:
     """A device that a probe found: its backend, its serial number, and whether it can be opened."""
 
     backend: str
+    """The sensor backend that drives the device."""
     serial: str
+    """The serial number of the device."""
     where: str
+    """Where it is connected, as in `/dev/hidraw0`."""
     ready: bool
+    """Whether it can be opened now."""
     advice: str = ""
+    """What to do if it cannot be opened."""
 
 
 def _a_state(entry: object, attribute: Attribute[Any], state: str) -> None:
@@ -288,10 +349,15 @@ class Finding:
     """
 
     subject: str = field(validator=instance_of(str))
+    """What was examined."""
     state: Literal["ok", "note", "problem"] = field(validator=_a_state)
+    """`ok`, `note` (not wrong, but worth knowing) or `problem`."""
     found: str = field(validator=instance_of(str))
+    """What was found, in words."""
     advice: str = field(default="", validator=instance_of(str))
+    """What to do about a problem."""
     numbers: Mapping[str, float | int | str | bool] = field(factory=dict)
+    """Measured values, whose names end with their units: `rate_hz`."""
 
 
 ComponentEntry = SensorBackendEntry | ControllerEntry | FeatureSetEntry | ClassifierEntry

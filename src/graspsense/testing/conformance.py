@@ -141,8 +141,10 @@ def examine(
     """Return the components with this name, ready to be checked.
 
     `name` is a distribution, for itself and all its components, or a component (`NAME` or `DISTRIBUTION/NAME`). `keys`
-    are settings as in a pipeline file. `expected_failures` maps the id of a check to the reason of its failure. Raises
-    UnknownName.
+    are settings as in a pipeline file. `unplugged` and `absent` are further settings of a gripper: those under which it
+    vanishes during a grasp, and those under which it is not there. `expected_failures` maps the id of a check to the
+    reason of its failure. `wheel` is False if no wheel is to be built. `plugins` are searched for the name, by default
+    those that are installed. Raises UnknownName.
     """
     plugins = installed() if plugins is None else plugins
     whole = package_of(name, plugins, builds=wheel)
@@ -174,7 +176,8 @@ def examine(
 def parametrize_checks(name: str, **options: Any) -> Any:
     """Return the pytest mark that runs a test with every check of a component, as the argument `check`.
 
-    The test is `def test_conformance(check): check.run()`; the options are those of `examine`.
+    The test is `def test_conformance(check): check.run()`. The options are those of `examine`, which
+    docs/tcp_gripper.md explains.
 
     >>> from graspsense.plugin_api import parametrize_checks
     >>> @parametrize_checks("graspsense/knn")

@@ -1,0 +1,107 @@
+"""The gripper of docs/tcp_gripper.md: its code runs, conforms, and does with one force sensor what the page says."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from math import nan
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import pytest
+
+from graspsense import load_pipeline
+from graspsense.core.plugins import IsolatedPlugins
+from graspsense.plugin_api import Reading, SensorBackendEntry, hookimpl
+from graspsense.testing import examine
+
+PAGE = (Path(__file__).parents[1] / "docs" / "tcp_gripper.md").read_text(encoding="utf-8")
+
+
+class Plugin:
+    GRASPSENSE_API = (1, 0)
+
+    @hookimpl
+    def graspsense_sensor_backends(self):
+        return [SensorBackendEntry(name="lab-hand", target="lab_hand:TcpHand", summary="a hand on a socket")]
+
+
+@pytest.fixture
+def hand(monkeypatch):
+    """The module of the page. Its time passes while the driver sleeps, and a little as anybody looks at it."""
+    (code,) = re.findall(r"<!-- example: tcp gripper -->\n```python\n(.*?)```", PAGE, re.DOTALL)
+    module = ModuleType("lab_hand")
+    monkeypatch.setitem(sys.modules, "lab_hand", module)
+    exec(compile(code, "tcp_gripper.md", "exec", dont_inherit=True), vars(module))
+    now_s = 0.0
+
+    def sleep(seconds):
+        nonlocal now_s
+        now_s += seconds
+
+    def monotonic():
+        sleep(1e-5)
+        return now_s
+
+    module.time = SimpleNamespace(monotonic=monotonic, sleep=sleep)
+    return module
+
+
+@pytest.fixture
+def plugins(hand):
+    with IsolatedPlugins() as plugins:
+        plugins.add(Plugin(), "lab-hand")
+        yield plugins
+
+
+def grasp(plugins):
+    options = ["gripper.type=lab-hand/lab-hand", "gripper.reply_timeout_s=60", "classifier.type=none"]
+    return load_pipeline(options=options, plugins=plugins).grasp()
+
+
+def test_it_conforms(plugins):
+    examined = examine(
+        "lab-hand/lab-hand",
+        keys={"reply_timeout_s": 60.0},
+        unplugged={"vanishes_s": 0.5},
+        absent={"address": "127.0.0.1:9"},
+        plugins=plugins,
+    )
+    report = examined.report()
+
+    assert report.failures == []
+    assert {one.check for one in report.results if one.state == "skipped"} <= {
+        *("images-count-up", "pads-can-be-zeroed", "same-seed-same-frames"),
+        *("dry-run-accepts-the-same-commands", "objects-can-be-grasped"),
+    }
+
+
+def test_it_grasps_with_the_default_pipeline(plugins):
+    trial = grasp(plugins)
+
+    assert trial.outcome.words == "steady"
+    assert trial.features.as_dict()["p_first"] == pytest.approx(0.05, abs=1e-3)
+    assert trial.features.as_dict()["f_steady"] == pytest.approx(20.0, abs=1.5)
+
+
+@pytest.mark.parametrize("second", [nan, 0.0])
+def test_a_second_pad_without_a_force_never_touches(hand, plugins, monkeypatch, second):
+    read = hand.TcpHand.read
+
+    def one_pad(self, timeout_s):
+        reading = read(self, timeout_s)
+        return reading and Reading(reading.frame._replace(force_right_n=second), reading.pads)
+
+    monkeypatch.setattr(hand.TcpHand, "read", one_pad)
+    trial = grasp(plugins)
+
+    assert trial.features.as_dict()["p_first"] is None
+    assert trial.outcome.words != "steady"
+
+
+def test_every_option_of_the_checks_is_explained():
+    named = re.findall(r"^\| `(\w+)` \|", PAGE.partition("## Conformance checks")[2], re.MULTILINE)
+    options = [name for name in inspect.signature(examine).parameters if name != "name"]
+
+    assert named[: len(options)] == options
