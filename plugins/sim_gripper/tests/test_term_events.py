@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
-from graspsense.plugin_api import create
+from graspsense.cli.main import cli
+from graspsense.plugin_api import ConfigError, create
+from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.compiled.compose import composed_move
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.stepping.scheme import MEAN_FORCE, TR_BDF2, VERLET
+from graspsense_sim_gripper.terms import Term
+from graspsense_sim_gripper.terms.registry import TERMS
 
 CRUSH = """
 width_m = 0.05
@@ -99,3 +106,80 @@ def test_a_crushing_body_has_the_accuracy_that_is_asked_for(tmp_path):
     n = min(map(len, forces))
     error = np.sqrt(np.mean((forces[0][:n] - forces[1][:n]) ** 2) / np.mean(forces[1][:n] ** 2))
     assert error <= 0.01
+
+
+class Stuff(NamedTuple):
+    k_n_m: float
+    limit: float
+
+
+def not_a_number(params, state, d0, d1, h, v1):
+    return params.k_n_m * d1 * (1.0 if d1 < 0.002 else math.nan), state
+
+
+def infinite(params, state, d0, d1, h, v1):
+    return (params.k_n_m * d1 if d1 < 0.002 else math.inf), state
+
+
+def raises(params, state, d0, d1, h, v1):
+    return params.k_n_m * math.sqrt(params.limit - d1), state
+
+
+STUFF = """
+width_m = 0.05
+[[terms]]
+type = "elastic"
+k1_n_m = 500.0
+[[terms]]
+type = "stuff"
+k_n_m = 2000.0
+limit = 0.002
+"""
+
+
+@pytest.fixture
+def stuff(tmp_path, monkeypatch):
+    """Return a function that gives the scene of an object with a term of this law."""
+
+    def scene(law):
+        monkeypatch.setitem(TERMS, "stuff", Term(name="stuff", summary="", params=Stuff, law=law))
+        file = tmp_path / "stuff.toml"
+        file.write_text(STUFF)
+        return str(file)
+
+    return scene
+
+
+@pytest.mark.parametrize("pads_n_m", [3e4, math.inf])
+@pytest.mark.parametrize(("law", "value"), [(not_a_number, "nan"), (infinite, "inf")])
+def test_a_force_that_is_not_finite_ends_the_grasp_with_the_name_of_the_term(stuff, law, value, pads_n_m):
+    config = SimConfig(spread=False, sensor="ideal", pad_stiffness_n_m=pads_n_m)
+    done = run_many(config, create("controller", "hybrid"), [stuff(law)], [0], compiled=False)[0]
+    assert done.outcome.words == "aborted"
+    assert f"term 'stuff' gave the force {value} at a compression of 2" in done.reason
+    assert len(done.trace.t_s) > 100
+    assert 4.0 < done.state.peak_n < 6.0
+
+
+def test_compiled_code_names_the_term_too(stuff):
+    config, scene = SimConfig(spread=False, sensor="ideal"), stuff(not_a_number)
+    plain, compiled = (
+        run_many(config, create("controller", "hybrid"), [scene], [0], compiled=how)[0]
+        for how in (False, True)
+    )
+    assert compiled.outcome == plain.outcome
+    assert compiled.reason == plain.reason
+
+
+def test_a_single_grasp_names_the_term_too(stuff):
+    shown = CliRunner().invoke(cli, ["run", "--object", stuff(not_a_number), "--json"])
+    trial = json.loads(shown.stdout)
+    assert trial["outcome"] == "aborted"
+    assert "term 'stuff' gave the force nan" in trial["reason"]
+
+
+def test_a_law_that_raises_is_refused_by_name(stuff):
+    with pytest.raises(
+        ConfigError, match=r"stuff.toml: term 'stuff' raised ValueError: .* at a compression of"
+    ):
+        run_many(SimConfig(spread=False), create("controller", "hybrid"), [stuff(raises)], [0])

@@ -30,7 +30,7 @@ from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.build import CELL_OFFSET, EFFORT_LIMIT_N, build, device_info, instantiate
 from graspsense_sim_gripper.compiled.compose import INTERPRETED, Composition, composed_move
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.state import PlantState
+from graspsense_sim_gripper.dynamics.state import PlantState, is_finite
 from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
@@ -40,7 +40,9 @@ from graspsense_sim_gripper.reduction.propose import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N, PadBuffers, apply_tare, sense
 from graspsense_sim_gripper.stepping.scheme import PlantParams
+from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.terms.registry import find_term
+from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
 SIDES: Final = ("left", "right")
 
@@ -131,7 +133,7 @@ class SimBackend(BatchBackend[SimConfig]):
         if effort is None:
             effort = 0.0
         else:
-            self._state = self._move(self._plant, self._state, effort, dt)
+            self._state = self._moved(effort)
             self._ticks += 1
             contact = self._state.contact
             if self._explains and contact.touched == 1:
@@ -149,6 +151,17 @@ class SimBackend(BatchBackend[SimConfig]):
             image = buffers.images[count - 1]
             self._pads = Pads(self._sensor.image_t_s, count, tuple(image[0]), tuple(image[1]))
         return _reading(frame, self._pads)
+
+    def _moved(self, effort_n: float) -> PlantState:
+        """Return the plant after a tick. Raises TermFailed."""
+        setup, before = self._setup, self._state
+        try:
+            after = self._move(self._plant, before, effort_n, setup.dt_s)
+        except LAW_ERRORS as error:
+            raise TermFailed(raised_in_term(error, setup.kinds) or str(error)) from error
+        if not is_finite(after):
+            raise TermFailed(not_finite_in_tick(setup.kinds, setup.plant, before, effort_n, setup.dt_s))
+        return after
 
     def apply(self, command: Command) -> None:
         """Set the effort of the next tick."""

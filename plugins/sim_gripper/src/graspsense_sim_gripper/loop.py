@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import TARING, Command, Frame, Pads, TickParams, TickState
-from graspsense_sim_gripper.dynamics.state import PlantState
+from graspsense_sim_gripper.dynamics.state import PlantState, is_finite
 from graspsense_sim_gripper.sensing import PadBuffers, SensorParams, SensorState, apply_tare, sense
 
 COLUMNS: Final = (
@@ -51,6 +51,8 @@ class LoopState(NamedTuple):
     tare_from: int
     """The image with which the phase began: the tare is the mean from there on."""
     effort_n: float
+    failed: int
+    """1: a force or the motion was not finite after the last tick; the plant is that before it."""
 
 
 class SimulationState(NamedTuple):
@@ -75,7 +77,7 @@ class Buffers(NamedTuple):
     """(n,)"""
 
 
-NOT_STARTED: Final = LoopState(0, 0, -1, 0, 0.0)
+NOT_STARTED: Final = LoopState(0, 0, -1, 0, 0.0, 0)
 NOT_NEGATIVE: Final = 0x3FFFFFFF
 """With this mask the compiler knows that an index is not negative, and omits the test at each array."""
 
@@ -95,7 +97,7 @@ control: Callable[[TickParams, TickState, Frame, Pads], tuple[Command, TickState
 
 
 def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
-    """Run a grasp to its end, for `max_ticks`, or until a buffer is full; return its state then.
+    """Run a grasp to its end, for `max_ticks`, or until a buffer is full or a term fails; return its state then.
 
     Recorded are the frames without `dt_s` and status, which a simulated gripper does not vary, and the command. Where
     `images` or `columns` are full, call it again with the state it returned and longer buffers that begin with the same
@@ -103,7 +105,7 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
     """
     dt_s, pad_buffers, columns = params.dt_s, buffers.pads, buffers.columns
     images = pad_buffers.images
-    ticks, recorded, phase, tare_from, effort = progress.loop
+    ticks, recorded, phase, tare_from, effort, failed = progress.loop
     plant, sensor, state = progress.plant, progress.sensor, progress.controller
     capacity = len(columns[0])
     count = sensor.images
@@ -131,8 +133,12 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
         ticks += 1
         if state.done == 1 or state.guard.stopped == 1:
             break
-        plant = move(params.plant, plant, effort, dt_s)
-    return SimulationState(LoopState(ticks, recorded, phase, tare_from, effort), plant, sensor, state)
+        after = move(params.plant, plant, effort, dt_s)
+        if not is_finite(after):
+            failed = 1
+            break
+        plant = after
+    return SimulationState(LoopState(ticks, recorded, phase, tare_from, effort, failed), plant, sensor, state)
 
 
 def has_ended(state: TickState) -> bool:

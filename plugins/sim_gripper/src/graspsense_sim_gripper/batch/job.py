@@ -26,7 +26,7 @@ from graspsense.plugin_api import (
     tick_params,
 )
 from graspsense_sim_gripper.build import CELL_OFFSET, build, device_info, instantiate
-from graspsense_sim_gripper.compiled.compose import grasp_loop
+from graspsense_sim_gripper.compiled.compose import grasp_loop, guarded_loop
 from graspsense_sim_gripper.compiled.padding import composition_of, padded, unpadded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
@@ -37,6 +37,8 @@ from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sensing import PadBuffers
+from graspsense_sim_gripper.term_failure import not_finite_in_tick, raised_in_term
+from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
 TICKS: Final = 8200
 """Ticks that the buffers hold at first; a grasp that needs more continues with longer ones. Not a power of two: all
@@ -158,14 +160,23 @@ class Storage:
 
 def grasp_compiled(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> FinishedGrasp:
     """Grasp with the compiled loop of the setup's `composition_of`."""
-    done = grasp_once(job, padded(setup), loop, storage, on_arrays=True)
+    try:
+        done = grasp_once(job, padded(setup), loop, storage, on_arrays=True)
+    except LAW_ERRORS:
+        # Compiled code does not say which term raised it.
+        return grasp_plain(job, setup)
     return evolve(done, state=unpadded(done.state, setup))
 
 
 def grasp_plain(job: Job, setup: GraspSetup) -> FinishedGrasp:
     """Grasp in the interpreter."""
-    loop = grasp_loop(composition_of(job.config, setup, pad=False), type(job.controller).step)
-    return grasp_once(job, setup, loop, Storage(), on_arrays=False)
+    composition, step = composition_of(job.config, setup, pad=False), type(job.controller).step
+    try:
+        return grasp_once(job, setup, grasp_loop(composition, step), Storage(), on_arrays=False)
+    except LAW_ERRORS as error:
+        if composition.shape is not None or not raised_in_term(error, setup.kinds):
+            raise
+    return grasp_once(job, setup, guarded_loop(composition, step), Storage(), on_arrays=False)
 
 
 def grasp_once(
@@ -176,7 +187,10 @@ def grasp_once(
     if on_arrays:
         storage.buffers = buffers
     outcome, reason = ended_by_itself(end.controller)
-    if not has_ended(end.controller):
+    if end.loop.failed == 1:
+        outcome = Outcome.ABORTED
+        reason = not_finite_in_tick(setup.kinds, setup.plant, end.plant, end.loop.effort_n, setup.dt_s)
+    elif not has_ended(end.controller):
         outcome, reason = Outcome.ABORTED, overdue(job.run)
     if not job.traces and job.extract is None:
         return finished(job, outcome, reason, end.plant, None)
@@ -230,7 +244,8 @@ def _run(
     progress = SimulationState(NOT_STARTED, setup.state, setup.sensor_state, job.initial)
     while True:
         progress = loop(params, progress, buffers)
-        if has_ended(progress.controller) or progress.loop.ticks >= params.max_ticks:
+        ended = has_ended(progress.controller) or progress.loop.failed == 1
+        if ended or progress.loop.ticks >= params.max_ticks:
             return progress, buffers
         buffers = _doubled(buffers)
         if not ideal:

@@ -28,7 +28,7 @@ from graspsense_sim_gripper.stepping.tr_bdf2 import Stage
 from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
 from graspsense_sim_gripper.terms.registry import find_term, laws_of, phases_of
 from graspsense_sim_gripper.terms.switchable import Switchable
-from graspsense_sim_gripper.terms.term import NO_STATE, Law, Phase
+from graspsense_sim_gripper.terms.term import LAW_ERRORS, NO_STATE, Law, Phase
 
 TermsStates = Any
 """A tuple with a state of its own type for each term."""
@@ -193,6 +193,28 @@ def grasp_loop(
     composition: Composition, step: ControllerStep, *, interpreted: bool = True
 ) -> Callable[..., SimulationState]:
     """Return the loop of a grasp under a controller with this step; not `interpreted`: to be compiled."""
+    return _loop_of(composed_move(composition, interpreted=False), step, interpreted)
+
+
+@lru_cache(maxsize=64)
+def guarded_loop(composition: Composition, step: ControllerStep) -> Callable[..., SimulationState]:
+    """Return the loop of a grasp by steps in the interpreter, in which a law that raises an exception gives NaN."""
+    kinds = composition.kinds
+    laws = [_guarded(law) for law in laws_of(kinds)]
+    return _loop_of(plant_move(laws, phases_of(kinds), converges=composition.converges), step, True)
+
+
+def _loop_of(move: PlantMove, step: ControllerStep, interpreted: bool) -> Callable[..., SimulationState]:
     control = bind_reachable(tick, {"step": step})
-    loop = bind_reachable(grasp, {"move": composed_move(composition, interpreted=False), "control": control})
+    loop = bind_reachable(grasp, {"move": move, "control": control})
     return bind_reachable(loop, {}, INTERPRETED) if interpreted else loop
+
+
+def _guarded(law: Law) -> Law:
+    def guarded(params: Any, state: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
+        try:
+            return law(params, state, d0, d1, h, v1)
+        except LAW_ERRORS:
+            return math.nan, state
+
+    return guarded

@@ -189,13 +189,16 @@ def _release_from_rigid_pads(
         search = BalanceSearch(d0 - force0 / total, last, last_n, slope, total, lower, upper, n)
         search, force, states = _balance(model.terms, now, load, search, h)
     d1 = search.compression_m
-    free = ContactState(d1, 0.0, search.slope_n_m, states, 0.0, branch0, (d1 - d0) / h, math.inf)
+    # No force, but NaN where a law gave no finite one, so that it is noticed.
+    none = force - force
+    free = ContactState(d1, none, search.slope_n_m, states, 0.0, branch0, (d1 - d0) / h, math.inf)
     return free, _unbalanced(force, 0.0)
 
 
 def _unbalanced(force_n: float, pads_n: float) -> int:
-    """Return 1 if the force of the object is not that of the pads, or not a number."""
-    return 0 if abs(force_n - pads_n) <= UNBALANCED_RTOL * max(abs(force_n), 1.0) else 1
+    """Return 1 if the force of the object is not that of the pads, or not finite."""
+    miss_n = abs(force_n - pads_n)
+    return 0 if miss_n < math.inf and miss_n <= UNBALANCED_RTOL * max(abs(force_n), 1.0) else 1
 
 
 def _release_slope(slope: float, force: float, force0: float, d0: float, closure_m: float) -> float:
@@ -235,7 +238,8 @@ def _press_through_pads(
         )
         search, force, states = _balance(model.terms, now, PadLoad(k, c, base, over), search, h)
         d1, slope = search.compression_m, search.slope_n_m
-        if force >= 0.0 if pressed else n_changes > 0 or closure_m <= d1 + creep.free_pad_m:
+        # NaN ends the search too.
+        if not force < 0.0 if pressed else n_changes > 0 or closure_m <= d1 + creep.free_pad_m:
             break
         pressed, n_changes = not pressed, n_changes + 1
         over, base = h, d0
@@ -243,7 +247,7 @@ def _press_through_pads(
     if not pressed:
         pad = creep.free_pad_m
         branch = branch0 * creep.decay + (creep.mean_n_m + creep.ramp_n_m) * (pad - pad0)
-        return ContactState(d1, 0.0, slope, states, pad, branch, rate, math.inf), unbalanced
+        return ContactState(d1, force - force, slope, states, pad, branch, rate, math.inf), unbalanced
     span = h if force0 > 0.0 else math.inf
     if not creeps:
         return ContactState(d1, force, slope, states, pad0, branch0, rate, span), unbalanced

@@ -79,3 +79,9 @@ class PlantState(NamedTuple):
     """Current force of the drive, if it lags behind the command."""
     peak_n: float = 0.0
     """Largest force on a pad so far."""
+
+
+def is_finite(state: PlantState) -> bool:
+    """Return whether the forces on the object and the motion are finite numbers."""
+    contact = state.contact
+    return math.isfinite(contact.left.force_n + contact.right.force_n + state.motion.speed_rev_s)

@@ -30,6 +30,8 @@ from graspsense_sim_gripper.reduction.probe import Grip
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
 from graspsense_sim_gripper.reduction.verify import Sensitivity, TrialGrasps, trial_grasps
 from graspsense_sim_gripper.stepping.scheme import Steps
+from graspsense_sim_gripper.term_failure import raised_in_term
+from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
 ACCEPTED_WITH_SPREAD: Final = 0.5
 ACCEPTED: Final = 0.8
@@ -61,12 +63,21 @@ def select(
     `compiled`: run the trial grasps compiled, where the controller can be compiled; `padding`: the kinds of terms with
     which that code is padded, by default as in a batch. Both change times only.
 
-    Raises ConfigError if no model has the accuracy asked for, TypeError if there is no object.
+    Raises ConfigError if no model has the accuracy asked for or a term raises an exception, TypeError if there is no
+    object.
     """
     key = _SELECTED.key(problem, controller)
     reduction = _SELECTED.get(key)
     if reduction is None:
-        reduction = _select(problem, trial_grasps(problem, controller, compiled=compiled, padding=padding))
+        try:
+            reduction = _select(
+                problem, trial_grasps(problem, controller, compiled=compiled, padding=padding)
+            )
+        except LAW_ERRORS as error:
+            reason = raised_in_term(error, problem.nominal.kinds if problem.nominal else ())
+            if not reason:
+                raise
+            raise ConfigError(f"{_scene_in_words(problem)}: {reason}") from error
         _SELECTED.put(key, reduction)
     return reduction
 
@@ -175,9 +186,13 @@ def _refusal(problem: Problem, error: float, quantity: str, term: str) -> str:
 
 
 def _inaccurate(problem: Problem) -> str:
+    accuracy = problem.model_config.accuracy
+    return f"{_scene_in_words(problem)}: no model of it reaches gripper.accuracy = {accuracy:g}"
+
+
+def _scene_in_words(problem: Problem) -> str:
     spec: ObjectSpec | None = problem.spec
-    where = "the scene" if spec is None else spec.file or f"object {spec.name!r}"
-    return f"{where}: no model of it reaches gripper.accuracy = {problem.model_config.accuracy:g}"
+    return "the scene" if spec is None else spec.file or f"object {spec.name!r}"
 
 
 def _advice(reachable: float) -> str:

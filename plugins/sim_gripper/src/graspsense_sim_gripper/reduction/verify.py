@@ -46,6 +46,7 @@ from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.sensing import Bias, PadBuffers
 from graspsense_sim_gripper.stepping.scheme import VERLET, Steps
+from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick
 
 MAX_SECONDS: Final = 40.0
 """The longest trial grasp, and the longest approach in it."""
@@ -195,6 +196,13 @@ class TrialGrasps:
                 recorded = (table, phases) if on_arrays else (table.tolist(), phases.tolist())
                 progress = progress._replace(loop=progress.loop._replace(recorded=0))
                 progress = loop(grasp_params, progress, Buffers(*buffers, *recorded))
+                if progress.loop.failed == 1:
+                    effort_n = progress.loop.effort_n
+                    raise TermFailed(
+                        not_finite_in_tick(
+                            made.kinds, made.plant._replace(steps=steps), progress.plant, effort_n, setup.dt_s
+                        )
+                    )
                 rows = (*rows, np.vstack(recorded)[:, : progress.loop.recorded])
             return _Stage(progress, rows, from_open)
 

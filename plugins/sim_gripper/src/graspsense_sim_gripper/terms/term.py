@@ -16,6 +16,8 @@ Phase = Callable[[TermState], int]
 Law = Callable[[TermParams, TermState, float, float, float, float], tuple[float, TermState]]
 """`law(params, state, d0, d1, h, v1) -> (force, state)`: from d0 to d1 (m) in h (s), then at v1 (m/s)."""
 
+LAW_ERRORS: Final = (ArithmeticError, ValueError)
+"""What a law may raise where it has no value, such as a division by zero or the root of a negative number."""
 PIECES: Final = 256
 
 
