@@ -26,7 +26,7 @@ from graspsense.core.features import Features, FeatureTable, Prediction
 from graspsense.core.trace import Trace
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
 from graspsense.scaffold.make import KINDS, plugin_module, words_of
-from graspsense.testing import CHECKS, FLOOR
+from graspsense.testing import CHECKS, MINIMUM_CHECKS
 
 FOLDER = Path(__file__).parent / "roles"
 TITLES = {
@@ -53,7 +53,7 @@ HELPERS = {
     "Settings": ("setting",),
     "Contact and rest": (
         *("CONTACT_FORCE_N", "REST_SPEED_M_S", "REST_WINDOW_S"),
-        *("both_touch", "Stillness", "watch", "at_rest", "first_rest"),
+        *("both_touch", "RestState", "update_rest", "at_rest", "first_rest"),
     ),
     "Phases that a controller reports": ("APPROACH", "SQUEEZE", "HOLD"),
     "Outcomes that a controller reports": (
@@ -63,8 +63,8 @@ HELPERS = {
     "Kinds of command": ("EFFORT", "VELOCITY", "POSITION", "FORCE"),
     "Features and tables": ("missing", "in_words", "table_of"),
     "Tests of a plugin": (
-        *("parametrize_checks", "create", "bench", "drive"),
-        *("squeeze", "with_channels", "three_kinds", "a_trial"),
+        *("parametrize_checks", "create", "model_gripper", "drive"),
+        *("squeeze", "with_channels", "sample_table", "a_trial"),
     ),
 }
 FURTHER = {
@@ -121,8 +121,8 @@ def page(role: str) -> str:
     lines += [
         "## Conformance checks",
         "",
-        f"There are {len(CHECKS[role])} checks, and at least {FLOOR[role]} of them must run. A check that does not "
-        "apply is skipped, with a reason.",
+        f"There are {len(CHECKS[role])} checks, and at least {MINIMUM_CHECKS[role]} of them must run. A check "
+        "that does not apply is skipped, with a reason.",
         "",
         "| check | requirement |",
         "|---|---|",
@@ -207,7 +207,7 @@ def _helper(name: str) -> list[str]:
     helper = getattr(plugin_api, name)
     # The quotes of annotations go, those of default values stay.
     signature = re.sub(r"(: |-> )'([^']+)'", r"\1\2", str(inspect.signature(helper)))
-    signature = re.sub(r"ForwardRef\((\w+)\)", r"\1", signature)
+    signature = re.sub(r"ForwardRef\('?(\w+)'?\)", r"\1", signature)
     meaning, _, example = (inspect.getdoc(helper) or "").partition("\n\n>>> ")
     lines = [f"### {name}", "", f"    {name}{signature}", "", re.sub(r"(?<!\n)\n(?!\n)", " ", meaning), ""]
     return [*lines, "```pycon", ">>> " + example, "```", ""] if example else lines

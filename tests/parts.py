@@ -35,9 +35,9 @@ from graspsense.plugin_api import (
     in_words,
     setting,
 )
-from graspsense.testing.bench import Bench
 from graspsense.testing.gentle import GentleController as Gentle
 from graspsense.testing.gentle import GentleParams, GentleState, step
+from graspsense.testing.model_gripper import ModelGripper
 
 
 @frozen(kw_only=True)
@@ -80,7 +80,7 @@ class HandConfig:
 
 
 class Hand(SensorBackend[HandConfig]):
-    """The bench with cells, a zero, and a cable."""
+    """The model_gripper with cells, a zero, and a cable."""
 
     _bench = None
 
@@ -93,7 +93,7 @@ class Hand(SensorBackend[HandConfig]):
     def open(self, seed):
         if not self.config.here:
             raise NoDevice("no hand at port 7: plug it in, then `graspsense devices`")
-        self._bench, self._zero = Bench(frozenset(CHANNELS_OF_HAND), 0.05, 1500.0), None
+        self._bench, self._zero = ModelGripper(frozenset(CHANNELS_OF_HAND), 0.05, 1500.0), None
         self._info = self._bench.open(seed)
         self._effort = 0.0
         return DeviceInfo(

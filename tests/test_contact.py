@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from graspsense.core.contact import (
     REST_SPEED_M_S,
     REST_WINDOW_S,
-    Stillness,
+    RestState,
     at_rest,
     both_touch,
     first_rest,
-    watch,
+    update_rest,
 )
 
 
@@ -25,9 +25,9 @@ def test_contact_needs_both_pads_at_or_over_the_threshold():
 
 
 def still_after(gaps, dt=0.001):
-    still = Stillness(0.0, gaps[0])
+    still = RestState(0.0, gaps[0])
     for k, gap in enumerate(gaps):
-        still = watch(still, k * dt, gap, REST_SPEED_M_S, REST_WINDOW_S)
+        still = update_rest(still, k * dt, gap, REST_SPEED_M_S, REST_WINDOW_S)
     return still, (len(gaps) - 1) * dt
 
 
@@ -51,31 +51,31 @@ def test_a_gap_that_creeps_slower_than_tau_2_is_at_rest():
 
 
 def test_fifty_ticks_of_a_millisecond_fill_the_window_despite_rounding():
-    still = Stillness(3 * 0.001, 0.05)
+    still = RestState(3 * 0.001, 0.05)
     assert at_rest(still, 53 * 0.001, REST_WINDOW_S)
     assert not at_rest(still, 52 * 0.001, REST_WINDOW_S)
 
 
 def test_a_gap_that_is_no_number_is_never_still():
-    still = watch(Stillness(0.0, 0.05), 0.001, float("nan"), REST_SPEED_M_S, REST_WINDOW_S)
-    again = watch(still, 0.1, float("nan"), REST_SPEED_M_S, REST_WINDOW_S)
+    still = update_rest(RestState(0.0, 0.05), 0.001, float("nan"), REST_SPEED_M_S, REST_WINDOW_S)
+    again = update_rest(still, 0.1, float("nan"), REST_SPEED_M_S, REST_WINDOW_S)
     assert not at_rest(again, 0.1, REST_WINDOW_S)
 
 
 def test_on_a_clock_slower_than_the_window_the_bound_grows_with_the_time_elapsed():
-    still = Stillness(0.0, 0.05)
-    assert watch(still, 1.0, 0.05 - 0.9e-4, REST_SPEED_M_S, REST_WINDOW_S) is still
-    assert watch(still, 1.0, 0.05 - 1.1e-4, REST_SPEED_M_S, REST_WINDOW_S) is not still
+    still = RestState(0.0, 0.05)
+    assert update_rest(still, 1.0, 0.05 - 0.9e-4, REST_SPEED_M_S, REST_WINDOW_S) is still
+    assert update_rest(still, 1.0, 0.05 - 1.1e-4, REST_SPEED_M_S, REST_WINDOW_S) is not still
 
 
 @given(st.lists(st.floats(-1e-3, 1e-3), min_size=60, max_size=200))
 def test_at_rest_means_the_gap_stayed_within_bounds_over_the_whole_window(steps):
     gap, t = 0.05, 0.0
-    still, seen = Stillness(t, gap), [(t, gap)]
+    still, seen = RestState(t, gap), [(t, gap)]
     for step in steps:
         t, gap = t + 0.001, gap + step * 0.01
         seen.append((t, gap))
-        still = watch(still, t, gap, REST_SPEED_M_S, REST_WINDOW_S)
+        still = update_rest(still, t, gap, REST_SPEED_M_S, REST_WINDOW_S)
         if at_rest(still, t, REST_WINDOW_S):
             within = [g for when, g in seen if when >= still.since_t_s]
             assert max(abs(g - within[0]) for g in within) <= REST_SPEED_M_S * (t - still.since_t_s) + 1e-15
@@ -93,9 +93,9 @@ def test_rest_over_a_trace_is_rest_sample_by_sample(steps, window):
     gaps = 0.05 + np.array([0.0 if np.isnan(dx) else dx for _, dx, _ in steps]).cumsum()
     gaps[[np.isnan(dx) for _, dx, _ in steps]] = np.nan
     shows = np.array([may for _, _, may in steps])
-    expected, still, since = None, Stillness(times[0], gaps[0]), 0
+    expected, still, since = None, RestState(times[0], gaps[0]), 0
     for i, (t, gap) in enumerate(zip(times, gaps, strict=True)):
-        now = watch(still, t, gap, REST_SPEED_M_S, window)
+        now = update_rest(still, t, gap, REST_SPEED_M_S, window)
         if now is not still:
             still, since = now, i
         if shows[i] and at_rest(still, t, window):

@@ -80,7 +80,7 @@ def test_a_helper_has_an_example_that_holds(name):
     helper = getattr(plugin_api, name)
     finder = doctest.DocTestFinder(recurse=False)
     (example,) = finder.find(helper, name, globs={**vars(sys.modules[helper.__module__]), "np": numpy})
-    if name != "Stillness":
+    if name != "RestState":
         assert example.examples, f"{name} has no example in its docstring"
 
     assert doctest.DocTestRunner().run(example).failed == 0

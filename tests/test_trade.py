@@ -14,7 +14,13 @@ from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import ConditionResult, summarise
 from graspsense.experiments.task_results import ClassifierResult
-from graspsense.experiments.trade.next_squeeze import Decision, Forces, Promise, SqueezeAnswers, decide
+from graspsense.experiments.trade.next_squeeze import (
+    Decision,
+    ForceChoices,
+    SqueezePredictions,
+    SqueezeStatistics,
+    decide,
+)
 from graspsense.experiments.trade.trade_point import advise, trade_points
 
 
@@ -73,37 +79,41 @@ GUESSES = np.full((2, 2), 0.5)
 
 
 def squeezed(answer, seconds=1.0):
-    return SqueezeAnswers(answer=np.array([answer]), seconds=np.array([seconds]))
+    return SqueezePredictions(answer=np.array([answer]), seconds=np.array([seconds]))
 
 
-def promise(confusion, seconds=1.0):
-    return Promise(confusion=confusion, seconds=np.full(2, seconds))
+def statistics(confusion, seconds=1.0):
+    return SqueezeStatistics(confusion=confusion, seconds=np.full(2, seconds))
 
 
 def test_who_is_sure_at_the_contact_does_not_squeeze():
-    known = (squeezed(1), promise(KNOWS))
-    forces = Forces(answers={17.0: squeezed(0)}, promises={17.0: promise(KNOWS)})
+    known = (squeezed(1), statistics(KNOWS))
+    forces = ForceChoices(answers={17.0: squeezed(0)}, statistics={17.0: statistics(KNOWS)})
     decision = decide(0, known, forces, sure=0.9, most=3, again_s=1.0)
     assert decision == Decision(answer=1, seconds=0.0, squeezes=0)
 
 
 def test_who_is_not_takes_the_force_that_tells_most_per_second():
-    nothing = (squeezed(0), promise(GUESSES))
+    nothing = (squeezed(0), statistics(GUESSES))
     answers = {17.0: squeezed(0, 0.3), 20.0: squeezed(1, 0.4)}
-    informative = Forces(answers=answers, promises={17.0: promise(GUESSES, 0.3), 20.0: promise(KNOWS, 0.4)})
+    informative = ForceChoices(
+        answers=answers, statistics={17.0: statistics(GUESSES, 0.3), 20.0: statistics(KNOWS, 0.4)}
+    )
     decision = decide(0, nothing, informative, sure=0.9, most=3, again_s=1.0)
     assert decision == Decision(answer=1, seconds=0.4, squeezes=1)
     # Both are equally informative; one takes less time.
-    equal = Forces(answers=answers, promises={17.0: promise(KNOWS, 0.3), 20.0: promise(KNOWS, 0.4)})
+    equal = ForceChoices(
+        answers=answers, statistics={17.0: statistics(KNOWS, 0.3), 20.0: statistics(KNOWS, 0.4)}
+    )
     decision = decide(0, nothing, equal, sure=0.9, most=3, again_s=1.0)
     assert decision == Decision(answer=0, seconds=0.3, squeezes=1)
 
 
 def test_a_second_squeeze_costs_its_opening_and_never_more_than_allowed():
-    nothing = (squeezed(0), promise(GUESSES))
-    forces = Forces(
+    nothing = (squeezed(0), statistics(GUESSES))
+    forces = ForceChoices(
         answers={17.0: squeezed(0, 0.3), 20.0: squeezed(1, 0.4)},
-        promises={17.0: promise(KNOWS, 0.3), 20.0: promise(KNOWS, 0.4)},
+        statistics={17.0: statistics(KNOWS, 0.3), 20.0: statistics(KNOWS, 0.4)},
     )
     decision = decide(0, nothing, forces, sure=0.999, most=3, again_s=1.0)
     assert (decision.seconds, decision.squeezes) == (pytest.approx(0.3 + 1.0 + 0.4), 2)

@@ -105,11 +105,11 @@ _TABLE: Final[Table] = {
             "CONTACT_FORCE_N",
             "REST_SPEED_M_S",
             "REST_WINDOW_S",
-            "Stillness",
+            "RestState",
             "at_rest",
             "both_touch",
             "first_rest",
-            "watch",
+            "update_rest",
         ),
     },
     "Feature sets": {
@@ -129,8 +129,8 @@ _TABLE: Final[Table] = {
     },
     "Tests of a plugin": {
         "testing.conformance": ("parametrize_checks",),
-        "testing.samples": ("a_trial", "squeeze", "three_kinds", "with_channels"),
-        "testing.bench": ("bench", "drive"),
+        "testing.samples": ("a_trial", "squeeze", "sample_table", "with_channels"),
+        "testing.model_gripper": ("model_gripper", "drive"),
     },
     "Observers": {
         "trial": ("GraspEvent", "RunInfo", "Trial"),

@@ -97,11 +97,11 @@ from graspsense.core.roles import StepLaw as StepLaw
 from graspsense.core.contact import CONTACT_FORCE_N as CONTACT_FORCE_N
 from graspsense.core.contact import REST_SPEED_M_S as REST_SPEED_M_S
 from graspsense.core.contact import REST_WINDOW_S as REST_WINDOW_S
-from graspsense.core.contact import Stillness as Stillness
+from graspsense.core.contact import RestState as RestState
 from graspsense.core.contact import at_rest as at_rest
 from graspsense.core.contact import both_touch as both_touch
 from graspsense.core.contact import first_rest as first_rest
-from graspsense.core.contact import watch as watch
+from graspsense.core.contact import update_rest as update_rest
 
 # Feature sets
 from graspsense.core.features import Features as Features
@@ -132,10 +132,10 @@ from graspsense.core.labelled import Labelled as Labelled
 from graspsense.testing.conformance import parametrize_checks as parametrize_checks
 from graspsense.testing.samples import a_trial as a_trial
 from graspsense.testing.samples import squeeze as squeeze
-from graspsense.testing.samples import three_kinds as three_kinds
+from graspsense.testing.samples import sample_table as sample_table
 from graspsense.testing.samples import with_channels as with_channels
-from graspsense.testing.bench import bench as bench
-from graspsense.testing.bench import drive as drive
+from graspsense.testing.model_gripper import model_gripper as model_gripper
+from graspsense.testing.model_gripper import drive as drive
 
 # Observers
 from graspsense.core.trial import GraspEvent as GraspEvent

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from graspsense.core.roles import DeviceInfo
 
 
-class _Bench(NamedTuple):
+class _Setup(NamedTuple):
     """A gripper opened without any calibration, the way to drive it, and where its calibrations are kept."""
 
     backend: Any
@@ -58,15 +58,15 @@ def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
     from graspsense.core.calibrating import unloaded_images
     from graspsense.core.calibration_files import stored_zero
 
-    with _bench(asked, replace) as bench:
-        stored = stored_zero(bench.stored["tare"]) if "tare" in bench.stored else None
-        counts_per_n = _counts_per_n(bench)
-        taken = unloaded_images(bench.rig, images, timeout_s=10.0 + images)
+    with _set_up(asked, replace) as setup:
+        stored = stored_zero(setup.stored["tare"]) if "tare" in setup.stored else None
+        counts_per_n = _counts_per_n(setup)
+        taken = unloaded_images(setup.rig, images, timeout_s=10.0 + images)
         left, right = calibration.tare(taken, counts_per_n, stored)
         if stored is None and not replace:
-            bench.backend.tare(taken)
+            setup.backend.tare(taken)
         data = {"left": list(left), "right": list(right), "images": len(taken)}
-        _store(bench, "tare", data, as_json)
+        _store(setup, "tare", data, as_json)
 
 
 @calibrate.command("load-cell")
@@ -78,9 +78,9 @@ def load_cell(readings: str, replace: bool, as_json: bool, **asked: Any) -> None
     READINGS is a CSV file with the columns side (left or right), pad_counts (sum of the 15 pad cells over their tare)
     and load_n (force of the load cell).
     """
-    with _bench(asked, replace) as bench:
-        data = _tables(readings, _counts_per_n(bench))
-        _store(bench, "load-cell", data, as_json)
+    with _set_up(asked, replace) as setup:
+        data = _tables(readings, _counts_per_n(setup))
+        _store(setup, "load-cell", data, as_json)
 
 
 @calibrate.command()
@@ -94,25 +94,25 @@ def friction(gaps: int, narrowest_m: float, replace: bool, as_json: bool, **aske
     """Store the effort at which the fingers begin to move, closing and opening, over the stroke."""
     from graspsense.core.calibrating import breakaways, unloaded_images
 
-    with _bench(asked, replace) as bench:
-        if bench.info.tare_images:
-            bench.backend.tare(unloaded_images(bench.rig, bench.info.tare_images, timeout_s=10.0))
-        widest_m = bench.rig.open().frame.gap_m * 0.95
+    with _set_up(asked, replace) as setup:
+        if setup.info.tare_images:
+            setup.backend.tare(unloaded_images(setup.rig, setup.info.tare_images, timeout_s=10.0))
+        widest_m = setup.rig.open().frame.gap_m * 0.95
         step_m = (widest_m - narrowest_m) / (gaps - 1)
-        found = breakaways(bench.rig, [narrowest_m + i * step_m for i in range(gaps)], bench.first_effort_n)
+        found = breakaways(setup.rig, [narrowest_m + i * step_m for i in range(gaps)], setup.first_effort_n)
         data = {
             "gap_m": [one.gap_m for one in found],
             "closing_n": [one.closing_n for one in found],
             "opening_n": [one.opening_n for one in found],
         }
-        _store(bench, "friction", data, as_json)
+        _store(setup, "friction", data, as_json)
         if not as_json:
             rows = [(f"{a * 1e3:.1f}", f"{b:.2f}", f"{c:.2f}") for a, b, c in found]
             echo_table(("GAP mm", "CLOSING N", "OPENING N"), rows)
 
 
 @contextmanager
-def _bench(asked: Mapping[str, Any], replace: bool) -> Iterator[_Bench]:
+def _set_up(asked: Mapping[str, Any], replace: bool) -> Iterator[_Setup]:
     """Open the gripper that the options ask for, uncalibrated, and let go of it whatever happens.
 
     Unless they are to be replaced, the stored calibrations must fit it.
@@ -139,41 +139,41 @@ def _bench(asked: Mapping[str, Any], replace: bool) -> Iterator[_Bench]:
         calibration_path(folder, info.serial, UNCALIBRATED)
         rig = Rig(backend, info, settings.run)
         stored = {} if replace else calibrations_of(folder, info.serial, info.numbers)
-        yield _Bench(backend, info, rig, folder, stored, settings.run.first_effort_n)
+        yield _Setup(backend, info, rig, folder, stored, settings.run.first_effort_n)
     finally:
         backend.close()
 
 
-def _store(bench: _Bench, kind: str, data: Mapping[str, Any], as_json: bool) -> None:
+def _store(setup: _Setup, kind: str, data: Mapping[str, Any], as_json: bool) -> None:
     from datetime import UTC, datetime
 
     from graspsense.core.calibration_files import Calibration, calibration_path, write_calibration
 
     made = Calibration(
         kind=kind,
-        serial=bench.info.serial,
-        device=dict(bench.info.numbers),
+        serial=setup.info.serial,
+        device=dict(setup.info.numbers),
         made=datetime.now(UTC).isoformat(timespec="seconds"),
         data=data,
     )
-    path = calibration_path(bench.folder, bench.info.serial, kind)
+    path = calibration_path(setup.folder, setup.info.serial, kind)
     written = write_calibration(path, made)
     if as_json:
         echo_json({"file": str(path), "kind": kind, "serial": written.serial, "made": written.made,
                    "sha256": written.sha256, "data": dict(written.data)})  # fmt: skip
     else:
         echo(f"{kind} of {written.serial} kept in {path}", indent=2)
-    for note in bench.info.notes:
+    for note in setup.info.notes:
         talk(f"note: {note}")
 
 
-def _counts_per_n(bench: _Bench) -> float:
+def _counts_per_n(setup: _Setup) -> float:
     """Return the counts of the pad under one newton, which the gripper states. Raises ConfigError."""
     from graspsense.core.errors import ConfigError
 
-    counts = bench.info.numbers.get("pad_counts_per_n")
+    counts = setup.info.numbers.get("pad_counts_per_n")
     if counts is None:
-        raise ConfigError(f"{bench.info.name} does not state the counts of its pads under one newton")
+        raise ConfigError(f"{setup.info.name} does not state the counts of its pads under one newton")
     return float(counts)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
-from graspsense.core.contact import CONTACT_FORCE_N, Stillness, at_rest, watch
+from graspsense.core.contact import CONTACT_FORCE_N, RestState, at_rest, update_rest
 from graspsense.core.errors import DeviceLost, GraspsenseError
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
@@ -78,14 +78,14 @@ class Rig:
     def _until_rest(self, command: Command) -> Reading:
         reading = self.tick(command)
         began_s = reading.frame.t_s
-        still = Stillness(began_s, reading.frame.gap_m)
+        still = RestState(began_s, reading.frame.gap_m)
         while not at_rest(still, reading.frame.t_s, OPEN_WINDOW_S):
             if reading.frame.t_s - began_s > self._run.opening_timeout_s:
                 raise CalibrationFailed(
                     f"the fingers did not come to rest within run.opening_timeout_s = {self._run.opening_timeout_s} s"
                 )
             reading = self.tick(command)
-            still = watch(still, reading.frame.t_s, reading.frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
+            still = update_rest(still, reading.frame.t_s, reading.frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
         return reading
 
     def _read(self) -> Reading:

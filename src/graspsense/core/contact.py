@@ -26,10 +26,10 @@ FEW: Final = 8
 """Number of samples that are examined one by one before all others at once."""
 
 
-class Stillness(NamedTuple):
+class RestState(NamedTuple):
     """The time since which the gap has been at rest (s), and its value then (m).
 
-    A control law keeps one in its state and begins with `Stillness(0.0, 0.0)`.
+    A control law keeps one in its state and begins with `RestState(0.0, 0.0)`.
     """
 
     since_t_s: float
@@ -45,34 +45,34 @@ def both_touch(force_left_n: float, force_right_n: float, contact_force_n: float
     return force_left_n >= contact_force_n and force_right_n >= contact_force_n
 
 
-def watch(
-    still: Stillness, t_s: float, gap_m: float, rest_speed_m_s: float, rest_window_s: float
-) -> Stillness:
-    """Return the stillness after one more sample: unchanged, or starting at this sample if the gap has moved.
+def update_rest(
+    still: RestState, t_s: float, gap_m: float, rest_speed_m_s: float, rest_window_s: float
+) -> RestState:
+    """Return the state after one more sample: unchanged, or starting at this sample if the gap has moved.
 
     Call it in every tick with the time (s) and the gap (m) of the frame, the speed below which the fingers are at
-    rest (m/s), and the time for which they must be at rest (s). The gap may differ from its value at the start of the
-    stillness by the rest speed times the window, or, if samples are further apart than the window, by the rest speed
+    rest (m/s), and the time for which they must be at rest (s). The gap may differ from the value in the state by the
+    rest speed times the window, or, if samples are further apart than the window, by the rest speed
     times the elapsed time. A gap of NaN is never at rest.
 
-    >>> still = Stillness(since_t_s=1.0, gap_m=0.05)
-    >>> watch(still, 1.02, 0.05, REST_SPEED_M_S, REST_WINDOW_S)
-    Stillness(since_t_s=1.0, gap_m=0.05)
-    >>> watch(still, 1.02, 0.049, REST_SPEED_M_S, REST_WINDOW_S)
-    Stillness(since_t_s=1.02, gap_m=0.049)
+    >>> still = RestState(since_t_s=1.0, gap_m=0.05)
+    >>> update_rest(still, 1.02, 0.05, REST_SPEED_M_S, REST_WINDOW_S)
+    RestState(since_t_s=1.0, gap_m=0.05)
+    >>> update_rest(still, 1.02, 0.049, REST_SPEED_M_S, REST_WINDOW_S)
+    RestState(since_t_s=1.02, gap_m=0.049)
     """
     allowed_m = rest_speed_m_s * max(rest_window_s, t_s - still.since_t_s)
     if abs(gap_m - still.gap_m) <= allowed_m:
         return still
-    return Stillness(t_s, gap_m)
+    return RestState(t_s, gap_m)
 
 
-def at_rest(still: Stillness, t_s: float, rest_window_s: float) -> bool:
-    """Return whether the stillness has lasted for the window (s) at time `t_s` (equation 2).
+def at_rest(still: RestState, t_s: float, rest_window_s: float) -> bool:
+    """Return whether the gap has been at rest for the window (s) at time `t_s` (equation 2).
 
     Rest then began at `still.since_t_s`.
 
-    >>> still = Stillness(since_t_s=1.0, gap_m=0.05)
+    >>> still = RestState(since_t_s=1.0, gap_m=0.05)
     >>> at_rest(still, 1.02, REST_WINDOW_S), at_rest(still, 1.06, REST_WINDOW_S)
     (False, True)
     """
@@ -89,7 +89,8 @@ def first_rest(
 ) -> tuple[int, int] | None:
     """Return the index of the sample at which rest begins and that of the first that shows it, or None.
 
-    The arrays have shape (n,). Only samples in `shows` can show a rest. `watch` and `at_rest` give the same result.
+    The arrays have shape (n,). Only samples in `shows` can show a rest. The result is that of
+    `update_rest` and `at_rest`.
 
     >>> times, gaps, shows = np.arange(11) * 0.01, np.array([0.06, 0.055] + [0.05] * 9), np.ones(11, bool)
     >>> first_rest(times, gaps, shows, REST_SPEED_M_S, REST_WINDOW_S)
@@ -100,9 +101,9 @@ def first_rest(
     n = len(times_s)
     if n == 0:
         return None
-    # A stillness that the next sample ends cannot be a rest, unless one sample suffices.
+    # A state that the next sample replaces cannot be a rest, unless one sample suffices.
     lasting = np.ones(n, bool)
-    if not at_rest(Stillness(times_s[0], gaps_m[0]), times_s[0], rest_window_s):
+    if not at_rest(RestState(times_s[0], gaps_m[0]), times_s[0], rest_window_s):
         allowed = rest_speed_m_s * np.maximum(rest_window_s, times_s[1:] - times_s[:-1])
         np.less_equal(np.abs(gaps_m[1:] - gaps_m[:-1]), allowed, out=lasting[:-1])
     skipped = int(lasting.argmax())
@@ -115,15 +116,18 @@ def first_rest(
         while begins[following] < end:
             following += 1
         since = begins[following]
-        still = Stillness(times[since], gaps[since])
-        # While the gap moves, most stillnesses are short: the first samples are examined one by one, as by `watch`.
+        still = RestState(times[since], gaps[since])
+        # While the gap moves, most states are short: the first samples are examined one by one, as by `update_rest`.
         few = min(since + FEW, n)
         end, at_m, since_s = since, still.gap_m, still.since_t_s
         if times[few - 1] - since_s <= rest_window_s:
             while end < few and abs(gaps[end] - at_m) <= at_once_m:
                 end += 1
         else:
-            while end < few and watch(still, times[end], gaps[end], rest_speed_m_s, rest_window_s) is still:
+            while (
+                end < few
+                and update_rest(still, times[end], gaps[end], rest_speed_m_s, rest_window_s) is still
+            ):
                 end += 1
         if end == few:
             begin = skipped + few

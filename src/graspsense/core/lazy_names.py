@@ -19,7 +19,7 @@ from typing import Any, Final
 Table = Mapping[str, Mapping[str, tuple[str, ...]]]
 """What names are for, the module that defines them, and the names.
 
-A module is one of `graspsense.core`, or, with a dot, one of another package of graspsense: `testing.bench`.
+A module is one of `graspsense.core`, or, with a dot, one of another package of graspsense: `testing.model_gripper`.
 """
 
 

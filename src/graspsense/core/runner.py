@@ -19,7 +19,7 @@ from typing import Any, Final, Protocol
 from attrs import frozen
 
 from graspsense.core.binding import bind, maker
-from graspsense.core.contact import CONTACT_FORCE_N, Stillness, at_rest, watch
+from graspsense.core.contact import CONTACT_FORCE_N, RestState, at_rest, update_rest
 from graspsense.core.errors import DeviceLost, RecordingEnded, TareRefused, named
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.interrupts import Interrupts
@@ -338,7 +338,7 @@ class _Grasp:
         info, run = self.info, self.run
         try:
             if opens and info.opening is not None and self.state.phase >= APPROACH and self.last is not None:
-                still, began_s = Stillness(self.last.t_s, self.last.gap_m), self.last.t_s
+                still, began_s = RestState(self.last.t_s, self.last.gap_m), self.last.t_s
                 give_up = time.perf_counter() + run.opening_timeout_s
                 fresh = GuardState(1, 0, 0)
                 # After a second Ctrl-C, only relax.
@@ -350,7 +350,7 @@ class _Grasp:
                         break
                     self.last, _ = reading
                     frame = self.last
-                    still = watch(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
+                    still = update_rest(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
                     if at_rest(still, frame.t_s, OPEN_WINDOW_S) or (
                         frame.t_s - began_s > run.opening_timeout_s
                     ):

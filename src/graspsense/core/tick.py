@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from graspsense.core.contact import Stillness, at_rest, watch
+from graspsense.core.contact import RestState, at_rest, update_rest
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.signals import RUNNING, STEADY, Command, Frame, Pads, Phase
 
@@ -51,7 +51,7 @@ class TickState(NamedTuple):
 
     phase: int
     since_t_s: float
-    still: Stillness
+    still: RestState
     first_image: int
     law: Any
     guard: GuardState
@@ -60,7 +60,7 @@ class TickState(NamedTuple):
 
 def first_state(law: Any) -> TickState:
     """Return the state before the first tick, given that of the controller."""
-    return TickState(-1, 0.0, Stillness(0.0, 0.0), 0, law, GuardState(0, 0, 0), 0)
+    return TickState(-1, 0.0, RestState(0.0, 0.0), 0, law, GuardState(0, 0, 0), 0)
 
 
 def _unbound(params: Any, state: Any, frame: Frame, pads: Pads) -> tuple[Command, Any]:
@@ -75,7 +75,7 @@ def tick(params: TickParams, state: TickState, frame: Frame, pads: Pads) -> tupl
     schedule = params.schedule
     phase, since, still, first_image, law, watcher, done = state
     if phase == -1:
-        phase, since, still = OPENING, frame.t_s, Stillness(frame.t_s, frame.gap_m)
+        phase, since, still = OPENING, frame.t_s, RestState(frame.t_s, frame.gap_m)
         if schedule.opens != 1:
             phase = APPROACH
 
@@ -85,7 +85,7 @@ def tick(params: TickParams, state: TickState, frame: Frame, pads: Pads) -> tupl
         if law.outcome == RUNNING:
             since = frame.t_s
         elif law.outcome != STEADY or frame.t_s - since >= schedule.hold_s:
-            since, still = frame.t_s, Stillness(frame.t_s, frame.gap_m)
+            since, still = frame.t_s, RestState(frame.t_s, frame.gap_m)
             if schedule.opens != 0:
                 phase = RELEASE
             else:
@@ -98,7 +98,7 @@ def tick(params: TickParams, state: TickState, frame: Frame, pads: Pads) -> tupl
             phase, since = APPROACH, frame.t_s
     else:
         command = schedule.opening
-        still = watch(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
+        still = update_rest(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
         waited = frame.t_s - since
         if at_rest(still, frame.t_s, OPEN_WINDOW_S) or waited >= schedule.opening_timeout_s:
             if phase == RELEASE:

@@ -94,7 +94,7 @@ def make(name: str, roles: Sequence[str], folder: Path) -> list[str]:
     kinds = _kinds(roles)
     if not NAME.fullmatch(name):
         raise ConfigError(
-            f"the name {name!r} will not do: small letters, digits and single hyphens, a letter first, "
+            f"the name {name!r} is not valid: write small letters, digits and single hyphens, a letter first, "
             "without spaces, as in lab-hand"
         )
     part = name.removeprefix("graspsense-")
@@ -252,7 +252,7 @@ def _check_importable(name: str) -> None:
     """Refuse a name whose package exists in another distribution or in Python. Raises ConfigError."""
     package = name.replace("-", "_")
     if keyword.iskeyword(package):
-        raise ConfigError(f"the name {name!r} will not do: {package} is a keyword of Python")
+        raise ConfigError(f"the name {name!r} is not valid: {package} is a keyword of Python")
     if package in sys.stdlib_module_names:
         raise ConfigError(f"the name {name!r} is taken: Python itself has a module {package}")
     plugins = {source.distribution for source in installed_sources()}

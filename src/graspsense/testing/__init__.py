@@ -16,12 +16,12 @@ Only the last two import pytest.
 
 from __future__ import annotations
 
-from graspsense.testing.checks import FLOOR, Check, ConformanceReport, Result
+from graspsense.testing.checks import MINIMUM_CHECKS, Check, ConformanceReport, Result
 from graspsense.testing.conformance import CHECKS, Conformance, Examined, examine, parametrize_checks
 
 __all__ = [
     "CHECKS",
-    "FLOOR",
+    "MINIMUM_CHECKS",
     "Check",
     "Conformance",
     "ConformanceReport",

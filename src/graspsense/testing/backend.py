@@ -29,9 +29,9 @@ from graspsense.core.signals import (
     Pads,
 )
 from graspsense.testing import component
-from graspsense.testing.bench import CHANNELS_OF_FIELD
 from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand
 from graspsense.testing.gentle import EFFORT_N, FORCE_N, GentleController, kind_of
+from graspsense.testing.model_gripper import CHANNELS_OF_FIELD
 from graspsense.testing.session import TIMEOUT_S, limits_of
 from graspsense.testing.subject import Subject
 

@@ -44,7 +44,7 @@ class Result:
     text: str = ""
 
 
-FLOOR: Final[Mapping[str, int]] = {
+MINIMUM_CHECKS: Final[Mapping[str, int]] = {
     "distribution": 4,
     "sensor-backend": 18,
     "controller": 16,
@@ -115,20 +115,20 @@ class ConformanceReport:
         """Return the reasons why the components do not conform."""
         found = [f"{one.subject}: {one.check}: {one.text}" for one in self.results if one.state == "failed"]
         for subject, role in dict.fromkeys((one.subject, one.role) for one in self.results):
-            text = self.below_floor(subject, role)
+            text = self.too_few_ran(subject, role)
             if text and not any(one.startswith(f"{subject}: ") for one in found):
                 found.append(f"{subject}: {text}")
         return found
 
-    def below_floor(self, subject: str, role: str) -> str:
+    def too_few_ran(self, subject: str, role: str) -> str:
         """Return a message if too few checks of a component ran, else an empty string."""
         mine = [one for one in self.results if (one.subject, one.role) == (subject, role)]
         ran = sum(one.state != "skipped" for one in mine)
-        if ran >= FLOOR[role]:
+        if ran >= MINIMUM_CHECKS[role]:
             return ""
         skipped = "; ".join(f"{one.check}: {one.text}" for one in mine if one.state == "skipped")
         return (
-            f"only {ran} of {len(mine)} checks of a {role.replace('-', ' ')} ran, {FLOOR[role]} must. "
+            f"only {ran} of {len(mine)} checks of a {role.replace('-', ' ')} ran, {MINIMUM_CHECKS[role]} must. "
             f"Skipped: {skipped or 'none'}"
         )
 
@@ -140,5 +140,7 @@ class ConformanceReport:
                 one.state for one in self.results if (one.subject, one.role) == (subject, role)
             ]
             kinds = [f"{states.count(kind)} {kind}" for kind in dict.fromkeys(states)]
-            lines.append(f"{role} {subject}: {len(states)} checks: {', '.join(kinds)}; floor {FLOOR[role]}")
+            lines.append(
+                f"{role} {subject}: {len(states)} checks: {', '.join(kinds)}; at least {MINIMUM_CHECKS[role]} must run"
+            )
         return "\n".join(lines)

@@ -14,7 +14,7 @@ from graspsense.core.errors import DataDamaged, named
 from graspsense.core.features import FeatureTable, Prediction
 from graspsense.testing import component
 from graspsense.testing.checks import CheckFailed, checks_of, demand
-from graspsense.testing.samples import three_kinds
+from graspsense.testing.samples import sample_table
 from graspsense.testing.subject import Subject
 
 SEED: Final = 11
@@ -35,7 +35,7 @@ def _fitted(subject: Subject, table: FeatureTable, labels: Sequence[str]) -> Any
 
 
 def _learned(subject: Subject) -> tuple[Any, FeatureTable, list[str]]:
-    table, labels = three_kinds()
+    table, labels = sample_table()
     return _fitted(subject, table, labels), table, labels
 
 
@@ -140,7 +140,7 @@ def single_trials_agree(subject: Subject) -> None:
 
 def handles_missing_values(subject: Subject) -> None:
     """It handles NaN in training and prediction, a feature without values, and a trial without values."""
-    table, labels = three_kinds(missing=True)
+    table, labels = sample_table(missing=True)
     bare = table.values.copy()
     bare[:, 1] = math.nan
     for what, values in (("some values missing", table.values), ("a whole feature missing", bare)):
@@ -157,7 +157,7 @@ def handles_missing_values(subject: Subject) -> None:
 
 def one_label_is_refused_or_certain(subject: Subject) -> None:
     """With one training label, `fit` raises ValueError, or that label has probability 1."""
-    table, labels = three_kinds()
+    table, labels = sample_table()
     one = subject.create()
     try:
         one.fit(table, ["can:full"] * len(labels), SEED)
@@ -175,7 +175,7 @@ def one_label_is_refused_or_certain(subject: Subject) -> None:
 
 def few_trials_are_refused_or_learned(subject: Subject) -> None:
     """With few training trials, `fit` raises ValueError, or the model gives valid probabilities."""
-    table, labels = three_kinds()
+    table, labels = sample_table()
     for what, rows in (
         ("two trials of two labels", [0, 1]),
         ("one trial of each label", [0, 1, 2]),
@@ -239,7 +239,7 @@ def explains_its_predictions(subject: Subject) -> None:
 
 def does_not_change_the_table(subject: Subject) -> None:
     """Neither fit nor probabilities changes the table."""
-    table, labels = three_kinds(missing=True)
+    table, labels = sample_table(missing=True)
     before = table.values.copy()
     fitted = _fitted(subject, table, labels)
     fitted.probabilities(table)

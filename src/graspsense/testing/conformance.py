@@ -30,7 +30,7 @@ def checks_for(subject: Subject | Package) -> tuple[Check, ...]:
     return (*CHECKS[subject.role], *contributed)
 
 
-FLOOR_CASE: Final = "enough-checks-ran"
+MINIMUM_CASE: Final = "enough-checks-ran"
 
 
 @define(eq=False)
@@ -64,7 +64,7 @@ class BoundCheck:
 
 
 @define(eq=False)
-class FloorCase:
+class MinimumCase:
     """The requirement that enough checks of a component ran."""
 
     subject: Subject | Package
@@ -73,7 +73,7 @@ class FloorCase:
     @property
     def id(self) -> str:
         """The component and the name of this case."""
-        return f"{self.subject.name}:{FLOOR_CASE}"
+        return f"{self.subject.name}:{MINIMUM_CASE}"
 
     def run(self) -> None:
         """Fail if too few checks of the component ran."""
@@ -83,7 +83,7 @@ class FloorCase:
             [self.examined.result(self.subject, one) for one in checks_for(self.subject)]
         )
         print(report.counts())  # noqa: T201 (pytest shows it beside a failure, and with -rP)
-        text = report.below_floor(self.subject.name, self.subject.role)
+        text = report.too_few_ran(self.subject.name, self.subject.role)
         if text:
             pytest.fail(text, pytrace=False)
 
@@ -110,12 +110,12 @@ class Examined:
             return Result(subject.name, subject.role, check.id, check.title, "skipped", why)
         return outcome_of(check, subject, self.expected)  # type: ignore[arg-type]
 
-    def cases(self) -> Iterator[BoundCheck | FloorCase]:
+    def cases(self) -> Iterator[BoundCheck | MinimumCase]:
         """Yield every check of every component, and after each component whether enough of them ran."""
         for subject in self.subjects:
             for check in checks_for(subject):
                 yield BoundCheck(check, subject, self)
-            yield FloorCase(subject, self)
+            yield MinimumCase(subject, self)
 
     def report(self, told: Callable[[Result], None] = lambda _: None) -> ConformanceReport:
         """Run every check and return the results; `told` is called with each of them."""
@@ -220,7 +220,7 @@ class Conformance:
             setattr(cls, "".join(c if c.isalnum() else "_" for c in test), _test_of(case))
 
 
-def _test_of(case: BoundCheck | FloorCase) -> Callable[[Any], None]:
+def _test_of(case: BoundCheck | MinimumCase) -> Callable[[Any], None]:
     def test(self: Any) -> None:
         case.run()
 

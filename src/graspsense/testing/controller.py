@@ -24,8 +24,8 @@ from graspsense.core.signals import (
     Phase,
 )
 from graspsense.testing import component
-from graspsense.testing.bench import CHANNELS_OF_FIELD, THINGS, bench
 from graspsense.testing.checks import CheckFailed, checks_of, demand
+from graspsense.testing.model_gripper import CHANNELS_OF_FIELD, OBJECTS, model_gripper
 from graspsense.testing.subject import Subject
 
 TICKS: Final = 4000
@@ -42,16 +42,16 @@ class Tick(NamedTuple):
     after: Any
 
 
-def ticks_of(subject: Subject, thing: str = "a soft thing") -> list[Tick]:
-    """Return the ticks of this law on the bench, until it ends the grasp or for four seconds; computed once."""
+def ticks_of(subject: Subject, object_name: str = "a soft object") -> list[Tick]:
+    """Return the ticks of this law on the model_gripper, until it ends the grasp or for four seconds; computed once."""
     kept: dict[str, list[Tick]] = subject.kept.setdefault("ticks", {})
-    if thing not in kept:
-        kept[thing] = fresh_ticks(subject, thing)
-    return kept[thing]
+    if object_name not in kept:
+        kept[object_name] = fresh_ticks(subject, object_name)
+    return kept[object_name]
 
 
 def fresh_ticks(
-    subject: Subject, thing: str = "a soft thing", channels: Any = None, first: int = 0
+    subject: Subject, object_name: str = "a soft object", channels: Any = None, first: int = 0
 ) -> list[Tick]:
     """Return the same ticks as `ticks_of`, computed again.
 
@@ -59,7 +59,7 @@ def fresh_ticks(
     """
     law = subject.create()
     step, params, state = type(law).step, law.params(), law.init()
-    gripper = bench(_all_channels() if channels is None else channels, thing)
+    gripper = model_gripper(_all_channels() if channels is None else channels, object_name)
     gripper.open(0)
     gripper.tare([])
     ticks: list[Tick] = []
@@ -71,8 +71,8 @@ def fresh_ticks(
             command, after = step(params, state, frame, pads)
         except Exception as error:
             raise CheckFailed(
-                f"step raised {named(error)} at t = {frame.t_s:.3f} s with {thing} between the fingers: a law answers "
-                "every frame with a command and a state; a channel that the gripper lacks is NaN"
+                f"step raised {named(error)} at t = {frame.t_s:.3f} s with {object_name} between the fingers: a law "
+                "answers every frame with a command and a state; a channel that the gripper lacks is NaN"
             ) from error
         ticks.append(Tick(state, frame, pads, command, after))
         state = after
@@ -209,13 +209,13 @@ def commands_are_numbers(subject: Subject) -> None:
 
 def commands_are_of_declared_kinds(subject: Subject) -> None:
     """Every command is of a kind that `commands` lists."""
-    for thing in THINGS:
-        for tick in ticks_of(subject, thing):
+    for object_name in OBJECTS:
+        for tick in ticks_of(subject, object_name):
             kind = tick.command.kind
             name = KINDS[kind] if 0 <= kind < len(KINDS) else str(kind)
             demand(
                 name in subject.entry.commands,
-                f"it commands {name} at t = {tick.frame.t_s:.3f} s with {thing} between the fingers; "
+                f"it commands {name} at t = {tick.frame.t_s:.3f} s with {object_name} between the fingers; "
                 "its entry declares "
                 f"{', '.join(subject.entry.commands) or 'none'}: add it to `commands`",
             )
@@ -223,12 +223,13 @@ def commands_are_of_declared_kinds(subject: Subject) -> None:
 
 def commands_are_finite(subject: Subject) -> None:
     """Values are finite, and limits are neither negative nor NaN, with any object between the fingers."""
-    for thing in THINGS:
-        for tick in ticks_of(subject, thing):
+    for object_name in OBJECTS:
+        for tick in ticks_of(subject, object_name):
             command = tick.command
             demand(
                 isfinite(command.value),
-                f"it commands {command.value} at t = {tick.frame.t_s:.3f} s with {thing} between the fingers: bound it",
+                f"it commands {command.value} at t = {tick.frame.t_s:.3f} s with {object_name} between the "
+                "fingers: bound it",
             )
             for name in ("effort_limit_n", "speed_limit_m_s"):
                 limit = getattr(command, name)
@@ -303,9 +304,9 @@ def handles_frames_of_nan(subject: Subject) -> None:
 
 def phases_are_in_order(subject: Subject) -> None:
     """The phases are APPROACH, SQUEEZE and HOLD, in this order."""
-    for thing in THINGS:
+    for object_name in OBJECTS:
         latest = APPROACH
-        for tick in ticks_of(subject, thing):
+        for tick in ticks_of(subject, object_name):
             phase = tick.after.phase
             demand(
                 APPROACH <= phase <= HOLD,
@@ -321,13 +322,13 @@ def phases_are_in_order(subject: Subject) -> None:
 
 def ends_every_grasp(subject: Subject) -> None:
     """With a soft object, a hard object and nothing, it ends the grasp by itself with a valid outcome."""
-    for thing in THINGS:
-        gripper = bench(_all_channels(), thing)
+    for object_name in OBJECTS:
+        gripper = model_gripper(_all_channels(), object_name)
         # If the controller does not end the grasp, the runner ends it after three more opening times.
         grasp = run_grasp(gripper, subject.create(), RunConfig(grasp_timeout_s=LONGEST_S))
         demand(
             grasp.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RUNNING),
-            f"with {thing} between the fingers the grasp ended as {grasp.outcome.words}: "
+            f"with {object_name} between the fingers the grasp ended as {grasp.outcome.words}: "
             f"{grasp.reason}. Let the state's "
             f"`outcome` leave RUNNING, after {LONGEST_S:g} s at the latest",
         )

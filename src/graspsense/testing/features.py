@@ -14,9 +14,9 @@ from graspsense.testing.samples import (
     COLUMNS_OF_CHANNEL,
     columns_of,
     copied,
-    odd_traces,
     shifted,
     squeeze,
+    unusual_traces,
     with_channels,
 )
 from graspsense.testing.subject import Subject
@@ -51,7 +51,7 @@ def _same(a: Features, b: Features) -> bool:
 def returns_the_declared_features(subject: Subject) -> None:
     """Names and units are those of the declared features, in their order, for every trace."""
     declared = tuple((feature.name, feature.unit) for feature in subject.entry.features)
-    for of, trace in {"a whole grasp": squeeze(), **odd_traces()}.items():
+    for of, trace in {"a whole grasp": squeeze(), **unusual_traces()}.items():
         features = _features(subject, trace, of)
         given = tuple(zip(features.names, features.units, strict=True))
         demand(
@@ -67,7 +67,7 @@ def _listed(features: tuple[tuple[str, str], ...]) -> str:
 
 def values_are_floats(subject: Subject) -> None:
     """Every value is a Python float, not an int or a scalar of numpy."""
-    for of, trace in {"a whole grasp": squeeze(), **odd_traces()}.items():
+    for of, trace in {"a whole grasp": squeeze(), **unusual_traces()}.items():
         features = _features(subject, trace, of)
         for name, value in zip(features.names, features.values, strict=True):
             demand(
@@ -88,7 +88,7 @@ def a_whole_grasp_has_features(subject: Subject) -> None:
 
 def handles_every_trace(subject: Subject) -> None:
     """Any trace (empty, short, without contact, without a channel, with gaps) gives values, or NaN with a reason."""
-    for of, trace in odd_traces().items():
+    for of, trace in unusual_traces().items():
         _features(subject, trace, of)
 
 
@@ -161,7 +161,7 @@ def views_and_copies_agree(subject: Subject) -> None:
 
 def survives_json(subject: Subject) -> None:
     """The features survive being written as JSON and read again."""
-    for of, trace in {"a whole grasp": squeeze(), **odd_traces()}.items():
+    for of, trace in {"a whole grasp": squeeze(), **unusual_traces()}.items():
         features = _features(subject, trace, of)
         again = json.loads(json.dumps(features.as_dict(), allow_nan=False))
         demand(again == features.as_dict(), f"on {of} {features.as_dict()} became {again} through JSON")

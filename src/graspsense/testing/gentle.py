@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import Final, NamedTuple
 
-from graspsense.core.contact import Stillness, at_rest, watch
+from graspsense.core.contact import RestState, at_rest, update_rest
 from graspsense.core.entries import KINDS
 from graspsense.core.roles import Controller
 from graspsense.core.signals import (
@@ -41,14 +41,14 @@ class GentleParams(NamedTuple):
 
 
 class GentleState(NamedTuple):
-    """The start of the grasp, the last gap, and the stillness."""
+    """The start of the grasp, the last gap, and the state of rest."""
 
     phase: int
     outcome: int
     begun_t_s: float
     gap_m: float
     before_m: float
-    still: Stillness
+    still: RestState
 
 
 def closing(kind: int, seconds: float, before_m: float, frame: Frame) -> Command:
@@ -73,8 +73,8 @@ def step(params: GentleParams, state: GentleState, frame: Frame, pads: Pads) -> 
     """Close until the gap is at rest, or for six seconds."""
     begun, gap, still = state.begun_t_s, state.gap_m, state.still
     if begun != begun:
-        begun, gap, still = frame.t_s, frame.gap_m, Stillness(frame.t_s, frame.gap_m)
-    still = watch(still, frame.t_s, frame.gap_m, REST_SPEED_M_S, REST_S)
+        begun, gap, still = frame.t_s, frame.gap_m, RestState(frame.t_s, frame.gap_m)
+    still = update_rest(still, frame.t_s, frame.gap_m, REST_SPEED_M_S, REST_S)
     phase, outcome = state.phase, state.outcome
     if phase == APPROACH and gap - frame.gap_m > 1e-3:
         phase = SQUEEZE
@@ -98,7 +98,7 @@ class GentleController(Controller[int]):
 
     def init(self) -> GentleState:
         """Return the state before the first tick."""
-        return GentleState(APPROACH, RUNNING, float("nan"), float("nan"), float("nan"), Stillness(0.0, 0.0))
+        return GentleState(APPROACH, RUNNING, float("nan"), float("nan"), float("nan"), RestState(0.0, 0.0))
 
 
 def kind_of(accepts: tuple[str, ...]) -> int:

@@ -100,7 +100,7 @@ def columns_of(trace: Trace) -> list[str]:
     return [one.name for one in fields(Trace) if isinstance(getattr(trace, one.name), np.ndarray)]
 
 
-def odd_traces() -> dict[str, Trace]:
+def unusual_traces() -> dict[str, Trace]:
     """Return the unusual traces that a feature set must handle, by their description."""
     whole = squeeze()
     return {
@@ -128,12 +128,12 @@ def _holed(trace: Trace) -> Trace:
     return holed
 
 
-def three_kinds(trials: int = 45, missing: bool = False) -> tuple[FeatureTable, list[str]]:
+def sample_table(trials: int = 45, missing: bool = False) -> tuple[FeatureTable, list[str]]:
     """Return a table of trials with three separable labels, and their labels.
 
     With `missing`, values are missing at random.
 
-    >>> table, labels = three_kinds(6)
+    >>> table, labels = sample_table(6)
     >>> table.values.shape, labels[:2]
     ((6, 4), ['bottle:full_open', 'bottle:empty_open'])
     """
@@ -158,8 +158,8 @@ def a_trial() -> Trial:
     names = ("p_first", "f_steady")
     return Trial(
         run=RunInfo(
-            components={"gripper": "graspsense-test/bench 0.1"},
-            settings={"run": {"seed": 7}, "gripper": {"type": "graspsense-test/bench"}},
+            components={"gripper": "graspsense-test/model_gripper 0.1"},
+            settings={"run": {"seed": 7}, "gripper": {"type": "graspsense-test/model_gripper"}},
             seed=7,
             labels={"object": "bottle:full"},
         ),
@@ -171,7 +171,7 @@ def a_trial() -> Trial:
         ),
         prediction=None,
         device=DeviceInfo(
-            name="bench",
+            name="model_gripper",
             clock="virtual",
             simulated=True,
             rate_hz=RATE_HZ,

@@ -21,10 +21,10 @@ from graspsense.plugin_api import (
     Controller,
     Frame,
     Pads,
-    Stillness,
+    RestState,
     at_rest,
     setting,
-    watch,
+    update_rest,
 )
 
 
@@ -89,16 +89,16 @@ class State(NamedTuple):
     phase: int
     outcome: int
     seconds: float
-    still: Stillness
+    still: RestState
 
 
 def step(params: CloseUntilStoppedConfig, state: State, frame: Frame, pads: Pads) -> tuple[Command, State]:
     """Close; squeeze from contact on; hold when the fingers are at rest."""
     phase, outcome, seconds = state.phase, state.outcome, state.seconds + frame.dt_s
-    still = watch(state.still, frame.t_s, frame.gap_m, params.rest_speed_m_s, params.rest_window_s)
+    still = update_rest(state.still, frame.t_s, frame.gap_m, params.rest_speed_m_s, params.rest_window_s)
     if outcome == RUNNING:
         if phase == APPROACH and frame.effort_n >= params.contact_effort_n:
-            phase, still = SQUEEZE, Stillness(frame.t_s, frame.gap_m)
+            phase, still = SQUEEZE, RestState(frame.t_s, frame.gap_m)
         elif phase == SQUEEZE and at_rest(still, frame.t_s, params.rest_window_s):
             phase, outcome = HOLD, STEADY
         elif frame.gap_m <= params.closed_gap_m:
@@ -118,4 +118,4 @@ class CloseUntilStopped(Controller[CloseUntilStoppedConfig]):
 
     def init(self) -> State:
         """Return the state before the first tick."""
-        return State(APPROACH, RUNNING, 0.0, Stillness(0.0, 0.0))
+        return State(APPROACH, RUNNING, 0.0, RestState(0.0, 0.0))

@@ -227,7 +227,7 @@ class C45Classifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
             # The check is slow, and it can find nothing wrong with integers.
             check_classification_targets(y)
         if len(labels) != n_rows:
-            raise ValueError(f"{len(labels)} labels for {n_rows} rows; there must be one a row")
+            raise ValueError(f"{len(labels)} labels for {n_rows} rows; give one label per row")
         try:
             present, codes = np.unique(labels, return_inverse=True)
         except TypeError:

@@ -43,10 +43,10 @@ def make_table(
     if x.ndim != 2 or x.shape[1] != len(schema.attributes):
         raise ValueError(f"values have the shape {x.shape}; expected (rows, {len(schema.attributes)})")
     if y.shape != (x.shape[0],):
-        raise ValueError(f"labels have the shape {y.shape}; expected ({x.shape[0]},), one a row")
+        raise ValueError(f"labels have the shape {y.shape}; expected ({x.shape[0]},), one per row")
     w = np.ones(x.shape[0]) if weights is None else np.asarray(weights, dtype=np.float64)
     if w.shape != y.shape:
-        raise ValueError(f"weights have the shape {w.shape}; expected {y.shape}, one a row")
+        raise ValueError(f"weights have the shape {w.shape}; expected {y.shape}, one per row")
     check_values(schema, x)
     if y.size and (y.min() < MISSING_CLASS or y.max() >= len(schema.classes)):
         raise ValueError(f"labels must be in 0..{len(schema.classes) - 1} or {MISSING_CLASS} (missing class)")

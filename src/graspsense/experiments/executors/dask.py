@@ -188,7 +188,7 @@ class DaskCluster:
 def _done(task: Task, answer: str | Exception) -> TaskResult:
     """Return the result of a task, from its answer or from the exception that prevented it."""
     if isinstance(answer, Exception):
-        return TaskResult.failed(task, f"its worker could not do it: {named(answer)}")
+        return TaskResult.failed(task, f"the worker failed: {named(answer)}")
     return TaskResult.from_text(answer)
 
 

@@ -70,8 +70,8 @@ def compare_classifiers(part: str, title: str, conditions: Sequence[ConditionRes
         "classifier",
         "recognised",
         "95 % of the mean",
-        f"points above {base.classifier}",
-        "95 % of that",
+        f"points more than {base.classifier}",
+        "95 % of the difference",
         "p",
     )
     tables = [

@@ -1,4 +1,4 @@
-"""The task `next_squeeze`: stop when sure enough, or else squeeze with the force that promises most per second.
+"""The task `next_squeeze`: stop when sure enough, or else squeeze with the most informative force per second.
 
 At contact, the width alone gives a first prediction. Each squeeze then gives a prediction from all features, at its own
 force. A cross validation within the training trials measures how often each label gets each prediction at each force.
@@ -62,7 +62,7 @@ class NextSqueezeSettings(CostSettings):
 
 
 @frozen(kw_only=True, eq=False)
-class SqueezeAnswers:
+class SqueezePredictions:
     """The predictions for the test trials at one force, as numbers of labels, and the seconds of each squeeze."""
 
     answer: NDArray[np.int64]
@@ -70,13 +70,13 @@ class SqueezeAnswers:
 
 
 @frozen(kw_only=True, eq=False)
-class Promise:
-    """What a force promises: how often each label (row) gets each prediction, and the mean seconds of each label."""
+class SqueezeStatistics:
+    """Squeezes at one force: how often each label (row) gets each prediction, and its mean seconds."""
 
     confusion: Floats
     seconds: Floats
 
-    def rate(self, belief: Floats, again_s: float) -> float:
+    def information_rate(self, belief: Floats, again_s: float) -> float:
         """Return the expected information of a squeeze, in bits per second.
 
         `belief` holds the probabilities of the labels, `again_s` the time to open and close before the squeeze.
@@ -87,11 +87,11 @@ class Promise:
 
 
 @frozen(kw_only=True, eq=False)
-class Forces:
-    """The predictions and promises of every force, for one fold."""
+class ForceChoices:
+    """The predictions and the statistics of every force, for one fold."""
 
-    answers: Mapping[float, SqueezeAnswers]
-    promises: Mapping[float, Promise]
+    answers: Mapping[float, SqueezePredictions]
+    statistics: Mapping[float, SqueezeStatistics]
 
 
 @frozen(kw_only=True)
@@ -110,8 +110,8 @@ def _entropy(shares: Floats) -> float:
 
 def decide(
     trial: int,
-    contact: tuple[SqueezeAnswers, Promise],
-    forces: Forces,
+    contact: tuple[SqueezePredictions, SqueezeStatistics],
+    choices: ForceChoices,
     *,
     sure: float,
     most: int,
@@ -129,14 +129,16 @@ def decide(
     seconds = 0.0
     used: list[float] = []
     while True:
-        left = [force for force in forces.answers if force not in used]
+        left = [force for force in choices.answers if force not in used]
         opens = again_s if used else 0.0
-        best = max(left, key=lambda force: forces.promises[force].rate(belief, opens), default=None)
+        best = max(
+            left, key=lambda force: choices.statistics[force].information_rate(belief, opens), default=None
+        )
         if best is None or belief.max() >= sure or len(used) >= most:
             return Decision(answer=int(belief.argmax()), seconds=seconds, squeezes=len(used))
-        answers = forces.answers[best]
+        answers = choices.answers[best]
         seconds += opens + float(answers.seconds[trial])
-        evidence = evidence * forces.promises[best].confusion[:, answers.answer[trial]]
+        evidence = evidence * choices.statistics[best].confusion[:, answers.answer[trial]]
         belief = _normalised(evidence)
         used.append(best)
 
@@ -214,19 +216,19 @@ def _decisions(
         learned = {
             force: learning.learned(table, seconds[force], training, test) for force, table in tables.items()
         }
-        forces = Forces(
+        choices = ForceChoices(
             answers={force: answers for force, (answers, _) in learned.items()},
-            promises={force: promise for force, (_, promise) in learned.items()},
+            statistics={force: statistics for force, (_, statistics) in learned.items()},
         )
         for k, i in enumerate(test.tolist()):
             true = str(learning.true[i])
-            for force, answers in forces.answers.items():
+            for force, answers in choices.answers.items():
                 single = Decision(
                     answer=int(answers.answer[k]), seconds=float(answers.seconds[k]), squeezes=1
                 )
                 decisions.setdefault(fixed_name(force), []).append((true, single))
             for sure in settings.sure:
-                decision = decide(k, contact, forces, sure=sure, most=settings.most, again_s=again_s)
+                decision = decide(k, contact, choices, sure=sure, most=settings.most, again_s=again_s)
                 decisions.setdefault(f"sequential, sure at {sure:g}", []).append((true, decision))
     return decisions
 
@@ -257,10 +259,10 @@ class _Learning:
 
     def learned(
         self, table: FeatureTable, seconds: Floats, training: NDArray[np.int64], test: NDArray[np.int64]
-    ) -> tuple[SqueezeAnswers, Promise]:
-        """Return the predictions for the test trials, and the promise measured within the training trials."""
-        answers = SqueezeAnswers(answer=self._answers(table, training, test), seconds=seconds[test])
-        return answers, self._promise(table, training, seconds)
+    ) -> tuple[SqueezePredictions, SqueezeStatistics]:
+        """Return the predictions for the test trials, and the statistics measured within the training trials."""
+        answers = SqueezePredictions(answer=self._answers(table, training, test), seconds=seconds[test])
+        return answers, self._statistics(table, training, seconds)
 
     def _answers(
         self, table: FeatureTable, training: NDArray[np.int64], test: NDArray[np.int64]
@@ -272,7 +274,9 @@ class _Learning:
         answers: NDArray[np.int64] = numbers[classifier.probabilities(table.rows(test)).argmax(axis=1)]
         return answers
 
-    def _promise(self, table: FeatureTable, training: NDArray[np.int64], seconds: Floats) -> Promise:
+    def _statistics(
+        self, table: FeatureTable, training: NDArray[np.int64], seconds: Floats
+    ) -> SqueezeStatistics:
         known = self.true[training].tolist()
         instances = [self.instances[i] for i in training.tolist()]
         folds = instance_held_out(known, instances, INNER_FOLDS, self.seed)
@@ -284,4 +288,4 @@ class _Learning:
             answers = self._answers(table, training[inner], training[other])
             np.add.at(counts, (true[other], answers), 1.0)
         means = np.array([seconds[training[true == k]].mean() for k in range(n)])
-        return Promise(confusion=counts / counts.sum(axis=1, keepdims=True), seconds=means)
+        return SqueezeStatistics(confusion=counts / counts.sum(axis=1, keepdims=True), seconds=means)

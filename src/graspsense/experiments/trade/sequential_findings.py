@@ -31,14 +31,14 @@ def compare_sequential(
             faster.append((point, saved))
     header = (
         "case",
-        "seconds from contact",
+        "s from contact to the answer",
         "squeezes",
         "recognised",
         "95 % of the mean",
-        f"points above {fixed_n:g} N",
-        "95 % of that",
-        f"seconds above {fixed_n:g} N",
-        "95 % of that",
+        f"points more than with {fixed_n:g} N",
+        "95 % of the difference in points",
+        f"s more than with {fixed_n:g} N",
+        "95 % of the difference in s",
         "on the Pareto front",
     )
     text = _text(fixed, fixed_n, faster)

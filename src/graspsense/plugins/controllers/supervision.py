@@ -30,11 +30,11 @@ from graspsense.plugin_api import (
     TOO_WIDE,
     Channel,
     Frame,
-    Stillness,
+    RestState,
     at_rest,
     both_touch,
     setting,
-    watch,
+    update_rest,
 )
 
 LAW_CHANNELS: Final = (
@@ -163,7 +163,7 @@ class GraspProgress(NamedTuple):
     start_gap_m: float
     deadline_s: float
     """Time at which the approach, later the squeeze, has taken too long."""
-    still: Stillness
+    still: RestState
     peak_force_n: float
     peak_gap_m: float
     felt_t_s: float
@@ -198,7 +198,7 @@ def supervision(
 
 def not_begun() -> GraspProgress:
     """Return the progress before the first tick."""
-    return GraspProgress(APPROACH, RUNNING, 0, 0.0, 0.0, Stillness(0.0, 0.0), 0.0, 0.0, 0.0)
+    return GraspProgress(APPROACH, RUNNING, 0, 0.0, 0.0, RestState(0.0, 0.0), 0.0, 0.0, 0.0)
 
 
 def supervise(params: Supervision, now: GraspProgress, frame: Frame) -> GraspProgress:
@@ -227,7 +227,7 @@ def _approaching(params: Supervision, now: GraspProgress, frame: Frame) -> Grasp
         if start_gap - gap >= params.too_wide_m or begun == 0:
             force = 0.5 * (left + right)
             deadline = t + params.steady_timeout_s
-            return GraspProgress(SQUEEZE, RUNNING, 1, start_gap, deadline, Stillness(t, gap), force, gap, t)
+            return GraspProgress(SQUEEZE, RUNNING, 1, start_gap, deadline, RestState(t, gap), force, gap, t)
         outcome = TOO_WIDE
     elif gap <= params.closed_gap_m:
         outcome = NOTHING_THERE
@@ -235,13 +235,13 @@ def _approaching(params: Supervision, now: GraspProgress, frame: Frame) -> Grasp
         outcome = ONE_FINGER if left >= contact or right >= contact else NOTHING_THERE
     if outcome == RUNNING and begun == 1:
         return now
-    return GraspProgress(APPROACH, outcome, 1, start_gap, deadline, Stillness(t, gap), 0.0, gap, t)
+    return GraspProgress(APPROACH, outcome, 1, start_gap, deadline, RestState(t, gap), 0.0, gap, t)
 
 
 def _squeezing(params: Supervision, now: GraspProgress, frame: Frame) -> GraspProgress:
     t, gap, left, right = frame.t_s, frame.gap_m, frame.force_left_n, frame.force_right_n
     force = 0.5 * (left + right)
-    still = watch(now.still, t, gap, params.rest_speed_m_s, params.rest_window_s)
+    still = update_rest(now.still, t, gap, params.rest_speed_m_s, params.rest_window_s)
     peak_force, peak_gap, felt_t = now.peak_force_n, now.peak_gap_m, now.felt_t_s
     if force > peak_force:
         peak_force, peak_gap = force, gap

@@ -32,7 +32,7 @@ CHANNELS_OF_FIELD: Final = {
 }
 
 
-class Bench(SensorBackend[None]):
+class ModelGripper(SensorBackend[None]):
     """A gripper with a stroke of 80 mm, at 1 kHz, that accepts every kind of command; channels not given are NaN.
 
     Between its fingers is an object of width `width_m` (0: nothing) and stiffness `stiffness_n_m`.
@@ -50,7 +50,7 @@ class Bench(SensorBackend[None]):
         self._gap, self._speed, self._effort, self._ticks = OPEN_M - 0.002, 0.0, 0.0, 0
         self._pads = NO_PADS
         return DeviceInfo(
-            name="bench",
+            name="model_gripper",
             clock="virtual",
             simulated=True,
             rate_hz=1.0 / DT_S,
@@ -112,13 +112,13 @@ class Bench(SensorBackend[None]):
         return self._stiffness_n_m * max(self._width_m - self._gap, 0.0)
 
 
-def bench(channels: Any, thing: str = "a soft thing") -> Bench:
-    """Return a model gripper with these channels and one of `THINGS` as the object, to drive a controller with.
+def model_gripper(channels: Any, object_name: str = "a soft object") -> ModelGripper:
+    """Return a model gripper with these channels and one of `OBJECTS` as the object, to drive a controller with.
 
-    >>> sorted(THINGS)
-    ['a hard thing', 'a soft thing', 'nothing']
+    >>> sorted(OBJECTS)
+    ['a hard object', 'a soft object', 'nothing']
     """
-    return Bench(frozenset(channels), *THINGS[thing])
+    return ModelGripper(frozenset(channels), *OBJECTS[object_name])
 
 
 def drive(controller: Controller[Any], gripper: SensorBackend[Any]) -> Grasp:
@@ -126,7 +126,7 @@ def drive(controller: Controller[Any], gripper: SensorBackend[Any]) -> Grasp:
 
     >>> from graspsense.plugin_api import create
     >>> channels = ("gap", "velocity", "effort", "force_left", "force_right")
-    >>> drive(create("controller", "hybrid"), bench(channels, "a soft thing")).outcome.words
+    >>> drive(create("controller", "hybrid"), model_gripper(channels, "a soft object")).outcome.words
     'steady'
     """
     from graspsense.core.run_config import RunConfig
@@ -135,8 +135,8 @@ def drive(controller: Controller[Any], gripper: SensorBackend[Any]) -> Grasp:
     return run_grasp(gripper, controller, RunConfig())
 
 
-THINGS: Final = {
-    "a soft thing": (0.05, 1500.0),
-    "a hard thing": (0.05, 40000.0),
+OBJECTS: Final = {
+    "a soft object": (0.05, 1500.0),
+    "a hard object": (0.05, 40000.0),
     "nothing": (0.0, 0.0),
 }
