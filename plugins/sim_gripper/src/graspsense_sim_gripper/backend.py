@@ -28,7 +28,7 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.build import CELL_OFFSET, EFFORT_LIMIT_N, build, device_info, instantiate
-from graspsense_sim_gripper.compiled.compose import INTERPRETED, Composition, composed_move
+from graspsense_sim_gripper.compiled.compose import INTERPRETED, composed_move, composition
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState, is_finite
 from graspsense_sim_gripper.exact.discretise import discretise
@@ -109,10 +109,8 @@ class SimBackend(BatchBackend[SimConfig]):
         self._setup = setup = instantiate(problem, self._reduction, seed)
         exact = discretise(self.config, setup)
         self._plant: PlantParams | ExactPlant = setup.plant if exact is None else exact[0]
-        composition = Composition(
-            setup.kinds, None if exact is None else exact[1], setup.plant.steps.settle > 0.0
-        )
-        self._move = composed_move(composition)
+        shape = None if exact is None else exact[1]
+        self._move = composed_move(composition(setup.kinds, setup.plant, shape))
         self._state, self._sensor = setup.state, setup.sensor_state
         self._ticks = 0
         zero = (CELL_OFFSET[0],) * CELLS

@@ -33,7 +33,7 @@ from graspsense_sim_gripper.objects.instance import Instance, cell_weights, cent
 from graspsense_sim_gripper.objects.library import find, split_number
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.problem import GraspSetup, Problem
-from graspsense_sim_gripper.reduction.candidates import reduced
+from graspsense_sim_gripper.reduction.candidates import reduce_plant
 from graspsense_sim_gripper.reduction.levels import step_tolerance
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
@@ -116,8 +116,7 @@ def instantiate(problem: Problem, reduction: Reduction | None, seed: int) -> Gra
     if problem.spec is not None:
         instance = sample(problem.spec, rng if config.spread else None, problem.number)
         _check_fit(config, instance)
-    setup = _setup(config, instance, rng)
-    return setup if reduction is None else reduced(setup, reduction)
+    return _setup(config, instance, rng, reduction)
 
 
 def unverified_setup(config: SimConfig, scene: str | ObjectSpec | None, seed: int) -> GraspSetup:
@@ -130,9 +129,13 @@ def unverified_setup(config: SimConfig, scene: str | ObjectSpec | None, seed: in
     return instantiate(problem, reduction, seed)
 
 
-def _setup(config: SimConfig, instance: Instance | None, rng: np.random.Generator) -> GraspSetup:
-    """Return the grasp of an instance with all its terms."""
+def _setup(
+    config: SimConfig, instance: Instance | None, rng: np.random.Generator, reduction: Reduction | None = None
+) -> GraspSetup:
+    """Return the grasp of an instance in its reduced model; `reduction` None: with all its terms."""
     plant, state = _plant(config, instance, rng)
+    if instance is not None and reduction is not None:
+        plant = reduce_plant(plant, instance.kinds, reduction)
     sensor = _sensor(config, instance, rng)
     return GraspSetup(
         kinds=instance.kinds if instance else (),

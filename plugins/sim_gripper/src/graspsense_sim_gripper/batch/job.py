@@ -44,7 +44,8 @@ TICKS: Final = 8200
 """Ticks that the buffers hold at first; a grasp that needs more continues with longer ones. Not a power of two: all
 columns would then share one set of a processor's cache, and evict each other."""
 IMAGES: Final = 128
-"""Cell images that the buffers hold at first."""
+"""Cell images that the buffers hold at first, a multiple of a block of noise. A grasp that needs more draws more noise
+then: drawing is a sixth of the time of a grasp."""
 
 Extracted = Any
 """What `Job.extract` returns, such as features."""
@@ -161,11 +162,10 @@ class Storage:
 def grasp_compiled(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> FinishedGrasp:
     """Grasp with the compiled loop of the setup's `composition_of`."""
     try:
-        done = grasp_once(job, padded(setup), loop, storage, on_arrays=True)
+        return grasp_once(job, padded(setup), loop, storage, on_arrays=True, own=setup)
     except LAW_ERRORS:
         # Compiled code does not say which term raised it.
         return grasp_plain(job, setup)
-    return evolve(done, state=unpadded(done.state, setup))
 
 
 def grasp_plain(job: Job, setup: GraspSetup) -> FinishedGrasp:
@@ -180,12 +180,22 @@ def grasp_plain(job: Job, setup: GraspSetup) -> FinishedGrasp:
 
 
 def grasp_once(
-    job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage, *, on_arrays: bool
+    job: Job,
+    setup: GraspSetup,
+    loop: GraspLoop,
+    storage: Storage,
+    *,
+    on_arrays: bool,
+    own: GraspSetup | None = None,
 ) -> FinishedGrasp:
-    """Grasp what `setup` describes with the loop, on arrays where it is compiled, on lists where it is not."""
+    """Grasp what `setup` describes with the loop, on arrays where it is compiled, on lists where it is not.
+
+    `own`: the same grasp before it was padded; the plant is returned with its terms.
+    """
     end, buffers = _run(job, setup, loop, storage, on_arrays)
+    plant = end.plant if own is None else unpadded(end.plant, own)
     if on_arrays:
-        storage.buffers = buffers
+        storage.buffers = _first_images(buffers)
     outcome, reason = ended_by_itself(end.controller)
     if end.loop.failed == 1:
         outcome = Outcome.ABORTED
@@ -193,19 +203,21 @@ def grasp_once(
     elif not has_ended(end.controller):
         outcome, reason = Outcome.ABORTED, overdue(job.run)
     if not job.traces and job.extract is None:
-        return finished(job, outcome, reason, end.plant, None)
+        return finished(job, outcome, reason, plant, None)
     n, k = end.loop.recorded, end.sensor.images
     columns, phases = buffers.columns, buffers.phases
     table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
     images, times = np.asarray(buffers.pads.images[:k]), np.asarray(buffers.image_times[:k])
     if job.traces and 2 * n < len(columns[0]):
-        return finished(job, outcome, reason, end.plant, _trace(table.copy(), numbers.copy(), images, times))
+        return finished(job, outcome, reason, plant, _trace(table.copy(), numbers.copy(), images, times))
     # A trace that fills most of the buffers, or that only features are extracted from, is a view of them.
     # While a column of it is referenced, those buffers are kept, and the next grasps have new ones.
     references = sys.getrefcount(columns), sys.getrefcount(phases)
-    done = finished(job, outcome, reason, end.plant, _trace(table, numbers, images, times))
+    done = finished(job, outcome, reason, plant, _trace(table, numbers, images, times))
     if on_arrays and (sys.getrefcount(columns), sys.getrefcount(phases)) != references:
-        storage.buffers = buffers._replace(columns=np.empty_like(columns), phases=np.empty_like(phases))
+        storage.buffers = _first_images(buffers)._replace(
+            columns=np.empty_like(columns), phases=np.empty_like(phases)
+        )
     return done
 
 
@@ -226,7 +238,7 @@ def _run(
     blocks, ideal = setup.noise(), setup.sensor.ideal == 1
     buffers = storage.buffers
     if not ideal:
-        _draw_noise(buffers.pads.noise, blocks, 0)
+        _draw_noise(buffers.pads.noise, blocks)
     buffers.pads.images[-1] = math.nan
     zeros = np.full((2, CELLS), CELL_OFFSET[0])
     buffers = buffers._replace(pads=buffers.pads._replace(left_zero=zeros[0], right_zero=zeros[1]))
@@ -247,15 +259,17 @@ def _run(
         ended = has_ended(progress.controller) or progress.loop.failed == 1
         if ended or progress.loop.ticks >= params.max_ticks:
             return progress, buffers
-        buffers = _doubled(buffers)
-        if not ideal:
-            _draw_noise(buffers.pads.noise, blocks, len(buffers.pads.noise) // 2)
+        if not ideal and progress.sensor.images == len(buffers.pads.images):
+            buffers = _with_more_images(buffers, next(blocks))
+        else:
+            buffers = _with_more_ticks(buffers)
         if not on_arrays:
             buffers = _as_lists(buffers)
 
 
-def _draw_noise(noise: NDArray[np.float64], blocks: Iterator[NDArray[np.float64]], begin: int) -> None:
-    """Fill `noise` from row `begin` on with whole blocks."""
+def _draw_noise(noise: NDArray[np.float64], blocks: Iterator[NDArray[np.float64]]) -> None:
+    """Fill `noise` with whole blocks."""
+    begin = 0
     while begin < len(noise):
         block = next(blocks)
         noise[begin : begin + len(block)] = block
@@ -263,26 +277,38 @@ def _draw_noise(noise: NDArray[np.float64], blocks: Iterator[NDArray[np.float64]
 
 
 def _as_lists(buffers: Buffers) -> Buffers:
-    pads = PadBuffers(*(array.tolist() for array in buffers.pads))
-    return Buffers(pads, *(array.tolist() for array in buffers[1:]))
+    pads = PadBuffers(*(np.asarray(array).tolist() for array in buffers.pads))
+    return Buffers(pads, *(np.asarray(array).tolist() for array in buffers[1:]))
 
 
-def _doubled(buffers: Buffers) -> Buffers:
-    """Return arrays of twice the length that begin with the same values."""
-
-    def doubled(values: Any, axis: int = 0) -> NDArray[Any]:
-        array = np.asarray(values)
-        return np.concatenate([array, np.zeros_like(array)], axis=axis)
-
-    pads = buffers.pads
-    images = doubled(pads.images)
+def _with_more_images(buffers: Buffers, noise: NDArray[np.float64]) -> Buffers:
+    """Return buffers for as many more images as `noise` has rows; they begin with the same values."""
+    left_zero, right_zero, drawn, images = (np.asarray(array) for array in buffers.pads)
+    images = np.concatenate([images, np.zeros((len(noise), 2, CELLS))])
     images[-1] = math.nan
-    zeros = np.asarray(pads.left_zero), np.asarray(pads.right_zero)
-    return Buffers(
-        pads=PadBuffers(*zeros, doubled(pads.noise), images),
-        image_times=doubled(buffers.image_times),
-        columns=doubled(buffers.columns, axis=1),
-        phases=doubled(buffers.phases),
+    return buffers._replace(
+        pads=PadBuffers(left_zero, right_zero, np.concatenate([drawn, noise]), images),
+        image_times=np.concatenate([np.asarray(buffers.image_times), np.zeros(len(noise))]),
+    )
+
+
+def _with_more_ticks(buffers: Buffers) -> Buffers:
+    """Return buffers for twice as many ticks; they begin with the same values."""
+    columns, phases = np.asarray(buffers.columns), np.asarray(buffers.phases)
+    return buffers._replace(
+        columns=np.concatenate([columns, np.zeros_like(columns)], axis=1),
+        phases=np.concatenate([phases, np.zeros_like(phases)]),
+    )
+
+
+def _first_images(buffers: Buffers) -> Buffers:
+    """Return the buffers with the images that every grasp begins with, so that none draws noise which it needs not."""
+    pads = buffers.pads
+    if len(pads.images) == IMAGES:
+        return buffers
+    return buffers._replace(
+        pads=pads._replace(noise=pads.noise[:IMAGES], images=pads.images[:IMAGES]),
+        image_times=buffers.image_times[:IMAGES],
     )
 
 

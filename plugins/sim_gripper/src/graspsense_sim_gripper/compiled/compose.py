@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import Frame, bind, maker, tick
-from graspsense_sim_gripper.binding import Constructors, bind_reachable
+from graspsense_sim_gripper.binding import Constructors, FunctionT, bind_reachable
 from graspsense_sim_gripper.dynamics.contact import BalanceSearch, ObjectModel, PadLoad, solve_contact
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
@@ -25,7 +25,7 @@ from graspsense_sim_gripper.stepping.converge import refine_until_converged
 from graspsense_sim_gripper.stepping.implicit import SpeedSearch
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start
 from graspsense_sim_gripper.stepping.tr_bdf2 import Stage
-from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
+from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper, lumped
 from graspsense_sim_gripper.terms.registry import find_term, laws_of, phases_of
 from graspsense_sim_gripper.terms.switchable import Switchable
 from graspsense_sim_gripper.terms.term import LAW_ERRORS, NO_STATE, Law, Phase
@@ -113,6 +113,32 @@ def sum_of(laws: Sequence[Law]) -> Law:
     return bind(_sum_of_more, first=laws[0], second=laws[1], third=laws[2], rest=sum_of(laws[3:]))
 
 
+def active_laws(kinds: Sequence[str]) -> list[Law]:
+    """Return the laws that `laws_of` makes switchable: that of the lumped spring and damper, then that of each term."""
+    return [lumped, *(find_term(kind)[1].law for kind in kinds)]
+
+
+def sum_of_active(laws: Sequence[Law]) -> Law:
+    """Return what `sum_of` computes with `laws_of`, bit for bit, in a form that suits the interpreter.
+
+    It takes the `active_laws`, calls those of the active terms only, and cannot be compiled.
+    """
+    from_last = tuple(reversed(list(enumerate(laws))))
+
+    def force_of_active(
+        params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+    ) -> tuple[float, TermsStates]:
+        total, after = 0.0, list(states)
+        for i, law in from_last:
+            active, term = params[i]
+            if active == 1:
+                force, after[i] = law(term, after[i], d0, d1, h, v1)
+                total = force + total
+        return total, tuple(after)
+
+    return force_of_active
+
+
 def _no_phase(states: TermsStates) -> int:
     return 0
 
@@ -158,34 +184,57 @@ class Composition(NamedTuple):
     """That of the exact discretisation, where it advances the plant."""
     converges: bool
     """Whether the steps of a tick are halved until the result no longer changes."""
+    lags: bool = False
+    """Whether the force of the drive lags behind the command."""
+
+
+def composition(kinds: tuple[str, ...], plant: PlantParams, shape: Shape | None) -> Composition:
+    """Return what the loop of this plant is composed of; `shape`: of its exact discretisation, if it has one."""
+    return Composition(kinds, shape, plant.steps.settle > 0.0, plant.drive.lag_s > 0.0)
 
 
 @lru_cache(maxsize=64)
 def contact_solver(kinds: tuple[str, ...]) -> ContactSolver:
     """Return `solve_contact` for an object of these terms."""
-    return bind_reachable(solve_contact, {"object_force": sum_of(laws_of(kinds))}, INTERPRETED)
+    return bind_reachable(solve_contact, {"object_force": sum_of_active(active_laws(kinds))}, INTERPRETED)
 
 
 def plant_move(
-    laws: Sequence[Law], phases: Sequence[tuple[int, Phase]] = (), *, converges: bool = True
+    laws: Sequence[Law],
+    phases: Sequence[tuple[int, Phase]] = (),
+    *,
+    converges: bool = True,
+    lags: bool = True,
 ) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
     """Return `move` for an object whose force is the sum of these laws, with the events of `phases_of`.
 
-    `converges`: whether the steps of a tick may be halved until the result no longer changes.
+    `converges`: whether the steps of a tick may be halved until the result no longer changes; `lags`: whether the force
+    of the drive may lag behind the command.
     """
-    over_a_tick = refine_until_converged if converges else advance
+    over_a_tick: PlantMove = refine_until_converged if converges else advance
+    if lags:
+        over_a_tick = bind(move, advance=over_a_tick)
     parts = {"object_force": sum_of(laws), "object_phase": phase_of_all(phases)}
-    return bind_reachable(bind(move, advance=over_a_tick), parts)
+    return bind_reachable(over_a_tick, parts)
 
 
 @lru_cache(maxsize=64)
 def composed_move(composition: Composition, *, interpreted: bool = True) -> PlantMove:
     """Return what advances the plant by a tick; not `interpreted`: to be compiled."""
-    kinds = composition.kinds
-    move: PlantMove = plant_move(laws_of(kinds), phases_of(kinds), converges=composition.converges)
+    kinds, move = composition.kinds, _step_move(composition)
     if composition.shape is not None:
         move = bind_move(kinds, composition.shape, move)
-    return bind_reachable(move, {}, INTERPRETED) if interpreted else move
+    if not interpreted:
+        return move
+    return bind_reachable(move, {"object_force": sum_of_active(active_laws(kinds))}, INTERPRETED)
+
+
+def _step_move(composition: Composition) -> PlantMove:
+    """Return what advances the plant by a tick in time steps."""
+    kinds = composition.kinds
+    return plant_move(
+        laws_of(kinds), phases_of(kinds), converges=composition.converges, lags=composition.lags
+    )
 
 
 @lru_cache(maxsize=64)
@@ -193,21 +242,22 @@ def grasp_loop(
     composition: Composition, step: ControllerStep, *, interpreted: bool = True
 ) -> Callable[..., SimulationState]:
     """Return the loop of a grasp under a controller with this step; not `interpreted`: to be compiled."""
-    return _loop_of(composed_move(composition, interpreted=False), step, interpreted)
+    force = sum_of_active(active_laws(composition.kinds)) if interpreted else None
+    return _loop_of(composed_move(composition, interpreted=False), step, force)
 
 
 @lru_cache(maxsize=64)
 def guarded_loop(composition: Composition, step: ControllerStep) -> Callable[..., SimulationState]:
     """Return the loop of a grasp by steps in the interpreter, in which a law that raises an exception gives NaN."""
-    kinds = composition.kinds
-    laws = [_guarded(law) for law in laws_of(kinds)]
-    return _loop_of(plant_move(laws, phases_of(kinds), converges=composition.converges), step, True)
+    force = sum_of_active([_guarded(law) for law in active_laws(composition.kinds)])
+    return _loop_of(_step_move(composition), step, force)
 
 
-def _loop_of(move: PlantMove, step: ControllerStep, interpreted: bool) -> Callable[..., SimulationState]:
+def _loop_of(move: PlantMove, step: ControllerStep, force: Law | None) -> Callable[..., SimulationState]:
+    """Return the loop with this plant; `force`: of the object, in the form that suits the interpreter."""
     control = bind_reachable(tick, {"step": step})
     loop = bind_reachable(grasp, {"move": move, "control": control})
-    return bind_reachable(loop, {}, INTERPRETED) if interpreted else loop
+    return bind_reachable(loop, {"object_force": force}, INTERPRETED) if force else loop
 
 
 def _guarded(law: Law) -> Law:

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from attrs import evolve
 
-from graspsense_sim_gripper.compiled.compose import Composition
+from graspsense_sim_gripper.compiled.compose import Composition, composition
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import ContactState, PlantState
 from graspsense_sim_gripper.exact.discretise import discretise
@@ -77,7 +77,7 @@ def composition_of(config: SimConfig, setup: GraspSetup, *, pad: bool = True) ->
     """Return the composition in which a grasp is compiled; not `pad`: with the object's own terms."""
     exact = discretise(config, setup, on_arrays=True)
     kinds = layout_of(setup).kinds if pad else setup.kinds
-    return Composition(kinds, None if exact is None else exact[1], setup.plant.steps.settle > 0.0)
+    return composition(kinds, setup.plant, None if exact is None else exact[1])
 
 
 def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetup:

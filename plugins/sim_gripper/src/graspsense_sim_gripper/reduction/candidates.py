@@ -58,8 +58,12 @@ def named(name: str, candidates: Iterator[Candidate]) -> ObjectModel:
 
 def reduced(setup: GraspSetup, reduction: Reduction) -> GraspSetup:
     """Return the grasp of an instance with all its terms as the reduction simulates it, with its steps."""
-    model = reduce_model(setup.plant.object, setup.kinds, reduction)
-    return evolve(setup, plant=PlantParams(setup.plant.drive, model, reduction.steps))
+    return evolve(setup, plant=reduce_plant(setup.plant, setup.kinds, reduction))
+
+
+def reduce_plant(plant: PlantParams, kinds: Sequence[str], reduction: Reduction) -> PlantParams:
+    """Return the plant of an instance as the reduction simulates it, with its steps."""
+    return PlantParams(plant.drive, reduce_model(plant.object, kinds, reduction), reduction.steps)
 
 
 def reduce_model(model: ObjectModel, kinds: Sequence[str], reduction: Reduction) -> ObjectModel:

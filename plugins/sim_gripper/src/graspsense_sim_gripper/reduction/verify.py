@@ -25,7 +25,7 @@ from graspsense.plugin_api import (
     seconds_at_most,
     tick_params,
 )
-from graspsense_sim_gripper.compiled.compose import Composition, grasp_loop
+from graspsense_sim_gripper.compiled.compose import composition, grasp_loop
 from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
 from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
@@ -218,16 +218,15 @@ class TrialGrasps:
         on_arrays = self.compiled
         made = padded(setup, self.padding) if on_arrays else setup
         exact = discretise(self.config, made, on_arrays=on_arrays)
-        composition = Composition(
-            made.kinds, None if exact is None else exact[1], made.plant.steps.settle > 0.0
-        )
+        shape = None if exact is None else exact[1]
+        composed = composition(made.kinds, made.plant, shape)
         model = None if exact is None else exact[0]
         if not on_arrays:
-            return False, grasp_loop(composition, self.controller.step), made, model
-        machine_code = compiled_loop(composition, self.controller.step)
+            return False, grasp_loop(composed, self.controller.step), made, model
+        machine_code = compiled_loop(composed, self.controller.step)
 
         def loop(*args: Any) -> SimulationState:
-            with compiling(composition):
+            with compiling(composed):
                 progress: SimulationState = machine_code(*args)
                 return progress
 
