@@ -144,7 +144,7 @@ def test_a_killed_collect_loses_no_trial_and_goes_on(tmp_path):
     folder, each = tmp_path / "trials", 20 * KILLS
     command = [sys.executable, "-m", "graspsense", "collect", "--save", str(folder), "--each", str(each)]
     command += ["--labels", "can:full_open,block", "-o", "classifier.type=none"]
-    announced, saved = 0, 0
+    announced, recovered_trials = 0, 0
     for _ in range(KILLS):
         with subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
@@ -160,10 +160,10 @@ def test_a_killed_collect_loses_no_trial_and_goes_on(tmp_path):
             said += process.stderr.readlines()
         announced += sum(map(is_kept, said))
         found = check(folder, set())
-        saved += sum(one.what == "saved" for one in found)
+        recovered_trials += sum(one.what in ("added", "recovered") for one in found)
         with Store.read(folder) as store:
             assert sum(store.counts("collect").values()) >= announced
-    report("collect", announced=announced, saved=saved)
+    report("collect", announced=announced, recovered=recovered_trials)
     assert announced > 0
     with Store.read(folder) as store:
         numbers = [one.id for one in store.page(set_aside=None, limit=10_000)]

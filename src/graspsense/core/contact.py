@@ -89,8 +89,7 @@ def first_rest(
 ) -> tuple[int, int] | None:
     """Return the index of the sample at which rest begins and that of the first that shows it, or None.
 
-    The arrays have shape (n,). Only samples in `shows` can show a rest. The result is that of
-    `update_rest` and `at_rest`.
+    Arrays of shape (n,). Only samples in `shows` can show a rest. The result is that of `update_rest` and `at_rest`.
 
     >>> times, gaps, shows = np.arange(11) * 0.01, np.array([0.06, 0.055] + [0.05] * 9), np.ones(11, bool)
     >>> first_rest(times, gaps, shows, REST_SPEED_M_S, REST_WINDOW_S)
@@ -110,7 +109,7 @@ def first_rest(
     begins = np.flatnonzero(lasting[skipped:]).tolist()
     times, gaps = times_s[skipped:].tolist(), gaps_m[skipped:].tolist()
     n -= skipped
-    at_once_m = rest_speed_m_s * rest_window_s
+    at_once_m, limits = rest_speed_m_s * rest_window_s, (rest_speed_m_s, rest_window_s)
     end = following = 0
     while end < n:
         while begins[following] < end:
@@ -124,10 +123,7 @@ def first_rest(
             while end < few and abs(gaps[end] - at_m) <= at_once_m:
                 end += 1
         else:
-            while (
-                end < few
-                and update_rest(still, times[end], gaps[end], rest_speed_m_s, rest_window_s) is still
-            ):
+            while end < few and update_rest(still, times[end], gaps[end], *limits) is still:
                 end += 1
         if end == few:
             begin = skipped + few
