@@ -1,8 +1,8 @@
-"""The cache of reduced models: in memory and on disk, by the content of everything that a model follows from.
+"""The cache of reduced models, in memory and on disk.
 
-A model follows from the settings, the object and the controller, and from the code of all of these and of the
-simulator. In memory the key holds the settings, the object and the controller. On disk it is a digest of these and of
-the code, so that a model of other code is never used. A file that cannot be read is ignored.
+A model depends on the settings, the object and the controller, and on the code of the simulator, the terms and the
+controller. In memory the key holds the settings, the object and the controller. On disk the key is a digest of these
+and of the code, so that a model is never used with other code. A file that cannot be read is ignored.
 """
 
 from __future__ import annotations
@@ -42,17 +42,20 @@ Json = Any
 
 
 class Key(NamedTuple):
-    """Everything that a model follows from, but for the code."""
+    """Everything that a model depends on, except the code."""
 
     config: SimConfig
     kinds: tuple[str, ...]
+    """The kinds of the object's terms."""
     spec: str
+    """`ObjectSpec.content`."""
     step: ControllerStep
     controller: str
+    """`GraspController.content`."""
 
 
 class ReductionCache:
-    """Reduced models by their content. Threads may share it."""
+    """Reduced models by `Key`. Threads may share a cache."""
 
     def __init__(self) -> None:
         self._models: OrderedDict[Key, Reduction] = OrderedDict()
@@ -66,7 +69,7 @@ class ReductionCache:
         return Key(problem.model_config, spec.kinds, spec.content, controller.step, controller.content)
 
     def get(self, key: Key) -> Reduction | None:
-        """Return the model of this key, from memory or else from disk; None where there is none."""
+        """Return the model of this key, from memory or else from disk; None if there is none."""
         with self._lock:
             if key in self._models:
                 self._models.move_to_end(key)
@@ -78,7 +81,7 @@ class ReductionCache:
         return model
 
     def put(self, key: Key, model: Reduction) -> None:
-        """Cache a model. Only a verified one is worth a file."""
+        """Cache a model: in memory, and on disk if it was verified by trial grasps."""
         self._remember(key, model)
         if model.verification is not None:
             name = _file_name(key)
@@ -86,7 +89,7 @@ class ReductionCache:
                 _write(name, model)
 
     def clear(self) -> None:
-        """Forget the models in memory."""
+        """Remove the models in memory; those on disk remain."""
         with self._lock:
             self._models.clear()
 
@@ -102,15 +105,15 @@ class ReductionCache:
 
 
 def _file_name(key: Key) -> str | None:
-    """Return the name of a model's file: a digest of its key and of all code that it follows from.
+    """Return the name of a model's file: a digest of its key and of all code that it depends on.
 
-    None where the code of a term or of the controller cannot be identified.
+    None if the code of a term or of the controller cannot be identified.
     """
     digest = hashlib.sha256(_own_code())
     functions = (key.step, *laws_of(key.kinds))
     try:
         marks = [fingerprint(function) for function in functions]
-        # Beside its law, the file of a term holds its rates and limits.
+        # The rates and limits of a term are in the same file as its law: the file is identified as well.
         stamps = [_stamp(Path(str(sys.modules[function.__module__].__file__))) for function in functions]
     except (NotCompilable, KeyError, AttributeError, OSError):
         return None
@@ -122,7 +125,7 @@ def _file_name(key: Key) -> str | None:
 
 @cache
 def _own_code() -> bytes:
-    """Return what identifies the code of the simulator and of the core as it is on disk."""
+    """Return text that identifies the files of the simulator and of the core: their paths, sizes and times."""
     packages = (Path(__file__).parent.parent, Path(plugin_api.__file__).parent / "core")
     return "".join(_stamp(source) for folder in packages for source in sorted(folder.rglob("*.py"))).encode()
 
@@ -141,14 +144,14 @@ def _read(name: str) -> Reduction | None:
 
 
 def _write(name: str, model: Reduction) -> None:
-    """Write a model to disk where that is possible."""
+    """Write a model to disk. If that is not possible, nothing happens."""
     folder = _folder()
     if folder is None:
         return
     with suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
         _delete_old_files(folder)
-        # Replaced in one piece, whichever other process writes the same file.
+        # A rename is atomic: another process that reads or writes the same file never sees half of it.
         with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".part", delete=False) as part:
             try:
                 json.dump(_as_values(model), part)

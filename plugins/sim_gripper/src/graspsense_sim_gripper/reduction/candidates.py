@@ -1,4 +1,4 @@
-"""What may stand for a term or for the pads in a reduced model, and the reduced model of an instance."""
+"""The simplifications of a term and of the pads, and the reduced model of an instance."""
 
 from __future__ import annotations
 
@@ -18,16 +18,20 @@ from graspsense_sim_gripper.terms.switchable import Switchable
 from graspsense_sim_gripper.terms.term import WorkingPoint
 
 Candidate = tuple[str, ObjectModel]
-"""The name of a simplification, and the model with it."""
+"""The name of a simplification, and the model that it gives."""
 RIGID_PADS: Final = "rigid"
 ELASTIC_PADS: Final = "springs"
-RELAXED_PADS: Final = "springs that do not creep"
+UNRELAXED_PADS: Final = "springs that do not creep"
+"""Springs with the stiffness before creep, to which the Maxwell branch still contributes."""
 
 
 def without_term(
     model: ObjectModel, kinds: Sequence[str], i: int, point: WorkingPoint
 ) -> Iterator[Candidate]:
-    """Yield the model with term `i` dropped, then with each of the term's limits."""
+    """Yield the model with term `i` dropped, then with each of the term's limits at the working point.
+
+    `i` counts the terms in `kinds`, without the lumped spring and damper. A limit that is the term itself is skipped.
+    """
     params = model.terms[i + 1].params
     yield DROPPED, _with(model, i, Switchable(0, params), 0.0, 0.0)
     for limit in find_term(kinds[i])[1].limits(params, point):
@@ -40,34 +44,37 @@ def without_term(
 
 
 def simpler_pads(model: ObjectModel) -> Iterator[Candidate]:
-    """Yield the model with simpler pads, the simplest first."""
+    """Yield the model with rigid pads, then with pads that are springs without a damper or creep.
+
+    A simplification that the pads already have is left out.
+    """
     pads = model.pads
     if pads.stiffness_n_m < math.inf:
         yield RIGID_PADS, model._replace(pads=pads._replace(stiffness_n_m=math.inf))
     if pads.damping_n_s_m > 0.0 or pads.branch_n_m > 0.0:
         elastic = pads._replace(damping_n_s_m=0.0, branch_n_m=0.0)
         yield ELASTIC_PADS, model._replace(pads=elastic)
-        relaxed = elastic._replace(stiffness_n_m=pads.stiffness_n_m + pads.branch_n_m)
-        yield RELAXED_PADS, model._replace(pads=relaxed)
+        unrelaxed = elastic._replace(stiffness_n_m=pads.stiffness_n_m + pads.branch_n_m)
+        yield UNRELAXED_PADS, model._replace(pads=unrelaxed)
 
 
 def named(name: str, candidates: Iterator[Candidate]) -> ObjectModel:
-    """Return the model of the candidate with this name."""
+    """Return the model of the candidate with this name. Raises StopIteration if there is none."""
     return next(model for candidate, model in candidates if candidate == name)
 
 
 def reduced(setup: GraspSetup, reduction: Reduction) -> GraspSetup:
-    """Return the grasp of an instance with all its terms as the reduction simulates it, with its steps."""
+    """Return the grasp of an instance with the reduced model and its steps; `setup` has all terms."""
     return evolve(setup, plant=reduce_plant(setup.plant, setup.kinds, reduction))
 
 
 def reduce_plant(plant: PlantParams, kinds: Sequence[str], reduction: Reduction) -> PlantParams:
-    """Return the plant of an instance as the reduction simulates it, with its steps."""
+    """Return the plant of an instance with the reduced model and its steps; `plant` has all terms."""
     return PlantParams(plant.drive, reduce_model(plant.object, kinds, reduction), reduction.steps)
 
 
 def reduce_model(model: ObjectModel, kinds: Sequence[str], reduction: Reduction) -> ObjectModel:
-    """Return the full model of an instance as the reduction simulates it."""
+    """Return the reduced model of an instance; `model` has all its terms."""
     for i, treatment in enumerate(reduction.treatment[:-1]):
         if treatment != KEPT:
             model = named(treatment, without_term(model, kinds, i, reduction.point))
@@ -79,7 +86,7 @@ def reduce_model(model: ObjectModel, kinds: Sequence[str], reduction: Reduction)
 def _with(
     model: ObjectModel, i: int, term: Switchable, spring_n_m: float, damper_n_s_m: float
 ) -> ObjectModel:
-    """Return the model with another term `i`, and with more of the spring and damper that limits leave."""
+    """Return the model with `term` in place of term `i`, and with this much added to the lumped spring and damper."""
     before = model.terms[0].params
     spring, damper = before.spring_n_m + spring_n_m, before.damper_n_s_m + damper_n_s_m
     lumped = Switchable(1 if spring > 0.0 or damper > 0.0 else 0, LumpedSpringDamper(spring, damper))

@@ -1,13 +1,13 @@
-"""The error of one simulated grasp compared with another, which is what an accuracy limits.
+"""The error of one simulated grasp compared with another. `gripper.accuracy` limits this error.
 
-It is the largest error of the six features, of the peak force and of the force over time. The error of a quantity is
-the difference divided by the larger of its size and a scale; that of the force over time is the root mean square of the
-difference, divided by that of the force or by 1 N.
+It is the largest error of the six features, of the peak force and of the force over time. The error of a feature or of
+the peak is the difference, divided by the larger of its magnitude and a scale. The error of the force over time is the
+root mean square of the difference, divided by that of the force or by 1 N, whichever is larger.
 
 The features are those of Chitta, Piccoli and Sturm (ICRA 2010) with the mean of both forces, from ideal sensors. The
-feature set `chitta` (graspsense.plugins.features) extracts them at ticks; here instants lie between ticks, so that an
-error does not depend on the clock, and that code cannot be shared. `test_they_are_the_feature_sets_own_to_a_tick` holds
-the two equal to a tick.
+feature set `chitta` (graspsense.plugins.features) evaluates them at ticks. Here contact and rest are interpolated
+between ticks, so that the error does not jump by a tick, and that code cannot be shared.
+`test_they_are_the_feature_sets_own_to_a_tick` verifies that both agree to a tick.
 """
 
 from __future__ import annotations
@@ -31,26 +31,30 @@ SCALES: Final = {
     "df_dt": 1.0,
     "peak": 1.0,
 }
-"""Quantities smaller than these (m, m, N, s, m/s, N/s, N) count as if they had this size."""
+"""The error of a quantity is relative to its magnitude, or to this (m, m, N, s, m/s, N/s, N) if it is smaller."""
 TRACE_SCALE_N: Final = 1.0
+"""The same for the root mean square of the force over time."""
 
 
 @frozen(kw_only=True, eq=False)
 class GraspRecord:
-    """What of a grasp is compared: a row for each tick from the approach on, its outcome and the true peak force."""
+    """What is compared of a grasp: a row for each tick from the approach on, the outcome and the peak force."""
 
     outcome: int
+    """The outcome as the control law numbers it; -1 if the guard stopped the grasp."""
     dt_s: float
     gap_m: NDArray[np.float64]
     speed_m_s: NDArray[np.float64]
+    """Rate of the gap; closing is negative."""
     left_n: NDArray[np.float64]
     right_n: NDArray[np.float64]
     n_rows: int
     """Number of rows until the fingers open."""
     peak_n: float
+    """The largest force on a pad, also between ticks."""
 
     def quantities(self) -> dict[str, float]:
-        """Return the features and the peak force; NaN for a feature that this grasp does not have."""
+        """Return the six features and the peak force, by the names of `SCALES`; NaN for an undefined feature."""
         values = dict.fromkeys(SCALES, math.nan)
         values["peak"] = self.peak_n
         first = self._contact()
@@ -71,12 +75,12 @@ class GraspRecord:
         return values
 
     def contact_speed_m_s(self) -> float:
-        """Return the closing speed when a pad first felt a force; 0 where none did."""
+        """Return the closing speed (m/s) at the tick before the first force on a pad; 0 if there is none."""
         felt = np.flatnonzero(np.maximum(self.left_n, self.right_n) > 0.0)
         return float(-self.speed_m_s[max(int(felt[0]) - 1, 0)]) if len(felt) else 0.0
 
     def _contact(self) -> float | None:
-        """Return the row, with its fraction, at which both pads feel the contact force."""
+        """Return the interpolated row at which both pads reach the contact force; None if they never do."""
         felt = np.minimum(self.left_n, self.right_n)[: self.n_rows] - CONTACT_FORCE_N
         over = np.flatnonzero(felt >= 0.0)
         if not len(over):
@@ -85,9 +89,10 @@ class GraspRecord:
         return float(i) if i == 0 else i - float(felt[i] / (felt[i] - felt[i - 1]))
 
     def _rest(self, first: float) -> tuple[float, bool] | None:
-        """Return the row, with its fraction, from which on the fingers rest, and whether they moved since the contact.
+        """Return the interpolated row at which the fingers come to rest, and whether they moved since the contact.
 
-        The row of the contact itself does not count as motion, as in the feature set.
+        None if they do not rest for REST_WINDOW_S. The row of the contact does not count as motion, as in the feature
+        set.
         """
         speed = np.abs(self.speed_m_s[: self.n_rows]) - REST_SPEED_M_S
         window = round(REST_WINDOW_S / self.dt_s)
@@ -101,13 +106,14 @@ class GraspRecord:
 
 
 def _at(column: NDArray[np.float64], place: float) -> float:
+    """Return the value of a column at a row with a fraction, by linear interpolation."""
     return float(np.interp(place, np.arange(len(column)), column))
 
 
 def deviation(grasp: GraspRecord, expected: GraspRecord) -> tuple[float, str]:
-    """Return the largest error of all quantities, and the quantity; infinite where the outcomes differ.
+    """Return the largest relative error of all quantities, and the name of that quantity.
 
-    It is also infinite where only one of the grasps has a feature.
+    The error is infinite if the outcomes differ, or if a feature is defined in one of the grasps only.
     """
     if grasp.outcome != expected.outcome:
         return math.inf, "outcome"
@@ -123,7 +129,7 @@ def deviation(grasp: GraspRecord, expected: GraspRecord) -> tuple[float, str]:
         errors["trace"] = rms / max(float(np.sqrt(np.mean(others**2))), TRACE_SCALE_N)
     worst, quantity = 0.0, "nothing"
     for name, error in errors.items():
-        # Written so that NaN counts as the largest.
+        # `not <=` instead of `>`: NaN counts as the largest error.
         if not error <= worst:
             worst, quantity = (math.inf if math.isnan(error) else error), name
     return worst, quantity

@@ -1,4 +1,7 @@
-"""The levels of reduction that are tried in turn, from the largest tolerances to the smallest."""
+"""The levels of reduction, in the order in which they are tried: from the largest tolerances to the smallest.
+
+Source: the table of levels in docs/numerics.md, section "Model reduction".
+"""
 
 from __future__ import annotations
 
@@ -8,30 +11,32 @@ from typing import Final, Literal, NamedTuple
 from graspsense_sim_gripper.stepping.scheme import Steps
 
 STEP_SHARE: Final = 0.34
-"""The error of a step is this share of the accuracy to the power of 1.5: many steps then add up to a part of it."""
+"""The tolerance of a step is (0.34 accuracy)^1.5, so that the accumulated error of many steps is proportional to the
+accuracy, and smaller."""
 GROWTH_ACCURACY: Final = 0.1
-"""Accuracy from which on steps grow twofold after a contact."""
+"""From this accuracy upwards, a step in contact may be twice as long as the one before."""
 
 
 class Level(NamedTuple):
     """The tolerances of one level of reduction."""
 
     model_tol: float
-    """Relative change of the force that leaving out terms may cause; 0: every term is kept."""
+    """Largest relative change of the force that simplifications may cause; 0: every term is kept."""
     step_tol: float
-    """The accuracy for which the steps are chosen."""
+    """The accuracy for which the steps are selected; `step_tolerance` of it is the tolerance of one step."""
     min_steps: int = 1
-    """Steps of a tick at the least."""
+    """Smallest number of steps per tick."""
 
 
 class LevelScale(NamedTuple):
-    """A level in relation to the accuracy that is asked for."""
+    """A level relative to the requested accuracy."""
 
     model: float
-    """`model_tol` is the accuracy times this."""
+    """`model_tol` over the accuracy."""
     steps: float = 1.0
-    """`step_tol` is the accuracy divided by this."""
+    """The accuracy over `step_tol`."""
     min_steps: int = 1
+    """As in `Level`."""
 
     def at(self, accuracy: float) -> Level:
         """Return the level for this accuracy."""
@@ -39,39 +44,44 @@ class LevelScale(NamedTuple):
 
 
 FULL_SCALES: Final = (LevelScale(0.0), LevelScale(0.0, 10.0, 4), LevelScale(0.0, 100.0, 32))
-"""Every term, with finer and finer steps."""
+"""All terms, with smaller and smaller steps."""
 UNVERIFIED: Final = LevelScale(0.05)
-"""The level without a trial grasp."""
+"""The level of a model that no trial grasp verifies."""
 SPREAD_SCALES: Final = (LevelScale(0.3), UNVERIFIED, *FULL_SCALES)
-"""Where instances differ from the object of the trial grasps, the two largest tolerances are left out: a level that
-only just suffices for the nominal object need not suffice for others."""
+"""The levels with spread. The two with the largest tolerances are left out: trial grasps use the nominal object, and a
+level that is just accurate enough for it may be too coarse for another instance."""
 SCENE_SCALES: Final = (LevelScale(10.0), LevelScale(3.0), *SPREAD_SCALES)
+"""The levels without spread."""
 REFERENCE_SCALES: Final = {
     1.0: LevelScale(0.0, 30.0, 2),
     10.0: LevelScale(0.0, 100.0, 8),
     100.0: LevelScale(0.0, 1000.0, 32),
 }
-"""The scale of the grasp that a trial grasp is compared with, by the `steps` of its own scale."""
+"""The scale of the full model that a candidate is compared with, by the `steps` of the candidate's own scale."""
 
 
 def scales_for(fidelity: Literal["scene", "full", "reference"], spread: bool) -> tuple[LevelScale, ...]:
-    """Return the scales to try, in order."""
+    """Return the scales to try, in order. `spread`: whether instances differ from the nominal object."""
     if fidelity != "scene":
         return FULL_SCALES
     return SPREAD_SCALES if spread else SCENE_SCALES
 
 
 def step_tolerance(accuracy: float) -> float:
-    """Return the relative error that a step may have, so that many of them add up to a part of the accuracy."""
+    """Return the largest relative error of one step for this accuracy.
+
+    The error of a second-order step is proportional to h^3 and the accumulated error to h^2. The power of 1.5 therefore
+    makes the accumulated error proportional to the accuracy.
+    """
     return float((STEP_SHARE * accuracy) ** 1.5)
 
 
 def step_growth(accuracy: float) -> float:
-    """Return the factor by which steps may grow after a contact: 2 from 10 % on, and less for a better accuracy."""
+    """Return the largest ratio of successive steps in contact: 2 from an accuracy of 10 % upwards, less below."""
     return 1.0 + min(1.0, math.sqrt(accuracy / GROWTH_ACCURACY))
 
 
 def steps_for(level: Level, scheme: int, dt_s: float) -> Steps:
-    """Return the step control of a level."""
+    """Return the step control of a level with this scheme, for ticks of `dt_s` seconds."""
     longest_s = dt_s / level.min_steps if level.min_steps > 1 else math.inf
     return Steps(step_tolerance(level.step_tol), scheme, longest_s, growth=step_growth(level.step_tol))

@@ -13,69 +13,83 @@ from graspsense_sim_gripper.terms.term import WorkingPoint
 KEPT: Final = "kept"
 DROPPED: Final = "dropped"
 FORCE_MARGIN: Final = 1.5
-"""A reduction is valid up to the expected force times this."""
+"""A reduction is valid for peak forces up to the expected force times this factor."""
 
 
 @frozen(kw_only=True)
 class TermDecision:
-    """What became of a term: kept, a limit or dropped; the number that decided; the error that it may cause."""
+    """What a reduction does with a term, the pads, the steps or the contact, as a row of a report."""
 
     term: str
+    """The kind of the term, or `pads`, `steps` or `contact`."""
     decision: str
+    """For a term `kept`, `dropped` or its limit, for the steps the scheme, for the contact whether its peak is resolved."""
     what: str
+    """The meaning of `number`."""
     number: float
+    """A dimensionless number that characterises the term, such as its rate times the duration of the grasp."""
     error: float
+    """Relative error of the force that this decision alone may cause."""
 
 
 @frozen(kw_only=True)
 class Verification:
-    """A trial grasp with the reduced model, compared with one with the full model and finer steps."""
+    """A trial grasp in the reduced model, compared with a trial grasp in the full model with finer steps."""
 
     error: float
+    """The largest relative error of all quantities, as `error.deviation` defines it."""
     quantity: str
     """The quantity with the largest error."""
     grasps: int
-    """Number of trial grasps until a level was accepted."""
+    """Number of trial grasps that were compared until a level was accepted."""
 
 
 @frozen(kw_only=True)
 class Reduction:
-    """The model of an object at an accuracy. It holds for every instance of the object."""
+    """The reduced model of an object for an accuracy. All instances of the object share it."""
 
     accuracy: float
+    """The accuracy that was asked for (`gripper.accuracy`)."""
     treatment: tuple[str, ...]
-    """For each term `kept`, `dropped` or the name of its limit; the last entry is that of the pads."""
+    """For each term `kept`, `dropped` or the name of its limit. The last entry is that of the pads."""
     point: WorkingPoint
+    """The compression, speed, duration and force for which the model was selected."""
     steps: Steps
     decisions: tuple[TermDecision, ...]
+    """Those of the pads, if they are simplified, and of each term."""
     scheme: TermDecision
+    """The scheme that integrates the model, and the damping rate times the tick."""
     contact: TermDecision
-    """Whether the peak force of a contact this stiff is resolved."""
+    """Whether the steps resolve the peak force of a contact as stiff as this one."""
     error: float
-    """Relative error of the force that leaving out terms may cause."""
+    """Largest relative change of the force on the probe paths through all simplifications together."""
     oscillates: bool
-    """Whether a term has a state that oscillates, or one whose rate it does not state."""
+    """Whether a kept term has a state that oscillates, or a state without declared rates."""
     level: Level
+    """The tolerances with which it was proposed."""
     verification: Verification | None = None
-    """The result of the trial grasps; None where there was none."""
+    """The result of the trial grasps; None if there was none."""
 
     @property
     def max_force_n(self) -> float:
-        """The force up to which the reduction is valid."""
+        """The largest peak force (N) for which the reduction is valid."""
         return FORCE_MARGIN * self.point.force_n
 
     def valid_for(self, peak_n: float) -> bool:
-        """Return whether the reduction is valid for a grasp with this peak force."""
+        """Return whether the reduction is valid for a grasp with this peak force (N).
+
+        A reduction without error keeps every term, and is valid for every force.
+        """
         return peak_n <= self.max_force_n or self.error == 0.0
 
     def with_exact_discretisation(self) -> Reduction:
-        """Return the same model where the exact discretisation of a linear scene replaces the steps."""
+        """Return the same reduction for a scene that is discretised exactly, without time steps."""
         what = "linear between changes of contact"
         scheme = TermDecision(term="steps", decision="exact discretisation", what=what, number=0.0, error=0.0)
         return evolve(self, scheme=scheme)
 
     def as_values(self) -> dict[str, Any]:
-        """Return it as plain values, for a report."""
+        """Return the reduction as a dictionary of plain values, for a report."""
         return {
             "accuracy": self.accuracy,
             "level": self.level._asdict(),

@@ -1,8 +1,7 @@
-"""Pressing an object along prescribed paths, to see what each of its terms contributes to the force.
+"""Compressing an object along prescribed paths, to find how much each of its terms contributes to the force.
 
 There are three paths: closing at the speed of the first contact, closing as fast as the gripping force can accelerate
-the fingers, and closing within the longest duration of a squeeze. After each the fingers rest for as long as a grasp
-lasts.
+the fingers, and closing over the longest duration of a squeeze. Each path ends with a hold of `HOLD_S`.
 """
 
 from __future__ import annotations
@@ -19,32 +18,41 @@ from graspsense_sim_gripper.reduction.candidates import without_term
 from graspsense_sim_gripper.terms.term import WorkingPoint
 
 HOLD_S: Final = 1.0
+"""Duration of the rest at the end of each path."""
 SQUEEZE_S: Final = 3.0
-"""No squeeze takes longer, since the controllers give up then."""
+"""The longest duration of a squeeze: controllers give up after it."""
 POINTS: Final = 24
-"""Equal steps of a closing path."""
+"""Number of equal steps of a closing path."""
 EARLY_POINTS: Final = 3
-"""Further points within the first of them, since the contact needs a finer look."""
+"""Number of further points within the first of these steps, to resolve the beginning of the contact."""
 MAX_CHANGE: Final = 0.5
-"""A relative change of the force that is too large for any accuracy."""
+"""A relative change of the force above this is too large for any accuracy."""
 MIN_SPEED_M_S: Final = 1e-4
+"""Slower contacts are probed at this speed."""
 MAX_DEPTH: Final = 0.9
 """No object is compressed by more than this share of its width."""
 MIN_FORCE_N: Final = 1.0
-"""Changes of smaller forces count as if the force were this."""
+"""The change of a force is relative to the force, or to this value if the force is smaller."""
 
 
 @frozen(kw_only=True)
 class ProbePath:
-    """Closures with their times and speeds, from the contact on."""
+    """A motion of the fingers after the contact, as points of equal number in each tuple."""
 
     closures: tuple[float, ...]
+    """By how much the gap is smaller than the width of the object (m)."""
     times: tuple[float, ...]
+    """Since the contact (s)."""
     speeds: tuple[float, ...]
+    """Closing speed (m/s)."""
 
 
 class Grip:
-    """An object as it is gripped: its full model, its paths and the force along them. No accuracy changes these."""
+    """The full model of an object, its probe paths, and the forces on them. None of these depends on the accuracy.
+
+    `point` is the working point that the paths reach. `force_n` is the gripping force, `speed_m_s` the speed of the gap
+    at the first contact, and `mass_kg` the mass that moves with the gap.
+    """
 
     def __init__(
         self, model: ObjectModel, kinds: tuple[str, ...], force_n: float, speed_m_s: float, mass_kg: float
@@ -56,7 +64,7 @@ class Grip:
         self._alternatives: list[list[tuple[str, float]]] | None = None
 
     def alternatives(self) -> list[list[tuple[str, float]]]:
-        """Return for each term what may stand for it, and the error of that alone."""
+        """Return for each term the names of its simplifications, each with the error that it causes alone."""
         if self._alternatives is None:
             self._alternatives = [
                 [
@@ -68,13 +76,13 @@ class Grip:
         return self._alternatives
 
     def error_of(self, model: ObjectModel, max_error: float = MAX_CHANGE) -> float:
-        """Return the largest relative change of the force on the paths with this model.
+        """Return the largest relative change of the force on the paths if `model` replaces the full model.
 
-        What is larger than `max_error` is returned as infinite.
+        A change larger than `max_error`, or a force that is not finite, gives infinity.
         """
         worst = 0.0
         for path, expected in zip(self.paths, self.forces, strict=True):
-            # The model's forces are computed no further than they are needed.
+            # The forces of the model are computed one by one, and only until `max_error` is exceeded.
             for force, other in zip(forces_along(model, self.kinds, path), expected, strict=False):
                 worst = max(worst, abs(force - other) / max(abs(other), MIN_FORCE_N))
                 if not math.isfinite(force) or worst > max_error:
@@ -83,7 +91,7 @@ class Grip:
 
 
 def forces_along(model: ObjectModel, kinds: Sequence[str], path: ProbePath) -> Iterator[float]:
-    """Yield the force at each point of the path."""
+    """Yield the force (N) at each point of the path."""
     press = contact_solver(tuple(kinds))
     contact, before = uncompressed(kinds), 0.0
     for closure, t, speed in zip(path.closures, path.times, path.speeds, strict=True):
@@ -93,7 +101,10 @@ def forces_along(model: ObjectModel, kinds: Sequence[str], path: ProbePath) -> I
 
 
 def stiffness(grip: Grip, dt_s: float) -> tuple[float, float]:
-    """Return the largest stiffness within a tick along the slow path, and that of the very first contact (N/m)."""
+    """Return two stiffnesses (N/m): the largest over a tick of `dt_s` on the slow path, and that at the first touch.
+
+    The first is the force after a further step within a tick less the force after a tick at rest, over that step.
+    """
     model, path = grip.model, grip.paths[-1]
     press = contact_solver(grip.kinds)
     contact = uncompressed(grip.kinds)
@@ -104,20 +115,21 @@ def stiffness(grip: Grip, dt_s: float) -> tuple[float, float]:
         (contact, _), before = press(model, contact, closure, speed, t - before), t
         if k % 4 < 3:
             continue
-        # The force after a tick further on, compared with that after a tick at rest.
         rests, further = (press(model, contact, closure + m, 0.0, dt_s)[0].force_n for m in (0.0, further_m))
         largest = max(largest, (further - rests) / further_m)
-    # A surface that is struck responds before the parts behind it give way.
+    # At the first touch the surface alone responds: the parts behind it have not moved yet.
     touch = path.closures[0]
     at_once = next(forces_along(model, grip.kinds, ProbePath(closures=(touch,), times=(0.0,), speeds=(0.0,))))
     return largest, at_once / touch
 
 
 def damping(grip: Grip, model: ObjectModel, dt_s: float) -> float:
-    """Return the damping (N s/m) of the pads and the object in this model, over a tick at the end of the fast path."""
+    """Return the damping (N s/m) of the pads and the object in this model, over a tick at the end of the fast path.
+
+    It is the difference of the force at the closing speed and the force at a speed of 0, over the closing speed.
+    """
     if not grip.kinds:
         return 0.0
-    # How much larger the force is while the fingers move than while they rest.
     fast = grip.paths[1]
     depth, speed = fast.closures[-1], fast.speeds[0]
     back = min(speed * dt_s, 0.5 * depth)
@@ -138,14 +150,14 @@ def _paths(
 ) -> tuple[list[ProbePath], WorkingPoint]:
     """Return the paths up to the expected force, and the working point that they reach."""
     depth = _depth(model, kinds, force_n, speed_m_s)
-    # The contact itself: a spring stops the moving mass.
+    # A spring k that stops a mass m at a speed v bears the force v sqrt(k m).
     impact = speed_m_s * math.sqrt(force_n / depth * mass_kg)
     if impact > force_n:
         force_n = impact
         depth = _depth(model, kinds, force_n, speed_m_s)
-    # What creeps ends where it does when it is pressed slowly.
+    # An object that creeps yields further when it is pressed slowly.
     slow_depth = _depth(model, kinds, force_n, 0.0)
-    # A step of effort on a spring crosses it in a quarter of a period.
+    # A step of force F on a mass m with a spring k reaches the speed F / sqrt(k m).
     fast = max(force_n / math.sqrt(force_n / depth * mass_kg), speed_m_s)
     paths = [
         _path(depth, depth / speed_m_s, HOLD_S),
@@ -156,7 +168,10 @@ def _paths(
 
 
 def _depth(model: ObjectModel, kinds: Sequence[str], force_n: float, speed_m_s: float) -> float:
-    """Return how far the fingers close against this force, by bisection; at speed 0 within the time of a squeeze."""
+    """Return the closure (m) at which the force exceeds `force_n`, by bisection to 2 %.
+
+    The fingers close at this speed; at speed 0, over the time of a squeeze.
+    """
     lower, upper = 0.0, MAX_DEPTH * max(model.width_m, 1e-4)
     for _ in range(40):
         middle = 0.5 * (lower + upper)
@@ -171,7 +186,7 @@ def _depth(model: ObjectModel, kinds: Sequence[str], force_n: float, speed_m_s: 
 
 
 def _path(depth_m: float, duration_s: float, hold_s: float) -> ProbePath:
-    """Return a closure at constant speed followed by rest, with points that become rarer while it rests."""
+    """Return a path that closes at constant speed and then rests, with points further and further apart."""
     speed = depth_m / duration_s
     early = (4.0**-k / POINTS for k in range(EARLY_POINTS, 0, -1))
     shares = [*early, *((k + 1) / POINTS for k in range(POINTS))]

@@ -1,8 +1,8 @@
-"""Proposing the reduced model of a level: what becomes of each term, and which scheme steps it.
+"""Proposing the reduced model of a level: which terms are kept, replaced or dropped, and which scheme integrates it.
 
-The object is pressed along three paths by the laws of its own terms (see `probe`). A term may be left out where that
-changes the force on those paths by little, relative to the force itself. Decisions therefore depend on rates and
-shares, never on names, and a term of another distribution is treated like any other.
+The object is compressed along three prescribed paths (see `probe`). A term may be dropped or replaced if this changes
+the force on these paths by no more than the tolerance of the level. Decisions depend only on computed forces and
+rates, not on the kinds of the terms, so a term that a plugin contributes is treated like any other.
 """
 
 from __future__ import annotations
@@ -34,20 +34,22 @@ from graspsense_sim_gripper.terms.term import NO_STATE, WorkingPoint, no_rates
 
 FORCE_N: Final = 20.0
 SPEED_M_S: Final = 0.01
-"""The gripping force and the closing speed that are assumed without other information: those of the paper."""
+"""The gripping force and the closing speed that are assumed without other information: those of the paper (Chitta,
+Piccoli and Sturm, ICRA 2010)."""
 REFERENCE_ACCURACY: Final = 1e-3
-"""The accuracy with which the steps of a reference begin."""
+"""The steps of a reference begin with the tolerance for this accuracy, or for a finer one that is requested."""
 CONVERGED: Final = 1e-7
-"""A reference halves the steps of a tick until speed and force change by less than this part of the accuracy."""
+"""A reference halves the steps of a tick until speed and force change by less than this times the accuracy."""
 STIFFEST_N_M: Final = 1e6
-"""Peak forces on contacts up to this stiff agree with their reference."""
+"""The largest contact stiffness (N/m) for which peak forces agree with those of the reference."""
 SCHEMES: Final = {VERLET: "Verlet", TR_BDF2: "TR-BDF2", MEAN_FORCE: "mean force"}
 
 
 def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | None = None) -> Grip:
-    """Return the nominal object as it is gripped with this force, after the fingers touch it at this speed.
+    """Return the nominal object with its probe paths, for this gripping force (N) and this speed at the contact (m/s).
 
-    What the settings expect of the grasp takes precedence over these. Raises TypeError if there is no object.
+    `expected_force_n` and `expected_speed_m_s` of the settings take precedence over the arguments. Without either, the
+    values of the paper are used. Raises TypeError if there is no object.
     """
     config, setup = problem.model_config, _nominal(problem)
     drive = setup.plant.drive
@@ -61,7 +63,10 @@ def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | N
 
 
 def propose(problem: Problem, grip: Grip, scale: LevelScale = UNVERIFIED) -> Reduction:
-    """Return the reduced model of a level, without trying it in a grasp."""
+    """Return the reduced model for a level, without a trial grasp. Raises TypeError if there is no object.
+
+    With a fidelity other than `scene`, every term is kept.
+    """
     config, drive, dt_s = problem.model_config, _nominal(problem).plant.drive, _nominal(problem).dt_s
     if config.fidelity != "scene" and scale.model > 0.0:
         scale = FULL_SCALES[0]
@@ -94,7 +99,7 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = UNVERIFIED) -> Red
 
 
 def _mass_kg(drive: Drive, gap_m: float) -> float:
-    """Return the mass that moves with the gap: the rotor's inertia through the linkage."""
+    """Return the mass (kg) that moves with the gap: the rotor's inertia through the linkage, J (2 pi)^2 / g^2."""
     _, jacobian = gap_and_rate(drive.link, revolutions_at(drive.link, gap_m))
     return drive.inertia / (jacobian * jacobian)
 
@@ -106,16 +111,16 @@ def _nominal(problem: Problem) -> GraspSetup:
 
 
 def _scheme(accuracy: float, damping_rate: float, frequency: float, dt_s: float, has_friction: bool) -> int:
-    """Return the scheme for these rates (1/s)."""
+    """Return the scheme for this damping rate (1/s) and this angular frequency (rad/s) of the contact."""
     if damping_rate * dt_s > 1.0:
         return TR_BDF2
-    # With Verlet the energy of an oscillation varies by a share of it, which shows only where nothing dissipates it.
+    # Velocity Verlet lets the energy of an oscillation vary. This matters only if the oscillation is hardly damped.
     undamped = frequency * (6.0 * step_tolerance(accuracy)) ** (2.0 / 3.0) / 4.0
     return MEAN_FORCE if damping_rate < undamped and not has_friction else VERLET
 
 
 def _with_settings(steps: Steps, config: SimConfig) -> Steps:
-    """Return the steps as the settings modify them."""
+    """Return the steps with the scheme, the length and the convergence that the settings prescribe."""
     if config.scheme != "auto":
         steps = steps._replace(scheme=(steps.scheme or TR_BDF2) if config.scheme == "implicit" else VERLET)
     if config.step_s is not None:
@@ -130,6 +135,7 @@ def _with_settings(steps: Steps, config: SimConfig) -> Steps:
 
 
 def _oscillates(kind: str, params: TermParams, point: WorkingPoint) -> bool:
+    """Return whether a term has a state that oscillates, or a state without declared rates."""
     term = find_term(kind)[1]
     if term.rates is no_rates:
         return bool(term.at_rest != NO_STATE)
@@ -137,7 +143,7 @@ def _oscillates(kind: str, params: TermParams, point: WorkingPoint) -> bool:
 
 
 def _resolution(grip: Grip, dt_s: float) -> TermDecision:
-    """Return whether the peak force of the contact is resolved, and its natural frequency times the tick."""
+    """Return whether the peak force of the contact is resolved, with its natural frequency times the tick."""
     within_tick, at_once = stiffness(grip, dt_s)
     number = math.sqrt(max(within_tick, 0.0) / grip.mass_kg) * dt_s
     resolved = max(within_tick, at_once) <= 1.05 * STIFFEST_N_M and number <= 1.05
@@ -153,13 +159,16 @@ def _resolution(grip: Grip, dt_s: float) -> TermDecision:
 def _reduce(
     grip: Grip, max_error: float
 ) -> tuple[tuple[str, ...], tuple[TermDecision, ...], float, ObjectModel]:
-    """Return what becomes of each term and of the pads, why, the error of all that, and the reduced model."""
+    """Return the treatment of each term and of the pads, the decisions, their joint error, and the reduced model.
+
+    The joint error is the relative change of the force on the probe paths; it is at most `max_error`.
+    """
     kinds, point = grip.kinds, grip.point
     treatment, errors, spent, model = [KEPT] * (len(kinds) + 1), [0.0] * len(kinds), 0.0, grip.model
     decisions: list[TermDecision] = []
     if max_error > 0.0:
         alternatives = grip.alternatives()
-        # The terms that matter least are decided first, each for the cheapest candidate within the tolerance.
+        # The terms that matter least are decided first; each gets its cheapest candidate within the tolerance.
         for i in sorted(range(len(kinds)), key=lambda i: min(error for _, error in alternatives[i])):
             for name, error_alone in alternatives[i]:
                 if error_alone > max_error:
@@ -181,6 +190,7 @@ def _reduce(
 
 
 def _pads_decision(grip: Grip, name: str, error: float) -> TermDecision:
+    """Return the decision on the pads; `error` is the change of the joint error that it causes."""
     share = grip.forces[0][-1] / grip.model.pads.stiffness_n_m / max(grip.point.compression_m, 1e-9)
     what = "their compression over the total compression"
     return TermDecision(term="pads", decision=name, what=what, number=share, error=error)
@@ -198,7 +208,10 @@ def _term_decisions(grip: Grip, treatment: Sequence[str], errors: Sequence[float
 
 
 def _deciding(kind: str, params: TermParams, point: WorkingPoint) -> tuple[str, float]:
-    """Return the number that says most about a term: its fastest rate times the grasp, or its share of the force."""
+    """Return the number that characterises a term best, and its meaning.
+
+    It is the fastest rate times the duration of the grasp, or, without rates, the force over the gripping force.
+    """
     term = find_term(kind)[1]
     rates = term.rates(params, point)
     if rates:

@@ -1,13 +1,13 @@
 """Selecting the reduced model of an object: the first level whose trial grasp is accurate enough.
 
-A proposed model is simulated in a trial grasp, and compared with one in the full model with finer steps. The very first
-trial grasp, in the full model, also gives the speed at the first contact and the gripping force, from which proposals
-are made. Levels are tried from the largest tolerances to the smallest.
+The first trial grasp uses the full model. It gives the speed at the first contact and the peak force, for which models
+are proposed. Each proposed model is then simulated in a trial grasp, and compared with a trial grasp in the full model
+with finer steps. Levels are tried from the largest tolerances to the smallest.
 
-An accepted model is tried twice more, with a controller that reads slightly larger and slightly smaller values of force
-and travel. Where a threshold is met so closely at a tick that the grasp then continues a tick earlier or later, both
-grasps may be on the wrong side of it, and a level with smaller steps is tried. Where even the last level fails, no
-model of this scene has that accuracy, and ConfigError says so.
+A model that passes is tried twice more, with a controller that reads slightly larger and slightly smaller values of
+force and travel. This finds a threshold that is met so closely that an error of this size makes the grasp continue a
+tick earlier or later. Both compared grasps may then be on the wrong side of the threshold, and a level with smaller
+steps is tried. If the last level fails as well, no model of the scene has the accuracy, and ConfigError says so.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
 ACCEPTED_WITH_SPREAD: Final = 0.5
 ACCEPTED: Final = 0.8
-"""A model is accepted where the trial grasps differ by less than this part of the accuracy. With spread, the rest is
-for the instances of the object; without, only pads and the errors of the trial grasps themselves remain."""
+"""A model is accepted if the trial grasps differ by at most this share of the accuracy. With spread, the rest allows
+for the differences between instances. Without spread, it allows for pad sensors and the errors of the trial grasps."""
 COARSE: Final = 0.03
-"""From this accuracy on, a threshold met too closely is examined again with a tenth of the accuracy."""
+"""From this accuracy upwards, a threshold that is met too closely is examined again with a tenth of the accuracy."""
 FINE: Final = 0.003
-"""Up to this accuracy, the grasps to compare with have twice as many steps a tick: a contact that one step sees and
-another does not."""
+"""Down from this accuracy, the full model to compare with takes twice as many steps per tick, because one of two grasps
+may resolve a short contact that the other misses."""
 CULPRIT: Final = 0.2
-"""A term without which no more than this part of an error remains is its cause."""
+"""A term is named as the cause of an error if less than this share of the error remains without the term."""
 
 _SELECTED: Final = ReductionCache()
 
@@ -57,14 +57,15 @@ def select(
 ) -> Reduction:
     """Return the reduced model of a problem's object, verified by trial grasps under the controller.
 
-    Models are cached by their content, in memory and on disk. With forced steps, as a reference, and where the peak
-    force cannot be resolved (which the reduction says), there is no trial grasp, and `verification` is None.
+    Models are cached in memory and on disk, by everything that they depend on. The model is not verified, and its
+    `verification` is None, if the settings prescribe the steps or ask for the reference, if the controller raises in
+    the first trial grasp, or if the peak force cannot be resolved (`Reduction.contact`).
 
-    `compiled`: run the trial grasps compiled, where the controller can be compiled; `padding`: the kinds of terms with
-    which that code is padded, by default as in a batch. Both change times only.
+    `compiled`: run the trial grasps compiled, if the controller can be compiled. `padding`: the kinds of terms in the
+    compiled code, by default those of a batch. Both change the run time only.
 
-    Raises ConfigError if no model has the accuracy asked for or a term raises an exception, TypeError if there is no
-    object.
+    Raises ConfigError if no model reaches the requested accuracy or a term raises an exception, TypeError if there is
+    no object.
     """
     key = _SELECTED.key(problem, controller)
     reduction = _SELECTED.get(key)
@@ -83,6 +84,7 @@ def select(
 
 
 def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
+    """Return the model as `select` does, without the cache."""
     config, grip = problem.model_config, grip_of(problem)
     reference = propose(problem, grip, _reference_scale(config, FULL_SCALES[0]))
     not_verified = config.has_forced_steps or config.fidelity == "reference"
@@ -91,7 +93,7 @@ def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
     try:
         first = trial.record(reference)
     except Exception:
-        # A controller may fail. In the grasp itself that is an outcome, and is reported.
+        # A controller that raises does so in the grasp as well, and is reported there.
         return propose(problem, grip)
     grip = grip_of(problem, _two_digits(first.peak_n), _two_digits(first.contact_speed_m_s()))
     reference = propose(problem, grip, _reference_scale(config, FULL_SCALES[0]))
@@ -101,6 +103,7 @@ def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
 
 
 def _first_accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reduction:
+    """Return the model of the first level that trial grasps accept. Raises ConfigError if none does."""
     config = problem.model_config
     least, quantity, grasps = math.inf, "", 1
     near_threshold: Sensitivity | None = None
@@ -127,7 +130,7 @@ def _first_accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reducti
         term = _culprit(problem, grip, trial)
         raise ConfigError(_refusal(problem, least, quantity, term))
     if config.accuracy >= COARSE:
-        # Steps this coarse are too inaccurate to tell which side of the threshold is right.
+        # With steps this coarse, the trial grasps cannot tell on which side of the threshold the grasp is.
         finer = evolve(problem, model_config=evolve(config, accuracy=0.1 * config.accuracy))
         with suppress(ConfigError):
             return evolve(_select(finer, evolve(trial)), accuracy=config.accuracy)
@@ -135,23 +138,24 @@ def _first_accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reducti
 
 
 def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:
-    """Return the scale of the grasp that a trial grasp of this scale is compared with."""
+    """Return the scale of the full model that a candidate of this scale is compared with."""
     reference = REFERENCE_SCALES[scale.steps]
     factor = 2 if config.accuracy <= FINE else 1
     return reference._replace(min_steps=factor * reference.min_steps)
 
 
 def _accepted(config: SimConfig) -> float:
+    """Return the share of the accuracy by which trial grasps may differ."""
     return ACCEPTED_WITH_SPREAD if config.spread else ACCEPTED
 
 
 def _two_digits(value: float) -> float:
-    """Return the value to two digits: no decision needs more, and similar grasps then share their proposals."""
+    """Return the value rounded to two digits, which suffice: similar grasps then get the same proposals."""
     return float(f"{value:.1e}")
 
 
 def _culprit(problem: Problem, grip: Grip, trial: TrialGrasps) -> str:
-    """Return the term without which the grasp depends least on its steps; empty where no single one stands out."""
+    """Return the kind of the term that makes the grasp depend on its steps; empty if no single term does."""
     scale = FULL_SCALES[1]
     pair = [propose(problem, grip, s) for s in (scale, _reference_scale(problem.model_config, scale))]
     fine, finer = pair
@@ -196,6 +200,6 @@ def _scene_in_words(problem: Problem) -> str:
 
 
 def _advice(reachable: float) -> str:
-    """Return what to do, where an accuracy may be reachable."""
+    """Return the advice of an error message; `reachable` is an accuracy that a model would probably reach."""
     advice = f"ask for {reachable:.1g} (gripper.accuracy), or " if reachable <= 0.5 else ""
     return f'{advice}accept an unverified result with gripper.fidelity = "reference"'

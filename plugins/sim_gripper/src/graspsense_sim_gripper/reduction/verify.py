@@ -1,7 +1,7 @@
 """Trial grasps of the nominal object, in one reduced model after another.
 
-A trial grasp has ideal sensors, and goes from the open fingers to the release under the controller that is to grasp the
-object. In the approach nothing but the steps differs between models, so it is simulated once for each step tolerance.
+A trial grasp uses ideal sensors and the controller of the run. It begins with open fingers and ends with the release.
+The approach depends on the steps, but not on the reduced model. It is therefore simulated once per step tolerance.
 """
 
 from __future__ import annotations
@@ -49,50 +49,57 @@ from graspsense_sim_gripper.stepping.scheme import VERLET, Steps
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick
 
 MAX_SECONDS: Final = 40.0
-"""The longest trial grasp, and the longest approach in it."""
+"""Longest simulated time of an approach, and of the grasp after it."""
 NEAR_M: Final = 3e-3
-"""An approach that takes longer is repeated from this distance to the object."""
+"""An approach longer than `MAX_SECONDS` is repeated from this distance to the object."""
 MIN_CLOSING_M_S: Final = 0.01
+"""The remaining time of an approach is estimated with this closing speed, or with a higher present one."""
 MAX_HOLD_S: Final = 0.3
+"""A longer hold is shortened to this in a trial grasp."""
 TICKS_AT_ONCE: Final = 50
-"""Ticks of the approach between two looks at the distance."""
+"""Largest number of ticks of the approach between two checks of the distance."""
 CAPACITY: Final = 4096
-"""Ticks that a buffer holds."""
+"""Largest number of ticks in a buffer."""
 SENSITIVITY: Final = 10.0
 MIN_FORCE_ERROR_N: Final = 0.01
 MAX_FORCE_ERROR_N: Final = 0.25
-"""The forces that the controller reads may be wrong by this multiple of the difference of two models at the contact, at
-least and at most by these times the step tolerance."""
+"""The assumed error of the forces that the controller reads: SENSITIVITY times the difference of two models at the
+contact, limited to between MIN_FORCE_ERROR_N and MAX_FORCE_ERROR_N times the step tolerance of the level."""
 TRAVEL_ERROR: Final = 0.025
-"""The distance since the contact, from which rest is detected, may be wrong by this share times the step tolerance."""
+"""The assumed relative error of the distance since the contact is this times the step tolerance of the level."""
 
 
 class Sensitivity(NamedTuple):
-    """What changes in a grasp whose controller reads slightly wrong values."""
+    """How much a grasp changes if its controller reads slightly wrong values."""
 
     force_n: float
+    """Error of the forces that are read (N)."""
     travel: float
-    """The errors of the readings, in newtons and as a share."""
+    """Relative error of the distance since the contact that is read."""
     change: float
+    """The largest relative change of a quantity, see `error.deviation`."""
     quantity: str
-    """The largest change, and the quantity that changes."""
+    """The quantity with that change."""
     step_tol: float
-    """That of the level."""
+    """The `step_tol` of the level."""
 
 
 class _Stage(NamedTuple):
-    """A trial grasp under way: its state, and what was recorded."""
+    """A trial grasp in progress: its state, and what was recorded."""
 
     progress: SimulationState
     rows: tuple[Any, ...]
-    """The columns of `COLUMNS` and the phases below them, piece by piece."""
+    """Arrays of shape (len(COLUMNS) + 1, n) in the order of time: the columns, and the phases as the last row."""
     from_open: bool
     """Whether it began with the fingers open."""
 
 
 @define(eq=False)
 class TrialGrasps:
-    """Grasps of one object under one controller."""
+    """Trial grasps of one object under one controller, each simulated once.
+
+    `compiled` becomes False if the controller or a term turns out not to be compilable.
+    """
 
     config: SimConfig
     setup: GraspSetup
@@ -104,13 +111,13 @@ class TrialGrasps:
     """The same without opening and release, for a grasp that begins near the object."""
     compiled: bool
     padding: tuple[str, ...] | None
-    """The kinds with which compiled code is padded; None: as in a batch."""
+    """The kinds of terms in compiled code, see `compiled.padding`; None: those of a batch."""
     _records: dict[Any, GraspRecord] = field(factory=dict, init=False)
     _starts: dict[float, _Stage] = field(factory=dict, init=False)
     """The grasp shortly before the first contact, by the step tolerance of the approach."""
 
     def record(self, reduction: Reduction, force_n: float = 0.0, travel: float = 0.0) -> GraspRecord:
-        """Return the grasp in this model, with these errors of what the controller reads (see `Sensitivity`)."""
+        """Return the grasp in this model; the controller reads values with these errors (see `Sensitivity`)."""
         key = (reduction.treatment, reduction.steps, force_n, travel)
         if key not in self._records:
             try:
@@ -121,7 +128,10 @@ class TrialGrasps:
         return self._records[key]
 
     def sensitivity(self, reduction: Reduction, expected: GraspRecord) -> Sensitivity:
-        """Return what becomes of the grasp where the controller's readings are as wrong as the model may be."""
+        """Return the change of the grasp if the controller reads values that are as wrong as the model may be.
+
+        `expected` is the grasp in the full model. The grasp is simulated twice, with errors of either sign.
+        """
         exact, scale = self.record(reduction), reduction.level.step_tol
         force_n = max(SENSITIVITY * _force_difference_n(exact, expected), MIN_FORCE_ERROR_N * scale)
         force_n, travel = min(force_n, MAX_FORCE_ERROR_N * scale), TRAVEL_ERROR * scale
@@ -130,6 +140,7 @@ class TrialGrasps:
         return Sensitivity(force_n, travel, change, quantity, scale)
 
     def _grasp(self, reduction: Reduction, force_n: float, travel: float) -> GraspRecord:
+        """Simulate what `record` returns. Raises NotCompilable."""
         setup = reduced(self.setup, reduction)
         tolerance = setup.plant.steps.tolerance
         if tolerance not in self._starts:
@@ -145,15 +156,15 @@ class TrialGrasps:
         return math.ceil(min(MAX_SECONDS, seconds_at_most(self.controller.run)) / self.setup.dt_s)
 
     def _approach(self, setup: GraspSetup) -> _Stage:
-        """Return the grasp shortly before the first contact, begun near the object where it takes too long."""
+        """Return the grasp shortly before the first contact; it begins near the object if it would take too long."""
         stage, came_near = self._closed_in(setup, from_open=True)
         if not came_near and not has_ended(stage.progress.controller):
             stage, _ = self._closed_in(setup, from_open=False)
         return stage
 
     def _closed_in(self, setup: GraspSetup, from_open: bool) -> tuple[_Stage, bool]:
-        """Return the grasp shortly before the first contact, or where it ended, and whether it came to the contact."""
-        # No short steps, as nothing happens.
+        """Return the grasp shortly before the first contact, or at its end, and whether it reached the contact."""
+        # Without contact the motion is smooth, and long steps suffice.
         steps = setup.plant.steps._replace(scheme=VERLET, longest_s=math.inf)
         reach = setup.plant.object.width_m + 2.0 * abs(setup.state.contact.offset_m)
         state, link = setup.state, setup.plant.drive.link
@@ -176,7 +187,7 @@ class TrialGrasps:
         return stage, False
 
     def _runner(self, setup: GraspSetup, from_open: bool) -> Callable[[Steps, _Stage, int], _Stage]:
-        """Return what continues a grasp of this model with given steps, until a tick."""
+        """Return a function `run(steps, stage, until)` that continues a grasp of this model up to the tick `until`."""
         on_arrays, loop, made, exact = self._loop(setup)
         buffers = _ideal_buffers(on_arrays)
         params = self.params if from_open else self.params_near
@@ -184,7 +195,7 @@ class TrialGrasps:
         def run(steps: Steps, stage: _Stage, until: int) -> _Stage:
             progress, rows, _ = stage
             if progress.plant.contact.touched == 0:
-                # The untouched object as this composition describes it.
+                # The stage may come from another composition: the untouched object in the terms of this one.
                 fresh = made.state.contact
                 contact = progress.plant.contact._replace(left=fresh.left, right=fresh.right)
                 progress = progress._replace(plant=progress.plant._replace(contact=contact))
@@ -211,7 +222,7 @@ class TrialGrasps:
     def _loop(
         self, setup: GraspSetup
     ) -> tuple[bool, Callable[..., SimulationState], GraspSetup, PlantModel | None]:
-        """Return whether the loop is compiled, the loop, the setup that it takes, and the exact model if there is one.
+        """Return whether the loop is compiled, the loop, its setup, and the exactly discretised plant or None.
 
         Raises NotCompilable.
         """
@@ -253,7 +264,7 @@ def trial_grasps(
 
 
 def _ideal_buffers(on_arrays: bool) -> tuple[PadBuffers, Any]:
-    """Return the buffers of cell images and their times, which an ideal sensor does not use."""
+    """Return minimal buffers for cell images and their times, which an ideal sensor does not use."""
     zero, noise, images = np.zeros((2, CELLS)), np.zeros((1, 2 * CELLS)), np.full((1, 2, CELLS), math.nan)
     if on_arrays:
         return PadBuffers(zero[0], zero[1], noise, images), np.zeros(1)
@@ -262,7 +273,7 @@ def _ideal_buffers(on_arrays: bool) -> tuple[PadBuffers, Any]:
 
 
 def _record(end: _Stage, bias: Bias, dt_s: float) -> GraspRecord:
-    """Return what a grasp is compared by, without the errors of the readings."""
+    """Return the record of a grasp, from which the errors of the readings are subtracted."""
     columns, progress = np.concatenate(end.rows, axis=1), end.progress
     gap_m, left_n, right_n = (
         columns[COLUMNS.index(name)] for name in ("gap_m", "force_left_n", "force_right_n")
@@ -281,7 +292,10 @@ def _record(end: _Stage, bias: Bias, dt_s: float) -> GraspRecord:
 
 
 def _force_difference_n(grasp: GraspRecord, expected: GraspRecord) -> float:
-    """Return the difference of the forces of two grasps where both pads come to feel the contact force."""
+    """Return the difference (N) of the forces of two grasps at the tick of the contact and at the tick before it.
+
+    The force is that of the pad with the smaller one.
+    """
     forces, others = (np.minimum(record.left_n, record.right_n) for record in (grasp, expected))
     i = min(int(np.argmax(force >= CONTACT_FORCE_N)) for force in (forces, others))
     there = slice(max(i - 1, 0), i + 1)
