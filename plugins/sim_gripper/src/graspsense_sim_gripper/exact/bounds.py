@@ -1,4 +1,7 @@
-"""Bounds on how far the outputs of a mode can depart inside a tick from their values at its beginning."""
+"""Bounds on the change of the outputs of a mode within a tick, which exclude events without a search.
+
+The bounds are sampled and multiplied by a safety factor; they are not proven.
+"""
 
 from __future__ import annotations
 
@@ -10,38 +13,40 @@ import numpy as np
 from graspsense_sim_gripper.exact.expm import Array
 
 FAST: Final = 0.5
-"""A motion is fast if its eigenvalue (1/s) times the tick is above this in magnitude."""
+"""An eigenmode is fast if the magnitude of its eigenvalue (1/s) times the tick is above this."""
 SAMPLES_LOG2: Final = 6
-"""The tick is sampled at two to this power instants."""
+"""The tick is sampled at 2^6 equidistant times."""
 SAFETY: Final = 2.0
-"""Factor on the bounds, for the time between the samples."""
+"""Safety factor on the bounds, for the times between the samples."""
 
 
 class OutputBounds(NamedTuple):
-    """Bounds of each mode on |y(t) - y(0)| for 0 <= t <= dt, from the change c = x(dt) - x(0) of the state.
+    """Matrices of each mode that bound the outputs y(t) for 0 <= t <= dt, given the change c = x(dt) - x(0).
 
         |y(t) - y(0)| <= direct |c|,        |y(t) - y(0)| <= modal |projection c|
 
-    The first needs fewer operations; the second is tighter. Entries are inf where there is no bound.
+    The first bound needs fewer operations; the second is tighter. Entries are inf if there is no bound.
     """
 
     direct: Array
     """Shape (n_modes, n_outputs, n_states)."""
     projection: Array
-    """Shape (n_modes, 2 n_states, n_states): the slow part of a change of the state, and its fast modal coordinates."""
+    """Shape (n_modes, 2 n_states, n_states): the slow part of c, and below it the fast modal coordinates of c."""
     modal: Array
     """Shape (n_modes, n_outputs, 2 n_states)."""
 
 
 def output_bounds(rates: Array, maps: Array, integrals: Array, outputs: Array, dt_s: float) -> OutputBounds:
-    """Return the bounds of each mode.
+    """Return the bounds of each mode for a tick of `dt_s` seconds.
 
-    `rates` are the matrices A of the states, `outputs` the rows C of the outputs y = C x; `maps` and `integrals` are
-    those of `exponentials`. With P(t) the integral of exp(A s) over 0 to t and r = x'(0), the state changes by P(t) r
-    until t, and c = P(dt) r. The change of y until t is therefore C P(t) P(dt)^-1 c, which is sampled.
+    `rates` are the matrices A of the states (1/s), shape (n_modes, n_states, n_states). `outputs` are the matrices C of
+    the outputs y = C x, shape (n_modes, n_outputs, n_columns). `maps` and `integrals` are those of `exponentials`.
 
-    The projection separates fast motions of the tick from slow ones. A slow motion in which many states change together
-    then counts by its effect on y, and not by the sum of the effects of each state.
+    With P(t) the integral of exp(A s) over 0 to t, and r = x'(0), the state changes by P(t) r until t, and c = P(dt) r.
+    The change of y until t is therefore C P(t) P(dt)^-1 c, which is sampled.
+
+    The projection separates fast eigenmodes from slow ones. A slow motion of many states together then counts with its
+    effect on y, and not with the sum of the effects of each state.
     """
     n = rates.shape[-1]
     step, samples = maps[:, SAMPLES_LOG2, :n, :n], integrals[:, SAMPLES_LOG2, :n, :n][:, None]
@@ -68,10 +73,10 @@ def output_bounds(rates: Array, maps: Array, integrals: Array, outputs: Array, d
 
 
 def _split_by_speed(rates: Array, dt_s: float) -> tuple[Array, Array, Array]:
-    """Return the projector onto the slow subspace, the rows that give the fast modal coordinates, and their vectors.
+    """Return the projector onto the slow subspace, the rows that give the fast modal coordinates, and the fast vectors.
 
-    The left and right eigenvectors of the fast eigenvalues give the latter two; a complex pair counts as its real and
-    imaginary parts. Where they do not form a basis, every motion counts as slow.
+    The rows follow from the left eigenvectors of the fast eigenvalues, the vectors are the right ones. A complex pair
+    is replaced by its real and imaginary parts. If the eigenvectors do not form a basis, everything counts as slow.
     """
     n = len(rates)
     sides = []

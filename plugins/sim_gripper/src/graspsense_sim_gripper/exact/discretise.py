@@ -1,4 +1,4 @@
-"""Whether a grasp is discretised exactly, and the plant that is."""
+"""Deciding whether a grasp is discretised exactly, and computing the plant with its matrices."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from graspsense_sim_gripper.terms.term import LinearForm, OwnContact, TermParams
 
 
 def applicable(config: SimConfig, setup: GraspSetup) -> str:
-    """Return why a grasp is not discretised exactly; empty if it is.
+    """Return the reason why exact discretisation does not apply to a grasp, or an empty string if it applies.
 
-    This is the only place that decides between time steps and the matrix exponential. Steps are prescribed by the
-    settings, by a level of the reduction that divides each tick, and by a reference. Raises TypeError for a term whose
-    linear form has other states than its law.
+    This is the only place that decides between time steps and the matrix exponential. Time steps are prescribed by the
+    settings, by a level of reduction that divides each tick, and by the fidelity `reference`. Raises TypeError if the
+    linear form of a term has another number of states than its law.
     """
     drive, model, steps = setup.plant.drive, setup.plant.object, setup.plant.steps
     if config.has_forced_steps or steps.longest_s < math.inf or steps.settle > 0.0:
@@ -46,9 +46,10 @@ def applicable(config: SimConfig, setup: GraspSetup) -> str:
 def discretise(
     config: SimConfig, setup: GraspSetup, *, on_arrays: bool = False
 ) -> tuple[ExactPlant, Shape] | None:
-    """Return the plant of a grasp with the matrices of its modes, and their shape; None if it is not `applicable`.
+    """Return the plant with the matrices of its modes, and their shape; None if exact discretisation does not apply.
 
-    `on_arrays`: as compiled code takes them; the interpreter is faster with lists. Raises TypeError as `applicable`.
+    `on_arrays`: store the matrices in arrays, for compiled code; otherwise in lists, which the interpreter indexes
+    faster. Raises TypeError as `applicable` does.
     """
     if applicable(config, setup):
         return None
@@ -61,6 +62,7 @@ def discretise(
 
 
 def _tables(setup: GraspSetup, *, on_arrays: bool) -> tuple[Shape, Tables] | None:
+    """Return the matrices of a grasp whose terms are all linear; None as `tables_of`."""
     drive, model = setup.plant.drive, setup.plant.object
     scene = LinearScene(
         drive.inertia / setup.state.motion.jacobian_m_rev**2,
@@ -75,7 +77,10 @@ def _tables(setup: GraspSetup, *, on_arrays: bool) -> tuple[Shape, Tables] | Non
 
 
 def _forms(setup: GraspSetup) -> list[tuple[str, LinearForm | OwnContact | None]]:
-    """Return the kinds of the terms that the model keeps, with their linear forms."""
+    """Return the kind and the linear form of each term that the model keeps; None as the form: not linear.
+
+    The lumped spring and damper comes first, with an empty kind.
+    """
     lumped, *terms = setup.plant.object.terms
     forms: list[tuple[str, LinearForm | OwnContact | None]] = []
     if lumped.active == 1:
@@ -90,7 +95,10 @@ def _forms(setup: GraspSetup) -> list[tuple[str, LinearForm | OwnContact | None]
 
 @lru_cache(maxsize=256)
 def _form(kind: str, params: TermParams) -> LinearForm | OwnContact | None:
-    """Return a term's linear form. Raises TypeError if it has other states than the law."""
+    """Return the linear form of a term, or None if it has none.
+
+    Raises TypeError if the form has another number of states than the law.
+    """
     term = find_term(kind)[1]
     form = term.linear(params)
     if form is None:
@@ -103,7 +111,7 @@ def _form(kind: str, params: TermParams) -> LinearForm | OwnContact | None:
                 f"{term.at_rest!r}; give the form as many states as that has fields, all of them floats"
             )
     if isinstance(form, LinearForm) and not form.rates and n_states:
-        # States that the form does not change are states with a rate of zero.
+        # A form without rates leaves the states unchanged: their rates are zero.
         zeros = (0.0,) * n_states
         return form._replace(rates=(zeros,) * n_states, by_compression=zeros, by_speed=zeros, force=zeros)
     return form

@@ -1,4 +1,4 @@
-"""The matrix exponential and its integral, for a tick and its repeated halves."""
+"""The matrix exponential and its integral, for a tick and for its repeated halves tick / 2^k."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 MAX_BISECTIONS: Final = 34
-"""Events are located to a tick over two to this power: 6e-14 s of 1 ms."""
+"""Events are located to tick / 2^34: 6e-14 s for a tick of 1 ms."""
 TAYLOR_TERMS: Final = 13
 EXTRA_HALVINGS: Final = 3
-"""The series is summed where the norm of the matrix is below two to the power of minus this."""
+"""The Taylor series is summed for a duration h at which the norm of A h is at most 2^-3."""
 
 
 def exponentials(rates: Array, dt_s: float) -> tuple[Array, Array]:
@@ -23,9 +23,9 @@ def exponentials(rates: Array, dt_s: float) -> tuple[Array, Array]:
     `rates` are matrices A (1/s), shape (n_modes, n, n). The results have the shape (n_modes, MAX_BISECTIONS + 1, n, n).
 
     Scaling and squaring (N. J. Higham, "The scaling and squaring method for the matrix exponential revisited", SIAM
-    Journal on Matrix Analysis and Applications 26, 2005), with a Taylor series in place of the Padé approximant, since
-    all the halved durations occur on the way. E - I is squared rather than E = exp(A h), so that small changes are not
-    lost beside I. With the integral S,
+    Journal on Matrix Analysis and Applications 26, 2005), with a Taylor series in place of the Padé approximant. The
+    repeated squaring passes through all durations that are needed. E - I is squared instead of E = exp(A h), so that
+    small entries are not lost beside I to rounding. With the integral S,
 
         E(2h) - I = 2 (E - I) + (E - I)²,        S(2h) = 2 S + (E - I) S.
 

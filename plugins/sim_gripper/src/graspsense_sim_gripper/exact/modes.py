@@ -1,32 +1,35 @@
 """The modes of a piecewise-linear scene and their matrices.
 
 A mode is a combination of contact (free, compressed), motion (stuck, closing, opening) and the states of the terms' own
-contacts. Within a mode the scene is the linear system
+contacts (closed, open). Within a mode the scene is the linear system
 
     x' = A x + B u,        x = (D, V, δ, p, a, s, e),        u = (E, c)
 
-    D  closure (m): width of the object less the gap
-    V  closing speed (m/s)
+    D  closure (m): width of the object minus the gap
+    V  closing speed (m/s): the rate of D
     δ  compression of the object (m); a state if the object can separate from the pads
-    p  compression of the pads (m); a state if they damp or creep
+    p  compression of both pads together (m); a state if they damp or creep
     a  force of the pads' Maxwell branch (N); a state if p is
     s  states of the terms
     e  effort of the drive (N); a state if the drive lags
     E  commanded effort (N), constant over the tick
-    c  constant part of friction (N), if the drive has friction
+    c  Coulomb friction (N), the constant part of friction; an input if the drive has friction
 
-With the force N on a pad and friction F the equations of motion are
+With the force N on a pad, friction F, mass m, damping b, load friction coefficient μ and drive lag T, the equations of
+motion are
 
     D' = V,    m V' = e - N - b V - F,    F = ±(c + μ N) while sliding,    V = V' = 0 while stuck,
-    e' = (E - e) / T,
+    e' = (E - e) / T.
 
-and the pads and the object both carry N:
+The pads and the object both carry N. The pads have the spring k_p, the damper g_p and a Maxwell branch k_a, τ:
 
     N = k_p p + g_p p' + a,        a' = k_a p' - a / τ,                     (pads)
     N = k δ + g δ' + f·s,          s' = A_s s + b_s δ + c_s δ',             (all terms together)
 
-In contact p = D - δ, and δ' follows from the equality of both. Without contact both are 0. An equation without dampers
-is differentiated with respect to time.
+In contact p = D - δ, and the equality of both forces determines δ'. Without contact both forces are 0, which determines
+δ' and p'. A balance that contains no damper contains neither rate; it is differentiated with respect to time.
+
+Source: docs/numerics.md, sections "Equations of motion", "Contact" and "Exact discretisation".
 """
 
 from __future__ import annotations
@@ -44,14 +47,15 @@ from graspsense_sim_gripper.terms.term import LinearForm, OwnContact
 
 STUCK, CLOSING, OPENING = range(3)
 FORCE, FORCE_RATE, FIRST_GUARD = range(3)
-"""Indices of the outputs of a mode: force on a pad (N), its rate (N/s), then the guards, which end the mode below 0."""
+"""Indices of the outputs of a mode: force on a pad (N), its rate (N/s), and the first guard. A mode ends if one of its
+guards becomes negative."""
 GAP_TOL_M: Final = 1e-15
 FORCE_TOL_N: Final = 1e-9
-"""A guard below 0 by less than this is rounding."""
+"""A guard that is negative by less than this counts as 0: the difference is rounding."""
 
 
 class LinearScene(NamedTuple):
-    """The parameters of the modes. The constant part of friction is an input and not among them."""
+    """The parameters of the modes. Coulomb friction is an input, and therefore not among them."""
 
     mass_kg: float
     damping_n_s_m: float
@@ -60,14 +64,15 @@ class LinearScene(NamedTuple):
     lag_s: float
     pads: PadCompliance
     forms: tuple[LinearForm | OwnContact, ...]
+    """The linear form of each term."""
 
 
 class Shape(NamedTuple):
-    """The layout of states, modes and outputs. Code that propagates the state is specialised for it."""
+    """The numbers of states, modes and outputs, for which the code of `propagate` is specialised."""
 
     n_states: int
     n_columns: int
-    """States and inputs."""
+    """Number of states and inputs."""
     separable: int
     """1: the object can separate from the pads, and its compression is a state."""
     pad_states: int
@@ -75,29 +80,30 @@ class Shape(NamedTuple):
     lags: int
     """1: the effort of the drive is a state."""
     n_motions: int
-    """3: stuck, closing, opening; 1: no friction, so that these do not differ."""
+    """3: stuck, closing, opening; 1: without friction these do not differ."""
     n_contacts: int
-    """Number of contacts of the terms' own."""
+    """Number of terms with a contact of their own."""
     n_guards: int
-    """One for each contact of the terms, one if the object is separable, two for the motion if there is friction."""
+    """One for each contact of a term, one if the object is separable, and two for the motion if there is friction."""
 
 
 class ModeMatrices(NamedTuple):
-    """One mode."""
+    """The matrices of one mode. A row has n_columns coefficients: the states and then the inputs."""
 
     rates: Array
-    """A and B, with rows of zeros for the inputs: shape (n_columns, n_columns)."""
+    """A and B side by side, above rows of zeros for the inputs: shape (n_columns, n_columns)."""
     force: Array
     """The row that gives the force on a pad."""
     reset: Array
-    """Two rows: δ and p immediately after the mode is entered from another contact state."""
+    """Two rows: δ and p immediately after contact or separation has led to this mode."""
     guards: Array
-    """Rows that are not negative while the mode lasts."""
+    """The row of each guard, shape (n_guards, n_columns). A guard is not negative while the mode lasts."""
     guard_tol: list[float]
+    """By how much each guard may be negative (m, N or m/s, as the guard)."""
 
 
 class Layout:
-    """The places of the states and inputs in x, and rows that select them."""
+    """The indices of the states and inputs in (x, u), and rows that select them."""
 
     def __init__(self, scene: LinearScene) -> None:
         self.scene = scene
@@ -120,7 +126,7 @@ class Layout:
 
     @property
     def shape(self) -> Shape:
-        """The layout as numbers."""
+        """The numbers of states, modes and outputs."""
         return Shape(
             self.n_states,
             self.n_columns,
@@ -133,45 +139,48 @@ class Layout:
         )
 
     def row(self, *places: int) -> Array:
-        """Return the row that sums these states and inputs; without any, a row of zeros."""
+        """Return the row with ones at these indices and zeros elsewhere."""
         row = np.zeros(self.n_columns)
         row[list(places)] = 1.0
         return row
 
     @property
     def compression(self) -> Array:
-        """The row of δ, which is D where it is not a state."""
+        """The row of δ; the row of D if δ is not a state."""
         return self.row(2 if self.separable else 0)
 
     @property
     def pad(self) -> Array:
-        """The row of p; zeros where it is not a state."""
+        """The row of p; zeros if p is not a state."""
         return self.row(3) if self.pad_states else self.row()
 
     @property
     def branch(self) -> Array:
-        """The row of a; zeros where it is not a state."""
+        """The row of a; zeros if a is not a state."""
         return self.row(4) if self.pad_states else self.row()
 
     @property
     def effort(self) -> Array:
-        """The row of e, which is E where the drive does not lag."""
+        """The row of e; the row of E if the drive does not lag."""
         return self.row(self.n_states - 1 if self.lags else self.n_states)
 
     @property
     def friction(self) -> Array:
-        """The row of c."""
+        """The row of c; zeros without friction."""
         return self.row(self.n_states + 1) if self.has_friction else self.row()
 
     def modes(self) -> Iterator[tuple[bool, int, int]]:
-        """Yield whether the object is compressed, the motion, and a bit for each closed contact of the terms' own."""
+        """Return all modes: whether the object is compressed, the motion, and a bit for each closed contact of a term.
+
+        Their order is that of `propagate._mode_index`.
+        """
         compressed = (False, True) if self.separable else (True,)
         motions = (STUCK, CLOSING, OPENING) if self.has_friction else (CLOSING,)
         return product(compressed, motions, range(1 << self.n_contacts))
 
 
 def mode_matrices(layout: Layout, mode: tuple[bool, int, int]) -> ModeMatrices | None:
-    """Return the matrices of a mode; None where the equations of force leave δ' undetermined."""
+    """Return the matrices of a mode; None if the balance of forces leaves δ' undetermined."""
     compressed, motion, contacts = mode
     scene = layout.scene
     compression = layout.row(0) if compressed and layout.rigid_pads else layout.compression
@@ -186,7 +195,7 @@ def mode_matrices(layout: Layout, mode: tuple[bool, int, int]) -> ModeMatrices |
         return None
     force = layout.row()
     if compressed:
-        # Of two equal forces, that of the softer spring has the smaller rounding error.
+        # Object and pads carry the same force: computed from the softer spring, it has the smaller rounding error.
         force = terms.spring_n_m * compression + terms.damper_n_s_m * balance.rate + terms.own
         softer_pads = not layout.rigid_pads and scene.pads.stiffness_n_m < terms.spring_n_m + terms.gain_n_m
         if softer_pads and _pads(layout)[0] == 0.0:
@@ -205,7 +214,7 @@ def mode_matrices(layout: Layout, mode: tuple[bool, int, int]) -> ModeMatrices |
 
 
 def _only_pushes(form: LinearForm | OwnContact) -> bool:
-    """Return whether the force is that of a contact spring, so that it never pulls."""
+    """Return whether a term never pulls: without force, or a spring on a contact of its own."""
     if not isinstance(form, OwnContact):
         return form.spring_n_m == form.damper_n_s_m == 0.0 and not any(form.force)
     touching, parted = form.touching, form.parted
@@ -215,7 +224,7 @@ def _only_pushes(form: LinearForm | OwnContact) -> bool:
 
 
 class _Terms(NamedTuple):
-    """The force of all terms in a mode, k δ + g δ' + own x, where own x' = drift x + gain δ'."""
+    """The force of all terms in a mode, k δ + g δ' + own x. The rate of own x is drift x + gain δ'."""
 
     spring_n_m: float
     damper_n_s_m: float
@@ -223,12 +232,13 @@ class _Terms(NamedTuple):
     own: Array
     drift: Array
     forms: list[tuple[slice, LinearForm]]
-    """The places of each term's states, and its form in this mode."""
+    """The indices of each term's states, and its linear form in this mode."""
     guards: list[Array]
-    """For each contact of the terms' own, the row that is not negative while it is as in this mode."""
+    """The guard of each contact of a term: not negative while the contact is closed, or open, as in this mode."""
 
 
 def _terms(layout: Layout, contacts: int, compression: Array) -> _Terms:
+    """Return the force of all terms; bit i of `contacts` says whether the i-th contact of a term is closed."""
     spring = damper = gain = 0.0
     own, drift = layout.row(), layout.row()
     forms: list[tuple[slice, LinearForm]] = []
@@ -253,23 +263,24 @@ def _terms(layout: Layout, contacts: int, compression: Array) -> _Terms:
 
 
 class _Balance(NamedTuple):
-    """What the equations of force determine."""
+    """What the balance of forces determines."""
 
     rate: Array
     """The row of δ'."""
     pad_rate: Array
     """The row of p'."""
     reset: tuple[Array, Array]
-    """The rows of δ and p as the mode is entered."""
+    """The rows of δ and p when the mode is entered."""
 
 
 def _pads(layout: Layout) -> tuple[float, float, float]:
-    """Return damper and Maxwell branch of the pads; the time constant is 1 s where there are none."""
+    """Return g_p, k_a and τ of the pads; 0, 0 and 1 s if the pads neither damp nor creep."""
     pads = layout.scene.pads
     return (pads.damping_n_s_m, pads.branch_n_m, pads.branch_tau_s) if layout.pad_states else (0.0, 0.0, 1.0)
 
 
 def _in_contact(layout: Layout, terms: _Terms, compression: Array, speed: Array) -> _Balance | None:
+    """Return the balance in contact, N of the pads = N of the object; None if it does not determine δ'."""
     closure, branch = layout.row(0), layout.branch
     if layout.rigid_pads:
         return _Balance(speed, layout.row(), (closure, layout.row()))
@@ -295,6 +306,7 @@ def _in_contact(layout: Layout, terms: _Terms, compression: Array, speed: Array)
 
 
 def _separated(layout: Layout, terms: _Terms, compression: Array) -> _Balance | None:
+    """Return the balance without contact, where both forces are 0; None if it does not determine δ'."""
     spring, entered = terms.spring_n_m, layout.compression
     if terms.damper_n_s_m > 0.0:
         rate = -(spring * compression + terms.own) / terms.damper_n_s_m
@@ -337,7 +349,7 @@ def _add_state_rates(
 
 
 def _guards(layout: Layout, mode: tuple[bool, int, int], force: Array) -> tuple[list[Array], list[float]]:
-    """Return the guards of separation and of the motion, and by how much they may be below 0."""
+    """Return the guards of separation and of the motion, and by how much each may be negative."""
     compressed, motion, _ = mode
     guards: list[Array] = []
     tol: list[float] = []
@@ -345,7 +357,7 @@ def _guards(layout: Layout, mode: tuple[bool, int, int], force: Array) -> tuple[
         guards.append(force if compressed else layout.compression + layout.pad - layout.row(0))
         tol.append(FORCE_TOL_N if compressed else GAP_TOL_M)
     if layout.has_friction and motion == STUCK:
-        # Friction holds the fingers while it exceeds what pushes them, in either direction.
+        # Friction holds the fingers while it exceeds the driving force in either direction.
         limit = layout.friction + layout.scene.load_friction_coefficient * force
         guards += [limit - layout.effort + force, limit + layout.effort - force]
         tol += [FORCE_TOL_N, FORCE_TOL_N]

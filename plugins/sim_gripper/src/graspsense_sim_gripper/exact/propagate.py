@@ -1,19 +1,20 @@
-"""One tick of the plant by precomputed matrix exponentials, with the events that end a mode located in it.
+"""Advancing the plant by one tick with precomputed matrix exponentials, and locating the events that end a mode.
 
-The workspace of a tick is one flat table with these vectors at fixed places:
+`modes` defines the states x, the inputs u and the outputs. The workspace of a tick is one flat table that holds these
+vectors at fixed offsets:
 
-    X0     x at the beginning of a piece of the tick, and the inputs
-    X1     x at its end, followed by the outputs there
-    Y0     the outputs at its beginning
+    X0     x and u at the beginning of a piece of the tick
+    X1     x at the end of the piece, followed by the outputs there
+    Y0     the outputs at the beginning of the piece
     BOUND  bounds on the change of the outputs within the tick
-    DX     the change of x in modal coordinates
+    DX     the change of x within the tick, projected as in `bounds`
 
-Compiled code then knows that they do not overlap, and keeps most of the numbers in registers. The names in capitals and
-the products of matrices are globals that `bind_move` fills in, so that all loops have a constant length.
+The compiler can then tell that the vectors do not overlap, and keeps most numbers in registers. The names in capitals
+and the matrix products are globals that `bind_move` replaces by constants and functions, so that every loop has a
+constant length.
 
-Events are located by bisection between precomputed maps, unlike those of the time-stepping schemes (`stepping`), which
-locate events by Newton or secant iterations on the solution of a step. Here no iteration is needed: a map for any
-duration tick / 2^k is there, and each costs one product of a matrix with a vector.
+Events are located by bisection: a map for each duration tick / 2^k is precomputed, and a piece costs one product of a
+matrix and a vector. The time-stepping schemes (`stepping`) have no such maps, and iterate on the solution of a step.
 """
 
 from __future__ import annotations
@@ -42,14 +43,15 @@ from graspsense_sim_gripper.exact.term_states import term_state_functions
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 
 INDEX_MASK: Final = 0x3FFFFFFF
-"""An index after `&` with this is known not to be negative, which compiled code otherwise checks at each access."""
+"""After `&` with this mask the compiler knows that an index is not negative, and omits the check at each access."""
 TICK_UNITS: Final = 1 << MAX_BISECTIONS
-"""The length of a tick, in the shortest pieces."""
+"""The length of a tick in units of the shortest piece, tick / 2^MAX_BISECTIONS."""
 MAX_EVENTS: Final = 64
-"""After this many events in a tick the last mode is kept to its end, and the step counts as unresolved."""
+"""After this many events in a tick, the mode is kept to the end of the tick, and the step counts as unresolved."""
 PEAK_TOL: Final = 2e-3
-"""An oscillation inside a tick that exceeds the peak force by less than this part of it may be missed."""
+"""A maximum inside a tick that exceeds the peak force by less than this share of it may be missed."""
 VECTORS: Final = ("X0", "X1", "Y0", "BOUND", "DX")
+"""The vectors of the workspace, in their order."""
 
 
 class ExactPlant(NamedTuple):
@@ -58,27 +60,31 @@ class ExactPlant(NamedTuple):
     plant: PlantParams
     tables: Tables
     workspace: Table
+    """`workspace_size` numbers that `move` overwrites in each tick."""
 
 
 class Mode(NamedTuple):
     """The mode in which a piece of the tick begins."""
 
     compressed: int
-    """1: the pads compress the object; 0: it is separated from them. 1 as well if it is not separable."""
+    """1: the pads compress the object, or it is not separable; 0: it is separated from the pads."""
     motion: int
     """STUCK, CLOSING or OPENING."""
     contacts: int
-    """A bit for each contact of the terms' own that is closed."""
+    """A bit for each closed contact of a term."""
     at_rest: bool
-    """Whether the speed is 0, so that it has to be checked whether friction holds the fingers."""
+    """Whether the speed is 0. It must then be checked whether friction holds the fingers."""
 
 
 class TickResult(NamedTuple):
-    """How a tick ended, beside the state vector X1."""
+    """How a tick ended, in addition to the state vector X1."""
 
     compressed: int
+    """As in `Mode`."""
     touched: int
+    """As in `Contact`."""
     peak_n: float
+    """The largest force on a pad (N) in the grasp so far."""
     n_events: int
 
 
@@ -88,9 +94,9 @@ class TickResult(NamedTuple):
 def bind_move(
     kinds: Sequence[str], shape: Shape, step_move: Callable[..., PlantState]
 ) -> Callable[[Any, PlantState, float, float], PlantState]:
-    """Return `move` for an object of these terms and modes of this shape.
+    """Return `move` for an object with terms of these kinds and modes of this shape.
 
-    `step_move` advances the plant by time steps in the ticks that are not linear.
+    `step_move` advances the plant by time steps in ticks to which exact discretisation does not apply.
     """
     constants = _constants(shape)
     n, n_outputs = shape.n_states, padded(FIRST_GUARD + shape.n_guards)
@@ -104,7 +110,7 @@ def bind_move(
         "bound_by_modes": bind(_product, ROWS=n_outputs, COLUMNS=2 * n, FROM=dx, TO=bound, OF_MAGNITUDE=1),
     }
     pack, unpack = term_state_functions(kinds)
-    # DX is read by the products only.
+    # Only the products read DX.
     parts: dict[str, Any] = {name: place for name, place in constants.items() if name != "DX"}
     parts |= {**products, "pack": pack, "unpack": unpack, "step_move": step_move}
     bound_move: Callable[[Any, PlantState, float, float], PlantState] = bind_reachable(move, parts)
@@ -112,7 +118,10 @@ def bind_move(
 
 
 def cold_calls(function: Callable[..., Any]) -> tuple[str, ...]:
-    """Return what a part of `move` seldom calls: not inlined, it leaves compiled code the registers for the rest."""
+    """Return the names of the functions that `function`, a part of `move`, rarely calls.
+
+    The compiler should not inline them, so that the registers remain for the frequent path.
+    """
     code = function.__code__
     if code is move.__code__:
         return ("step_move",)
@@ -120,7 +129,7 @@ def cold_calls(function: Callable[..., Any]) -> tuple[str, ...]:
 
 
 def workspace_size(shape: Shape) -> int:
-    """Return how many numbers the workspace of a tick has."""
+    """Return the number of entries of the workspace."""
     return len(VECTORS) * _vector_size(shape)
 
 
@@ -159,16 +168,16 @@ N_STATES = N_COLUMNS = SEPARABLE = PAD_STATES = LAGS = N_MOTIONS = N_CONTACTS = 
 OUTPUT_ROWS = MAP_ROWS = PROJECTION_ROWS = 0
 """Rows of the tables, with the padding."""
 TERM_STATES = 0
-"""The place of the first state of a term in x."""
+"""The index of the first state of a term in x."""
 X0 = X1 = Y0 = BOUND = 0
 ROWS = COLUMNS = FROM = TO = 0
-"""Of a product: the shape of the matrix, and the places of its operand and result."""
+"""Of a product: the shape of the matrix, and the offsets of its operand and result in the workspace."""
 OF_CHANGE = OF_MAGNITUDE = 0
-"""1: the operand is taken less X0; the magnitudes of the operand are taken."""
+"""1: X0 is subtracted from the operand; 1: the magnitudes of the operand are taken."""
 
 
 def _product(table: Table, at: int, ws: Table) -> None:
-    """Write the matrix that begins at place `at` of the table, times the operand at FROM, to TO."""
+    """Write to TO the product of the matrix at index `at` of the table and the operand at FROM."""
     at &= INDEX_MASK
     for group in range(ROWS // GROUP):
         i = group * GROUP
@@ -191,7 +200,7 @@ map_step = map_outputs = bound_directly = project_change = bound_by_modes = _pro
 
 
 def _row_product(rows: Table, at: int, ws: Table) -> float:
-    """Return the row that begins at place `at`, times X0."""
+    """Return the product of the row at index `at` and X0."""
     at &= INDEX_MASK
     total = 0.0
     for j in range(N_COLUMNS):
@@ -200,12 +209,15 @@ def _row_product(rows: Table, at: int, ws: Table) -> float:
 
 
 def _mode_index(mode: Mode) -> int:
-    """Return the place of a mode among the modes. Without friction the motion is STUCK, which is 0."""
+    """Return the index of a mode among `Layout.modes`. Without friction the motion is always STUCK, which is 0."""
     return ((mode.compressed * SEPARABLE * N_MOTIONS + mode.motion) << N_CONTACTS) + mode.contacts
 
 
 def move(params: ExactPlant, state: PlantState, effort_n: float, dt: float) -> PlantState:
-    """Return the plant after a tick of `dt` (s), the one that the matrices are for, under this commanded effort."""
+    """Return the plant after a tick under this commanded effort (N).
+
+    `dt` is the length of the tick (s) for which the matrices were computed.
+    """
     linear, after = propagate(params, state, effort_n, dt)
     if not linear:
         return step_move(params.plant, state, effort_n, dt)  # type: ignore[no-any-return]
@@ -213,10 +225,11 @@ def move(params: ExactPlant, state: PlantState, effort_n: float, dt: float) -> P
 
 
 def propagate(params: ExactPlant, state: PlantState, effort_n: float, dt: float) -> tuple[bool, PlantState]:
-    """Return whether the tick is linear between events, and the plant after it.
+    """Return whether exact discretisation applies to the tick, and the plant after it.
 
-    It is not where the object is off the centre line, and where the fingers reach an end of their travel. Fingers that
-    are pushed against the open end stand still under an effort of 0, while the object recovers its shape.
+    It does not apply if the object is off the centre line, or if the fingers reach an end of their travel. In both
+    cases the second value is not the plant after the tick. Fingers pushed against the open end are an exception: they
+    stand still, as under an effort of 0, while the object recovers its shape.
     """
     contact, drive = state.contact, params.plant.drive
     at_open_end = state.motion.revolutions >= drive.open_rev and effort_n <= 0.0
@@ -237,7 +250,7 @@ def propagate(params: ExactPlant, state: PlantState, effort_n: float, dt: float)
 
 
 def _load(params: ExactPlant, state: PlantState, effort_n: float) -> Mode:
-    """Write X0, and return the mode. Which of the terms' own contacts are closed is a guess that the guards correct."""
+    """Write the state to X0, and return the mode. Its closed contacts of terms are a guess that the guards correct."""
     drive, model, ws = params.plant.drive, params.plant.object, params.workspace
     left = state.contact.left
     closure = model.width_m - state.motion.gap_m
@@ -271,11 +284,11 @@ def _load(params: ExactPlant, state: PlantState, effort_n: float) -> Mode:
 def _store(
     params: ExactPlant, state: PlantState, result: TickResult, at_open_end: bool
 ) -> tuple[bool, PlantState]:
-    """Return the plant with X1 as its state, and before that whether the fingers are within their travel."""
+    """Return whether the fingers are within their travel, and the plant with the state in X1."""
     drive, ws = params.plant.drive, params.workspace
     revolutions, _, gap, jacobian = state.motion
     closed_by = ws[X1] - (params.plant.object.width_m - gap)
-    # The next tick waits for this, and a product is available sooner than a quotient.
+    # The next tick depends on this, and a product is available sooner than a quotient.
     rev_per_m = 1.0 / jacobian
     revolutions1 = revolutions - closed_by * rev_per_m
     if not (drive.closed_rev < revolutions1 < drive.open_rev or (at_open_end and closed_by == 0.0)):
@@ -289,7 +302,7 @@ def _store(
 
 
 def _store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_open_end: bool) -> Contact:
-    """Return the object and the forces on the pads as in X1."""
+    """Return the contact with the state of the object and the forces on the pads in X1."""
     model, ws, before = params.plant.object, params.workspace, contact.left
     # A mode that is entered at the very end of the tick has not acted yet.
     force = max(ws[X1 + N_STATES + FORCE], 0.0) if result.compressed == 1 else 0.0
@@ -321,9 +334,10 @@ def _store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_
 
 
 def no_event(params: ExactPlant, mode: Mode, peak_n: float, dt: float) -> bool:
-    """Return whether no event can end the mode within the tick, and write the state after it to X1.
+    """Write the state after the tick to X1, and return whether it is valid because no event ends the mode before.
 
-    Most ticks end here. False as well where the force may exceed `peak_n` inside the tick but not at its ends.
+    This is the frequent case. The result is also False if the force may exceed `peak_n` inside the tick but not at its
+    ends.
     """
     tables, ws = params.tables, params.workspace
     tol, index = tables.guard_tol, _mode_index(mode)
@@ -349,7 +363,7 @@ def no_event(params: ExactPlant, mode: Mode, peak_n: float, dt: float) -> bool:
 
 
 def _guard_violated(tables: Tables, index: int, ws: Table) -> bool:
-    """Return whether a guard of the mode is below 0 in X1."""
+    """Return whether a guard of the mode is negative in X1."""
     at = (index * N_GUARDS) & INDEX_MASK
     violated = False
     for k in range(N_GUARDS):
@@ -359,10 +373,10 @@ def _guard_violated(tables: Tables, index: int, ws: Table) -> bool:
 
 
 def _event_possible(params: ExactPlant, index: int, peak_n: float, dt: float) -> bool:
-    """Return whether a guard may be below 0 inside a tick at whose end none is, or the force above `peak_n`.
+    """Return whether, inside a tick, a guard may be negative or the force above `peak_n`, although not at its end.
 
-    The outputs inside the tick differ from Y0 by no more than the bounds: the direct ones, and the modal ones if these
-    exclude nothing.
+    The outputs inside the tick differ from Y0 by no more than the bounds (see `bounds`). The direct bound is evaluated
+    first, and the modal one only if the direct one does not exclude an event.
     """
     tables, ws = params.tables, params.workspace
     bound_directly(tables.direct_bound, index * OUTPUT_ROWS * N_STATES, ws)
@@ -380,17 +394,17 @@ def _event_possible(params: ExactPlant, index: int, peak_n: float, dt: float) ->
             return True
     if ws[Y0 + FORCE] + ws[BOUND + FORCE] <= exceeded:
         return False
-    # A force that rises as evenly as its rates at both ends say has no oscillation in between.
+    # If the rates at both ends agree with the mean rate, the force does not oscillate in between.
     rise = ws[X1 + N_STATES + FORCE] - ws[Y0 + FORCE]
     uneven = max(abs(ws[Y0 + FORCE_RATE] * dt - rise), abs(ws[X1 + N_STATES + FORCE_RATE] * dt - rise))
     return not max(ws[Y0 + FORCE], ws[X1 + N_STATES + FORCE]) + uneven <= exceeded
 
 
 def locate_events(params: ExactPlant, mode: Mode, touched: int, peak_n: float, dt: float) -> TickResult:
-    """Take a tick in pieces of dt / 2^level, and switch modes at the events. The state after it is in X0 and X1.
+    """Advance by a tick in pieces of dt / 2^level, switching modes at events. The state after it is in X0 and X1.
 
-    The tick is first taken whole. If an event is possible in it, pieces of the bisection depth are tried one after the
-    other. A piece at whose end a guard is below 0 is halved until the shortest map; the event lies at its end.
+    The whole tick is tried first. If an event is possible in it, pieces of the bisection depth are tried in turn. A
+    piece at whose end a guard is negative is halved, down to the shortest piece; the event lies at its end.
     """
     tables, ws, depth = params.tables, params.workspace, params.tables.bisection_depth
     remaining, level, n_events, until, index = TICK_UNITS, 0, 0, 0, 0
@@ -428,7 +442,7 @@ def locate_events(params: ExactPlant, mode: Mode, touched: int, peak_n: float, d
             for j in range(FIRST_GUARD + N_GUARDS):
                 ws[Y0 + j] = ws[X1 + N_STATES + j]
             if level > depth and searching:
-                # The event that was seen at the end of a longer piece lies in its second half.
+                # The event that ended a longer piece lies in its second half.
                 level = min(level + 1, MAX_BISECTIONS) if remaining > until else depth
     for j in range(N_STATES):
         ws[X1 + j] = ws[X0 + j]
@@ -436,10 +450,10 @@ def locate_events(params: ExactPlant, mode: Mode, touched: int, peak_n: float, d
 
 
 def _enter(params: ExactPlant, mode: Mode, first: bool) -> Mode:
-    """Return the mode that X0 is in, and write its outputs to Y0.
+    """Return the mode of the state in X0, and write its outputs to Y0.
 
-    `first`: at the beginning of the tick, when the state of the terms' own contacts is a guess. Fingers at rest are
-    stuck unless a guard of that mode says that what pushes them exceeds friction.
+    `first`: at the beginning of the tick, where the closed contacts of terms are a guess that is corrected here.
+    Fingers at rest are stuck, unless a guard of that mode shows that the driving force exceeds friction.
     """
     tables, ws = params.tables, params.workspace
     compressed, motion, contacts, at_rest = mode
@@ -464,7 +478,7 @@ def _enter(params: ExactPlant, mode: Mode, first: bool) -> Mode:
 
 
 def _switch(params: ExactPlant, mode: Mode, index: int) -> Mode:
-    """Return the mode after the events at X1, and write what changes at once to X0: the reset map, and a speed of 0."""
+    """Return the mode after the events at X1, and write to X0 what they change: δ and p by the reset map, or V to 0."""
     tables, ws = params.tables, params.workspace
     at = (index * N_GUARDS) & INDEX_MASK
     compressed, motion, contacts, at_rest = mode
@@ -475,7 +489,7 @@ def _switch(params: ExactPlant, mode: Mode, index: int) -> Mode:
             elif SEPARABLE == 1 and k == N_CONTACTS:
                 compressed = 1 - compressed
             else:
-                # The fingers stop, or friction no longer holds them: `_enter` says in which direction they go on.
+                # The fingers stop, or friction no longer holds them: `_enter` determines in which direction they move.
                 ws[X0 + 1] = 0.0
                 motion, at_rest = STUCK, True
     if compressed != mode.compressed:
@@ -491,7 +505,7 @@ def _switch(params: ExactPlant, mode: Mode, index: int) -> Mode:
 
 
 def _piece_peak(params: ExactPlant, level: int, peak_n: float, dt: float) -> float:
-    """Return the peak force after a piece of the tick, from Y0 to X1."""
+    """Return the peak force (N) of the grasp after a piece of the tick, from Y0 to X1."""
     ws = params.workspace
     force1, rate1 = ws[X1 + N_STATES + FORCE], ws[X1 + N_STATES + FORCE_RATE]
     if force1 > peak_n:
@@ -503,9 +517,9 @@ def _piece_peak(params: ExactPlant, level: int, peak_n: float, dt: float) -> flo
 
 
 def _cubic_peak(force0: float, rate0: float, force1: float, rate1: float, h: float) -> float:
-    """Return the maximum of the cubic Hermite polynomial over `h` with these values and slopes at its ends.
+    """Return the maximum of the cubic Hermite polynomial over `h` (s) with these values and slopes at its ends.
 
-    It is at most where the tangents at the ends meet, as the force is concave there.
+    It is limited to the tangent at each end, evaluated at the other end: a concave force does not exceed either.
     """
     step = force1 - force0
     m0, m1 = rate0 * h, rate1 * h

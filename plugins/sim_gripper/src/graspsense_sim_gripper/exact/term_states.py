@@ -1,7 +1,7 @@
 """Copying the states of the terms, which are named tuples, to and from the state vector.
 
-An object has any number of terms, and compiled code cannot loop over a tuple of different types. Each function here
-therefore handles the first term and calls the function for the rest, which `term_state_functions` binds.
+Compiled code cannot loop over a tuple of different types. Each function here therefore handles the first term, and
+calls the function for the remaining terms, which `term_state_functions` binds.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import NO_STATE, TermState
 
 MAX_NUMBERS: Final = 4
+"""The largest number of fields of a state that is copied."""
 
 TermsParams = Any
 """A tuple with the parameters of each term, which are `Switchable`."""
@@ -25,15 +26,19 @@ TermStateFunctions = tuple[Callable[..., int], Callable[..., Any]]
 
 
 def n_numbers(state: TermState) -> int:
-    """Return how many numbers of the state vector a term's state takes: its fields, at most four, if all are floats."""
+    """Return how many places of the state vector a term's state takes: one for each field.
+
+    It takes none if a field is not a float, or if there are more than MAX_NUMBERS.
+    """
     return len(state) if all(isinstance(value, float) for value in state) and len(state) <= MAX_NUMBERS else 0
 
 
 def term_state_functions(kinds: Sequence[str]) -> TermStateFunctions:
-    """Return `pack` and `unpack` for an object of these terms, after the lumped spring and damper.
+    """Return `pack` and `unpack` for an object with the lumped spring and damper and then terms of these kinds.
 
-    `pack(terms, states, vector, at)` writes the states of the kept terms from place `at` on. `unpack(terms, states,
-    vector, at)` returns the states with the numbers that stand there, and the place behind them.
+    `pack(terms, states, vector, at)` writes the states of the active terms to `vector` from index `at` on, and returns
+    the index after them. `unpack(terms, states, vector, at)` returns the states with the values of active terms read
+    from there, and the index after them. The state of an inactive term remains as it is.
     """
     pack, unpack = _pack_none, _unpack_none
     for state in reversed((NO_STATE, *(find_term(kind)[1].at_rest for kind in kinds))):

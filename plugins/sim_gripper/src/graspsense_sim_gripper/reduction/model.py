@@ -23,7 +23,7 @@ class TermDecision:
     term: str
     """The kind of the term, or `pads`, `steps` or `contact`."""
     decision: str
-    """For a term `kept`, `dropped` or its limit, for the steps the scheme, for the contact whether its peak is resolved."""
+    """`kept`, `dropped` or a limit for a term; a scheme for the steps; for the contact whether its peak is resolved."""
     what: str
     """The meaning of `number`."""
     number: float
