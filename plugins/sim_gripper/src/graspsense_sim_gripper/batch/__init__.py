@@ -1,4 +1,4 @@
-"""Many grasps at once, compiled where that pays, on all cores."""
+"""Simulating many grasps on all cores, compiled if that saves time."""
 
 from graspsense_sim_gripper.batch.threads import run_many
 

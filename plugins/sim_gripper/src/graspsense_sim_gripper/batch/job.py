@@ -1,4 +1,4 @@
-"""One grasp of a batch: the loop on buffers that the grasps of a thread share, and what is kept of it."""
+"""Simulating one grasp of a batch, with buffers that the grasps of a thread reuse, and keeping its results."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ from graspsense_sim_gripper.term_failure import not_finite_in_tick, raised_in_te
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
 TICKS: Final = 8200
-"""Ticks that the buffers hold at first; a grasp that needs more continues with longer ones. Not a power of two: all
-columns would then share one set of a processor's cache, and evict each other."""
+"""Ticks that the buffers hold at first; a grasp that needs more continues with longer ones. It is not a power of two,
+because all columns would then share one set of the processor's cache and evict each other."""
 IMAGES: Final = 128
 """Cell images that the buffers hold at first, a multiple of a block of noise. A grasp that needs more draws more noise
 then: drawing is a sixth of the time of a grasp."""
@@ -54,15 +54,16 @@ GraspLoop = Callable[[GraspParams, SimulationState, Buffers], SimulationState]
 
 @frozen(kw_only=True, eq=False)
 class FinishedGrasp:
-    """One grasp of a batch: how it ended, and the plant at its end (with the true peak force)."""
+    """The result of one grasp of a batch."""
 
     outcome: Outcome
     reason: str
     state: PlantState
+    """The plant at the end of the grasp, with the true peak force."""
     extracted: Extracted
-    """What `Job.extract` returned for its trace."""
+    """What `Job.extract` returned for the trace; None if there is no `Job.extract`."""
     kept: Trace | None
-    """The trace, where traces are kept."""
+    """The trace; None if traces are not kept."""
 
     @property
     def trace(self) -> Trace:
@@ -74,18 +75,19 @@ class FinishedGrasp:
 
 @frozen(kw_only=True, eq=False)
 class Job:
-    """What all grasps of a batch have in common."""
+    """The settings that all grasps of a batch share."""
 
     config: SimConfig
     controller: Controller[Any]
     run: RunConfig
     extract: Callable[[Trace], Extracted] | None
-    """Called with each trace."""
+    """Called with each trace, for example to compute features; its result is `FinishedGrasp.extracted`."""
     traces: bool
     """Whether traces are kept."""
     params: TickParams = field(init=False)
+    """The parameters of controller and guard in every grasp."""
     initial: TickState = field(init=False)
-    """The parameters of every grasp, and the state that each begins with."""
+    """The state of controller and guard before the first tick."""
 
     @params.default
     def _params(self) -> TickParams:
@@ -103,14 +105,14 @@ class Job:
 
 @define
 class Scenes:
-    """The scenes of a job, each with its reduced model, which all its seeds share."""
+    """The scenes of a job, each with its reduced model. All seeds of a scene share the model."""
 
     job: Job
     _scenes: dict[tuple[str, bool], tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
-    """By the name without the number of an instance, and whether there is one."""
+    """By `scene_key`."""
 
     def add(self, scene: str, *, compiled: bool = False) -> None:
-        """Select the model of a scene, by compiled trial grasps or in the interpreter.
+        """Select the model of a scene. `compiled`: run the trial grasps compiled, not in the interpreter.
 
         Raises UnknownName and ConfigError as `build` and `select` do.
         """
@@ -120,7 +122,10 @@ class Scenes:
         self._scenes[scene_key(scene)] = problem, reduction
 
     def setup(self, scene: str, seed: int) -> GraspSetup:
-        """Return the grasp of a scene with this seed; its model is selected if it was not yet."""
+        """Return the grasp of a scene with this seed. The model is selected if the scene was not added before.
+
+        Raises as `add` and `instantiate` do.
+        """
         key = scene_key(scene)
         if key not in self._scenes:
             self.add(scene)
@@ -131,7 +136,7 @@ class Scenes:
 
 
 def scene_key(scene: str) -> tuple[str, bool]:
-    """Return by what scenes share a model: the name, and whether it has the number of an instance."""
+    """Return the key of a scene's model: the name without the number of an instance, and whether there is a number."""
     if scene == "none":
         return scene, False
     name, number = split_number(scene)
@@ -154,13 +159,13 @@ def _new_buffers() -> Buffers:
 
 @define(eq=False)
 class Storage:
-    """The buffers of a thread, which its grasps use one after the other."""
+    """The buffers of a thread. Its grasps use them one after the other."""
 
     buffers: Buffers = field(factory=_new_buffers)
 
 
 def grasp_compiled(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> FinishedGrasp:
-    """Grasp with the compiled loop of the setup's `composition_of`."""
+    """Simulate a grasp with the compiled loop of its composition (see `composition_of`)."""
     try:
         return grasp_once(job, padded(setup), loop, storage, on_arrays=True, own=setup)
     except LAW_ERRORS:
@@ -169,7 +174,7 @@ def grasp_compiled(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storag
 
 
 def grasp_plain(job: Job, setup: GraspSetup) -> FinishedGrasp:
-    """Grasp in the interpreter."""
+    """Simulate a grasp in the interpreter."""
     composition, step = composition_of(job.config, setup, pad=False), type(job.controller).step
     try:
         return grasp_once(job, setup, grasp_loop(composition, step), Storage(), on_arrays=False)
@@ -224,7 +229,7 @@ def grasp_once(
 def finished(
     job: Job, outcome: Outcome, reason: str, state: PlantState, trace: Trace | None
 ) -> FinishedGrasp:
-    """Return what is kept of a grasp. A trace is needed where it is kept or features are extracted from it."""
+    """Return the result of a grasp. `trace` may be None if neither traces nor `extract` are asked for."""
     extracted = None if job.extract is None or trace is None else job.extract(trace)
     return FinishedGrasp(
         outcome=outcome, reason=reason, state=state, extracted=extracted, kept=trace if job.traces else None

@@ -1,8 +1,8 @@
-"""Many grasps at once: compiled on all cores where numba is installed, in the interpreter where it is not.
+"""Simulating many grasps on all cores: compiled if numba is installed, otherwise in the interpreter.
 
-Threads process slices of the batch in turn. A compiled loop runs in its thread without the interpreter's lock. A loop
-in the interpreter runs in a process of its thread, since such loops would otherwise wait for each other. The result of
-a grasp follows from its scene and seed alone, so the number of workers changes times only.
+Threads process slices of the batch in turn. A compiled loop runs in its thread without the interpreter lock. Grasps in
+the interpreter run in one process per thread, because loops in one process would wait for the lock. The result of a
+grasp depends on its scene and seed only; the number of workers changes the run time only.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ from graspsense_sim_gripper.objects.library import kinds_in
 from graspsense_sim_gripper.problem import GraspSetup
 
 WORTH_COMPILING: Final = 50
-"""Grasps of one composition from which on compiling saves more time than it takes."""
+"""Number of grasps of one composition from which compiling saves more time than it takes."""
 WORTH_A_PROCESS: Final = 16
-"""Grasps a worker in the interpreter from which on a process for them, which starts in half a second, saves time."""
+"""Number of grasps per worker in the interpreter from which a process, which starts in half a second, saves time."""
 SLICE: Final = 16
-"""Grasps that a worker takes at once."""
+"""Number of grasps that a worker takes at once."""
 MAX_AHEAD: Final = 8
-"""Slices a worker that may be finished before an earlier one that takes long."""
+"""Number of slices per worker that may be ahead of the earliest unfinished slice."""
 PROGRESS_S: Final = 0.2
 """Time between two calls of the progress callback."""
 
@@ -58,11 +58,15 @@ def run_many(
     compiled: bool | None = None,
     **options: Unpack[BatchOptions],
 ) -> list[FinishedGrasp]:
-    """Grasp each scene with its seed and return the results in that order, the same for any number of workers.
+    """Simulate a grasp of each scene with its seed, and return the results in that order.
 
-    Traces are kept unless the options say otherwise. `compiled` requires or forbids compiling; by default a composition
-    is compiled from `WORTH_COMPILING` grasps on. Where a controller or a term cannot be compiled the loop runs in the
-    interpreter, and a warning gives the reason.
+    The results are the same for any number of workers. Traces are kept unless the options say otherwise. `compiled`:
+    True compiles every loop, False none; None compiles a composition that at least `WORTH_COMPILING` grasps have. If
+    numba is missing, or a controller or term cannot be compiled, the loop runs in the interpreter, and a warning gives
+    the reason.
+
+    Raises TypeError for an unknown option, ValueError if there are not as many seeds as scenes, UnknownName for an
+    unknown object, and ConfigError if the object cannot be read or no model reaches the accuracy.
     """
     return list(grasps(config, controller, scenes, seeds, compiled, {"traces": True, **options}))
 
@@ -75,7 +79,7 @@ def grasps(
     compiled: bool | None,
     options: BatchOptions,
 ) -> Iterator[FinishedGrasp]:
-    """Yield what `run_many` returns, grasp by grasp."""
+    """Yield the results of `run_many` one by one, in order. Raises as `run_many` does."""
     unknown = options.keys() - BatchOptions.__annotations__.keys()
     if unknown:
         raise TypeError(f"run_many has no {sorted(unknown)}; it has {sorted(BatchOptions.__annotations__)}")
@@ -105,15 +109,15 @@ class _Batch:
     workers: int
     compiled: bool | None
     notes: dict[str, None] = field(factory=dict, init=False)
-    """Remarks on how the grasps ran, each once."""
+    """Remarks on how the grasps ran, as keys, so that each is given once."""
     models: Scenes = field(init=False)
     counts: Counter[Composition] = field(factory=Counter, init=False)
-    """Grasps of each composition."""
+    """Number of grasps of each composition."""
     is_compiled: dict[Composition, bool] = field(factory=dict, init=False)
     loops: dict[Composition, GraspLoop] = field(factory=dict, init=False)
-    """The compiled loops that have run once."""
+    """The compiled loops that have run once, so that their machine code exists."""
     local: threading.local = field(factory=threading.local, init=False)
-    """What belongs to a thread: its storage, and its process for grasps in the interpreter."""
+    """The storage of each thread, and its process for grasps in the interpreter."""
     processes: ExitStack = field(factory=ExitStack, init=False)
 
     @models.default
@@ -121,7 +125,10 @@ class _Batch:
         return Scenes(self.job)
 
     def grasps(self, progress: Callable[[int, int], None] | None) -> Iterator[FinishedGrasp]:
-        """Run all grasps and yield them in order, so that a caller that keeps little needs little memory."""
+        """Run all grasps and yield their results in order; `progress(finished, total)` is called now and then.
+
+        Results are not collected here, so that a caller that keeps little needs little memory.
+        """
         total = len(self.scenes)
         self._plan()
         slices = range(0, total, SLICE)
@@ -132,7 +139,7 @@ class _Batch:
         with self.processes, ThreadPoolExecutor(max_workers=workers) as pool:
             try:
                 while True:
-                    # A slice a worker and one in reserve: nothing piles up, and an interruption takes effect soon.
+                    # Two slices per worker, one in reserve: few results wait, and an interruption takes effect soon.
                     while len(running) < 2 * workers and asked < min(
                         len(slices), given + MAX_AHEAD * workers
                     ):
@@ -151,19 +158,19 @@ class _Batch:
                         given += 1
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
-                # A thread that waits for a process then learns that it has ended.
+                # This ends the processes, so that no thread keeps waiting for one.
                 self.processes.close()
                 raise
 
     def _plan(self) -> None:
-        """Select the models and decide what is compiled. Raises UnknownName for a name that is not known."""
-        # In the order of the scenes, so that the first unknown name is reported.
+        """Select the models, and decide which compositions are compiled. Raises as `Scenes.add` does."""
+        # In the order of the scenes, so that an error names the first unknown scene.
         counts = Counter(scene_key(scene) for scene in self.scenes)
         examples = {scene_key(scene): scene for scene in reversed(self.scenes)}
         of_kinds: Counter[tuple[str, ...]] = Counter()
         for key, n in counts.items():
             of_kinds[compiled_kinds(kinds_in(examples[key]))] += n
-        # A straight drive has exact grasps, but its trial grasps have steps, which would be compiled for these alone.
+        # With a straight drive grasps are exact, but trial grasps take steps: these are not worth compiling.
         may_compile = self.job.config.transmission != "straight"
         for key, n in counts.items():
             worth = self._worth(of_kinds[compiled_kinds(kinds_in(examples[key]))])
@@ -176,7 +183,7 @@ class _Batch:
         return n >= WORTH_COMPILING if self.compiled is None else self.compiled
 
     def _slice(self, begin: int) -> list[FinishedGrasp]:
-        """Run the slice that begins there."""
+        """Run the grasps of the slice that begins at this index."""
         scenes, seeds = self.scenes[begin : begin + SLICE], self.seeds[begin : begin + SLICE]
         done: dict[int, FinishedGrasp] = {}
         plain: list[int] = []
@@ -192,10 +199,10 @@ class _Batch:
         return [done[i] for i in range(len(scenes))]
 
     def _compiled(self, setup: GraspSetup) -> FinishedGrasp | None:
-        """Run a grasp compiled; None where it is to run in the interpreter."""
+        """Return the result of a compiled grasp; None if it has to run in the interpreter."""
         composition = composition_of(self.job.config, setup)
         if composition not in self.is_compiled:
-            # The friction drawn may leave it piecewise linear in one trial and not in the next.
+            # The friction that is drawn may make one trial of a scene piecewise linear, and the next not.
             self.is_compiled[composition] = any(
                 compiled for other, compiled in self.is_compiled.items() if other.kinds == composition.kinds
             )
@@ -220,7 +227,7 @@ class _Batch:
         self.notes[f"these grasps run in plain Python {how}, about a hundred times slower: {reason}"] = None
 
     def _worth_processes(self) -> bool:
-        """Return whether the grasps in the interpreter are worth processes of their own."""
+        """Return whether separate processes save time for the grasps in the interpreter."""
         plain = sum(n for composition, n in self.counts.items() if not self.is_compiled[composition])
         return self.workers > 1 and plain >= WORTH_A_PROCESS * self.workers
 

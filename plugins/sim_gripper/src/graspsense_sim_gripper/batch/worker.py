@@ -1,8 +1,9 @@
-"""Grasps in the interpreter of a process of their own, since loops in one process would wait for each other.
+"""Simulating grasps in the interpreter of a separate process, because loops in one process share the interpreter lock.
 
-The process is a new interpreter with `main` as its program, so that nothing of the caller's script runs a second time.
-It reads a line of JSON with the settings and the controller's registered name, and then lines with scenes and seeds. It
-answers each with a line, followed by the traces in numpy's own format. Features are extracted by the caller.
+The process is a new interpreter that runs `main`, so that the script of the caller is not imported a second time. It
+reads one line of JSON with the settings and the registered name of the controller, and then lines with scenes and
+seeds. It answers each of these with a line of JSON, followed by the traces in numpy's npy format. The caller extracts
+the features.
 """
 
 from __future__ import annotations
@@ -32,11 +33,14 @@ Json = Any
 
 
 class NotHandedOver(Exception):
-    """A job that cannot be given to another process; the text gives the reason."""
+    """A job cannot run in another process; the text gives the reason."""
 
 
 class PlainProcess:
-    """A process that runs the grasps of a job in the interpreter. It ends with the context that it is used as."""
+    """A process that runs the grasps of a job in the interpreter. Use it as a context manager, which ends the process.
+
+    Raises NotHandedOver if the controller cannot be created again from its name and settings.
+    """
 
     def __init__(self, scenes: Scenes) -> None:
         self._scenes = scenes
@@ -44,7 +48,7 @@ class PlainProcess:
         try:
             self._greeting = _line(
                 {
-                    # The classes that are named have to be found there: the same folders, in the same order.
+                    # The process has to find the same classes: the same folders, in the same order.
                     "path": [folder or os.getcwd() for folder in sys.path],
                     "config": asdict(job.config),
                     "controller": _named(job.controller),
@@ -70,9 +74,10 @@ class PlainProcess:
         self._process.communicate()
 
     def run(self, scenes: Sequence[str], seeds: Sequence[int]) -> list[FinishedGrasp]:
-        """Grasp these scenes with these seeds and return the results.
+        """Simulate these scenes with these seeds, and return the results in that order.
 
-        Raises NotHandedOver, also where a grasp raised there: it raises here when it is run here.
+        Raises NotHandedOver if the process has ended, and if a grasp raises an exception in it. The caller then runs
+        the grasps itself, which raises the original exception.
         """
         to, of = self._process.stdin, self._process.stdout
         assert to is not None
@@ -97,10 +102,10 @@ class PlainProcess:
 
 
 def main() -> None:
-    """Serve one caller until it hangs up."""
+    """Answer the requests on the standard input until it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), "wb")
-    # What anything prints here must not get between the answers.
+    # Text that other code prints must not appear between the answers.
     os.dup2(2, 1)
     asked = sys.stdin.buffer
     try:
@@ -145,10 +150,13 @@ def _job(greeting: dict[str, Json]) -> Job:
 
 
 def _named(controller: Controller[Any]) -> tuple[str, dict[str, Json]]:
-    """Return the controller's name and settings. Raises ValueError if it does not follow from these alone."""
+    """Return the registered name and the settings of a controller.
+
+    Raises ValueError if a controller that is created from these has other parameters or another initial state.
+    """
     name, values = recipe_of("controller", controller)
     twin = create("controller", name, **values)
-    # As text, for NaN is not equal to itself.
+    # Compared as text, because NaN is not equal to itself.
     if repr((twin.params(), twin.init())) != repr((controller.params(), controller.init())):
         raise ValueError(f"another {name} with its settings has other numbers")
     return name, values
@@ -183,7 +191,7 @@ def _read_trace(of: IO[bytes]) -> Trace:
 
 
 def _like(pattern: Json, values: Json) -> Json:
-    """Return these values, lists in lists, as tuples of the types in `pattern`."""
+    """Return nested lists of values as nested tuples of the same types as `pattern`."""
     if not isinstance(pattern, tuple):
         return values
     parts = [_like(*one) for one in zip(pattern, values, strict=True)]

@@ -1,7 +1,8 @@
-"""Composing the functions of a scene: the sum of its terms, the plant that presses it, and the loop of a grasp.
+"""Composing the functions of a scene: the sum of its terms, the motion of the plant, and the loop of a grasp.
 
-A generic function names its parts as globals, and `binding.bind_reachable` fills them in wherever the function or what
-it calls reads them. Everything composed here runs as it is in the interpreter, and `compiled.jit` compiles it.
+A generic function reads its parts, such as the law of a term, as globals. `binding.bind_reachable` makes a copy of the
+function, and of the functions that it calls, in which these globals are the given parts. The result runs in the
+interpreter as it is, and `compiled.jit` compiles it.
 """
 
 from __future__ import annotations
@@ -35,8 +36,9 @@ TermsStates = Any
 TermsParams = Any
 """A tuple with parameters of its own type for each term."""
 PlantMove = Callable[[Any, PlantState, float, float], PlantState]
-"""Takes the plant's model, its state, the effort and the length of the tick."""
+"""`move(model, state, effort_n, dt_s) -> state` over one tick."""
 ContactSolver = Callable[[ObjectModel, ContactState, float, float, float], tuple[ContactState, int]]
+"""`dynamics.contact.solve_contact` with the terms of an object."""
 
 INTERPRETED: Final[Constructors] = {
     kind: maker(kind)
@@ -45,7 +47,7 @@ INTERPRETED: Final[Constructors] = {
         *(Start, Attempt, SpeedSearch, Stage, PadLoad, BalanceSearch),
     )
 }
-"""Named tuples that a tick creates, each with a constructor that the interpreter runs in half the time."""
+"""The named tuples that a tick creates, each with a constructor that takes the interpreter half the time."""
 
 
 # ------------------------------------------------------------------------------------------ the object's terms
@@ -98,9 +100,10 @@ def _sum_of_more(
 
 
 def sum_of(laws: Sequence[Law]) -> Law:
-    """Return one law that is the sum of these: parameters and states become tuples in the same order.
+    """Return one law that is the sum of these; its parameters and states are tuples in the same order.
 
-    Forces are summed from the last to the first, so that a term of no force changes no bit.
+    Forces are added from the last to the first. A term without force then changes no bit of the sum, and a padded
+    object has exactly the force of the original one.
     """
     if not laws:
         return _no_terms
@@ -176,12 +179,12 @@ def uncompressed(kinds: Sequence[str]) -> ContactState:
 
 
 class Composition(NamedTuple):
-    """What a loop is composed of."""
+    """What the code of a loop depends on, besides the controller. Loops are cached and compiled by it."""
 
     kinds: tuple[str, ...]
     """The kinds of the object's terms."""
     shape: Shape | None
-    """That of the exact discretisation, where it advances the plant."""
+    """The shape of the exact discretisation; None if time steps advance the plant."""
     converges: bool
     """Whether the steps of a tick are halved until the result no longer changes."""
     lags: bool = False
@@ -189,7 +192,7 @@ class Composition(NamedTuple):
 
 
 def composition(kinds: tuple[str, ...], plant: PlantParams, shape: Shape | None) -> Composition:
-    """Return what the loop of this plant is composed of; `shape`: of its exact discretisation, if it has one."""
+    """Return the composition of a loop for this plant; `shape` is that of its exact discretisation, or None."""
     return Composition(kinds, shape, plant.steps.settle > 0.0, plant.drive.lag_s > 0.0)
 
 
@@ -220,7 +223,7 @@ def plant_move(
 
 @lru_cache(maxsize=64)
 def composed_move(composition: Composition, *, interpreted: bool = True) -> PlantMove:
-    """Return what advances the plant by a tick; not `interpreted`: to be compiled."""
+    """Return the function that advances the plant by a tick; `interpreted` False: in the form that is compiled."""
     kinds, move = composition.kinds, _step_move(composition)
     if composition.shape is not None:
         move = bind_move(kinds, composition.shape, move)
@@ -230,7 +233,7 @@ def composed_move(composition: Composition, *, interpreted: bool = True) -> Plan
 
 
 def _step_move(composition: Composition) -> PlantMove:
-    """Return what advances the plant by a tick in time steps."""
+    """Return the function that advances the plant by a tick in time steps."""
     kinds = composition.kinds
     return plant_move(
         laws_of(kinds), phases_of(kinds), converges=composition.converges, lags=composition.lags
@@ -241,7 +244,7 @@ def _step_move(composition: Composition) -> PlantMove:
 def grasp_loop(
     composition: Composition, step: ControllerStep, *, interpreted: bool = True
 ) -> Callable[..., SimulationState]:
-    """Return the loop of a grasp under a controller with this step; not `interpreted`: to be compiled."""
+    """Return the loop of a grasp for a controller with this step; `interpreted` False: in the form that is compiled."""
     force = sum_of_active(active_laws(composition.kinds)) if interpreted else None
     return _loop_of(composed_move(composition, interpreted=False), step, force)
 

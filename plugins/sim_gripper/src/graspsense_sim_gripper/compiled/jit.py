@@ -1,5 +1,4 @@
-"""Compiling the loop of a grasp, with the options that suit it; `graspsense.plugin_api.compile_function` does the
-work."""
+"""Compiling the loop of a grasp with numba: the options for it, on top of `graspsense.plugin_api.compile_function`."""
 
 from __future__ import annotations
 
@@ -18,22 +17,22 @@ from graspsense_sim_gripper.stepping.advance import advance, attempt_of, move, t
 from graspsense_sim_gripper.stepping.converge import refine_until_converged
 
 _REMAIN_CALLS: Final = {
-    # Every scheme reaches the object's laws through the contact: inlined, they would be compiled for each scheme again.
+    # Every scheme calls the laws of the object through the contact: inlined, they would be compiled once per scheme.
     pad_forces.__code__: ("solve_contact",),
     solve_contact.__code__: ("_release_from_rigid_pads",),
-    # Seldom called: inlined, they would take registers from velocity Verlet.
+    # These are rarely called: inlined, they would take registers from velocity Verlet.
     attempt_of.__code__: ("tr_bdf2", "mean_force"),
     take_step.__code__: ("stick", "_after_event"),
 }
 
 
 def _remaining_calls(function: Callable[..., Any]) -> tuple[str, ...]:
-    """Return the names of the functions that remain calls in the code of this one."""
+    """Return the names of the functions that are not inlined in the code of this one."""
     return _REMAIN_CALLS.get(function.__code__) or cold_calls(function)
 
 
 OPTIONS: Final = CompileOptions(
-    # Nothing here creates an array, and counting references to the arrays that are passed took half of a tick.
+    # No code here creates an array, and counting references to the arguments took half of the time of a tick.
     counts_references=False,
     inlining=Inlining(
         short_code=400,
@@ -49,25 +48,25 @@ _COMPILING: Final = threading.Lock()
 
 
 def compile_part(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a composed function compiled with all that it calls.
+    """Return a composed function, compiled with all functions that it calls.
 
-    Raises NotCompilable for closures and recursion, and where numba cannot be imported.
+    Raises NotCompilable for closures and recursion, and if numba cannot be imported.
     """
     return compile_function(function, OPTIONS)
 
 
 @lru_cache(maxsize=64)
 def compiled_loop(composition: Composition, step: ControllerStep) -> Callable[..., Any]:
-    """Return the compiled loop of a composition under a controller with this step. Raises NotCompilable."""
+    """Return the compiled loop of a composition for a controller with this step. Raises NotCompilable."""
     with _COMPILING:
         return compile_part(grasp_loop(composition, step, interpreted=False))
 
 
 @contextmanager
 def compiling(composition: Composition) -> Iterator[None]:
-    """Call a compiled loop inside this context where that may compile it: threads then wait for each other.
+    """Context for a call of a compiled loop that may be its first, which generates the machine code.
 
-    Otherwise each would compile the same. Raises NotCompilable if numba refuses.
+    Threads wait for each other here, so that the code is not generated twice. Raises NotCompilable if numba refuses.
     """
     with _COMPILING, first_call(slp_vectorize=composition.shape is not None):
         yield

@@ -1,9 +1,9 @@
 """Padding a grasp with unused terms, so that few compositions have to be compiled.
 
-Compiling takes seconds for each composition. The objects of the catalogue have few kinds of terms among them, so all of
-them are compiled as one composition with each kind once, in which the terms that an object does not have are dropped.
-Another object is compiled with the terms that its reduced model keeps. Forces are summed from the last term to the
-first, so that a term of no force changes no bit.
+Compiling takes seconds per composition. The objects of the catalogue have few kinds of terms among them. All of them
+therefore share one composition that contains each kind once; the terms that an object does not have are switched off.
+Any other object is compiled with the terms that its reduced model keeps. Forces are added from the last term to the
+first, so that a term that is switched off changes no bit.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from graspsense_sim_gripper.terms.term import TermState
 
 
 class Filler(NamedTuple):
-    """What fills the place of a term that an object does not have: unused parameters, and the state at rest."""
+    """The placeholder of a term that an object does not have: unused parameters, and the state at rest."""
 
     params: Switchable
     state: TermState
@@ -37,17 +37,20 @@ NOTHING: Final = Filler(Switchable(0, None), None)
 
 
 class PaddedLayout(NamedTuple):
-    """The terms of a composition, and where those of an object are in it; the lumped spring and damper is first."""
+    """The terms of a composition, and the positions of an object's own terms in it.
+
+    In `sources` and `places`, though not in `kinds`, the lumped spring and damper is at position 0.
+    """
 
     kinds: tuple[str, ...]
     sources: tuple[tuple[int, Filler], ...]
-    """For each place the index of the object's own term (-1: none), and what fills it then."""
+    """For each position the index of the object's own term, or -1 and the placeholder in its stead."""
     places: tuple[tuple[int, TermState], ...]
-    """For each of the object's own terms its place (-1: none), and its state then."""
+    """For each of the object's own terms its position, or -1 and the state that it keeps."""
 
 
 def layout_of(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> PaddedLayout:
-    """Return the layout in which a grasp is compiled: with these kinds, or by default as in a batch."""
+    """Return the layout in which a grasp is compiled: with these kinds; None: as in a batch."""
     if kinds is not None:
         return _with_kinds(setup.kinds, kinds)
     if is_common(setup.kinds):
@@ -57,19 +60,19 @@ def layout_of(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> Padded
 
 @cache
 def common_kinds() -> tuple[str, ...]:
-    """Return the kinds of terms of the catalogue's objects, each once, in the canonical order."""
+    """Return the kinds of all terms in the catalogue, each once, in the canonical order."""
     names = sorted({kind for spec in catalogue().values() for kind, _ in spec.terms})
     return tuple(names[i] for i in in_order(names))
 
 
 @lru_cache(maxsize=1024)
 def is_common(kinds: tuple[str, ...]) -> bool:
-    """Return whether these terms fit into the catalogue's composition: all of its kinds, and none twice."""
+    """Return whether these terms fit into the composition of the catalogue: each is of its kinds, and none is twice."""
     return len(set(kinds)) == len(kinds) and set(kinds) <= set(common_kinds())
 
 
 def compiled_kinds(kinds: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the kinds with which an object of these terms is compiled if its model keeps all of them."""
+    """Return the kinds in the composition of an object with these terms, if its reduced model keeps all of them."""
     return common_kinds() if is_common(kinds) else kinds
 
 
@@ -81,8 +84,8 @@ def composition_of(config: SimConfig, setup: GraspSetup, *, pad: bool = True) ->
 
 
 def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetup:
-    """Return the same grasp as a compiled loop takes it: in its `layout_of`, with the cells' numbers in arrays."""
-    # As tuples they would be passed number by number, and indexed by a chain of comparisons.
+    """Return the same grasp for a compiled loop: in the layout of `layout_of`, with the data of the cells in arrays."""
+    # Compiled code passes a tuple number by number, and indexes it by a chain of comparisons.
     sensor = setup.sensor
     cells = (IDEAL_CELLS, IDEAL_CELLS)
     if sensor.ideal == 0:
@@ -101,7 +104,7 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
 
 
 def unpadded(state: PlantState, setup: GraspSetup) -> PlantState:
-    """Return the plant's state after a compiled grasp with the object's own terms, those of `setup`."""
+    """Return the state of the plant after a compiled grasp, with the states of the own terms of `setup` only."""
     layout = layout_of(setup)
     if layout.kinds == setup.kinds:
         return state
@@ -129,7 +132,7 @@ def _with_kinds(own: tuple[str, ...], kinds: tuple[str, ...]) -> PaddedLayout:
 
 @lru_cache(maxsize=256)
 def _with_kept(own: tuple[str, ...], kept: tuple[int, ...]) -> PaddedLayout:
-    """Return the layout with the terms that a model keeps, each kind once or more."""
+    """Return the layout with the terms that a model keeps; `kept` is 1 for these. A kind may occur more than once."""
     indices = [i for i, keeps in enumerate(kept) if keeps == 1]
     sources = tuple((i + 1, NOTHING) for i in indices)
     places = tuple(
@@ -142,7 +145,7 @@ def _with_kept(own: tuple[str, ...], kept: tuple[int, ...]) -> PaddedLayout:
 @lru_cache(maxsize=256)
 def _filler(kind: str) -> Filler:
     _, term = find_term(kind)
-    # Compiled code distinguishes types: floats, as all its parameters.
+    # Compiled code distinguishes types: the parameters must be floats, whatever their value.
     return Filler(Switchable(0, term.params(*(1.0 for _ in term.params._fields))), term.at_rest)
 
 
@@ -151,4 +154,4 @@ def _as_arrays(cells: PadCells) -> PadCells:
 
 
 IDEAL_CELLS: Final = _as_arrays(PadCells((1.0 / 15.0,) * 15, (0.0,) * 22))
-"""The cells of an ideal sensor, which nothing reads."""
+"""The cells of an ideal sensor; they are never read."""
