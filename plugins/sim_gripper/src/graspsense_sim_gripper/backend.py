@@ -52,9 +52,9 @@ _COMPILED: Final[Mapping[str, bool | None]] = {"worth": None, "always": True, "n
 
 
 def default_controller(config: SimConfig) -> GraspController:
-    """Return the controller for which a model is selected where none is given: that of the paper.
+    """Return the controller for which a model is selected if none is given: that of the paper.
 
-    It has the speed and the force that the config expects.
+    Its probing force and closing speed are those that the config expects, or those of the paper.
     """
     force = min(config.expected_force_n or FORCE_N, EFFORT_LIMIT_N)
     speed = config.expected_speed_m_s or SPEED_M_S
@@ -71,7 +71,7 @@ class SimBackend(BatchBackend[SimConfig]):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """The channels of a PR2 gripper; those of the fingertips come with each cell image."""
+        """The channels of a PR2 gripper. Forces and cells have the rate of cell images, others that of frames."""
         frames_hz = self.config.rate_hz
         pads_hz = min(1.0 / self.config.pad_period_s, frames_hz)
         forces = tuple(
@@ -90,7 +90,7 @@ class SimBackend(BatchBackend[SimConfig]):
         return object_kinds()
 
     def with_object(self, name: str) -> SimBackend:
-        """Return this gripper with another object in it: a name of the catalogue, or a scene file."""
+        """Return this gripper with another object in it: a name, a scene file, or `none`."""
         return SimBackend(evolve(self.config, object=name))
 
     def expect(self, controller: Controller[Any], run: RunConfig) -> None:
@@ -166,7 +166,7 @@ class SimBackend(BatchBackend[SimConfig]):
         self._effort_n = command.value
 
     def tare(self, images: Sequence[Pads]) -> None:
-        """Set the cells' zero."""
+        """Set the zeros of the cells to the mean of these images; an ideal sensor has none."""
         if self.config.sensor == "ideal":
             return
         left, right = tare(images, PAD_COUNTS_PER_N)
@@ -177,9 +177,10 @@ class SimBackend(BatchBackend[SimConfig]):
         """Do nothing: there is no device to release."""
 
     def report(self) -> Mapping[str, Any]:
-        """Return what only the model knows: the true peak force on the pads, and whether something broke.
+        """Return what only the model knows, such as the true peak force on the pads and whether something broke.
 
-        With `explain` in the settings, also how much each term of the object contributed, under `model`.
+        `selection` describes the reduced model. With `explain` in the settings, `model` gives the contribution of each
+        term.
         """
         setup, reduction = self._setup, self._reduction
         report = _model_report(self._state, setup.kinds)
@@ -198,13 +199,13 @@ class SimBackend(BatchBackend[SimConfig]):
         return report
 
     def _draw_noise(self) -> None:
-        """Draw the noise of the next images, and make room for these."""
+        """Draw the noise of the next images, and extend the buffer of images by as many."""
         noise, images = self._buffers.noise, self._buffers.images
         noise.extend(next(self._blocks).tolist())
         images.extend(([0.0] * CELLS, [0.0] * CELLS) for _ in range(len(noise) - len(images)))
 
     def variants(self) -> tuple[SimulationVariant, ...]:
-        """Return each scheme at each fidelity, from coarse to fine."""
+        """Return the settings that `graspsense tradeoff simulation` compares, see `variants`."""
         from graspsense_sim_gripper.variants import variants
 
         return variants()

@@ -1,6 +1,6 @@
-"""From a config, the name of an object and a seed to the parameters and initial states of one grasp.
+"""Building the parameters and initial states of a grasp from a config, the name of an object, and a seed.
 
-`build` gives the problem, `reduction.select` its reduced model, and `instantiate` one grasp of it.
+This takes three steps: `build` gives the problem, `reduction.select` its reduced model, and `instantiate` one grasp.
 """
 
 from __future__ import annotations
@@ -44,24 +44,26 @@ EFFORT_LIMIT_N: Final = 100.0
 SPEED_LIMIT_M_S: Final = 0.2
 """Software limits of the PR2 gripper at the time of the paper."""
 OPENING_N: Final = -20.0
-"""The authors' recordings show +17 and +20 N (opening) between squeezes."""
+"""The effort that opens the fingers. The recordings of the paper's authors show 17 and 20 N between squeezes."""
 TARE_IMAGES: Final = 6
+"""Number of cell images in a tare."""
 CELL_OFFSET: Final = (3300.0, 250.0)
-"""Mean and spread of an unloaded cell's counts: 2900 to 3800 are reported."""
+"""Mean and standard deviation of the counts of an unloaded cell; 2900 to 3800 counts are reported."""
 UNLOADED: Final = (CELL_OFFSET[0],) * CELLS
+"""The counts of the unloaded cells of an ideal sensor."""
 EVEN_WEIGHTS: Final = (1.0 / 15.0,) * 15
-"""The part of the force on each cell where there is no object."""
+"""The share of each cell of the gripping face in the force, if there is no object."""
 _SENSOR_SETTINGS: Final = ("noise_counts", "pad_period_s", "pad_cells", "pad_delay_s")
 _NOT_OF_THE_MODEL: Final[dict[str, Any]] = {
     field.name: field.default
     for field in fields(SimConfig)
     if field.name in ("object", "explain", "compile", *_SENSOR_SETTINGS)
 } | {"sensor": "ideal"}
-"""Settings on which a reduced model does not depend, as its trial grasps have them."""
+"""The settings that a reduced model does not depend on, with the values that they have in its trial grasps."""
 
 
 def device_info(config: SimConfig) -> DeviceInfo:
-    """Return how this gripper presents itself."""
+    """Return the properties of this gripper as a device: rate, limits, opening command, and tare."""
     return DeviceInfo(
         name="simulated PR2 gripper",
         clock="virtual",
@@ -77,9 +79,9 @@ def device_info(config: SimConfig) -> DeviceInfo:
 
 
 def build(config: SimConfig, scene: str) -> Problem:
-    """Return the problem of this object (`none`: no object; `*.toml`: a scene file) in a gripper.
+    """Return the problem of grasping an object: a name, a scene file (`*.toml`), or `none` for no object.
 
-    Raises UnknownName, and ConfigError for a file that cannot be read as an object.
+    Raises UnknownName for an unknown name, ConfigError for a file that cannot be read as an object.
     """
     if scene == "none":
         return problem_of(config, None)
@@ -88,13 +90,13 @@ def build(config: SimConfig, scene: str) -> Problem:
 
 
 def problem_of(config: SimConfig, spec: ObjectSpec | None, number: int | None = None) -> Problem:
-    """Return the problem of an object, or of its instance of this number; `spec` None: no object."""
+    """Return the problem of an object, or of its instance with this number; `spec` None: no object."""
     model_config = evolve(config, **_NOT_OF_THE_MODEL)
     nominal = None
     if spec is not None:
         nominal = _setup(evolve(model_config, spread=False), sample(spec, None), np.random.default_rng(0))
         if number is not None:
-            # A numbered instance differs from the nominal object, as any does with spread.
+            # A numbered instance differs from the nominal object, like the instances that a seed draws.
             model_config = evolve(model_config, spread=True)
     return Problem(
         config=config,
@@ -120,7 +122,7 @@ def instantiate(problem: Problem, reduction: Reduction | None, seed: int) -> Gra
 
 
 def unverified_setup(config: SimConfig, scene: str | ObjectSpec | None, seed: int) -> GraspSetup:
-    """Return a grasp in a model that is proposed without a trial grasp, for studies of the plant alone.
+    """Return a grasp in a model that no trial grasp has verified, for studies of the plant without a controller.
 
     Raises as `build` and `instantiate` do.
     """
@@ -150,7 +152,7 @@ def _setup(
 
 
 def _check_fit(config: SimConfig, instance: Instance) -> None:
-    """Refuse an object of a scene file that the open fingers would cut into; the catalogue's are not checked."""
+    """Raise ConfigError if an object of a scene file does not fit between the open fingers, or has no width."""
     where = instance.spec.file
     needed_m = instance.width_m + 2.0 * abs(instance.offset_m)
     if where and instance.width_m <= 0.0:
@@ -166,9 +168,9 @@ def _check_fit(config: SimConfig, instance: Instance) -> None:
 def _plant(
     config: SimConfig, instance: Instance | None, rng: np.random.Generator
 ) -> tuple[PlantParams, PlantState]:
-    """Return the plant's parameters, and its state before the grasp: open, at rest, without contact.
+    """Return the parameters of the plant, and its state before the grasp: open, at rest, without contact.
 
-    Friction varies between trials and is drawn here.
+    With spread, the Coulomb friction of the trial is drawn here.
     """
     gripper = _gripper(config)
     drive = gripper.drive
@@ -180,7 +182,7 @@ def _plant(
         friction = drive.friction._replace(coulomb_n=friction_n, breakaway_n=breakaway_n)
         drive = drive._replace(friction=friction)
     if instance is None:
-        # Thinner than the closed gap, so that no finger ever touches it.
+        # A negative width: the fingers close without touching anything.
         model = ObjectModel(-1.0, 0.0, gripper.pads, all_active(()))
         at_rest, offset = uncompressed(()), 0.0
     else:
@@ -197,12 +199,12 @@ def _plant(
 
 
 class _Gripper(NamedTuple):
-    """What is the same in every grasp of a config."""
+    """The parameters that all grasps of a config share."""
 
     drive: Drive
     pads: PadCompliance
     steps: Steps
-    """Those without a reduced model."""
+    """The steps of a model that is not reduced."""
     motion: Motion
     """At rest with open fingers."""
 
@@ -239,14 +241,14 @@ def _linkage(config: SimConfig) -> ScrewLinkage:
 
 
 def _inertia(config: SimConfig) -> float:
-    """Return the inertia on the motor's angle, as `Drive` has it."""
+    """Return the inertia `Drive.inertia`: m g^2 of straight jaws, (2 pi)^2 J of a rotor."""
     if config.transmission == "straight":
         return config.moving_mass_kg * STRAIGHT.pitch_m * STRAIGHT.pitch_m
     return 4.0 * math.pi * math.pi * config.rotor_kg_m2
 
 
 def _sensor(config: SimConfig, instance: Instance | None, rng: np.random.Generator) -> SensorParams:
-    """Return the sensors; the cells' offsets and the phase of the pads' clock are drawn here."""
+    """Return the sensors of a grasp. The offsets of the cells and the time of the first image are drawn here."""
     period = float(config.pad_period_s)
     if config.sensor == "ideal":
         cells = PadCells(EVEN_WEIGHTS, UNLOADED)

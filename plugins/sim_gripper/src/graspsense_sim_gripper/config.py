@@ -12,7 +12,7 @@ from graspsense.plugin_api import CHANGES_NO_RESULT, NAMES_INPUT, setting
 
 @frozen(kw_only=True, cache_hash=True)
 class SimConfig:
-    """A model of a PR2 gripper: the object in it, its drive and its sensors. SI units."""
+    """Settings of the simulated PR2 gripper: the object in it, its drive and its sensors. SI units."""
 
     object: str = setting(
         default="odwalla:full_closed",

@@ -1,6 +1,6 @@
-"""What the simulator requires of a term that another distribution contributes; run by `graspsense plugins check`.
+"""Checks of the terms that a plugin contributes; `graspsense plugins check` runs them.
 
-Terms are checked by their shape alone (`name`, `params`, `law`, `at_rest`, `linear`), as a plugin may build them.
+The checks use only the attributes `name`, `params`, `law`, `at_rest` and `linear`; a term need not be a `Term`.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 STEPS: Final = 40
 TICK_S: Final = 1e-3
 COMPRESSIONS_M: Final = tuple(0.0001 * (20 - abs(20 - k)) for k in range(STEPS + 1))
-"""Compressions (m) that a law is evaluated at in turn: to 2 mm in steps of 0.1 mm, and back."""
+"""The compressions (m) at which a law is evaluated in turn: up to 2 mm in steps of 0.1 mm, and back."""
 FALLBACK: Final = 0.05
-"""Value of a parameter that has no default."""
+"""The value of a parameter without a default."""
 
 
 def check_terms(results: Sequence[Any]) -> Iterator[str]:
-    """Yield each defect of the terms that a distribution contributes.
+    """Yield a text for each defect of the terms that a plugin contributes.
 
-    A law must be pure, give a finite force, keep the types of its state, and agree with its linear form. `results`
-    holds what each implementation of `graspsense_sim_terms` returned: a term, or several.
+    A law must depend on its arguments only, give a finite force, keep the types of its state, and agree with its linear
+    form. `results` holds what each implementation of `graspsense_sim_terms` returned: a term, or several.
     """
     for result in results:
         for term in [result] if hasattr(result, "law") else result:
@@ -38,7 +38,7 @@ def check_terms(results: Sequence[Any]) -> Iterator[str]:
 
 
 def _law_defect(term: Any, params: TermParams) -> str:
-    """Return what is wrong with the law of a term, empty if nothing is."""
+    """Return the first defect of the law of a term; empty if there is none."""
     state, called = term.at_rest, f"the law of term {term.name!r}"
     for d0, d1 in pairwise(COMPRESSIONS_M):
         try:
@@ -65,7 +65,10 @@ def _law_defect(term: Any, params: TermParams) -> str:
 
 
 def _linear_defect(term: Any, params: TermParams) -> str:
-    """Return where the linear form of a term differs from its law, along short straight pieces of path."""
+    """Return the first difference between the linear form and the law of a term; empty if there is none.
+
+    Both are evaluated over short intervals at a constant rate of compression.
+    """
     form = term.linear(params) if hasattr(term, "linear") else None
     if form is None:
         return ""

@@ -1,4 +1,4 @@
-"""How much each term of the object contributed to a grasp: its law evaluated again along the grasp's compressions."""
+"""The contribution of each term of the object to a grasp: its law, evaluated again along the recorded compressions."""
 
 from __future__ import annotations
 
@@ -12,12 +12,17 @@ from graspsense_sim_gripper.terms.term import WorkingPoint
 
 
 def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> dict[str, Any]:
-    """Return the contribution of every term as plain values, whether this grasp's model kept it or not.
+    """Return the contribution of each term as plain values, also of terms that the reduced model dropped.
 
-    `compressions` holds the compression (m) and the force (N) of the object at each tick from the first contact on. For
-    each term there are its largest force (`peak_n`), its force and its share of the total at the peak of the total
-    (`at_peak_n`, `share`), the work done on it until then (`work_j`), the work that it has not returned at the end
-    (`lost_j`), the force that its law alone predicts for such a grasp (`expected_n`), and its `rates`.
+    `compressions` holds the compression (m) and the force (N) of the object at each tick from the first contact on.
+    For each term, `terms` gives
+
+    - `peak_n`: its largest force (N),
+    - `at_peak_n` and `share`: its force (N) when the force of the object is largest, and its share of the sum of terms,
+    - `work_j`: the work done on it until then (J),
+    - `lost_j`: the work that it has not returned at the end (J),
+    - `expected_n`: the largest force (N) that `Term.importance` predicts for such a grasp,
+    - `rates`: its rates (1/s).
     """
     if not compressions:
         return {"touched": False, "terms": []}
@@ -51,7 +56,10 @@ def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> d
 def _contribution(
     kind: str, params: TermParams, path: Sequence[float], peak: int, dt_s: float, point: WorkingPoint
 ) -> dict[str, Any]:
-    """Return the contribution of a term; `path` is the compression before the first tick and after each."""
+    """Return the contribution of a term.
+
+    `path` holds the compression (m) before the first tick and after each tick; `peak` is the tick of the largest force.
+    """
     term = find_term(kind)[1]
     state, force, work, work_to_peak = term.at_rest, 0.0, 0.0, 0.0
     forces: list[float] = []

@@ -1,7 +1,7 @@
-"""The loop of a whole grasp on preallocated buffers: sensors, controller and plant in turn, tick by tick.
+"""The loop of a whole grasp on preallocated buffers: in each tick the sensors, the controller and the plant.
 
-It gives what the runner (`graspsense.core.runner`) gives with the simulated backend, and can be compiled as a whole.
-`test_runner_plain_loop_and_compiled_loop_give_one_trace` holds the two equal, the tare included.
+It gives the same trace as the runner (`graspsense.core.runner`) with the simulated backend, and can be compiled as a
+whole. `test_runner_plain_loop_and_compiled_loop_give_one_trace` verifies that both are equal, including the tare.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ COLUMNS: Final = (
     "edge_right_n",
     "command",
 )
-"""The rows of the recorded table, each a column of the trace. The phases are integers and are kept beside it."""
+"""The rows of the recorded table; each is a column of the trace. The phases are integers, in an array of their own."""
 
 PlantModel = Any
 """`PlantParams`, or `ExactPlant` where exact discretisation advances the plant."""
@@ -33,7 +33,7 @@ Table = Any
 
 
 class GraspParams(NamedTuple):
-    """What does not change during a grasp."""
+    """The constants of a grasp."""
 
     plant: PlantModel
     sensor: SensorParams
@@ -43,20 +43,24 @@ class GraspParams(NamedTuple):
 
 
 class LoopState(NamedTuple):
-    """The loop's own state between two ticks."""
+    """The state of the loop itself between two ticks."""
 
     ticks: int
+    """Number of ticks so far."""
     recorded: int
+    """Number of rows recorded so far."""
     phase: int
+    """The phase of the last tick; -1 before the first."""
     tare_from: int
-    """The image with which the phase began: the tare is the mean from there on."""
+    """Number of images when the phase began. The tare is the mean of the images from there on."""
     effort_n: float
+    """The commanded effort of the last tick."""
     failed: int
     """1: a force or the motion was not finite after the last tick; the plant is that before it."""
 
 
 class SimulationState(NamedTuple):
-    """All state of a grasp between two ticks."""
+    """The complete state of a grasp between two ticks."""
 
     loop: LoopState
     plant: PlantState
@@ -65,21 +69,21 @@ class SimulationState(NamedTuple):
 
 
 class Buffers(NamedTuple):
-    """What the loop writes: arrays in compiled code, lists in the interpreter."""
+    """The memory that the loop writes to: arrays in compiled code, lists in the interpreter."""
 
     pads: PadBuffers
-    """The zero before the tare, which the tare replaces; the noise; the images, of which the last is NaN at first."""
+    """The zeros, which the tare replaces; the noise; and the images, of which the last is NaN at first."""
     image_times: Any
-    """(k,)"""
+    """(k,) The time at which each image was taken (s)."""
     columns: Table
     """(9, n) The values of `COLUMNS` at each tick from the approach on."""
     phases: Any
-    """(n,)"""
+    """(n,) The phase of each row."""
 
 
 NOT_STARTED: Final = LoopState(0, 0, -1, 0, 0.0, 0)
 NOT_NEGATIVE: Final = 0x3FFFFFFF
-"""With this mask the compiler knows that an index is not negative, and omits the test at each array."""
+"""After `&` with this mask the compiler knows that an index is not negative, and omits the check at each access."""
 
 
 def _move_unbound(plant: PlantModel, state: PlantState, effort_n: float, dt_s: float) -> PlantState:
@@ -99,9 +103,9 @@ control: Callable[[TickParams, TickState, Frame, Pads], tuple[Command, TickState
 def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
     """Run a grasp to its end, for `max_ticks`, or until a buffer is full or a term fails; return its state then.
 
-    Recorded are the frames without `dt_s` and status, which a simulated gripper does not vary, and the command. Where
-    `images` or `columns` are full, call it again with the state it returned and longer buffers that begin with the same
-    values.
+    It records frames, commands and phases from the approach on; `dt_s` and the status are constant and left out. If
+    `images` or `columns` are full, call it again with the returned state, and with longer buffers that begin with the
+    same values.
     """
     dt_s, pad_buffers, columns = params.dt_s, buffers.pads, buffers.columns
     images = pad_buffers.images
@@ -159,9 +163,9 @@ def _record(columns: Table, row: int, frame: Frame, command: float) -> None:
 
 
 def _tare(pads: PadBuffers, begin: int, end: int) -> None:
-    """Make the mean of the images from `begin` to `end` the zero, summed in the order in which they came.
+    """Set the zeros to the mean of the images from `begin` to before `end`, added in order of arrival.
 
-    As `graspsense.core.calibration.tare` does where every cell answers, as simulated cells do.
+    The result is that of `graspsense.core.calibration.tare`, since every simulated cell has a reading.
     """
     for i in range(len(pads.left_zero)):
         left = pads.images[begin][0][i]

@@ -1,4 +1,4 @@
-"""What is simulated: an object in the gripper, the controller that grasps it, and one grasp before it begins."""
+"""The description of what is simulated: the object in the gripper, the controller, and one grasp before it begins."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from graspsense_sim_gripper.sensing import SensorParams, SensorState
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 
 IMAGES_PER_BLOCK: Final = 64
+"""Number of cell images whose noise is drawn at once."""
 
 ControllerStep = Callable[..., Any]
 """The step of a controller, with parameters and state of its own types."""
@@ -32,19 +33,19 @@ class GraspController:
 
     @property
     def step(self) -> ControllerStep:
-        """The controller's step."""
+        """The step function of the controller's class."""
         return type(self.controller).step
 
     @cached_property
     def content(self) -> str:
-        """All numbers that a grasp under this controller depends on, as text, since NaN is not equal to itself."""
+        """All numbers of the controller that a grasp depends on. They are text, because NaN is not equal to itself."""
         law = self.controller
         return repr((law.params(), law.init(), self.run.hold_s, self.run.grasp_timeout_s))
 
 
 @frozen(kw_only=True)
 class GraspSetup:
-    """One grasp before it begins: parameters and initial states of plant and sensors, and the rest of the seed."""
+    """One grasp before it begins: parameters and initial states of plant and sensors, and the random generator."""
 
     kinds: tuple[str, ...]
     """The kinds of the object's terms."""
@@ -56,11 +57,14 @@ class GraspSetup:
     sensor_state: SensorState
     dt_s: float
     rng: np.random.Generator
-    """The seed's generator after all of the above was drawn. It is not advanced any more."""
+    """The generator of the seed, after all of the above was drawn. It is not advanced any more."""
 
     def noise(self) -> Iterator[NDArray[np.float64]]:
-        """Yield blocks of rows of 44 standard normal numbers, a row an image; the same at every call."""
-        # As a copy of the generator would, in a quarter of the time.
+        """Yield the noise of the cell images: standard normal numbers in arrays of shape (IMAGES_PER_BLOCK, 2 CELLS).
+
+        Every call yields the same numbers.
+        """
+        # This takes a quarter of the time of copying the generator.
         rng = np.random.default_rng(0)
         rng.bit_generator.state = self.rng.bit_generator.state
         while True:
@@ -75,11 +79,11 @@ class Problem:
     spec: ObjectSpec | None
     """None: there is no object."""
     number: int | None
-    """The number of a particular instance."""
+    """The number of a particular instance; None: the seed draws the instance."""
     model_config: SimConfig
-    """The config as far as a reduced model depends on it: with ideal sensors. It has spread where the instance is
-    numbered, since that differs from the nominal object too."""
+    """The settings that a reduced model depends on; all others have fixed values, such as ideal sensors. `spread` is
+    True for a numbered instance, which also differs from the nominal object."""
     device: DeviceInfo
-    """How the gripper with ideal sensors presents itself to a controller."""
+    """The properties of the gripper with ideal sensors, for the controller of a trial grasp."""
     nominal: GraspSetup | None
-    """The grasp of the nominal object with all its terms, by `model_config`; None where there is no object."""
+    """The grasp of the nominal object with all its terms, with `model_config`; None if there is no object."""

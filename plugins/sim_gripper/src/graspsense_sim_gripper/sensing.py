@@ -1,11 +1,12 @@
-"""The sensors of the gripper: a quantised encoder with a velocity filter, and 22 pressure cells a fingertip.
+"""The sensors of the gripper: a quantised encoder with a velocity filter, and 22 pressure cells per fingertip.
 
-The encoder counts ticks of the motor; the gap follows from them through the linkage, and its rate is a difference
-with a first-order low-pass filter. Cell images are taken every 41 ms, or as the settings say, beside frames at the
-control rate. The force on the gripping face is distributed over its fifteen cells by the patch of contact, and the rest
-lands beside them. Each cell has an offset of its own, noise, integer counts and 16 bits. An image may arrive later
-than it was taken, as over a bus that transmits it in parts. The ideal sensor gives gap, rate and force exactly, at
-every tick, and has no cells.
+The encoder counts ticks of the motor's angle, and the linkage gives the gap. The rate of the gap is a difference that a
+first-order low-pass filter smooths. Frames have the control rate. Cell images have a period of their own, 41 ms by
+default, and may arrive later than they are taken, as over a bus that transmits an image in parts.
+
+The shape of the contact distributes the force over the fifteen cells of the gripping face; a part of the force may land
+beside them. A cell has an offset, noise, integer counts and 16 bits. The ideal sensor gives gap, rate and forces
+exactly at every tick, and has no cells.
 """
 
 from __future__ import annotations
@@ -26,15 +27,16 @@ from graspsense_sim_gripper.drive_models import ENCODER_TICKS
 from graspsense_sim_gripper.dynamics.state import PlantState
 
 VELOCITY_FILTER_S: Final = 0.003
-"""Time constant of the velocity filter. From 10 ms on the velocity loop runs into a limit cycle."""
+"""Time constant of the velocity filter. From 10 ms on, velocity control runs into a limit cycle."""
 LARGEST_COUNT: Final = 65535.0
+"""The largest reading of a cell: 16 bits."""
 PAD_COUNTS_PER_N: Final = 1600.0
 """Counts of the sum of the fifteen cells of the PR2's gripping face under one newton (fingertip_pressure, scripts/
 fingertip_geometry.py). The driver of the real gripper has the same scales: `tests/test_pr2_numbers.py`."""
 EDGE_COUNTS_PER_N: Final = (600.0, 400.0, 600.0, 600.0, 600.0, 600.0, 400.0)
-"""Counts of each of the cells 0 to 6 under one newton: back, side, corner, tip, tip, corner, side; source as above."""
+"""Counts per newton of each of the cells 0 to 6: back, side, corner, tip, tip, corner, side. Source as above."""
 CLOCK_TOLERANCE_S: Final = 1e-10
-"""Ticks and image times are sums of different steps, and differ by rounding."""
+"""Tolerance for an image that is due at a tick: both times are rounded differently."""
 
 CellColumn = Any
 """A number for each cell: an array in compiled code, a list or tuple in the interpreter."""
@@ -54,19 +56,20 @@ UNBIASED: Final = Bias(0.0, 0.0, 0.0)
 
 
 class ImageClock(NamedTuple):
-    """When cell images are taken, and how long afterwards they arrive."""
+    """When cell images are taken, and when they arrive."""
 
     phase_s: float
+    """Time of the first image."""
     period_s: float
     delay_s: float
+    """From the time when an image is taken until it arrives."""
 
 
 class PadCells(NamedTuple):
     """The cells of one fingertip."""
 
     weights: CellColumn
-    """(15,) The part of the force on the gripping face that each of its cells carries. A cell of weight 0 is missing:
-    it always reads its offset."""
+    """(15,) The share of each cell in the force on the gripping face. A cell with weight 0 always reads its offset."""
     offset: CellColumn
     """(22,) Counts of the unloaded cells."""
 
@@ -75,22 +78,25 @@ class SensorParams(NamedTuple):
     """The sensors of one grasp."""
 
     ideal: int
+    """1: exact values; 0: encoder and cells."""
     link: ScrewLinkage
     clock: ImageClock
     share: float
-    """The part of the force on a pad that lands on the fifteen cells of its gripping face."""
+    """The share of the force on a pad that lands on the fifteen cells of its gripping face."""
     noise_counts: float
+    """Standard deviation of the noise of a cell."""
     left: PadCells
     right: PadCells
     bias: Bias = UNBIASED
+    """Errors of the ideal sensor."""
 
 
 class PadBuffers(NamedTuple):
-    """The cell images of a grasp: arrays in compiled code, lists in the interpreter, which are written in place."""
+    """The cell images of a grasp, written in place: arrays in compiled code, lists in the interpreter."""
 
     left_zero: CellColumn
     right_zero: CellColumn
-    """(22,) Counts that are taken as no force."""
+    """(22,) The counts of each cell that stand for no force."""
     noise: Any
     """(k, 44) Standard normal numbers for each image."""
     images: Any
@@ -98,7 +104,7 @@ class PadBuffers(NamedTuple):
 
 
 class PadForces(NamedTuple):
-    """Forces of a cell image, in newtons: on the gripping faces, and on the cells around them."""
+    """Forces of a cell image (N): on the gripping faces, and on the cells of the edges."""
 
     left_n: float
     right_n: float
@@ -107,15 +113,17 @@ class PadForces(NamedTuple):
 
 
 class Pending(NamedTuple):
-    """The cell image that was taken and has not arrived: whether there is one, and the forces on the pads then."""
+    """The cell image that was taken and has not yet arrived."""
 
     waiting: int
+    """1: there is one."""
     left_n: float
     right_n: float
+    """The forces on the pads when it was taken."""
 
 
 class SensorState(NamedTuple):
-    """What was read last: the encoder, with the gap and the filtered rate that follow from it, and the cells."""
+    """The last readings: the encoder, the gap and the filtered rate computed from it, and the cells."""
 
     encoder_ticks: float
     gap_m: float
@@ -123,9 +131,9 @@ class SensorState(NamedTuple):
     images: int
     """Number of cell images so far."""
     image_t_s: float
-    """When the last of them was taken."""
+    """Time at which the last of them was taken."""
     forces: PadForces
-    """Those of the last image."""
+    """The forces of the last image."""
     pending: Pending
 
 
@@ -145,7 +153,10 @@ def sense(
     effort_n: float,
     pads: PadBuffers,
 ) -> tuple[Frame, SensorState]:
-    """Return the frame of this tick and the sensor's state; a new image is written to `pads.images`."""
+    """Return the frame at `t_s` (s) and the new state of the sensors; a new image is written to `pads.images`.
+
+    `effort_n` is the commanded effort (N), which the frame repeats.
+    """
     if params.ideal == 1:
         velocity = plant.motion.speed_rev_s * plant.motion.jacobian_m_rev
         gap, left_n, right_n = plant.motion.gap_m, plant.contact.left_n, plant.contact.right_n
@@ -160,7 +171,7 @@ def sense(
     motion, moved = plant.motion, 0.0
     ticks = float(math.floor(motion.revolutions * ENCODER_TICKS))
     if ticks != encoder_ticks:
-        # Within an encoder tick the linkage is linear to a tenth of a picometre.
+        # Over one encoder tick the linkage is linear to a tenth of a picometre.
         moved = -gap
         gap = motion.gap_m - motion.jacobian_m_rev * (motion.revolutions - ticks / ENCODER_TICKS)
         moved += gap
@@ -181,7 +192,7 @@ def sense(
 
 
 def image_forces(left: CellColumn, right: CellColumn, pads: PadBuffers) -> PadForces:
-    """Return the forces of one cell image of both fingertips, relative to their zeros."""
+    """Return the forces (N) of one cell image of both fingertips, relative to their zeros."""
     return PadForces(
         pad_force(left, pads.left_zero, PAD_COUNTS_PER_N),
         pad_force(right, pads.right_zero, PAD_COUNTS_PER_N),
@@ -191,7 +202,7 @@ def image_forces(left: CellColumn, right: CellColumn, pads: PadBuffers) -> PadFo
 
 
 def apply_tare(state: SensorState, pads: PadBuffers) -> SensorState:
-    """Return the sensor's state with the forces of the last image relative to the present zeros."""
+    """Return the state of the sensors, with the forces of the last image computed again from the present zeros."""
     last = pads.images[state.images - 1]
     ticks, gap, velocity, count, image_t, _, pending = state
     return SensorState(ticks, gap, velocity, count, image_t, image_forces(last[0], last[1], pads), pending)
@@ -200,7 +211,7 @@ def apply_tare(state: SensorState, pads: PadBuffers) -> SensorState:
 def _write_image(
     params: SensorParams, pad: PadCells, force_n: float, noise: CellColumn, first: int, cells: CellColumn
 ) -> None:
-    """Write the counts of one fingertip under this force to `cells`; its noise begins at `noise[first]`."""
+    """Write the counts of one fingertip under this force (N) to `cells`; its noise begins at `noise[first]`."""
     counts = force_n * params.share * PAD_COUNTS_PER_N
     spread = params.noise_counts
     for i in range(CELLS):

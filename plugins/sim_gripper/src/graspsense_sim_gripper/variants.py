@@ -12,7 +12,7 @@ from graspsense.plugin_api import SimulationVariant
 ACCURACIES: Final = (0.3, 0.1, 0.03, 0.01, 0.001, 1e-4)
 STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)
 FINE_S: Final = 2e-5
-"""Steps so short that only the error of the model remains."""
+"""Steps so short that their error is negligible beside that of the model."""
 
 _FORMS: Final = (
     SimulationVariant(
@@ -62,6 +62,9 @@ _FORMS: Final = (
 
 
 def variants() -> tuple[SimulationVariant, ...]:
-    """Return each scheme at each fidelity, from coarse to fine; compiled where that can be done."""
+    """Return the settings to compare: the reference, steps by their error, even steps of both schemes, and floors.
+
+    They are compiled if numba is installed, except for the one that measures the interpreter.
+    """
     compiled = "always" if find_spec("numba") is not None else "never"
     return tuple(evolve(variant, settings={"compile": compiled, **variant.settings}) for variant in _FORMS)

@@ -1,4 +1,4 @@
-"""One sampled instance of an object, and how its contact loads the cells of a pad."""
+"""Sampling an instance of an object, and distributing its contact force over the cells of a pad."""
 
 from __future__ import annotations
 
@@ -17,19 +17,21 @@ PAD_CELLS: Final = 15
 """Cells of the gripping face: five rows of three, the row at the tip first."""
 ROW_MM: Final = 6.0
 COLUMN_MM: Final = 5.6
-"""Distances between the centres of neighbouring cells."""
+"""Distances between the centres of neighbouring cells, along and across the pad."""
 
 
 @frozen(kw_only=True)
 class Instance:
-    """One object in its place: sampled from its spec, or with the nominal figures where nothing varies."""
+    """One individual object and its placement: sampled from its spec, or with the nominal values."""
 
     spec: ObjectSpec
     width_m: float
+    """The present width, from which a dent of earlier use is subtracted."""
     offset_m: float
     share: float
+    """As in `ObjectSpec`."""
     table_n: float
-    """Friction of the table that a finger has to overcome to push it."""
+    """Friction of the table, which a finger has to overcome to push the object."""
     kinds: tuple[str, ...]
     terms: tuple[TermParams, ...]
     """The parameters of its terms."""
@@ -38,16 +40,16 @@ class Instance:
 
 
 def sample(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None = None) -> Instance:
-    """Return an instance drawn from the spec's spreads; without a generator, the nominal figures, centred.
+    """Return an instance that `rng` draws from the spreads of the spec; without `rng`, one with the nominal values.
 
-    With a number it is one particular object: its stiffness and width follow from the kind and the number, the same
-    in every state and every trial, and only its placement is drawn from `rng`.
+    With a number it is one particular object. Its stiffness and width then depend on the class and the number only, and
+    are the same in every state and every trial; `rng` draws its placement.
     """
     draws = rng.standard_normal(5).tolist() if rng is not None else [0.0] * 5
     if rng is not None and number is not None:
         letters = spec.name.partition(":")[0].encode()
         draws[:2] = np.random.default_rng([number, *letters]).standard_normal(2).tolist()
-    # Lognormal, so that no draw makes a stiffness negative. The others are cut off at two standard deviations.
+    # The stiffness is lognormal, and never negative. All other values are clipped at two standard deviations.
     stiffness_factor = math.exp(spec.stiffness_spread * draws[0])
     clipped = [min(max(draw, -2.0), 2.0) for draw in draws]
     terms = tuple(
@@ -73,10 +75,11 @@ def sample(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None
 
 
 def cell_weights(patch: str, row: float) -> tuple[float, ...]:
-    """Return the part of the pad's force that each of its fifteen cells carries, tip row first; they sum to 1.
+    """Return the share of each of the fifteen cells in the force on the gripping face, tip row first; their sum is 1.
 
-    A line lies across the pad (an upright bottle): its pressure falls off over about a row. A face loads all
-    cells alike. A point loads the cells around it.
+    `patch` is `line`, `face` or `point`, and `row` its position in rows from the middle. A line lies across the pad, as
+    of an upright bottle, and its pressure falls off over about one row. A face loads all cells equally. A point loads
+    the cells around it.
     """
     weights = []
     for i in range(PAD_CELLS):

@@ -1,6 +1,6 @@
-"""The objects known by name: those of the catalogue, the scenes that are shipped, and scene files of the user's.
+"""Finding an object by name: in the catalogue, among the scenes that are shipped, or in a scene file of the user.
 
-In the catalogue every figure has its origin and reason beside it; a scene file needs neither.
+In the catalogue every value has an origin and a reason; a scene file needs neither.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from graspsense_sim_gripper.objects.spec import (
 CONTAINERS: Final = ("odwalla", "naked", "can", "water")
 """The containers of Chitta, Piccoli and Sturm (ICRA 2010), section III.E: trials are simulated with them by default."""
 ORIGINS: Final = ("measured", "datasheet", "published elsewhere", "assumed")
-"""The origins of a figure of the catalogue besides a fit."""
+"""The possible origins of a value of the catalogue, besides a fit."""
 FITTED_TO: Final = "fitted to "
 FITTED_RESULTS: Final = frozenset(("table_2", "table_3", "authors_tree", "section_3f", "fig_6_contact"))
-"""The published results that figures may be fitted to."""
+"""The published results that values may be fitted to."""
 
 
 @cache
@@ -52,7 +52,10 @@ def catalogue() -> Mapping[str, ObjectSpec]:
 
 @cache
 def shipped_scenes() -> Mapping[str, str]:
-    """Return the text of each scene that is installed with the simulator, by name; `specs/scenes` of a checkout."""
+    """Return the text of each scene that is installed with the simulator, by name.
+
+    In a checkout, `specs/scenes` links to their folder.
+    """
     folder = files("graspsense_sim_gripper.objects").joinpath("scenes")
     return {
         file.name.removesuffix(".toml"): file.read_text(encoding="utf-8")
@@ -77,7 +80,7 @@ def object_kinds() -> tuple[ObjectKind, ...]:
 
 
 def split_number(name: str) -> tuple[str, int | None]:
-    """Return the name without the number of its instance, and that number; `can:full_open#3` is one particular can.
+    """Return the name without the number of an instance, and the number or None; `can:full_open#3` gives 3.
 
     Raises UnknownName if the text after `#` is not a whole number.
     """
@@ -90,9 +93,9 @@ def split_number(name: str) -> tuple[str, int | None]:
 
 
 def find(name: str) -> ObjectSpec:
-    """Return the object of this name, or that of a file whose name ends in `.toml`.
+    """Return the object of this name, or of the scene file if the name ends in `.toml`.
 
-    A name is looked up in the catalogue, then among the shipped scenes. Raises UnknownName with the known names,
+    A name is looked up in the catalogue, and then among the shipped scenes. Raises UnknownName with the known names,
     ConfigError for a file that cannot be read as an object.
     """
     if name.endswith(".toml"):
@@ -139,9 +142,9 @@ def _read_scene(path: Path) -> ObjectSpec:
 
 
 def parse_entry(name: str, table: TomlTable) -> ObjectSpec:
-    """Return an entry of the catalogue, in which every figure has its origin and reason, and no key is left out.
+    """Return the object of an entry of the catalogue. Each value must have an origin and a reason, and no key may lack.
 
-    Raises ConfigError with the object's name and the key.
+    Raises ConfigError that names the object and the key.
     """
     reasons: dict[str, str] = {}
     fitted_to: set[str] = set()
@@ -192,7 +195,10 @@ def _figure(where: str, entry: TomlValue) -> float:
 
 
 def _fitted_to(where: str, origin: TomlValue) -> list[str]:
-    """Return the published results that a figure of this origin was fitted to. Raises ConfigError."""
+    """Return the published results that a value of this origin was fitted to.
+
+    Raises ConfigError if the text is not an origin.
+    """
     if origin in ORIGINS:
         return []
     results = str(origin).removeprefix(FITTED_TO).split(", ")

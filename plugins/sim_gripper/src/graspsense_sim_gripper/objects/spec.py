@@ -1,4 +1,4 @@
-"""The description of an object, and the strict reader of its terms.
+"""The description of an object, and the strict reader of scene files.
 
 An unknown key or a number out of range is an error that names the file or object, the table and the key.
 """
@@ -37,7 +37,7 @@ def _not_negative(default: float) -> float:
 
 
 class NominalTerm(NamedTuple):
-    """The nominal parameters of a term, and which of them are stiffnesses, which vary between instances."""
+    """The nominal parameters of a term, and which of them are stiffnesses and vary between instances."""
 
     params: TermParams
     is_stiffness: tuple[bool, ...]
@@ -50,28 +50,29 @@ class ObjectSpec:
     name: str
     summary: str = ""
     patch: str = field(default="line", validator=in_(PATCHES))
-    """The shape of its contact with a pad: a line, a face or a point."""
+    """The shape of the contact with a pad: a line, a face or a point."""
     width_m: float = _positive()
     width_spread_m: float = _not_negative(0.0)
     stiffness_spread: float = _not_negative(0.0)
+    """Standard deviation of the logarithm of the stiffness."""
     offset_m: float = 0.0
     """Distance from the gripper's centre line, positive towards the right finger."""
     offset_spread_m: float = _not_negative(0.0)
     share: float = field(default=1.0, validator=[gt(0.0), le(1.0)])
-    """The part of the force that lands on the fifteen cells of the gripping face."""
+    """The share of the force that lands on the fifteen cells of the gripping face."""
     share_spread: float = _not_negative(0.0)
     friction: float = _not_negative(0.3)
     """Coefficient of friction on the table."""
     held: bool = False
-    """Whether it is fixed in place: a finger that touches it first then presses it, and does not push it."""
+    """Whether the object is fixed in place: a finger that touches it first compresses it, and does not push it."""
     mass_kg: float = field(default=0.1, validator=gt(0.0))
     terms: tuple[TermEntry, ...] = ()
     """Kind and parameters of each term, in the canonical order."""
     reasons: Mapping[str, str] = field(factory=dict)
     fitted_to: tuple[str, ...] = ()
-    """The published results that figures of it were fitted to, sorted."""
+    """The published results to which values of this object were fitted, sorted."""
     file: str = ""
-    """The file it was read from; empty for the catalogue."""
+    """The scene file that the object was read from; empty for the catalogue."""
 
     @cached_property
     def kinds(self) -> tuple[str, ...]:
@@ -91,21 +92,24 @@ class ObjectSpec:
 
     @cached_property
     def content(self) -> str:
-        """All of it as text: equal for two specs that describe the same object."""
+        """All fields as text, which is equal for two specs of the same object."""
         return repr(self)
 
 
 def spec_with_sorted_terms(values: TomlTable, terms: list[TermEntry]) -> ObjectSpec:
-    """Return the spec with these values, its terms in the canonical order. Raises ValueError as its fields do."""
+    """Return the spec with these values, and its terms in the canonical order.
+
+    Raises ValueError if a value is out of the range of its field.
+    """
     order = in_order([kind for kind, _ in terms])
     return ObjectSpec(**values, terms=tuple(terms[i] for i in order))
 
 
 @cache
 def parse_scene(text: str, name: str, where: str) -> ObjectSpec:
-    """Return the object that the text of a scene file describes; `where` names the file in errors.
+    """Return the object that the text of a scene file describes. `where` names the file in error messages.
 
-    Raises ConfigError with every problem of the file.
+    Raises ConfigError that lists all problems of the file.
     """
     try:
         table = tomllib.loads(text)
@@ -123,7 +127,7 @@ def parse_scene(text: str, name: str, where: str) -> ObjectSpec:
 
 
 def _scene_values(table: TomlTable, problems: list[str]) -> dict[str, TomlValue]:
-    """Return the values of a scene's own keys, all but its terms."""
+    """Return the values of all keys of a scene except its terms; problems are added to `problems`."""
     known = fields_dict(ObjectSpec).keys() - {"name", "reasons", "fitted_to", "file"}
     values: dict[str, TomlValue] = {}
     for key, entry in table.items():
@@ -178,9 +182,10 @@ def parse_term(
     problems: list[str],
     number: Callable[[str, TomlValue], float],
 ) -> TermEntry | None:
-    """Return the qualified kind of a term and its parameters, or None where it cannot be read at all.
+    """Return the qualified kind of a term and its parameters; None if the kind is unknown.
 
-    `number` reads one value, given its place in the file: `prefix` and its key.
+    Problems are added to `problems`, and begin with `label`. `number(where, entry)` reads one value; `where` is
+    `prefix` followed by the key.
     """
     try:
         kind, term = find_term(str(table.get("type", "")))
