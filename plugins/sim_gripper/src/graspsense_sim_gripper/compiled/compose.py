@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import Frame, bind, maker, tick
-from graspsense_sim_gripper.binding import Constructors, FunctionT, bind_reachable
+from graspsense_sim_gripper.binding import Constructors, bind_reachable
 from graspsense_sim_gripper.dynamics.contact import BalanceSearch, ObjectModel, PadLoad, solve_contact
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
