@@ -56,7 +56,7 @@ class LoopState(NamedTuple):
     effort_n: float
     """The commanded effort of the last tick."""
     failed: int
-    """1: a force or the motion was not finite after the last tick; the plant is that before it."""
+    """1: a force or the motion was not finite after the last tick (see `before_failure`)."""
 
 
 class SimulationState(NamedTuple):
@@ -137,12 +137,28 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
         ticks += 1
         if state.done == 1 or state.guard.stopped == 1:
             break
-        after = move(params.plant, plant, effort, dt_s)
-        if not is_finite(after):
+        # Keeping the plant before the tick as well would cost compiled code a sixth of its time.
+        plant = move(params.plant, plant, effort, dt_s)
+        if not is_finite(plant):
             failed = 1
             break
-        plant = after
     return SimulationState(LoopState(ticks, recorded, phase, tare_from, effort, failed), plant, sensor, state)
+
+
+def before_failure(
+    loop: Callable[[GraspParams, SimulationState, Buffers], SimulationState],
+    params: GraspParams,
+    start: SimulationState,
+    buffers: Buffers,
+    failed: SimulationState,
+) -> PlantState:
+    """Return the plant before the tick in which `loop` failed. `start`, `failed`: the states before and after the call.
+
+    The loop runs again up to that tick and writes the same values to the buffers.
+    """
+    if start.loop.ticks >= failed.loop.ticks - 1:
+        return start.plant
+    return loop(params._replace(max_ticks=failed.loop.ticks - 1), start, buffers).plant
 
 
 def has_ended(state: TickState) -> bool:

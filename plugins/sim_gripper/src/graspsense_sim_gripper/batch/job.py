@@ -31,7 +31,15 @@ from graspsense_sim_gripper.compiled.padding import composition_of, padded, unpa
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.exact.discretise import discretise
-from graspsense_sim_gripper.loop import COLUMNS, NOT_STARTED, Buffers, GraspParams, SimulationState, has_ended
+from graspsense_sim_gripper.loop import (
+    COLUMNS,
+    NOT_STARTED,
+    Buffers,
+    GraspParams,
+    SimulationState,
+    before_failure,
+    has_ended,
+)
 from graspsense_sim_gripper.objects.library import split_number
 from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
 from graspsense_sim_gripper.reduction.model import Reduction
@@ -260,9 +268,11 @@ def _run(
     )
     progress = SimulationState(NOT_STARTED, setup.state, setup.sensor_state, job.initial)
     while True:
-        progress = loop(params, progress, buffers)
-        ended = has_ended(progress.controller) or progress.loop.failed == 1
-        if ended or progress.loop.ticks >= params.max_ticks:
+        start, progress = progress, loop(params, progress, buffers)
+        if progress.loop.failed == 1:
+            plant = before_failure(loop, params, start, buffers, progress)
+            return progress._replace(plant=plant), buffers
+        if has_ended(progress.controller) or progress.loop.ticks >= params.max_ticks:
             return progress, buffers
         if not ideal and progress.sensor.images == len(buffers.pads.images):
             buffers = _with_more_images(buffers, next(blocks))

@@ -38,6 +38,7 @@ from graspsense_sim_gripper.loop import (
     GraspParams,
     PlantModel,
     SimulationState,
+    before_failure,
     has_ended,
 )
 from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
@@ -206,12 +207,17 @@ class TrialGrasps:
                 phases = np.zeros(table.shape[1], np.int64)
                 recorded = (table, phases) if on_arrays else (table.tolist(), phases.tolist())
                 progress = progress._replace(loop=progress.loop._replace(recorded=0))
-                progress = loop(grasp_params, progress, Buffers(*buffers, *recorded))
+                start, written = progress, Buffers(*buffers, *recorded)
+                progress = loop(grasp_params, start, written)
                 if progress.loop.failed == 1:
-                    effort_n = progress.loop.effort_n
+                    before = before_failure(loop, grasp_params, start, written, progress)
                     raise TermFailed(
                         not_finite_in_tick(
-                            made.kinds, made.plant._replace(steps=steps), progress.plant, effort_n, setup.dt_s
+                            made.kinds,
+                            made.plant._replace(steps=steps),
+                            before,
+                            progress.loop.effort_n,
+                            setup.dt_s,
                         )
                     )
                 rows = (*rows, np.vstack(recorded)[:, : progress.loop.recorded])
