@@ -8,7 +8,7 @@ rates, not on the kinds of the terms, so a term that a plugin contributes is tre
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 from graspsense.plugin_api import gap_and_rate, revolutions_at
@@ -30,7 +30,7 @@ from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction, Ter
 from graspsense_sim_gripper.reduction.probe import Grip, damping, stiffness
 from graspsense_sim_gripper.stepping.scheme import MEAN_FORCE, TR_BDF2, VERLET, Steps
 from graspsense_sim_gripper.terms.registry import find_term
-from graspsense_sim_gripper.terms.term import NO_STATE, WorkingPoint, no_rates
+from graspsense_sim_gripper.terms.term import NO_STATE, OwnContact, WorkingPoint, no_rates
 
 FORCE_N: Final = 20.0
 SPEED_M_S: Final = 0.01
@@ -42,6 +42,12 @@ CONVERGED: Final = 1e-7
 """A reference halves the steps of a tick until speed and force change by less than this times the accuracy."""
 STIFFEST_N_M: Final = 1e6
 """The largest contact stiffness (N/m) for which peak forces agree with those of the reference."""
+SWING_SHARE: Final = 10.0
+MAX_SWING_RAD: Final = 1.0
+"""The angle of the fastest oscillation of a term over a step: the square root of this share of the accuracy, at most
+one radian. Longer steps see an oscillation at a few phases only, and the error estimate does not notice it."""
+MOST_SWING_STEPS: Final = 500
+"""An oscillation that needs more steps a tick is not resolved: its term is dropped, and the reduction says so."""
 SCHEMES: Final = {VERLET: "Verlet", TR_BDF2: "TR-BDF2", MEAN_FORCE: "mean force"}
 
 
@@ -71,15 +77,22 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = UNVERIFIED) -> Red
     if config.fidelity != "scene" and scale.model > 0.0:
         scale = FULL_SCALES[0]
     level = scale.at(config.accuracy)
-    treatment, decisions, error, model = _reduce(grip, level.model_tol)
+    angle = min(math.sqrt(SWING_SHARE * level.step_tol), MAX_SWING_RAD)
+    swings = _swings(grip, grip.model)
+    too_fast = {i: per_s for i, per_s in swings.items() if per_s * dt_s > MOST_SWING_STEPS * angle}
+    treatment, decisions, error, model = _reduce(grip, level.model_tol, too_fast)
     rate = (drive.friction.damping_n_s_m + damping(grip, model, dt_s)) / grip.mass_kg
-    contact = _resolution(grip, dt_s)
+    contact = _resolution(grip, dt_s, max(too_fast.values(), default=0.0))
     scheme = _scheme(config.accuracy, rate, contact.number / dt_s, dt_s, config.coulomb_n > 0.0)
+    steps = steps_for(level, scheme, dt_s)
+    fastest = max(_swings(grip, model).values(), default=0.0)
+    if fastest > 0.0:
+        steps = steps._replace(longest_touched_s=angle / fastest)
     return Reduction(
         accuracy=config.accuracy,
         treatment=treatment,
         point=grip.point,
-        steps=_with_settings(steps_for(level, scheme, dt_s), config),
+        steps=_with_settings(steps, config),
         decisions=decisions,
         scheme=TermDecision(
             term="steps",
@@ -142,10 +155,27 @@ def _oscillates(kind: str, params: TermParams, point: WorkingPoint) -> bool:
     return any(rate.what == "swings" for rate in term.rates(params, point))
 
 
-def _resolution(grip: Grip, dt_s: float) -> TermDecision:
-    """Return whether the peak force of the contact is resolved, with its natural frequency times the tick."""
+def _swings(grip: Grip, model: ObjectModel) -> dict[int, float]:
+    """Return the angular frequency (rad/s) of each term of this model by its index, 0 if it does not oscillate.
+
+    A term with a contact of its own divides its steps itself.
+    """
+    swings = {}
+    for i, kind in enumerate(grip.kinds):
+        term, params = find_term(kind)[1], grip.model.terms[i + 1].params
+        if model.terms[i + 1].active == 0 or isinstance(term.linear(params), OwnContact):
+            continue
+        swings[i] = max((r.per_s for r in term.rates(params, grip.point) if r.what == "swings"), default=0.0)
+    return swings
+
+
+def _resolution(grip: Grip, dt_s: float, too_fast_per_s: float) -> TermDecision:
+    """Return whether the peak force of the contact is resolved, and its natural frequency times the tick.
+
+    `too_fast_per_s`: the frequency of a term that is too fast to be resolved, 0 if none is.
+    """
     within_tick, at_once = stiffness(grip, dt_s)
-    number = math.sqrt(max(within_tick, 0.0) / grip.mass_kg) * dt_s
+    number = max(math.sqrt(max(within_tick, 0.0) / grip.mass_kg), too_fast_per_s) * dt_s
     resolved = max(within_tick, at_once) <= 1.05 * STIFFEST_N_M and number <= 1.05
     return TermDecision(
         term="contact",
@@ -157,20 +187,24 @@ def _resolution(grip: Grip, dt_s: float) -> TermDecision:
 
 
 def _reduce(
-    grip: Grip, max_error: float
+    grip: Grip, max_error: float, too_fast: Iterable[int] = ()
 ) -> tuple[tuple[str, ...], tuple[TermDecision, ...], float, ObjectModel]:
     """Return the treatment of each term and of the pads, the decisions, their joint error, and the reduced model.
 
     The joint error is the relative change of the force on the probe paths; it is at most `max_error`.
+    `too_fast`: the indices of terms that are dropped, whatever the error.
     """
     kinds, point = grip.kinds, grip.point
     treatment, errors, spent, model = [KEPT] * (len(kinds) + 1), [0.0] * len(kinds), 0.0, grip.model
     decisions: list[TermDecision] = []
+    for i in too_fast:
+        treatment[i], errors[i] = DROPPED, math.inf
+        model = named(DROPPED, without_term(model, kinds, i, point))
     if max_error > 0.0:
         alternatives = grip.alternatives()
         # The terms that matter least are decided first; each gets its cheapest candidate within the tolerance.
         for i in sorted(range(len(kinds)), key=lambda i: min(error for _, error in alternatives[i])):
-            for name, error_alone in alternatives[i]:
+            for name, error_alone in alternatives[i] if treatment[i] == KEPT else ():
                 if error_alone > max_error:
                     continue
                 other = named(name, without_term(model, kinds, i, point))

@@ -79,7 +79,7 @@ def take_steps(params: PlantParams, state: PlantState, effort_n: float, dt: floa
     """Return the plant after `dt` under a constant force, and the number of attempted steps."""
     left, n = dt, 0
     while True:
-        h, forced = next_length(params.steps, state.step, left, n)
+        h, forced = next_length(params.steps, state.step, left, n, state.contact.touched)
         state, used = take_step(params, state, effort_n, h, left, forced)
         left -= used
         n += 1
@@ -100,7 +100,12 @@ def take_step(
     if state.motion.speed_rev_s == 0.0 and is_held(drive, state, effort_n):
         if contact.touched == 0:
             return state, left_s
-        return stick(params, state, effort_n, left_s if forced else min(left_s, steps.longest_s))
+        return stick(
+            params,
+            state,
+            effort_n,
+            left_s if forced else min(left_s, steps.longest_s, steps.longest_touched_s),
+        )
     start = start_of(params, state, effort_n)
     if comes_to_rest(start):
         attempt = _standing(start)

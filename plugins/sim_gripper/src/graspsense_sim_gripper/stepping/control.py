@@ -44,9 +44,16 @@ TIME_RTOL: Final = 1e-9
 """The rest of a tick is one step if it exceeds the length of a step by less than this fraction."""
 
 
-def next_length(steps: Steps, step: StepState, left_s: float, n_steps: int) -> tuple[float, bool]:
-    """Return the length of the next step if `left_s` of the tick is left, and whether it is accepted in any case."""
+def next_length(
+    steps: Steps, step: StepState, left_s: float, n_steps: int, touched: int
+) -> tuple[float, bool]:
+    """Return the length of the next step if `left_s` of the tick is left, and whether it is accepted in any case.
+
+    `touched`: whether the object was touched (1).
+    """
     h = min(step.next_s, steps.longest_s)
+    if touched == 1:
+        h = min(h, steps.longest_touched_s)
     forced = n_steps >= MAX_STEPS
     if forced or left_s <= h * (1.0 + TIME_RTOL):
         h = left_s

@@ -74,4 +74,5 @@ def _halved(steps: Steps, dt: float) -> Steps:
         0.5 * min(steps.longest_s, dt),
         steps.settle,
         1.0 + 0.5 * (steps.growth - 1.0),
+        0.5 * min(steps.longest_touched_s, dt),
     )
