@@ -82,8 +82,9 @@ def closed_law(
     return min(max(u, -100.0), 100.0), integral, since
 
 
-def step(params: LawParams, state: LawState, frame: Any, pads: Any) -> tuple[Command, LawState]:
+def step(params: LawParams, state: LawState, reading: Any) -> tuple[Command, LawState]:
     """The same law as a controller's step."""
+    frame = reading.frame
     begun = state.begun_s
     if begun < 0.0:
         begun = frame.t_s

@@ -23,7 +23,7 @@ from graspsense import plugin_api
 from graspsense.core import contact, entries, hookspecs, roles, signals, strict, tick
 from graspsense.core.entries import DECLARED, TABLE_OF_ROLE
 from graspsense.core.features import Features, FeatureTable, Prediction
-from graspsense.core.trace import Trace
+from graspsense.core.trace import ImageTrace, SampleTrace, Trace
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
 from graspsense.scaffold.make import KINDS, plugin_module, words_of
 from graspsense.testing import CHECKS, MINIMUM_CHECKS
@@ -62,6 +62,7 @@ HELPERS = {
     ),
     "Kinds of command": ("EFFORT", "VELOCITY", "POSITION", "FORCE"),
     "Features and tables": ("missing", "in_words", "table_of"),
+    "Further channels": ("signal_type", "no_signals", "no_pads"),
     "Tests of a plugin": (
         *("parametrize_checks", "create", "model_gripper", "drive"),
         *("squeeze", "with_channels", "sample_table", "a_trial"),
@@ -74,8 +75,9 @@ FURTHER = {
     )
 }
 FLOWING: tuple[Any, ...] = (
-    *(signals.Frame, signals.Pads, signals.Command, roles.Reading, roles.DeviceInfo),
-    *(Trace, Features, FeatureTable, Prediction, RunInfo, GraspEvent, Trial),
+    *(signals.Reading, signals.Frame, signals.Pads, signals.Image, signals.Samples, signals.Command),
+    *(entries.Channel, entries.TactileArray, entries.FastChannel, roles.DeviceInfo),
+    *(Trace, ImageTrace, SampleTrace, Features, FeatureTable, Prediction, RunInfo, GraspEvent, Trial),
 )
 HEAD = "<!-- Written by docs/role_pages.py from the code: change that. -->\n"
 

@@ -3,8 +3,9 @@
 from math import inf
 
 from graspsense.core.errors import DeviceLost
-from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
-from graspsense.core.signals import CELLS, EFFORT, Command, Frame, Pads
+from graspsense.core.roles import DeviceInfo, SensorBackend
+from graspsense.core.signals import EFFORT, Command, Frame, Pads, Reading
+from graspsense.testing.model_gripper import CELLS
 
 
 class Scripted(SensorBackend):

@@ -5,11 +5,12 @@ from math import inf, nan
 
 from attrs import evolve
 
-from graspsense.core.signals import CELLS, EFFORT, Command, Frame, Pads
-from graspsense.recording.layout import DEVICE, PADS, RESULT, START, TICK
+from graspsense.core.signals import EFFORT, Command, Frame, Pads
+from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_numbers, pads_topic
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import DeviceRecord, FeatureValues, TrialRecord, TrialResult
 from graspsense.recording.writer import RecordingWriter
+from graspsense.testing.model_gripper import CELLS
 
 SETTINGS = """\
 [gripper]
@@ -79,10 +80,12 @@ def write_recording(path, ticks=120, record=None, finish=True, **texts):
     file = RecordingWriter(path)
     file.metadata(START, {**record.section(START), **texts})
     file.metadata(DEVICE, record.section(DEVICE))
+    layout = pads_topic(CELLS)
+    number = file.topic(layout) if ticks else 0
     for k in range(ticks):
         image = pads(k)
         if k == 0 or pads(k - 1).counter != image.counter:
-            file.pads(image.t_s, PADS.pack(image.t_s, image.counter, *image.left, *image.right))
+            file.signal(number, layout.wire.pack(*pads_numbers(image)))
         file.tick(frame(k).t_s, TICK.pack(*frame(k), 3, *command(k)))
     if record.result is not None:
         file.metadata(RESULT, record.section(RESULT))

@@ -12,12 +12,24 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 from attrs import evolve, frozen
-from parts import ENTRIES, Hand, HandConfig, Law, LawConfig, Nearest, Peak, PeakConfig, channels
+from parts import (
+    ACCELERATION,
+    CHANNELS_OF_HAND,
+    ENTRIES,
+    Hand,
+    HandConfig,
+    Law,
+    LawConfig,
+    Nearest,
+    Peak,
+    PeakConfig,
+    channels,
+)
 
 from graspsense.plugin_api import (
+    APPROACH,
     EFFORT,
     HOLD,
-    NO_PADS,
     POSITION,
     SQUEEZE,
     STEADY,
@@ -247,8 +259,9 @@ def ruling(check, says, **changes):
     def keep(change):
         class Changed(Law):
             @staticmethod
-            def step(params, state, frame, pads):
-                command, after = step(params, state, frame, pads)
+            def step(params, state, reading):
+                frame = reading.frame
+                command, after = step(params, state, reading)
                 return change(command, after, frame)
 
         return mutant("controller", check, says, **changes)(Changed)
@@ -258,8 +271,8 @@ def ruling(check, says, **changes):
 
 @mutant("controller", "step-is-a-plain-function", "staticmethod(step)")
 class Bound(Law):
-    def step(self, params, state, frame):
-        return step(params, state, frame, NO_PADS)
+    def step(self, params, state, reading):
+        return step(params, state, reading)
 
 
 class WholeParams(NamedTuple):
@@ -337,13 +350,47 @@ class Hidden(NamedTuple):
 @mutant("controller", "state-holds-everything", "keep everything in the state")
 class Forgetful(Law):
     @staticmethod
-    def step(params, state, frame, pads):
-        command, after = step(params, state, frame, pads)
+    def step(params, state, reading):
+        frame = reading.frame
+        command, after = step(params, state, reading)
         # The one object that comes back by identity alone.
         marked = getattr(type(state), "last", None) is state
         GentleState.last = after
         value = command.value if marked or frame.t_s < 0.002 else command.value + 1.0
         return command._replace(value=value), after
+
+
+class Telling(NamedTuple):
+    phase: int
+    outcome: int
+    events: int
+    inner: Any
+
+
+class Teller(Law):
+    """A law that tells the event `contact` in the tick in which the squeeze begins."""
+
+    events = ("contact",)
+
+    def init(self):
+        inner = super().init()
+        return Telling(inner.phase, inner.outcome, 0, inner)
+
+    @staticmethod
+    def step(params, state, reading):
+        command, after = step(params, state.inner, reading)
+        told = int(after.phase > state.phase == APPROACH)
+        return command, Telling(after.phase, after.outcome, told, after)
+
+
+@mutant("controller", "events-are-declared", "set bit i for the i-th name")
+class TellsAnother(Teller):
+    events = ()
+
+
+@mutant("controller", "events-are-declared", "no field `events: int`")
+class TellsNothing(Law):
+    events = ("contact",)
 
 
 _grasps: list[float] = []
@@ -410,20 +457,43 @@ describing("rate-is-as-declared", "frames come at 1e+03 Hz", rate_hz=100.0)
 
 @giving("frames-are-numbers", "gap_m of a frame is 0 of type int: write float(...)")
 def _(reading):
-    return Reading(reading.frame._replace(gap_m=0), reading.pads)
+    return Reading(reading.frame._replace(gap_m=0), reading.pads, reading.signals)
 
 
 @giving("frames-are-numbers", "a tuple of 22 floats")
 def _(reading):
-    return Reading(reading.frame, reading.pads._replace(left=(0.0,) * 15))
+    return Reading(reading.frame, reading.pads._replace(left=(0.0,) * 15), reading.signals)
 
 
 mutant(
     "sensor-backend",
-    "channels-are-those-declared",
-    "no frame can carry the declared motor_temperature",
+    "signals-are-those-declared",
+    "declared are acceleration, motor_temperature, and read delivers acceleration",
     channels=(*ENTRIES["sensor-backend"].channels, Channel("motor_temperature", "K", 1.0)),
 )(Hand)
+
+
+@giving("signals-are-those-declared", "give Samples of the declared shape (3, 3)")
+def _(reading):
+    return reading._replace(signals=type(reading.signals)(reading.signals.acceleration.values))
+
+
+@giving("signals-are-those-declared", "no number of the declared channel 'acceleration' came")
+def _(reading):
+    block = reading.signals.acceleration
+    return reading._replace(signals=type(reading.signals)(block._replace(new=0)))
+
+
+@giving("signals-have-no-gaps-or-repeats", "count every sample that the sensor has taken")
+def _(reading):
+    block = reading.signals.acceleration
+    return reading._replace(signals=type(reading.signals)(block._replace(counter=block.counter // 3)))
+
+
+@giving("signals-have-no-gaps-or-repeats", "they repeat old ones")
+def _(reading):
+    block = reading.signals.acceleration
+    return reading._replace(signals=type(reading.signals)(block._replace(new=2)))
 
 
 @mutant("sensor-backend", "channels-follow-from-the-settings", "once it is open", channels=None)
@@ -442,7 +512,7 @@ class Listing(Hand):
 
 @giving("channels-are-those-declared", "NaN in all")
 def _(reading):
-    return Reading(reading.frame._replace(edge_left_n=nan), reading.pads)
+    return Reading(reading.frame._replace(edge_left_n=nan), reading.pads, reading.signals)
 
 
 mutant(
@@ -455,50 +525,56 @@ mutant(
 
 @giving("time-runs-forward", "each is later than the last")
 def _(reading):
-    return Reading(reading.frame._replace(t_s=1.0), reading.pads)
+    return Reading(reading.frame._replace(t_s=1.0), reading.pads, reading.signals)
 
 
 @giving("time-runs-forward", "dt_s is 1 s where")
 def _(reading):
-    return Reading(reading.frame._replace(dt_s=1.0), reading.pads)
+    return Reading(reading.frame._replace(dt_s=1.0), reading.pads, reading.signals)
 
 
 mutant(
     "sensor-backend",
     "rate-is-as-declared",
     "is declared at 5000 Hz",
-    channels=channels(*(one.name for one in ENTRIES["sensor-backend"].channels), rate_hz=5000.0),
+    channels=(*channels(*CHANNELS_OF_HAND, rate_hz=5000.0), ACCELERATION),
 )(Hand)
 
 
 @giving("images-count-up", "count up by one")
 def _(reading):
-    return Reading(reading.frame, reading.pads._replace(counter=2 * reading.pads.counter))
+    return Reading(reading.frame, reading.pads._replace(counter=2 * reading.pads.counter), reading.signals)
 
 
 @giving("images-count-up", "while its counter stays")
 def _(reading):
-    return Reading(reading.frame, reading.pads._replace(left=(reading.frame.t_s,) * 22))
+    return Reading(reading.frame, reading.pads._replace(left=(reading.frame.t_s,) * 22), reading.signals)
 
 
 @giving("gap-is-in-metres", "divide by 1000")
 def _(reading):
-    return Reading(reading.frame._replace(gap_m=1000.0 * reading.frame.gap_m), reading.pads)
+    return Reading(reading.frame._replace(gap_m=1000.0 * reading.frame.gap_m), reading.pads, reading.signals)
 
 
 @giving("forces-are-in-newtons", "give newtons")
 def _(reading):
-    return Reading(reading.frame._replace(force_left_n=3000.0), reading.pads)
+    return Reading(reading.frame._replace(force_left_n=3000.0), reading.pads, reading.signals)
 
 
 @giving("velocity-is-the-rate-of-the-gap", "mm where the gap moved by")
 def _(reading):
-    return Reading(reading.frame._replace(velocity_m_s=1000.0 * reading.frame.velocity_m_s), reading.pads)
+    return Reading(
+        reading.frame._replace(velocity_m_s=1000.0 * reading.frame.velocity_m_s),
+        reading.pads,
+        reading.signals,
+    )
 
 
 @giving("velocity-is-the-rate-of-the-gap", "negative while it closes")
 def _(reading):
-    return Reading(reading.frame._replace(velocity_m_s=-reading.frame.velocity_m_s), reading.pads)
+    return Reading(
+        reading.frame._replace(velocity_m_s=-reading.frame.velocity_m_s), reading.pads, reading.signals
+    )
 
 
 @mutant("sensor-backend", "closing-closes", "close the fingers")
@@ -511,7 +587,7 @@ class Backwards(Hand):
 class Unlimited(Hand):
     def read(self, timeout_s):
         reading = super().read(timeout_s)
-        return Reading(reading.frame._replace(effort_n=self._asked), reading.pads)
+        return Reading(reading.frame._replace(effort_n=self._asked), reading.pads, reading.signals)
 
     def apply(self, command):
         self._asked = 60.0 if command.value > 0.0 else 0.0
@@ -594,7 +670,7 @@ class Once(Hand):
 
 @giving("same-seed-same-frames", "draw everything from the seed")
 def _(reading):
-    return Reading(reading.frame._replace(edge_left_n=_rng.random()), reading.pads)
+    return Reading(reading.frame._replace(edge_left_n=_rng.random()), reading.pads, reading.signals)
 
 
 @giving("performs-a-whole-grasp", "ended as aborted")

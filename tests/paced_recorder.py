@@ -19,6 +19,7 @@ from pathlib import Path
 
 from kept import command, ended, frame, pads
 
+from graspsense.core.signals import Reading
 from graspsense.recording.layout import DEVICE, RESULT, START, TICK_WIRE
 from graspsense.recording.recorder import Recorder
 from graspsense.store.store import Store
@@ -54,7 +55,7 @@ def record_trial(store: Store, trial: int, seconds: float, shared: mmap.mmap) ->
             time.sleep(late)
         while unread(recorder) > MOST_UNREAD:
             time.sleep(0.001)
-        recorder.take(frame(k), pads(k), 3, command(k))
+        recorder.take(Reading(frame(k), pads(k)), 3, command(k))
         PROGRESS.pack_into(shared, 0, trial, k, recorder._process.pid)
     recorder.metadata(RESULT, record.section(RESULT))
     store.add(record, recorder.finish())

@@ -20,6 +20,7 @@ from graspsense.plugin_api import (
     ControllerEntry,
     DeviceInfo,
     DeviceLost,
+    FastChannel,
     Feature,
     Features,
     FeatureSet,
@@ -31,6 +32,7 @@ from graspsense.plugin_api import (
     Reading,
     SensorBackend,
     SensorBackendEntry,
+    TactileArray,
     TareRefused,
     in_words,
     setting,
@@ -93,7 +95,10 @@ class Hand(SensorBackend[HandConfig]):
     def open(self, seed):
         if not self.config.here:
             raise NoDevice("no hand at port 7: plug it in, then `graspsense devices`")
-        self._bench, self._zero = ModelGripper(frozenset(CHANNELS_OF_HAND), 0.05, 1500.0), None
+        self._bench, self._zero = (
+            ModelGripper(frozenset((*CHANNELS_OF_HAND, ACCELERATION)), 0.05, 1500.0),
+            None,
+        )
         self._info = self._bench.open(seed)
         self._effort = 0.0
         return DeviceInfo(
@@ -109,14 +114,14 @@ class Hand(SensorBackend[HandConfig]):
         )
 
     def read(self, timeout_s):
-        frame, pads = self._opened().read(timeout_s)
+        frame, pads, signals = self._opened().read(timeout_s)
         if frame.t_s > self.config.vanishes_s:
             raise DeviceLost("the hand at port 7 does not answer: look at its cable")
         if self._zero is None:
             frame = frame._replace(
                 force_left_n=frame.force_left_n + 2.0, force_right_n=frame.force_right_n + 2.0
             )
-        return Reading(frame, pads)
+        return Reading(frame, pads, signals)
 
     def apply(self, command):
         self._opened().apply(command)
@@ -141,6 +146,7 @@ class Hand(SensorBackend[HandConfig]):
         return self._bench
 
 
+ACCELERATION = FastChannel("acceleration", "m/s2", 3000.0, samples=3, axes=("x", "y", "z"))
 CHANNELS_OF_HAND = (
     *("gap", "velocity", "effort", "force_left", "force_right", "edge_left", "edge_right", "pads"),
 )
@@ -203,7 +209,12 @@ class Nearest(Classifier[ClassifierConfig]):
 def channels(*names, rate_hz=1000.0):
     from graspsense.plugin_api import CHANNELS
 
-    return tuple(Channel(name, CHANNELS[name], rate_hz) for name in names)
+    return tuple(
+        TactileArray(name, "counts", rate_hz, rows=2, columns=11)
+        if name == "pads"
+        else Channel(name, CHANNELS[name], rate_hz)
+        for name in names
+    )
 
 
 ENTRIES = {
@@ -228,7 +239,7 @@ ENTRIES = {
         target="parts:Hand",
         config="parts:HandConfig",
         summary="a hand that is a mass and a spring",
-        channels=channels(*CHANNELS_OF_HAND),
+        channels=(*channels(*CHANNELS_OF_HAND), ACCELERATION),
         accepts=("effort",),
     ),
     "classifier": ClassifierEntry(

@@ -4,7 +4,8 @@ import pytest
 
 from graspsense.core.calibration import edge_force, pad_force, tare, zero_of
 from graspsense.core.errors import TareRefused
-from graspsense.core.signals import CELLS, Pads
+from graspsense.core.signals import Pads
+from graspsense.testing.model_gripper import CELLS
 
 EDGE_COUNTS_PER_N = (600.0, 400.0, 600.0, 600.0, 600.0, 600.0, 400.0)
 
@@ -17,7 +18,7 @@ def image(counter, level=3300.0, pad=0.0):
 def test_a_newton_is_1600_counts_over_the_pads_fifteen_cells():
     zero = (3000.0,) * CELLS
     cells = tuple(3000.0 + (1600.0 / 15 if i >= 7 else 5000.0) for i in range(CELLS))
-    assert pad_force(cells, zero, 1600.0) == pytest.approx(1.0)
+    assert pad_force(cells, zero, 1600.0, 7) == pytest.approx(1.0)
 
 
 def test_edge_force_is_the_largest_single_edge_cell_each_with_its_own_scale():
@@ -30,21 +31,21 @@ def test_edge_force_is_the_largest_single_edge_cell_each_with_its_own_scale():
 
 
 def test_the_zero_is_the_mean_of_all_images_not_the_last():
-    zeros = tare([image(1, 3300.0), image(2, 3310.0), image(3, 3305.0)], 1600.0)
+    zeros = tare([image(1, 3300.0), image(2, 3310.0), image(3, 3305.0)], 1600.0, 7)
     assert zeros[0] == pytest.approx((3305.0,) * CELLS)
     assert zero_of([(1.0, 2.0), (3.0, 6.0)]) == (2.0, 4.0)
 
 
 def test_a_tare_is_refused_without_images():
     with pytest.raises(TareRefused, match="no cell image"):
-        tare([], 1600.0)
+        tare([], 1600.0, 7)
 
 
 def test_a_tare_is_refused_while_something_touches_and_moves():
     with pytest.raises(TareRefused, match=r"left pad varied by .* 0.5 N is allowed"):
-        tare([image(1), image(2, pad=60.0), image(3)], 1600.0)
+        tare([image(1), image(2, pad=60.0), image(3)], 1600.0, 7)
 
 
 def test_a_tare_is_refused_where_a_fingertip_gives_no_numbers():
     with pytest.raises(TareRefused, match="not numbers"):
-        tare([image(1, float("nan")), image(2)], 1600.0)
+        tare([image(1, float("nan")), image(2)], 1600.0, 7)

@@ -56,7 +56,7 @@ def adding(name: str, command: click.Command):
     sys.modules[module].command = command
 
     class Plugin:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl
         def graspsense_commands(self):
@@ -250,7 +250,7 @@ class TestPluginsList:
         site.install("lab-broken", "import no_such_driver", version="3.1")
         observer = """
             from graspsense.plugin_api import hookimpl
-            GRASPSENSE_API = (1, 0)
+            GRASPSENSE_API = (2, 0)
             @hookimpl
             def graspsense_run_starting(run): pass
             """
@@ -316,7 +316,7 @@ class TestPluginsShow:
     ):
         plugin = """
             from graspsense.plugin_api import ClassifierEntry, hookimpl
-            GRASPSENSE_API = (1, 0)
+            GRASPSENSE_API = (2, 0)
             @hookimpl
             def graspsense_classifiers():
                 yield ClassifierEntry("odd", "no_lab:A", "odd", "pip install lab")
@@ -370,7 +370,7 @@ class TestConfig:
         plugin = """
             from attrs import frozen
             from graspsense.plugin_api import SensorBackendEntry, hookimpl
-            GRASPSENSE_API = (1, 0)
+            GRASPSENSE_API = (2, 0)
             @frozen
             class Config: pass
             @hookimpl
@@ -397,7 +397,7 @@ class TestDevices:
 
     def test_found_and_failed(self, run):
         class Looking:
-            GRASPSENSE_API = (1, 0)
+            GRASPSENSE_API = (2, 0)
 
             @hookimpl
             def graspsense_probe_devices(self, timeout_s):
@@ -405,7 +405,7 @@ class TestDevices:
                 return [FoundDevice("hand", "42", "bus 1", ready=False, advice="add a udev rule")]
 
         class Failing:
-            GRASPSENSE_API = (1, 0)
+            GRASPSENSE_API = (2, 0)
 
             @hookimpl
             def graspsense_probe_devices(self, timeout_s):

@@ -38,7 +38,7 @@ PARTS = """
     from graspsense.plugin_api import ClassifierEntry, Channel, ControllerEntry, FeatureSetEntry
     from graspsense.plugin_api import PipelineEntry, SensorBackendEntry, hookimpl
 
-    GRASPSENSE_API = (1, 0)
+    GRASPSENSE_API = (2, 0)
 
     @frozen
     class Filter:

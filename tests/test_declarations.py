@@ -187,7 +187,7 @@ def settings(plugins, fingers):
 
 def test_the_wiring_knows_the_channels_of_the_fitted_fingers():
     class Lab:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl
         def graspsense_sensor_backends(self):

@@ -15,7 +15,7 @@ from graspsense.core.plugins import Plugins, builtin_source, installed_sources
 
 FEATURES = """
     from graspsense.plugin_api import Feature, FeatureSetEntry, hookimpl
-    GRASPSENSE_API = (1, 0)
+    GRASPSENSE_API = (2, 0)
     @hookimpl
     def graspsense_feature_sets():
         peak = Feature("peak", "N", "largest force")
@@ -41,7 +41,7 @@ def graspsense(site, *arguments, code=0):
 
 
 def test_a_disabled_plugin_is_not_imported_until_it_is_enabled_again(home, site):
-    site.install("lab-loud", "import sys; sys.stderr.write('I was imported'); GRASPSENSE_API = (1, 0)")
+    site.install("lab-loud", "import sys; sys.stderr.write('I was imported'); GRASPSENSE_API = (2, 0)")
 
     assert "I was imported" in graspsense(site, "plugins", "list")
     said = graspsense(site, "plugins", "disable", "Lab_Loud")
@@ -59,7 +59,7 @@ def test_a_disabled_plugin_is_not_imported_until_it_is_enabled_again(home, site)
 
 
 def test_what_cannot_be_disabled_or_enabled(home, site):
-    site.install("lab-loud", "GRASPSENSE_API = (1, 0)")
+    site.install("lab-loud", "GRASPSENSE_API = (2, 0)")
 
     assert "Did you mean 'lab-loud'?" in graspsense(site, "plugins", "disable", "lab-lout", code=2)
     assert "no installed plugin" in graspsense(site, "plugins", "disable", "graspsense", code=2)
@@ -93,9 +93,9 @@ def test_the_list_says_what_is_to_be_done(home, site):
     site.install("lab-peak", FEATURES.format(name="peak"))
     site.install("lab-other", FEATURES.format(name="peak"))
     site.install("lab-old", "GRASPSENSE_API = (0, 9)")
-    site.install("lab-slow", "import numpy; GRASPSENSE_API = (1, 0)")
+    site.install("lab-slow", "import numpy; GRASPSENSE_API = (2, 0)")
     site.install("lab-broken", "import no_such_driver")
-    site.install("lab-sleepy", "import time; time.sleep(0.7); GRASPSENSE_API = (1, 0)")
+    site.install("lab-sleepy", "import time; time.sleep(0.7); GRASPSENSE_API = (2, 0)")
 
     said = graspsense(site, "plugins", "list").partition("To be done:")[2]
 
@@ -141,7 +141,7 @@ def test_a_hook_with_a_default_is_refused_with_what_to_write(site):
         "lab-peak",
         """
         from graspsense.plugin_api import hookimpl
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
         @hookimpl
         def graspsense_probe_devices(timeout_s=1.0):
             return []

@@ -20,7 +20,7 @@ PAGE = (Path(__file__).parents[1] / "docs" / "tcp_gripper.md").read_text(encodin
 
 
 class Plugin:
-    GRASPSENSE_API = (1, 0)
+    GRASPSENSE_API = (2, 0)
 
     @hookimpl
     def graspsense_sensor_backends(self):

@@ -152,7 +152,7 @@ def test_hook_graspsense_datasets():
 
 def test_hook_graspsense_commands():
     class Plugin:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl
         def graspsense_commands(self):
@@ -180,14 +180,14 @@ def test_hook_graspsense_conformance_checks():
 
 def test_hook_graspsense_diagnose():
     class Failing:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl
         def graspsense_diagnose(self):
             raise PermissionError("cannot list the bus")
 
     class Told:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl
         def graspsense_diagnose(self, config, timeout_s):
@@ -212,14 +212,14 @@ def test_a_finding_is_in_one_of_three_states():
 
 def test_hook_graspsense_probe_devices():
     class Failing:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl
         def graspsense_probe_devices(self):
             raise PermissionError("cannot list the bus")
 
     class Timed:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl
         def graspsense_probe_devices(self, timeout_s):
@@ -240,7 +240,7 @@ def test_hook_graspsense_probe_devices():
 
 def test_a_probe_that_gives_something_else_is_reported_as_failed():
     class Plugin:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl
         def graspsense_probe_devices(self):
@@ -278,7 +278,7 @@ def test_hook_graspsense_run_finished():
 @pytest.mark.parametrize("failure", [RuntimeError("no room on the disk"), SystemExit("no room on the disk")])
 def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, failure):
     class Raising:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl
         def graspsense_grasp_event(self, event):
@@ -304,7 +304,7 @@ def test_an_observer_that_raises_stops_nobody_and_is_reported_once(caplog, failu
 
 def test_an_observer_does_not_swallow_an_interrupt():
     class Interrupted:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl
         def graspsense_run_starting(self):
@@ -316,14 +316,14 @@ def test_an_observer_does_not_swallow_an_interrupt():
 
 def test_a_hook_that_a_plugin_owns_collects_from_all_that_implement_it(caplog):
     class Stiff:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl(optionalhook=True)
         def lab_terms(self, scale):
             return 2.0 * scale
 
     class Broken:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl(optionalhook=True)
         def lab_terms(self, scale):

@@ -5,14 +5,14 @@ from __future__ import annotations
 from math import nan
 
 from graspsense.cli.live_rows import LiveRows
-from graspsense.core.signals import EFFORT, NO_PADS, Command, Frame, Phase
+from graspsense.core.signals import EFFORT, NO_PADS, Command, Frame, Phase, Reading
 
 
 def test_a_gripper_without_pads_is_shown_as_often_as_another(capsys):
     rows = LiveRows()
     for k in range(300):
         frame = Frame(0.01 * k, 0.01, 0.08, 0.0, 0.0, nan, nan, nan, nan, 0)
-        rows.take(frame, NO_PADS, int(Phase.APPROACH), Command(EFFORT, 0.0, 1.0, 1.0))
+        rows.take(Reading(frame, NO_PADS), int(Phase.APPROACH), Command(EFFORT, 0.0, 1.0, 1.0))
 
     lines = capsys.readouterr().err.splitlines()
     assert 5 <= len(lines) <= 8

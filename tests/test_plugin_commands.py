@@ -15,7 +15,7 @@ from graspsense.testing import CHECKS
 
 
 class Lab:
-    GRASPSENSE_API = (1, 0)
+    GRASPSENSE_API = (2, 0)
 
     def __init__(self, *entries):
         self.entries = entries

@@ -13,7 +13,7 @@ from graspsense.core.roles import SensorBackend
 
 HEAD = """
     from graspsense.plugin_api import Channel, ControllerEntry, PipelineEntry, SensorBackendEntry, hookimpl
-    GRASPSENSE_API = (1, 0)
+    GRASPSENSE_API = (2, 0)
 """
 
 BROKEN = HEAD + "    import no_such_driver"
@@ -216,19 +216,21 @@ def test_a_disabled_plugin_is_not_even_imported(site, environ, loaded, reason):
 @pytest.mark.parametrize(
     ("line", "reason"),
     [
-        ("", "lab_a_plugin has no GRASPSENSE_API: add GRASPSENSE_API = (1, 0)"),
-        ("GRASPSENSE_API = 1", "GRASPSENSE_API is 1: it must be two integers, as (1, 0)"),
+        ("", "lab_a_plugin has no GRASPSENSE_API: add GRASPSENSE_API = (2, 0)"),
+        ("GRASPSENSE_API = 1", "GRASPSENSE_API is 1: it must be two integers, as (2, 0)"),
         (
-            "GRASPSENSE_API = (1, 1)",
-            "it is written for plugin API 1.1, graspsense 0.1.0 has 1.0: upgrade graspsense",
+            "GRASPSENSE_API = (2, 1)",
+            "it is written for plugin API 2.1, graspsense 0.1.0 has 2.0: upgrade graspsense",
         ),
         (
-            "GRASPSENSE_API = (2, 0)",
-            "it is written for plugin API 2.0, graspsense 0.1.0 has 1.0: upgrade graspsense",
+            "GRASPSENSE_API = (3, 0)",
+            "it is written for plugin API 3.0, graspsense 0.1.0 has 2.0: upgrade graspsense",
         ),
         (
-            "GRASPSENSE_API = (0, 9)",
-            "it is written for plugin API 0.9, graspsense 0.1.0 has 1.0: upgrade lab-a",
+            "GRASPSENSE_API = (1, 0)",
+            "it is written for plugin API 1.0, graspsense 0.1.0 has 2.0: upgrade lab-a. If it is yours: a controller's "
+            "step takes (params, state, reading), where reading.frame and reading.pads are what it took before; a "
+            "gripper declares its fingertips as TactileArray('pads', ...). All changes: docs/from-1-to-2.md",
         ),
     ],
 )

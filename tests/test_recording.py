@@ -18,6 +18,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from graspsense import load_pipeline
 from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.signals import Reading
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import START
 from graspsense.recording.reader import read_recorded
@@ -120,7 +121,7 @@ def test_a_recording_is_never_written_over_another(tmp_path):
     with pytest.raises(FileExistsError):
         RecordingWriter(tmp_path / "g.mcap")
     recorder = Recorder(tmp_path / "g.mcap")
-    recorder.take(frame(0), pads(0), 3, command(0))
+    recorder.take(Reading(frame(0), pads(0)), 3, command(0))
     with pytest.raises(SaveFailed, match="the recording already exists"):
         recorder.finish()
     assert (tmp_path / "g.mcap").read_bytes() == content
@@ -134,7 +135,7 @@ def test_a_writer_that_does_not_follow_holds_nobody_up_and_loses_nothing(tmp_pat
     os.kill(pid, signal.SIGSTOP)
     try:
         for k in range(20_000):
-            recorder.take(frame(k), pads(k), 3, command(k))
+            recorder.take(Reading(frame(k), pads(k)), 3, command(k))
     finally:
         os.kill(pid, signal.SIGCONT)
     recorded = recorder.finish()
@@ -159,7 +160,7 @@ def test_a_writer_that_has_died_does_not_stop_the_grasp(tmp_path):
 def test_a_grasp_that_ends_without_a_word_leaves_what_was_felt(tmp_path):
     felt, nothing = Recorder(tmp_path / "felt.mcap"), Recorder(tmp_path / "nothing.mcap")
     for k in range(10):
-        felt.take(frame(k), pads(k), 3, command(k))
+        felt.take(Reading(frame(k), pads(k)), 3, command(k))
     felt.leave()
     nothing.leave()
     assert [one.name for one in tmp_path.iterdir()] == ["felt.mcap.part"]

@@ -15,7 +15,7 @@ from graspsense.core.errors import NoDevice, RecordingEnded, TareRefused
 from graspsense.core.roles import Controller
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
-from graspsense.core.signals import EFFORT, Command, Outcome, Phase
+from graspsense.core.signals import EFFORT, Command, Outcome, Phase, Reading
 from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
 from graspsense.plugins.controllers.supervision import not_begun
 from graspsense.plugins.controllers.velocity import VelocityState
@@ -43,7 +43,9 @@ def test_a_grasp_from_opening_to_release():
     grasp = run_grasp(gripper, HYBRID, RUN)
     assert grasp.outcome is Outcome.STEADY
     assert phases_of(grasp) == [Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD, Phase.RELEASE]
-    assert [event.what for event in grasp.events if "guard" not in event.what] == [
+    assert [event.what for event in grasp.trace.events] == ["contact"]
+    told = [event for event in grasp.events if event.source == "runner"]
+    assert [event.what for event in told if "guard" not in event.what] == [
         "opening",
         "taring",
         "approach",
@@ -129,11 +131,11 @@ def controller_that(act, after):
     """The hybrid law, but from its `after`-th step on `act` decides."""
     calls = [0]
 
-    def step(params, state, frame, pads):
+    def step(params, state, reading):
         calls[0] += 1
         if calls[0] >= after:
             act()
-        return HybridController.step(params, state, frame, pads)
+        return HybridController.step(params, state, reading)
 
     class Faulty(HybridController):
         pass
@@ -183,7 +185,8 @@ def test_the_second_interrupt_still_relaxes_the_gripper():
 def test_a_command_that_is_no_number_ends_the_grasp_safely():
     class Broken(Controller):
         @staticmethod
-        def step(params, state, frame, pads):
+        def step(params, state, reading):
+            frame = reading.frame
             value = math.nan if frame.t_s > 0.5 else 5.0
             return Command(EFFORT, value, math.inf, math.inf), state
 
@@ -217,8 +220,8 @@ def test_a_refused_tare_aborts_before_anything_closes():
 def test_pads_that_never_report_end_the_taring_in_time():
     class Padless(Scripted):
         def read(self, timeout_s):
-            frame, pads = super().read(timeout_s)
-            return frame, pads._replace(counter=7)
+            frame, pads, _ = super().read(timeout_s)
+            return Reading(frame, pads._replace(counter=7))
 
         def tare(self, images):
             if not images:
@@ -282,8 +285,8 @@ def test_a_recording_ends_as_what_it_showed(length, outcome):
 def test_late_frames_are_counted_on_a_device_clock_only():
     class Jerky(Scripted):
         def read(self, timeout_s):
-            frame, pads = super().read(timeout_s)
-            return (frame._replace(dt_s=0.006) if self.k % 100 == 50 else frame), pads
+            frame, pads, _ = super().read(timeout_s)
+            return Reading(frame._replace(dt_s=0.006) if self.k % 100 == 50 else frame, pads)
 
     late = run_grasp(Jerky(squeezing, bottle, clock="device"), HYBRID, RUN).counts["late"]
     assert late == pytest.approx(18, abs=3)
@@ -302,12 +305,12 @@ class Counting:
     def __init__(self):
         self.ticks = 0
 
-    def take(self, frame, pads, phase, command):
+    def take(self, reading, phase, command):
         self.ticks += 1
 
 
 class FullDisk:
-    def take(self, frame, pads, phase, command):
+    def take(self, reading, phase, command):
         raise OSError("No space left on device")
 
 
@@ -376,7 +379,7 @@ def test_other_ends_of_a_session_let_go_too_and_tell_who_listened_before(number)
 def test_a_controller_that_never_ends_is_ended():
     class Endless(HybridController):
         @staticmethod
-        def step(params, state, frame, pads):
+        def step(params, state, reading):
             return Command(EFFORT, 30.0, math.inf, math.inf), state
 
     gripper = Scripted(lambda t: 0.05, lambda t: (9.0, 9.0))
@@ -390,8 +393,10 @@ def test_a_controller_that_never_ends_is_ended():
 def test_a_device_whose_clock_stands_still_does_not_squeeze_for_ever():
     class Frozen(Scripted):
         def read(self, timeout_s):
-            frame, pads = super().read(timeout_s)
-            return frame._replace(t_s=min(frame.t_s, 1.2), gap_m=squeezing(min(frame.t_s, 1.2))), pads
+            frame, pads, _ = super().read(timeout_s)
+            return Reading(
+                frame._replace(t_s=min(frame.t_s, 1.2), gap_m=squeezing(min(frame.t_s, 1.2))), pads
+            )
 
     gripper = Frozen(squeezing, bottle, clock="device")
     grasp = run_grasp(gripper, HYBRID, RunConfig(grasp_timeout_s=2.0, opening_timeout_s=1.0))
@@ -451,8 +456,8 @@ def test_a_recording_is_heard_to_its_end_however_long():
         def read(self, timeout_s):
             if self.k >= 2000:
                 raise RecordingEnded
-            frame, pads = super().read(timeout_s)
-            return frame._replace(t_s=0.0, gap_m=0.05), pads
+            frame, pads, _ = super().read(timeout_s)
+            return Reading(frame._replace(t_s=0.0, gap_m=0.05), pads)
 
     run = RunConfig(grasp_timeout_s=0.5, opening_timeout_s=0.1)
     grasp = run_grasp(Long(squeezing, lambda t: (0.0, 0.0)), HYBRID, run)
@@ -464,7 +469,7 @@ def test_a_recording_is_heard_to_its_end_however_long():
 def test_an_endless_grasp_ends_after_the_grasp_and_three_openings_and_not_before():
     class Endless(HybridController):
         @staticmethod
-        def step(params, state, frame, pads):
+        def step(params, state, reading):
             return Command(EFFORT, 5.0, math.inf, math.inf), state
 
     gripper = Scripted(lambda t: 0.05, lambda t: (9.0, 9.0))
@@ -492,8 +497,8 @@ def test_the_simulated_time_is_from_the_first_frame_to_the_last():
         """A clock that does not begin at 0."""
 
         def read(self, timeout_s):
-            frame, pads = super().read(timeout_s)
-            return frame._replace(t_s=frame.t_s + 40.0), pads
+            frame, pads, _ = super().read(timeout_s)
+            return Reading(frame._replace(t_s=frame.t_s + 40.0), pads)
 
     gripper = Late(squeezing, bottle, lose_at=51)
     assert run_grasp(gripper, HYBRID, RUN).seconds_simulated == pytest.approx(0.050)
@@ -504,8 +509,8 @@ def test_the_simulated_time_is_from_the_first_frame_to_the_last():
 def test_that_the_guard_limits_is_said_once_and_counted_each_time():
     class Strong(HybridController):
         @staticmethod
-        def step(params, state, frame, pads):
-            command, state = HybridController.step(params, state, frame, pads)
+        def step(params, state, reading):
+            command, state = HybridController.step(params, state, reading)
             return command._replace(value=500.0), state
 
     # Its own opening command is above the limit of a first use too: those ticks are not in the trace.
@@ -547,10 +552,10 @@ def test_fingers_that_do_not_come_to_rest_are_relaxed_after_the_opening_time():
             if self.k == 1200:
                 self.k += 1
                 raise ZeroDivisionError
-            frame, pads = super().read(timeout_s)
+            frame, pads, _ = super().read(timeout_s)
             if self.k > 1200:
                 frame = frame._replace(gap_m=0.05 + 0.01 * (self.k % 2) + 0.1 * (frame.t_s - 1.2))
-            return frame, pads
+            return Reading(frame, pads)
 
     gripper = Restless(squeezing, bottle)
     grasp = run_grasp(gripper, HYBRID, RunConfig(opening_timeout_s=2.0))
@@ -567,12 +572,12 @@ def test_fingers_whose_clock_stands_still_are_relaxed_after_the_opening_time_on_
         wall_s = 0.0
 
         def read(self, timeout_s):
-            frame, pads = super().read(timeout_s)
+            frame, pads, _ = super().read(timeout_s)
             if self.k == 1200:
                 raise ZeroDivisionError
             if self.k > 1200:
                 self.wall_s += 0.01
-            return frame._replace(t_s=min(frame.t_s, 1.2)), pads
+            return Reading(frame._replace(t_s=min(frame.t_s, 1.2)), pads)
 
     gripper = Frozen(squeezing, bottle)
     monkeypatch.setattr(runner, "time", SimpleNamespace(perf_counter=lambda: gripper.wall_s))
@@ -621,8 +626,8 @@ def test_fingers_that_are_open_are_not_opened_again():
 def test_a_frame_of_just_the_allowed_age_is_not_late():
     class Paced(Scripted):
         def read(self, timeout_s):
-            frame, pads = super().read(timeout_s)
-            return frame._replace(dt_s=5.0 / 1000.0), pads
+            frame, pads, _ = super().read(timeout_s)
+            return Reading(frame._replace(dt_s=5.0 / 1000.0), pads)
 
     assert run_grasp(Paced(squeezing, bottle, clock="device"), HYBRID, RUN).counts["late"] == 0
 

@@ -41,7 +41,7 @@ def graspsense_sensor_backends():
     return [SensorBackendEntry(name="tcp-hand", target=f"{__name__}:TcpHand", summary="a hand on a socket")]
 
 
-GRASPSENSE_API = (1, 0)
+GRASPSENSE_API = (2, 0)
 
 
 @pytest.mark.parametrize("emulated", [False, True], ids=["real", "emulated"])

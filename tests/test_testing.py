@@ -93,7 +93,7 @@ def test_an_expected_failure_is_no_failure_and_an_unexpected_pass_is_one():
 
 def test_one_part_is_found_by_name_and_a_wrong_name_by_likeness():
     class Plugin:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @hookimpl
         def graspsense_feature_sets(self):

@@ -14,7 +14,7 @@ from graspsense.testing.subject import package_of
 
 HEAD = """
     from graspsense.plugin_api import Feature, FeatureSetEntry, PipelineEntry, hookimpl
-    GRASPSENSE_API = (1, 0)
+    GRASPSENSE_API = (2, 0)
 """
 
 SOUND = (
@@ -118,7 +118,7 @@ def test_a_pipeline_that_does_not_resolve_is_caught(site):
 
 OWNER = """
     from graspsense.plugin_api import ConformanceCheckEntry, hookimpl
-    GRASPSENSE_API = (1, 0)
+    GRASPSENSE_API = (2, 0)
 
     @hookimpl
     def graspsense_conformance_checks():
@@ -191,7 +191,7 @@ def test_what_is_missing_from_the_wheel_is_named(site, tmp_path, packed, says):
     )
     plugin = """
 from graspsense.plugin_api import Feature, FeatureSetEntry, PipelineEntry, hookimpl
-GRASPSENSE_API = (1, 0)
+GRASPSENSE_API = (2, 0)
 @hookimpl
 def graspsense_feature_sets():
     peak = Feature("peak", "N", "largest force")

@@ -17,6 +17,7 @@ from graspsense.core.signals import (
     Frame,
     Pads,
     Phase,
+    Reading,
 )
 from graspsense.core.tick import Schedule, TickParams, first_state, tick
 from graspsense.plugins.controllers.velocity import VelocityState
@@ -30,7 +31,8 @@ LIMITS = GuardParams(100.0, 0.2, inf, inf, 0.625)
 def law_that_ends_at(t_end, outcome=STEADY):
     """A law that approaches, squeezes from 1 s on, and ends with `outcome` at `t_end`."""
 
-    def step(params, state, frame, pads):
+    def step(params, state, reading):
+        frame = reading.frame
         phase, ended = (SQUEEZE if frame.t_s >= 1.0 else APPROACH), RUNNING
         if frame.t_s >= t_end:
             phase, ended = HOLD, outcome
@@ -47,7 +49,7 @@ def walk(step, gap_of, ticks, opens=1, tare_images=3, hold_s=0.25, timeout_s=5.0
     for k in range(ticks):
         t = k * 0.001
         frame = Frame(t, 0.001, gap_of(t), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
-        command, state = bound(params, state, frame, Pads(t, 1 + k // images_every, (), ()))
+        command, state = bound(params, state, Reading(frame, Pads(t, 1 + k // images_every, (), ())))
         seen.append((t, state.phase, command.value))
         if state.done:
             break
@@ -124,4 +126,4 @@ def test_without_a_controller_it_says_so():
     state = first_state(VelocityState(APPROACH, RUNNING, None, 0.0))
     frame = Frame(0.0, 0.001, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
     with pytest.raises(TypeError, match="no controller"):
-        tick(params, state, frame, Pads(0.0, 0, (), ()))
+        tick(params, state, Reading(frame, Pads(0.0, 0, (), ())))

@@ -90,7 +90,7 @@ def test_commands_work_without_a_home_and_leave_nothing_behind(tmp_path):
 
 
 def test_disabling_without_a_home_says_what_to_set(site, tmp_path):
-    site.install("lab-peak", "GRASPSENSE_API = (1, 0)\n")
+    site.install("lab-peak", "GRASPSENSE_API = (2, 0)\n")
     path = os.pathsep.join(one for one in (str(site.folder), os.environ.get("PYTHONPATH", "")) if one)
     said = graspsense(tmp_path, "plugins", "disable", "lab-peak", code=2, PYTHONPATH=path)
     assert "XDG_CONFIG_HOME" in said

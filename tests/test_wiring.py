@@ -15,7 +15,7 @@ PARTS = """
     from attrs import frozen
     from graspsense.plugin_api import Channel, ControllerEntry, FeatureSetEntry, SensorBackendEntry, hookimpl
 
-    GRASPSENSE_API = (1, 0)
+    GRASPSENSE_API = (2, 0)
 
     @frozen
     class Empty:

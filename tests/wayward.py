@@ -16,7 +16,7 @@ import numpy as np
 from attrs import frozen
 from graspsense.plugin_api import Classifier, ClassifierConfig, ClassifierEntry, Prediction, hookimpl
 
-GRASPSENSE_API = (1, 0)
+GRASPSENSE_API = (2, 0)
 
 
 @hookimpl

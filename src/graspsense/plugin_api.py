@@ -22,6 +22,7 @@ _TABLE: Final[Table] = {
             "ControllerEntry",
             "DatasetEntry",
             "EmulatorEntry",
+            "FastChannel",
             "Feature",
             "FeatureSetEntry",
             "Finding",
@@ -29,21 +30,24 @@ _TABLE: Final[Table] = {
             "ModelEntry",
             "PipelineEntry",
             "SensorBackendEntry",
+            "TactileArray",
         ),
         "setting": ("CHANGES_NO_RESULT", "NAMES_INPUT", "setting"),
     },
     "Signals: what passes between a gripper and a controller": {
         "signals": (
-            "CELLS",
             "CHANNELS",
-            "FIRST_PAD_CELL",
             "NO_PADS",
             "Command",
             "CommandKind",
             "Frame",
+            "Image",
             "Outcome",
             "Pads",
             "Phase",
+            "Reading",
+            "Samples",
+            "no_pads",
         ),
     },
     "The same kinds, phases and outcomes as plain integers, for laws that are compiled": {
@@ -68,7 +72,8 @@ _TABLE: Final[Table] = {
         "tick": ("OPENING", "RELEASE", "TARING"),
     },
     "Sensor backends": {
-        "roles": ("DeviceInfo", "ObjectKind", "Reading", "SensorBackend"),
+        "roles": ("DeviceInfo", "ObjectKind", "SensorBackend"),
+        "channels": ("no_signals", "signal_type"),
     },
     "Sensor backends that do many grasps at once": {
         "roles": ("BatchBackend", "BatchOptions", "Grasped", "SimulationVariant"),
@@ -115,7 +120,7 @@ _TABLE: Final[Table] = {
     "Feature sets": {
         "features": ("Features", "missing"),
         "roles": ("FeatureSet",),
-        "trace": ("Trace", "TraceRecorder", "trace_of"),
+        "trace": ("ImageTrace", "SampleTrace", "Trace", "TraceRecorder", "trace_of"),
         "units": ("in_words",),
     },
     "Classifiers": {
@@ -133,14 +138,14 @@ _TABLE: Final[Table] = {
         "testing.model_gripper": ("model_gripper", "drive"),
     },
     "Observers": {
-        "trial": ("GraspEvent", "RunInfo", "Trial"),
+        "trial": ("GraspEvent", "RunInfo", "Trial", "event_name"),
     },
     "The tick of the runner, for a backend that runs it compiled": {
         "binding": ("bind", "maker"),
         "guard": ("GuardParams", "GuardState"),
         "run_config": ("RunConfig",),
         "runner": ("ended_by_itself", "overdue", "seconds_at_most", "tick_params"),
-        "tick": ("Schedule", "TickParams", "TickState", "first_state", "tick"),
+        "tick": ("Schedule", "TickParams", "TickState", "events_of", "first_state", "tick"),
     },
     "Compiling a function with all that it calls": {
         "call_graph": ("NotCompilable", "fingerprint"),

@@ -9,6 +9,7 @@ from graspsense.core.entries import ConformanceCheckEntry as ConformanceCheckEnt
 from graspsense.core.entries import ControllerEntry as ControllerEntry
 from graspsense.core.entries import DatasetEntry as DatasetEntry
 from graspsense.core.entries import EmulatorEntry as EmulatorEntry
+from graspsense.core.entries import FastChannel as FastChannel
 from graspsense.core.entries import Feature as Feature
 from graspsense.core.entries import FeatureSetEntry as FeatureSetEntry
 from graspsense.core.entries import Finding as Finding
@@ -16,21 +17,24 @@ from graspsense.core.entries import FoundDevice as FoundDevice
 from graspsense.core.entries import ModelEntry as ModelEntry
 from graspsense.core.entries import PipelineEntry as PipelineEntry
 from graspsense.core.entries import SensorBackendEntry as SensorBackendEntry
+from graspsense.core.entries import TactileArray as TactileArray
 from graspsense.core.setting import CHANGES_NO_RESULT as CHANGES_NO_RESULT
 from graspsense.core.setting import NAMES_INPUT as NAMES_INPUT
 from graspsense.core.setting import setting as setting
 
 # Signals: what passes between a gripper and a controller
-from graspsense.core.signals import CELLS as CELLS
 from graspsense.core.signals import CHANNELS as CHANNELS
-from graspsense.core.signals import FIRST_PAD_CELL as FIRST_PAD_CELL
 from graspsense.core.signals import NO_PADS as NO_PADS
 from graspsense.core.signals import Command as Command
 from graspsense.core.signals import CommandKind as CommandKind
 from graspsense.core.signals import Frame as Frame
+from graspsense.core.signals import Image as Image
 from graspsense.core.signals import Outcome as Outcome
 from graspsense.core.signals import Pads as Pads
 from graspsense.core.signals import Phase as Phase
+from graspsense.core.signals import Reading as Reading
+from graspsense.core.signals import Samples as Samples
+from graspsense.core.signals import no_pads as no_pads
 
 # The same kinds, phases and outcomes as plain integers, for laws that are compiled
 from graspsense.core.signals import APPROACH as APPROACH
@@ -56,8 +60,9 @@ from graspsense.core.tick import TARING as TARING
 # Sensor backends
 from graspsense.core.roles import DeviceInfo as DeviceInfo
 from graspsense.core.roles import ObjectKind as ObjectKind
-from graspsense.core.roles import Reading as Reading
 from graspsense.core.roles import SensorBackend as SensorBackend
+from graspsense.core.channels import no_signals as no_signals
+from graspsense.core.channels import signal_type as signal_type
 
 # Sensor backends that do many grasps at once
 from graspsense.core.roles import BatchBackend as BatchBackend
@@ -107,6 +112,8 @@ from graspsense.core.contact import update_rest as update_rest
 from graspsense.core.features import Features as Features
 from graspsense.core.features import missing as missing
 from graspsense.core.roles import FeatureSet as FeatureSet
+from graspsense.core.trace import ImageTrace as ImageTrace
+from graspsense.core.trace import SampleTrace as SampleTrace
 from graspsense.core.trace import Trace as Trace
 from graspsense.core.trace import TraceRecorder as TraceRecorder
 from graspsense.core.trace import trace_of as trace_of
@@ -141,6 +148,7 @@ from graspsense.testing.model_gripper import drive as drive
 from graspsense.core.trial import GraspEvent as GraspEvent
 from graspsense.core.trial import RunInfo as RunInfo
 from graspsense.core.trial import Trial as Trial
+from graspsense.core.trial import event_name as event_name
 
 # The tick of the runner, for a backend that runs it compiled
 from graspsense.core.binding import bind as bind
@@ -155,6 +163,7 @@ from graspsense.core.runner import tick_params as tick_params
 from graspsense.core.tick import Schedule as Schedule
 from graspsense.core.tick import TickParams as TickParams
 from graspsense.core.tick import TickState as TickState
+from graspsense.core.tick import events_of as events_of
 from graspsense.core.tick import first_state as first_state
 from graspsense.core.tick import tick as tick
 

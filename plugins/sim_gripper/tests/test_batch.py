@@ -223,7 +223,7 @@ def test_what_is_not_all_in_names_and_values_is_not_handed_over():
 
 def test_what_fails_in_another_process_is_said():
     class Here:
-        GRASPSENSE_API = (1, 0)
+        GRASPSENSE_API = (2, 0)
 
         @staticmethod
         @hookimpl
@@ -294,11 +294,11 @@ def test_a_name_nobody_knows_is_refused_before_anything_runs():
     assert told == []
 
 
-def endless(params, state, frame, pads):
+def endless(params, state, reading):
     return Command(EFFORT, 0.0, 1.0, 1.0), state
 
 
-def lost(params, state, frame, pads):
+def lost(params, state, reading):
     return Command(EFFORT, float("nan"), 1.0, 1.0), state
 
 

@@ -22,7 +22,10 @@ HYBRID = create("controller", "hybrid")
 
 
 def columns(trace):
-    return {f.name: np.asarray(getattr(trace, f.name), float) for f in fields(Trace) if f.name != "units"}
+    return {f.name: np.asarray(getattr(trace, f.name), float) for f in fields(Trace) if f.name not in OTHERS}
+
+
+OTHERS = ("units", "signals", "events")
 
 
 def assert_same(one, other):
@@ -87,10 +90,10 @@ def test_as_many_seeds_as_scenes():
 # ------------------------------------------------------------------------- a law that cannot be compiled
 
 
-def plain_only(params, state, frame, pads):
+def plain_only(params, state, reading):
     # An f-string of a float is outside the compiler's subset.
-    label = f"{frame.gap_m:.3f}"
-    command, state = type(HYBRID).step(params, state, frame, pads)
+    label = f"{reading.frame.gap_m:.3f}"
+    command, state = type(HYBRID).step(params, state, reading)
     return Command(
         EFFORT, command.value + 0.0 * len(label), command.effort_limit_n, command.speed_limit_m_s
     ), state

@@ -196,7 +196,7 @@ def test_forced_steps_and_contacts_beyond_the_tick_are_not_verified():
     assert (hard.contact.decision, hard.verification) == ("peak not resolved", None)
 
 
-def failing(params, state, frame, pads):
+def failing(params, state, reading):
     raise RuntimeError("out of order")
 
 

@@ -219,7 +219,7 @@ def test_run_explains_the_model_in_the_terminal_and_in_json():
 PLUGIN = """
     from graspsense.plugin_api import hookimpl
 
-    GRASPSENSE_API = (1, 0)
+    GRASPSENSE_API = (2, 0)
 
     @hookimpl(optionalhook=True)
     def graspsense_sim_terms():

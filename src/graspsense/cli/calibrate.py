@@ -62,7 +62,7 @@ def tare(images: int, replace: bool, as_json: bool, **asked: Any) -> None:
         stored = stored_zero(setup.stored["tare"]) if "tare" in setup.stored else None
         counts_per_n = _counts_per_n(setup)
         taken = unloaded_images(setup.rig, images, timeout_s=10.0 + images)
-        left, right = calibration.tare(taken, counts_per_n, stored)
+        left, right = calibration.tare(taken, counts_per_n, _first_facing(setup), stored)
         if stored is None and not replace:
             setup.backend.tare(taken)
         data = {"left": list(left), "right": list(right), "images": len(taken)}
@@ -165,6 +165,17 @@ def _store(setup: _Setup, kind: str, data: Mapping[str, Any], as_json: bool) -> 
         echo(f"{kind} of {written.serial} kept in {path}", indent=2)
     for note in setup.info.notes:
         talk(f"note: {note}")
+
+
+def _first_facing(setup: _Setup) -> int:
+    """Return the number of the first cell on the gripping face, which its declaration states. Raises ConfigError."""
+    from graspsense.core.entries import TactileArray
+    from graspsense.core.errors import ConfigError
+
+    for channel in setup.backend.channels:
+        if channel.name == "pads" and isinstance(channel, TactileArray):
+            return channel.facing.index(True) if True in channel.facing else 0
+    raise ConfigError(f"{setup.info.name} does not declare the cells of its fingertips")
 
 
 def _counts_per_n(setup: _Setup) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from graspsense.cli.terminal import talk, terminal_width
 
 if TYPE_CHECKING:
-    from graspsense.core.signals import Command, Frame, Pads
+    from graspsense.core.signals import Command, Reading
 
 BAR: Final = 24
 """Characters of the bar of the widest gap, where the terminal has room for it."""
@@ -26,9 +26,10 @@ class LiveRows:
         self._quiet_s = 0.5
         self._bar = BAR
 
-    def take(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
+    def take(self, reading: Reading, phase: int, command: Command) -> None:
         """Take one tick."""
-        del pads, command
+        del command
+        frame = reading.frame
         force = frame.force_left_n + frame.force_right_n
         if (
             phase == self._phase

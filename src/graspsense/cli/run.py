@@ -196,6 +196,9 @@ def print_trial(trial: Trial) -> None:
     wide = max([LABEL_WIDTH, *(len(name) + 1 for name in features.names)])
     for name, value, unit in zip(features.names, features.values, features.units, strict=True):
         echo_entry(name, _shown(value, unit, features.reasons.get(name, "")), width=wide)
+    for event in trial.trace.events:
+        unit = trial.trace.units["t"]
+        echo_entry("event", f"{event.what} at {event.t_s:.3f} {unit} ({event.phase.name.lower()})")
     if trial.prediction is not None:
         _print_prediction(trial.prediction)
     for note in trial.device.notes:

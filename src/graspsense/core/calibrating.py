@@ -11,10 +11,10 @@ from typing import Any, Final, NamedTuple
 from graspsense.core.contact import CONTACT_FORCE_N, RestState, at_rest, update_rest
 from graspsense.core.errors import DeviceLost, GraspsenseError
 from graspsense.core.guard import GuardParams, GuardState, guard
-from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
+from graspsense.core.roles import DeviceInfo, SensorBackend
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import frame_timeout_s, no_frame
-from graspsense.core.signals import EFFORT, Command, Pads
+from graspsense.core.signals import EFFORT, Command, Pads, Reading
 from graspsense.core.tick import OPEN_SPEED_M_S, OPEN_WINDOW_S
 
 RAMP_N_S: Final = 2.0

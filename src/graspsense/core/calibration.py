@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 from graspsense.core.errors import ConfigError, TareRefused
-from graspsense.core.signals import CELLS, FIRST_PAD_CELL, Pads
+from graspsense.core.signals import Pads
 
 TARE_SPREAD_N: Final = 0.5
 """A tare is refused if the sum of a pad varies by more than this while nothing should touch it."""
@@ -28,21 +28,21 @@ LARGEST_COUNT: Final = 65535.0
 Cells = tuple[float, ...]
 
 
-def pad_force(cells: Cells, zero: Cells, counts_per_n: float) -> float:
-    """Return the force (N) on the fifteen cells of the gripping face, without the edge cells.
+def pad_force(cells: Cells, zero: Cells, counts_per_n: float, first: int) -> float:
+    """Return the force (N) on the cells of the gripping face, which are all from number `first` on.
 
     `counts_per_n` is the number of counts of their sum under one newton.
     """
     total = 0.0
-    for i in range(FIRST_PAD_CELL, CELLS):
+    for i in range(first, len(cells)):
         total += cells[i] - zero[i]
     return total / counts_per_n
 
 
 def edge_force(cells: Cells, zero: Cells, counts_per_n: tuple[float, ...]) -> float:
-    """Return the largest force (N) on a single edge cell (0-6); `counts_per_n` is given for each of them."""
+    """Return the largest force (N) on a single one of the first cells, for each of which `counts_per_n` has a value."""
     largest = (cells[0] - zero[0]) / counts_per_n[0]
-    for i in range(1, FIRST_PAD_CELL):
+    for i in range(1, len(counts_per_n)):
         force = (cells[i] - zero[i]) / counts_per_n[i]
         if force > largest:
             largest = force
@@ -78,14 +78,18 @@ def zero_of(images: Sequence[Cells]) -> Cells:
 
 
 def tare(
-    images: Sequence[Pads], counts_per_n: float, stored: tuple[Cells, Cells] | None = None
+    images: Sequence[Pads],
+    counts_per_n: float,
+    first: int,
+    stored: tuple[Cells, Cells] | None = None,
 ) -> tuple[Cells, Cells]:
     """Return the zero of the left and of the right fingertip from images taken with nothing touching.
 
-    The zero of a cell is the mean over the images in which it works, or 0 if it works in none. `stored` is the zero of
-    an earlier tare of unloaded pads. Raises TareRefused if there is no image, if a value is NaN, if all cells of a
-    fingertip are dead, if the sum of a pad varies by more than `TARE_SPREAD_N` over the images (something touches it
-    or moves), or if it differs by more than `TARE_DRIFT_N` from the stored one (something presses on it steadily).
+    The cells of the gripping face are those from `first` on. The zero of a cell is the mean over the images in
+    which it works, or 0 if it works in none. `stored` is the zero of an earlier tare of unloaded pads. Raises
+    TareRefused if there is no image, if a value is NaN, if all cells of a fingertip are dead, if the sum of a pad
+    varies by more than `TARE_SPREAD_N` over the images (something touches it or moves), or if it differs by more
+    than `TARE_DRIFT_N` from the stored one (something presses on it steadily).
     """
     if not images:
         raise TareRefused("no cell image came while taring: check the fingertips' cables, then try again")
@@ -102,7 +106,7 @@ def tare(
                 raise TareRefused(
                     f"all cells of the {side} fingertip read 0 or {LARGEST_COUNT:.0f}: it may not be connected"
                 )
-        forces = [pad_force(masked(image, zero)[0], zero, counts_per_n) for image in cells]
+        forces = [pad_force(masked(image, zero)[0], zero, counts_per_n, first) for image in cells]
         spread = max(forces) - min(forces)
         if spread > TARE_SPREAD_N:
             raise TareRefused(
@@ -110,7 +114,7 @@ def tare(
                 "take everything out of the gripper, wait until it is still, and try again"
             )
         if stored is not None:
-            load = pad_force(masked(zero, stored[i])[0], stored[i], counts_per_n)
+            load = pad_force(masked(zero, stored[i])[0], stored[i], counts_per_n, first)
             if abs(load) > TARE_DRIFT_N:
                 raise TareRefused(
                     f"the {side} pad is {load:+.2f} N off its stored tare, and {TARE_DRIFT_N} N is allowed: take "

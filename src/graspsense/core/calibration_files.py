@@ -21,7 +21,6 @@ from attrs import frozen
 
 from graspsense.core.calibration import Cells, LoadTable
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.signals import CELLS
 from graspsense.core.user_folders import NOWHERE, data_folder
 
 FORMAT: Final = "graspsense-calibration"
@@ -168,8 +167,10 @@ def calibrations_of(folder: str | Path, serial: str, device: Mapping[str, Any]) 
 def stored_zero(calibration: Calibration) -> tuple[Cells, Cells]:
     """Return the zeros of both fingertips from a stored tare."""
     left, right = _numbers(calibration.data["left"]), _numbers(calibration.data["right"])
-    if len(left) != CELLS or len(right) != CELLS:
-        raise ValueError(f"a tare has {CELLS} cells a fingertip, not {len(left)} and {len(right)}")
+    if len(left) != len(right) or not left:
+        raise ValueError(
+            f"the tare has {len(left)} cells of the left fingertip and {len(right)} of the right"
+        )
     return left, right
 
 

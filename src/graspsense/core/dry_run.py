@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from graspsense.core.roles import Controller, DeviceInfo, Reading, SensorBackend
+from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
-from graspsense.core.signals import EFFORT, Command, Pads, Phase
+from graspsense.core.signals import EFFORT, Command, Pads, Phase, Reading
 from graspsense.core.trial import GraspEvent
 
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 PROJECT = "graspsense"
 ENTRY_POINT_GROUP = "graspsense.plugins"
-API = (1, 0)
+API = (2, 0)
 """Version of these hooks. A plugin's `GRASPSENSE_API` must have the same major number and a minor number not larger."""
 
 hookspec = pluggy.HookspecMarker(PROJECT)

@@ -9,13 +9,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from math import nan
+from types import FunctionType
 from typing import (
     TYPE_CHECKING,
     Any,
     ClassVar,
     Generic,
     Literal,
-    NamedTuple,
     Protocol,
     TypedDict,
     TypeVar,
@@ -26,7 +26,7 @@ from attrs import field, frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.core.setting import NAMES_INPUT, setting
-from graspsense.core.signals import Command, Frame, Outcome, Pads
+from graspsense.core.signals import Command, Outcome, Pads, Reading
 from graspsense.core.step_params import params_of
 
 if TYPE_CHECKING:
@@ -40,13 +40,6 @@ if TYPE_CHECKING:
     from graspsense.core.tree import TreeNode
 
 ConfigT = TypeVar("ConfigT")
-
-
-class Reading(NamedTuple):
-    """The result of one read of a gripper: the frame of this tick and the last cell image."""
-
-    frame: Frame
-    pads: Pads
 
 
 @frozen(kw_only=True)
@@ -81,7 +74,7 @@ class DeviceInfo:
     tared. `calibration` maps each stored calibration in use to the hash of its content. `numbers` state what the
     raw numbers of the device mean (counts per newton, transmission); a stored calibration is valid for these only.
     `units` names the units that are not SI, as in a recording: `{"t": "frame"}`. `notes` are sentences that a
-    reader of the result must know.
+    reader of the result must know. `channels` are those of the backend; the runner sets them where they are empty.
     """
 
     name: str
@@ -100,6 +93,7 @@ class DeviceInfo:
     numbers: Mapping[str, float | str] = field(factory=dict)
     units: Mapping[str, str] = field(factory=dict)
     notes: tuple[str, ...] = ()
+    channels: tuple[Channel, ...] = ()
 
 
 class SensorBackend(ABC, Generic[ConfigT]):
@@ -265,7 +259,11 @@ class BatchBackend(SensorBackend[ConfigT]):
 
 
 class ControllerState(Protocol):
-    """The fields that the state of every controller must have."""
+    """The fields that the state of every controller must have.
+
+    A controller that tells events also has a field `events: int`: bit i is 1 in a tick in which the i-th of
+    `Controller.events` happened. It holds for that tick only, so a later tick sets it to 0 again.
+    """
 
     @property
     def phase(self) -> int:
@@ -276,7 +274,7 @@ class ControllerState(Protocol):
         """`RUNNING` until the controller ends the grasp, then the number of an `Outcome`."""
 
 
-StepLaw = Callable[[Any, Any, Frame, Pads], tuple[Command, Any]]
+StepLaw = Callable[[Any, Any, Reading], tuple[Command, Any]]
 
 
 class Controller(ABC, Generic[ConfigT]):
@@ -294,13 +292,21 @@ class Controller(ABC, Generic[ConfigT]):
     """The kinds of command that `step` may return: any of effort, velocity, position, force."""
     alternatives: ClassVar[tuple[str, ...]] = ()
     """The kinds that it can send instead, each alone; the key `sends` of its config then names one kind."""
+    events: ClassVar[tuple[str, ...]] = ()
+    """The names of the events that it tells by the field `events` of its state: `("contact", "slip")`."""
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        # What composes a tick has the function alone.
+        if cls.events and "step" in vars(cls) and isinstance(cls.step, FunctionType):
+            cls.step.tells_events = True  # type: ignore[attr-defined]
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config
 
     @staticmethod
     @abstractmethod
-    def step(params: Any, state: Any, frame: Frame, pads: Pads) -> tuple[Command, Any]:
+    def step(params: Any, state: Any, reading: Reading) -> tuple[Command, Any]:
         """Return the command for this tick, and the state after it."""
 
     def params(self) -> Any:

@@ -14,18 +14,19 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from itertools import count
 from math import ceil
-from typing import Any, Final, Protocol
+from typing import Any, Final, Literal, Protocol
 
-from attrs import frozen
+from attrs import evolve, frozen
 
 from graspsense.core.binding import bind, maker
 from graspsense.core.contact import CONTACT_FORCE_N, RestState, at_rest, update_rest
+from graspsense.core.entries import Channel
 from graspsense.core.errors import DeviceLost, RecordingEnded, TareRefused, named
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.interrupts import Interrupts
 from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
 from graspsense.core.run_config import RunConfig
-from graspsense.core.signals import APPROACH, RUNNING, SQUEEZE, Command, Frame, Outcome, Pads, Phase
+from graspsense.core.signals import APPROACH, RUNNING, SQUEEZE, Command, Frame, Outcome, Pads, Phase, Reading
 from graspsense.core.tick import (
     OPEN_SPEED_M_S,
     OPEN_WINDOW_S,
@@ -33,17 +34,18 @@ from graspsense.core.tick import (
     Schedule,
     TickParams,
     TickState,
+    events_of,
     first_state,
     tick,
 )
 from graspsense.core.trace import SI_UNITS, Trace, TraceRecorder
-from graspsense.core.trial import GraspEvent
+from graspsense.core.trial import GraspEvent, event_name
 
 
 class Sink(Protocol):
     """A receiver of every tick, such as a terminal or a recorder. It must not block."""
 
-    def take(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
+    def take(self, reading: Reading, phase: int, command: Command) -> None:
         """Receive one tick."""
 
 
@@ -143,6 +145,8 @@ def run_grasp(
         try:
             backend.expect(controller, run)
             info = backend.open(run.seed)
+            if not info.channels:
+                info = evolve(info, channels=_declared(backend))
             if on_open is not None:
                 on_open(info)
             grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
@@ -179,6 +183,14 @@ def run_grasp(
     )
 
 
+def _declared(backend: SensorBackend[Any]) -> tuple[Channel, ...]:
+    """Return the channels of an open gripper; none where the class does not declare them."""
+    try:
+        return tuple(backend.channels)
+    except NotImplementedError:
+        return ()
+
+
 @contextmanager
 def _no_collection() -> Iterator[None]:
     """Suspend garbage collection, which would pause a tick for milliseconds once there are thousands of frames."""
@@ -211,6 +223,7 @@ class _Grasp:
         self.backend, self.run, self.info, self.on_event = backend, run, info, on_event
         self.sinks, self.interrupts = list(sinks), interrupts
         self.step = type(controller).step
+        self.event_names = type(controller).events
         self.params = tick_params(info, controller, run)
         self.state: TickState = first_state(controller.init())
         self.recorder = TraceRecorder({**SI_UNITS, **info.units})
@@ -255,7 +268,7 @@ class _Grasp:
 
     def _loop(self) -> None:
         read, apply, sinks, run = self.backend.read, self.backend.apply, self.sinks, self.run
-        advance = bind(tick, step=self.step, TickState=maker(TickState))
+        advance = bind(tick, step=self.step, events_told=events_of(self.step), TickState=maker(TickState))
         params, record = self.params, self.recorder.add
         on_device_clock = self.info.clock == "device"
         late_s = run.late_periods / self.info.rate_hz if on_device_clock else float("inf")
@@ -267,12 +280,12 @@ class _Grasp:
             reading = read(timeout_s)
             if reading is None:
                 raise DeviceLost(no_frame(run, self.info))
-            frame, pads = reading
+            frame, pads, _ = reading
             self.last = frame
             if self.first_t_s is None:
                 self.first_t_s = frame.t_s
             acted = state.guard.acted
-            command, state = advance(params, state, frame, pads)
+            command, state = advance(params, state, reading)
             self.state = state
             stepped = phase != TARING
             if not stepped and pads.counter > newest:
@@ -296,11 +309,13 @@ class _Grasp:
             finally:
                 # Also if the gripper is lost at this moment: the frame was measured.
                 if recorded:
-                    record(frame, pads, phase, command)
+                    record(reading, phase, command)
+                if state.events:
+                    self._told(frame, phase, state.events)
             if recorded:
                 for sink in sinks:
                     try:
-                        sink.take(frame, pads, phase, command)
+                        sink.take(reading, phase, command)
                     except Exception as error:
                         # A failing sink must not change the outcome of a grasp.
                         self.sinks = sinks = [one for one in sinks if one is not sink]
@@ -324,11 +339,21 @@ class _Grasp:
         elif now.acted and not before.acted:
             self._event(frame.t_s, Phase(self.state.phase), "guard: a command was limited")
 
-    def _event(self, t_s: float, phase: Phase, what: str) -> None:
-        event = GraspEvent(t_s, phase, what)
+    def _told(self, frame: Frame, phase: int, events: int) -> None:
+        """Log the events that the controller told in this tick, one for each bit that is set."""
+        for i in range(events.bit_length()):
+            if events >> i & 1:
+                event = self._event(frame.t_s, Phase(phase), event_name(self.event_names, i), "controller")
+                self.recorder.events.append(event)
+
+    def _event(
+        self, t_s: float, phase: Phase, what: str, source: Literal["runner", "controller"] = "runner"
+    ) -> GraspEvent:
+        event = GraspEvent(t_s, phase, what, source)
         self.events.append(event)
         if self.on_event is not None:
             self.on_event(event)
+        return event
 
     def _let_go(self, opens: bool) -> None:
         """Open the fingers, then relax. A failure of one step must not prevent the next.
@@ -348,7 +373,7 @@ class _Grasp:
                     reading = self.backend.read(frame_timeout_s(run, info))
                     if reading is None:
                         break
-                    self.last, _ = reading
+                    self.last = reading.frame
                     frame = self.last
                     still = update_rest(still, frame.t_s, frame.gap_m, OPEN_SPEED_M_S, OPEN_WINDOW_S)
                     if at_rest(still, frame.t_s, OPEN_WINDOW_S) or (

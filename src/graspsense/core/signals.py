@@ -1,4 +1,4 @@
-"""The values that pass between a gripper and a controller: frames, cell images, commands, and the outcome of a grasp.
+"""The values that pass between a gripper and a controller: readings, commands, and the outcome of a grasp.
 
 All are named tuples of numbers in SI units, so that the same control law runs in the interpreter and compiled. The gap
 is the distance between the fingertip faces; it decreases on closing, so a closing velocity is negative. An effort is
@@ -8,13 +8,8 @@ the force on each finger without losses in the drive; a positive effort squeezes
 from __future__ import annotations
 
 import enum
-from typing import Final, NamedTuple
-
-CELLS: Final = 22
-"""Number of cells of a fingertip, as the PR2 has them: 0 at the back, 1 to 6 along the edges, 7 to 21 on the gripping
-face in five rows of three. Images of any gripper have this layout so far; a cell that it lacks is NaN."""
-FIRST_PAD_CELL: Final = 7
-"""The first cell on the gripping face of the PR2; the cells before it are edge cells."""
+from math import nan
+from typing import Any, Final, NamedTuple
 
 CHANNELS: Final = {
     "gap": "m",
@@ -26,7 +21,7 @@ CHANNELS: Final = {
     "edge_right": "N",
     "pads": "counts",
 }
-"""The channels that a backend can declare, each with its unit."""
+"""The channels of a frame and of its fingertips, each with its unit. Every other channel is in `Reading.signals`."""
 
 
 class Frame(NamedTuple):
@@ -49,9 +44,10 @@ class Frame(NamedTuple):
 
 
 class Pads(NamedTuple):
-    """The last cell image: raw counts of the cells of both fingertips, which come at a lower rate than frames.
+    """The last cell image of the two fingertips, raw, which comes at a lower rate than frames.
 
-    `counter` increases by one with each new image. A backend without pads gives a counter of 0 and NaN cells.
+    `left` and `right` have one number for each cell, in the order of the array that the backend declares as `pads`.
+    `counter` increases by one with each new image. It is 0, and the cells are NaN, before the first image.
     """
 
     t_s: float
@@ -60,7 +56,55 @@ class Pads(NamedTuple):
     right: tuple[float, ...]
 
 
-NO_PADS: Final = Pads(0.0, 0, (float("nan"),) * CELLS, (float("nan"),) * CELLS)
+def no_pads(cells: int) -> Pads:
+    """Return the image of two fingertips with so many cells before the first image: counter 0, cells NaN.
+
+    >>> no_pads(2)
+    Pads(t_s=0.0, counter=0, left=(nan, nan), right=(nan, nan))
+    """
+    return Pads(0.0, 0, (nan,) * cells, (nan,) * cells)
+
+
+NO_PADS: Final = no_pads(0)
+"""The image of a gripper without cells on its fingertips."""
+
+
+class Image(NamedTuple):
+    """The last image of a tactile array other than the fingertips': one number for each cell, as the array declares.
+
+    `counter` increases by one with each new image. It is 0, and the cells are NaN, before the first image.
+    """
+
+    t_s: float
+    counter: int
+    cells: tuple[float, ...]
+
+
+class Samples(NamedTuple):
+    """The samples of a fast channel that are new in this tick, oldest first.
+
+    `values` has one row for each sample that a tick can hold, with one number for each axis. The first `new` rows are
+    new; the others are NaN. `counter` is the number of samples that the sensor has taken since the gripper was opened.
+    It increases by more than `new` where samples were lost. `t_s` is the time of the last sample.
+    """
+
+    t_s: float
+    counter: int
+    new: int
+    values: tuple[tuple[float, ...], ...]
+
+
+class Reading(NamedTuple):
+    """What a gripper measured in one tick: the frame, the last image of its fingertips, and its further channels.
+
+    `signals` is a named tuple with a field for each channel that is not part of the frame, under the name of the
+    channel: a float, an `Image` of a tactile array, or the `Samples` of a fast channel. It is empty where the gripper
+    has no further channels. `signal_type` makes its class from the declared channels.
+    """
+
+    frame: Frame
+    pads: Pads
+    signals: Any = ()
 
 
 class Command(NamedTuple):

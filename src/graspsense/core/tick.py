@@ -1,7 +1,8 @@
 """One tick of a grasp as one pure function: open, tare, the controller's step, hold, release, and the guard.
 
 The runner calls it in the interpreter. A simulator that runs many grasps at once compiles the same function, with the
-same controller, into its loop. `bind(tick, step=controller.step)` supplies the controller.
+same controller, into its loop. `bind(tick, step=controller.step, events_told=events_of(controller.step))` supplies the
+controller.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Any, NamedTuple
 
 from graspsense.core.contact import RestState, at_rest, update_rest
 from graspsense.core.guard import GuardParams, GuardState, guard
-from graspsense.core.signals import RUNNING, STEADY, Command, Frame, Pads, Phase
+from graspsense.core.signals import RUNNING, STEADY, Command, Phase, Reading
 
 OPENING = int(Phase.OPENING)
 TARING = int(Phase.TARING)
@@ -47,7 +48,11 @@ class TickParams(NamedTuple):
 
 
 class TickState(NamedTuple):
-    """The state of a grasp. `done` is 1 after the release."""
+    """The state of a grasp.
+
+    `done` is 1 after the release. `events` holds the events that the controller tells in this tick: bit i stands for
+    the i-th of `Controller.events`.
+    """
 
     phase: int
     since_t_s: float
@@ -56,32 +61,55 @@ class TickState(NamedTuple):
     law: Any
     guard: GuardState
     done: int
+    events: int
 
 
 def first_state(law: Any) -> TickState:
     """Return the state before the first tick, given that of the controller."""
-    return TickState(-1, 0.0, RestState(0.0, 0.0), 0, law, GuardState(0, 0, 0), 0)
+    return TickState(-1, 0.0, RestState(0.0, 0.0), 0, law, GuardState(0, 0, 0), 0, 0)
 
 
-def _unbound(params: Any, state: Any, frame: Frame, pads: Pads) -> tuple[Command, Any]:
+def _unbound(params: Any, state: Any, reading: Reading) -> tuple[Command, Any]:
     raise TypeError("tick has no controller: bind(tick, step=controller.step)")
 
 
-step: Callable[[Any, Any, Frame, Pads], tuple[Command, Any]] = _unbound
+step: Callable[[Any, Any, Reading], tuple[Command, Any]] = _unbound
 
 
-def tick(params: TickParams, state: TickState, frame: Frame, pads: Pads) -> tuple[Command, TickState]:
+def _no_events(law: Any) -> int:
+    return 0
+
+
+def _events(law: Any) -> int:
+    told: int = law.events
+    return told
+
+
+def events_of(step: Callable[..., Any]) -> Callable[[Any], int]:
+    """Return the part `events_told` of a tick: what gives the events in the state of the controller with this step.
+
+    A controller whose class names events has marked its step (`Controller.__init_subclass__`).
+    """
+    return _events if getattr(step, "tells_events", False) else _no_events
+
+
+events_told: Callable[[Any], int] = _no_events
+
+
+def tick(params: TickParams, state: TickState, reading: Reading) -> tuple[Command, TickState]:
     """Return the command for this tick and the next state."""
     schedule = params.schedule
-    phase, since, still, first_image, law, watcher, done = state
+    frame = reading.frame
+    phase, since, still, first_image, law, watcher, done, events = state
+    events = 0
     if phase == -1:
         phase, since, still = OPENING, frame.t_s, RestState(frame.t_s, frame.gap_m)
         if schedule.opens != 1:
             phase = APPROACH
 
     if phase >= APPROACH and phase != RELEASE:
-        command, law = step(params.law, law, frame, pads)
-        phase = law.phase
+        command, law = step(params.law, law, reading)
+        phase, events = law.phase, events_told(law)
         if law.outcome == RUNNING:
             since = frame.t_s
         elif law.outcome != STEADY or frame.t_s - since >= schedule.hold_s:
@@ -93,7 +121,7 @@ def tick(params: TickParams, state: TickState, frame: Frame, pads: Pads) -> tupl
     elif phase == TARING:
         command = schedule.relaxed
         waited = frame.t_s - since
-        if pads.counter >= first_image + schedule.tare_images or waited >= schedule.opening_timeout_s:
+        if reading.pads.counter >= first_image + schedule.tare_images or waited >= schedule.opening_timeout_s:
             # The zero applies from the next frame on, so the approach begins there.
             phase, since = APPROACH, frame.t_s
     else:
@@ -104,6 +132,6 @@ def tick(params: TickParams, state: TickState, frame: Frame, pads: Pads) -> tupl
             if phase == RELEASE:
                 done = 1
             else:
-                phase, since, first_image = TARING, frame.t_s, pads.counter
+                phase, since, first_image = TARING, frame.t_s, reading.pads.counter
     command, watcher = guard(params.guard, watcher, frame, command)
-    return command, TickState(phase, since, still, first_image, law, watcher, done)
+    return command, TickState(phase, since, still, first_image, law, watcher, done, events)

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import define, evolve, field, frozen
 
-from graspsense.core.signals import CELLS, CHANNELS, Command, Frame, Pads
+from graspsense.core.signals import CHANNELS, Command, Frame, Image, Pads, Reading, Samples
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from graspsense.core.trial import GraspEvent
 
     Floats = NDArray[np.float64]
     Integers = NDArray[np.int64]
@@ -25,13 +27,50 @@ PAD_COLUMNS: Final = ("pad_t_s", "pad_left", "pad_right")
 
 
 @frozen(eq=False, kw_only=True)
+class ImageTrace:
+    """The images of a tactile array: their times (m,), and the cells (m, number of cells)."""
+
+    t_s: Floats
+    cells: Floats
+
+    def until(self, t_s: float) -> ImageTrace:
+        """Return the images that are not later than `t_s`."""
+        m = int(np.searchsorted(self.t_s, t_s, side="right"))
+        return ImageTrace(t_s=self.t_s[:m], cells=self.cells[:m])
+
+
+@frozen(eq=False, kw_only=True)
+class SampleTrace:
+    """The samples of a fast channel: their times (s,), and the values (s, number of axes).
+
+    `lost` is the number of samples that the sensor took and that did not arrive. The time of a sample before the
+    last of its tick is computed: the samples between two ticks are taken as equally spaced.
+    """
+
+    t_s: Floats
+    values: Floats
+    lost: int = 0
+
+    def until(self, t_s: float) -> SampleTrace:
+        """Return the samples that are not later than `t_s`."""
+        m = int(np.searchsorted(self.t_s, t_s, side="right"))
+        return SampleTrace(t_s=self.t_s[:m], values=self.values[:m], lost=self.lost)
+
+
+SignalTrace = Any
+"""The values of a further channel over a grasp: an array (n,) of numbers, an `ImageTrace`, or a `SampleTrace`."""
+
+
+@frozen(eq=False, kw_only=True)
 class Trace:
     """A finished or running grasp as arrays: `n` ticks, and `m` cell images with times of their own.
 
     The columns of ticks have shape (n,): `phase` holds the numbers of `Phase`, `command` the value commanded after
-    the tick. `pad_t_s` has shape (m,), `pad_left` and `pad_right` have shape (m, 22), in raw counts. A channel that
+    the tick. `pad_t_s` has shape (m,), `pad_left` and `pad_right` have shape (m, cells), raw. A channel that
     the gripper lacks is NaN throughout. `units` gives the unit of each channel and of `t`: SI for a gripper, possibly
-    others for a recording (`{"t": "frame"}`).
+    others for a recording (`{"t": "frame"}`). `signals` holds the further channels of the gripper by name: an
+    array (n,) of a channel with one number a tick, an `ImageTrace` of a tactile array, a `SampleTrace` of a fast
+    channel. `events` are those that the controller told, in order.
     """
 
     t_s: Floats
@@ -49,6 +88,8 @@ class Trace:
     pad_left: Floats
     pad_right: Floats
     units: Mapping[str, str] = field(factory=lambda: dict(SI_UNITS))
+    signals: Mapping[str, SignalTrace] = field(factory=dict)
+    events: tuple[GraspEvent, ...] = ()
 
     def __len__(self) -> int:
         """Return the number of ticks."""
@@ -80,7 +121,12 @@ class Trace:
         m = int(np.searchsorted(self.pad_t_s, t_s, side="right"))
         cut: dict[str, Any] = {name: getattr(self, name)[:n] for name in TICK_COLUMNS}
         cut.update({name: getattr(self, name)[:m] for name in PAD_COLUMNS})
-        return evolve(self, **cut)
+        signals = {
+            name: value[:n] if isinstance(value, np.ndarray) else value.until(t_s)
+            for name, value in self.signals.items()
+        }
+        events = tuple(event for event in self.events if event.t_s <= t_s)
+        return evolve(self, **cut, signals=signals, events=events)
 
 
 @define(eq=False)
@@ -92,10 +138,15 @@ class TraceRecorder:
     phases: list[int] = field(factory=list, init=False)
     commands: list[float] = field(factory=list, init=False)
     images: list[Pads] = field(factory=list, init=False)
+    signals: list[Any] = field(factory=list, init=False)
+    events: list[GraspEvent] = field(factory=list, init=False)
 
-    def add(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
+    def add(self, reading: Reading, phase: int, command: Command) -> None:
         """Add one tick, and its cell image if the counter of the image is new."""
+        frame, pads, signals = reading
         self.frames.append(frame)
+        if signals:
+            self.signals.append(signals)
         self.phases.append(phase)
         self.commands.append(command.value)
         images = self.images
@@ -104,7 +155,8 @@ class TraceRecorder:
 
     def trace(self) -> Trace:
         """Return the trace of the ticks collected so far."""
-        return trace_of(self.frames, self.phases, self.commands, self.images, self.units)
+        trace = trace_of(self.frames, self.phases, self.commands, self.images, self.units, self.signals)
+        return evolve(trace, events=tuple(self.events))
 
 
 def trace_of(
@@ -113,8 +165,12 @@ def trace_of(
     commands: Sequence[float],
     images: Sequence[Pads],
     units: Mapping[str, str] = SI_UNITS,
+    signals: Sequence[Any] = (),
 ) -> Trace:
-    """Return the trace of these ticks and images. `frames`, `phases` and `commands` must have the same length."""
+    """Return the trace of these ticks and images. `frames`, `phases` and `commands` must have the same length.
+
+    `signals` are the values of `Reading.signals` in each tick, if the gripper has further channels.
+    """
     width = len(_FRAME_COLUMNS)
     numbers = np.fromiter(chain.from_iterable(frames), dtype=np.float64, count=len(frames) * width)
     table = numbers.reshape(len(frames), width)
@@ -127,7 +183,52 @@ def trace_of(
         phase=np.array(phases, dtype=np.int64),
         command=np.array(commands, dtype=np.float64),
         pad_t_s=np.array([image.t_s for image in images], dtype=np.float64),
-        pad_left=np.array([image.left for image in images], dtype=np.float64).reshape(len(images), CELLS),
-        pad_right=np.array([image.right for image in images], dtype=np.float64).reshape(len(images), CELLS),
+        pad_left=_rows([image.left for image in images]),
+        pad_right=_rows([image.right for image in images]),
         units=dict(units),
+        signals=signals_of(signals),
     )
+
+
+def signals_of(ticks: Sequence[Any]) -> dict[str, SignalTrace]:
+    """Return the trace of each further channel, given the values of `Reading.signals` in each tick."""
+    names = ticks[0]._fields if ticks else ()
+    return {name: _signal([tick[i] for tick in ticks]) for i, name in enumerate(names)}
+
+
+def _signal(values: Sequence[Any]) -> SignalTrace:
+    if isinstance(values[0], Image):
+        counters = [0, *(image.counter for image in values)]
+        images = [image for image, last in zip(values, counters, strict=False) if image.counter != last]
+        return ImageTrace(
+            t_s=np.array([image.t_s for image in images], dtype=np.float64),
+            cells=_rows([image.cells for image in images]),
+        )
+    if isinstance(values[0], Samples):
+        return _samples([block for block in values if block.new])
+    return np.array(values, dtype=np.float64)
+
+
+def _samples(blocks: Sequence[Samples]) -> SampleTrace:
+    """Return the samples of these blocks, each with a time between that of its block and that of the one before."""
+    times: list[float] = []
+    lost = 0
+    spacing = 0.0
+    if len(blocks) > 1:
+        spacing = (blocks[1].t_s - blocks[0].t_s) / max(blocks[1].counter - blocks[0].counter, 1)
+    for i, block in enumerate(blocks):
+        if i:
+            new = max(block.counter - blocks[i - 1].counter, 1)
+            lost += new - block.new
+            spacing = (block.t_s - blocks[i - 1].t_s) / new
+        times += [block.t_s - spacing * back for back in range(block.new - 1, -1, -1)]
+    return SampleTrace(
+        t_s=np.array(times, dtype=np.float64),
+        values=_rows([row for block in blocks for row in block.values[: block.new]]),
+        lost=lost,
+    )
+
+
+def _rows(rows: Sequence[Sequence[float]]) -> Floats:
+    """Return rows of equal length as an array with two dimensions, also where there is none."""
+    return np.array(rows, dtype=np.float64).reshape(len(rows), len(rows[0]) if rows else 0)

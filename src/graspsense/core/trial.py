@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import field, frozen
 
@@ -27,11 +27,21 @@ class RunInfo:
 
 @frozen
 class GraspEvent:
-    """An event of a grasp: its time (s), the phase, and a sentence."""
+    """An event of a grasp: its time (s), the phase, and a sentence.
+
+    `source` is `runner` for a change of phase, an action of the guard or a sink that failed, and `controller` for an
+    event that the controller told; `what` is then the name of the event, one of `Controller.events`.
+    """
 
     t_s: float
     phase: Phase
     what: str
+    source: Literal["runner", "controller"] = "runner"
+
+
+def event_name(names: Sequence[str], number: int) -> str:
+    """Return the name of the event of a controller with this number, given its `events`."""
+    return names[number] if number < len(names) else f"event {number}"
 
 
 @frozen(kw_only=True, eq=False)
@@ -101,10 +111,28 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
         },
         "report": dict(trial.report),
         "counts": dict(trial.counts),
-        "events": [
-            {"t_s": event.t_s, "phase": event.phase.name.lower(), "what": event.what}
-            for event in trial.events
-        ],
+        "events": [event_as_json(event) for event in trial.events],
         "seconds_simulated": trial.seconds_simulated,
         "seconds_wall": trial.seconds_wall,
     }
+
+
+def event_as_json(event: GraspEvent) -> dict[str, Any]:
+    """Return an event as JSON values."""
+    return {
+        "t_s": event.t_s,
+        "phase": event.phase.name.lower(),
+        "what": event.what,
+        "source": event.source,
+    }
+
+
+def event_from_json(value: Mapping[str, Any]) -> GraspEvent:
+    """Return the event of `event_as_json`; without a source it is of the runner. Raises KeyError, ValueError."""
+    told = value.get("source") == "controller"
+    return GraspEvent(
+        float(value["t_s"]),
+        Phase[str(value["phase"]).upper()],
+        str(value["what"]),
+        "controller" if told else "runner",
+    )

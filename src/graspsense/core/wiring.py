@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from graspsense.core.channels import declared_shape
 from graspsense.core.config import SelectedComponent, Settings
-from graspsense.core.entries import Channel
+from graspsense.core.entries import Channel, FastChannel, TactileArray
 from graspsense.core.errors import WiringError
 from graspsense.core.plugins import Component
 
@@ -41,9 +42,24 @@ def _channel_misfits(gripper: SelectedComponent, user: SelectedComponent) -> Ite
             yield f"{needs}, {lacks}. {choose}"
         elif have.unit != wanted.unit:
             yield f"{needs}, but {provider} gives it in {have.unit}. {choose}"
+        elif isinstance(wanted, TactileArray | FastChannel) and not _fits(wanted, have):
+            yield f"{needs} as {_layout(wanted)}, but {provider} gives it as {_layout(have)}. {choose}"
         elif have.rate_hz < wanted.rate_hz:
             rate = f"at {have.rate_hz:g} Hz" if have.rate_hz else "at no promised rate"
             yield f"{needs}, but {provider} gives it {rate}. {choose}"
+
+
+def _fits(wanted: Channel, have: Channel) -> bool:
+    """Return whether a channel has the kind and the shape that is wanted, so that the same code reads it."""
+    return type(have) is type(wanted) and declared_shape(have) == declared_shape(wanted)
+
+
+def _layout(channel: Channel) -> str:
+    if isinstance(channel, TactileArray):
+        return f"an array of {channel.cells} cells"
+    if isinstance(channel, FastChannel):
+        return f"{channel.samples} samples a tick of {', '.join(channel.axes)}"
+    return "one number a tick"
 
 
 def _settings_hint(gripper: SelectedComponent) -> str:

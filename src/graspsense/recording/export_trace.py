@@ -5,15 +5,15 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from graspsense.core.trace import PAD_COLUMNS, TICK_COLUMNS
+from graspsense.core.trace import PAD_COLUMNS, TICK_COLUMNS, ImageTrace
 from graspsense.recording.atomic_file import write_new
-from graspsense.recording.layout import PADS_FIELDS, TICK_FIELDS
+from graspsense.recording.layout import TICK_FIELDS
 from graspsense.recording.parquet import parquet
 
 if TYPE_CHECKING:
@@ -23,25 +23,45 @@ if TYPE_CHECKING:
 
 
 def write_csv(path: Path, grasp: RecordedGrasp) -> None:
-    """Write one line per tick, with an empty cell for a missing channel. Pad images go to `NAME-pads.csv`."""
-    if len(grasp.pads):
-        write_new(_pads_beside(path), _csv(grasp.pads, PADS_FIELDS))
-    write_new(path, _csv(grasp.ticks, TICK_FIELDS))
+    """Write one line per tick, with an empty cell for a missing channel.
+
+    Images of the fingertips go to `NAME-pads.csv`, and each other topic to a file that is named after it.
+    """
+    for name, found in grasp.topics.items():
+        write_new(_beside(path, name), _csv(*_flat(found.rows)))
+    write_new(path, _csv(grasp.ticks.tolist(), TICK_FIELDS))
 
 
 def write_npz(path: Path, grasp: RecordedGrasp) -> None:
-    """Write the columns of the trace as arrays with the names of `graspsense.Trace`."""
+    """Write the columns of the trace as arrays with the names of `graspsense.Trace`.
+
+    A further channel is `signal_NAME`; the times of an array or a fast channel are `signal_NAME_t_s`. The events of the
+    controller are `event_t_s` and `event_name`, if there are any.
+    """
     trace, out = grasp.trace(), io.BytesIO()
     columns = {name: getattr(trace, name) for name in (*TICK_COLUMNS, *PAD_COLUMNS)}
+    for name, signal in trace.signals.items():
+        if isinstance(signal, np.ndarray):
+            columns[f"signal_{name}"] = signal
+        else:
+            columns[f"signal_{name}_t_s"] = signal.t_s
+            columns[f"signal_{name}"] = signal.cells if isinstance(signal, ImageTrace) else signal.values
+    if trace.events:
+        columns["event_t_s"] = np.array([event.t_s for event in trace.events])
+        columns["event_name"] = np.array([event.what for event in trace.events])
     np.savez_compressed(out, allow_pickle=False, **columns)
     write_new(path, out.getvalue())
 
 
 def write_parquet(path: Path, grasp: RecordedGrasp) -> None:
-    """Write one row per tick. Pad images go to `NAME-pads.parquet`. Raises PluginUnavailable without pyarrow."""
+    """Write one row per tick, and the other topics as `write_csv` does. Raises PluginUnavailable without pyarrow."""
     ticks = parquet({name: (grasp.ticks[name], "") for name in TICK_FIELDS})
-    if len(grasp.pads):
-        write_new(_pads_beside(path), parquet({name: (grasp.pads[name], "") for name in PADS_FIELDS}))
+    for name, found in grasp.topics.items():
+        rows, fields = _flat(found.rows)
+        columns = zip(*rows, strict=True)
+        write_new(
+            _beside(path, name), parquet({n: (np.array(c), "") for n, c in zip(fields, columns, strict=True)})
+        )
     write_new(path, ticks)
 
 
@@ -65,14 +85,29 @@ WRITERS: Final[Mapping[str, Callable[[Path, RecordedGrasp], None]]] = {
 """File extension to the function that writes it."""
 
 
-def _csv(rows: NDArray[np.void], fields: tuple[str, ...]) -> bytes:
+def _flat(rows: NDArray[np.void]) -> tuple[list[tuple[Any, ...]], tuple[str, ...]]:
+    """Return the rows of a topic with a number a column, and the names of these: those of an array are numbered."""
+    fields: list[str] = []
+    columns: list[list[Any]] = []
+    for name in rows.dtype.names or ():
+        values = rows[name]
+        if values.ndim == 1:
+            fields.append(name)
+            columns.append(values.tolist())
+        else:
+            fields += [f"{name}_{i:02d}" for i in range(values.shape[1])]
+            columns += values.T.tolist()
+    return list(zip(*columns, strict=True)), tuple(fields)
+
+
+def _csv(rows: Sequence[tuple[Any, ...]], fields: tuple[str, ...]) -> bytes:
     out = io.StringIO(newline="")
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(fields)
-    for row in rows.tolist():
+    for row in rows:
         writer.writerow(["" if isinstance(cell, float) and math.isnan(cell) else repr(cell) for cell in row])
     return out.getvalue().encode()
 
 
-def _pads_beside(path: Path) -> Path:
-    return path.with_name(f"{path.stem}-pads{path.suffix}")
+def _beside(path: Path, topic: str) -> Path:
+    return path.with_name(f"{path.stem}-{topic.rpartition('/')[2]}{path.suffix}")

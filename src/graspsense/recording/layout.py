@@ -1,16 +1,22 @@
 """The layout of a recording: topics, fields and metadata of its MCAP file, and the protocol to the writer process.
 
-Messages are ROS 2 messages in CDR (schema encoding `ros2msg`, message encoding `cdr`). Every field is a scalar of 8
-bytes, so a message is 4 bytes of CDR header and a packed structure. One topic holds the control ticks. Another holds
-the pad images, which come at their own, lower rate. An image precedes the first tick that used it.
+Messages are ROS 2 messages in CDR (schema encoding `ros2msg`, message encoding `cdr`). Every field is a number of 8
+bytes or a fixed number of them, so a message is 4 bytes of CDR header and a packed structure. One topic holds the
+control ticks. Another holds the images of the fingertips, which come at their own, lower rate. Each tactile array and
+each fast channel has a topic of its own, and one topic has the other channels. A message precedes the first tick that
+used it. A topic but that of the ticks exists if it has a message.
 """
 
 from __future__ import annotations
 
+import re
 import struct
-from typing import Final
+from collections.abc import Callable
+from typing import Any, Final
 
-from graspsense.core.signals import CELLS, Frame
+from attrs import field, frozen
+
+from graspsense.core.signals import Frame, Image, Pads, Reading, Samples
 
 VERSION: Final = 2
 """Version of this layout, stored in the metadata record `START` of every recording."""
@@ -25,12 +31,11 @@ _COMMAND_FIELDS: Final = ("command", "command_effort_limit_n", "command_speed_li
 _INTEGERS: Final = frozenset({"status", "phase", "command_kind", "counter"})
 
 TICK_FIELDS: Final = (*Frame._fields, "phase", "command_kind", *_COMMAND_FIELDS)
-PADS_FIELDS: Final = (
-    "t_s",
-    "counter",
-    *(f"left_{i:02d}" for i in range(CELLS)),
-    *(f"right_{i:02d}" for i in range(CELLS)),
-)
+SCALARS_TOPIC: Final = "/grasp/scalars"
+SIGNAL_TOPIC: Final = "/grasp/signals/"
+"""Before the name of a tactile array or a fast channel."""
+MOST_NUMBERS: Final = 65536
+"""Limit on the numbers of one message that is read."""
 
 CDR_HEADER: Final = b"\x00\x01\x00\x00"
 """Little-endian CDR without options."""
@@ -45,14 +50,123 @@ def _code(fields: tuple[str, ...]) -> str:
     return "".join("q" if name in _INTEGERS else "d" for name in fields)
 
 
-SCHEMAS: Final = {
-    TICK_TOPIC: ("graspsense_msgs/msg/Tick", _schema(TICK_FIELDS)),
-    PADS_TOPIC: ("graspsense_msgs/msg/Pads", _schema(PADS_FIELDS)),
-}
-"""Topic to the name of its message type and the definition of that type."""
-
 TICK: Final = struct.Struct("<" + _code(TICK_FIELDS))
-PADS: Final = struct.Struct("<" + _code(PADS_FIELDS))
+TICK_SCHEMA: Final = ("graspsense_msgs/msg/Tick", _schema(TICK_FIELDS))
+"""The name of the message type of a tick, and the definition of that type."""
+
+
+@frozen
+class Topic:
+    """A topic beside the ticks: its name, the name of its message type, the definition of the type.
+
+    Every type begins with `t_s`. Its other fields are float64 or int64, alone or a fixed number of them. Raises
+    ValueError for any other definition.
+    """
+
+    name: str
+    type_name: str
+    definition: str
+    fields: tuple[tuple[str, str, int], ...] = field(init=False)
+    """Name, kind (`d` or `q`) and number of values of each field; a number of 0 stands for a field that is no array."""
+
+    @fields.default
+    def _fields(self) -> tuple[tuple[str, str, int], ...]:
+        fields = []
+        for line in self.definition.splitlines():
+            match = _FIELD.fullmatch(line)
+            if match is None:
+                raise ValueError(f"{self.name} has the field {line[:40]!r}")
+            kind, number, name = match.groups()
+            fields.append((name, "d" if kind == "float64" else "q", int(number or 0)))
+        if fields[:1] != [("t_s", "d", 0)] or sum(max(n, 1) for _, _, n in fields) > MOST_NUMBERS:
+            raise ValueError(f"{self.name} has other fields than graspsense writes")
+        return tuple(fields)
+
+    @property
+    def wire(self) -> struct.Struct:
+        """The structure of a message."""
+        return struct.Struct("<" + "".join(f"{max(number, 1)}{kind}" for _, kind, number in self.fields))
+
+
+_FIELD: Final = re.compile(r"(float64|int64)(?:\[([1-9][0-9]{0,5})\])? ([a-z][a-z0-9_]*)")
+
+
+def pads_topic(cells: int) -> Topic:
+    """Return the topic of the images of two fingertips with so many cells each."""
+    sides = [f"{side}_{i:02d}" for side in ("left", "right") for i in range(cells)]
+    fields = ("t_s", "counter", *sides)
+    # A schema is one definition, so fingertips of another size have a name of their own.
+    name = "Pads" if cells == _FIRST_SIZE else f"Pads{cells}"
+    return Topic(PADS_TOPIC, f"graspsense_msgs/msg/{name}", _schema(fields).decode())
+
+
+_FIRST_SIZE: Final = 22
+"""Cells of the fingertips of the message type that has no number in its name, which is that of old recordings."""
+
+
+def signal_topics(signals: Any) -> list[tuple[Topic, Callable[[Reading], tuple[Any, ...] | None]]]:
+    """Return the topics of the values of `Reading.signals`, each with what gives the numbers of its message.
+
+    The function returns None where the reading has nothing new.
+    """
+    topics: list[tuple[Topic, Callable[[Reading], tuple[Any, ...] | None]]] = []
+    scalars = []
+    for i, name in enumerate(getattr(signals, "_fields", ())):
+        value = signals[i]
+        if isinstance(value, Image):
+            topics.append((image_topic(name, len(value.cells)), _image_source(i)))
+        elif isinstance(value, Samples):
+            topics.append((samples_topic(name, len(value.values), len(value.values[0])), _samples_source(i)))
+        else:
+            scalars.append((i, name))
+    if scalars:
+        numbers = tuple(i for i, _ in scalars)
+        definition = "float64 t_s\n" + "".join(f"float64 {name}\n" for _, name in scalars)
+        topic = Topic(SCALARS_TOPIC, "graspsense_msgs/msg/Scalars", definition)
+        topics.append((topic, lambda reading: (reading.frame.t_s, *[reading.signals[i] for i in numbers])))
+    return topics
+
+
+def image_topic(name: str, cells: int) -> Topic:
+    """Return the topic of a tactile array."""
+    definition = f"float64 t_s\nint64 counter\nfloat64[{cells}] cells\n"
+    return Topic(SIGNAL_TOPIC + name, f"graspsense_msgs/msg/Array{cells}", definition)
+
+
+def samples_topic(name: str, samples: int, axes: int) -> Topic:
+    """Return the topic of a fast channel."""
+    definition = f"float64 t_s\nint64 counter\nint64 new\nint64 axes\nfloat64[{samples * axes}] values\n"
+    return Topic(SIGNAL_TOPIC + name, f"graspsense_msgs/msg/Samples{samples}x{axes}", definition)
+
+
+def pads_numbers(pads: Pads) -> tuple[Any, ...]:
+    """Return the numbers of the message of an image of the fingertips."""
+    return (pads.t_s, pads.counter, *pads.left, *pads.right)
+
+
+def _image_source(i: int) -> Callable[[Reading], tuple[Any, ...] | None]:
+    last = 0
+
+    def numbers(reading: Reading) -> tuple[Any, ...] | None:
+        nonlocal last
+        t_s, counter, cells = reading.signals[i]
+        if counter == last:
+            return None
+        last = counter
+        return (t_s, counter, *cells)
+
+    return numbers
+
+
+def _samples_source(i: int) -> Callable[[Reading], tuple[Any, ...] | None]:
+    def numbers(reading: Reading) -> tuple[Any, ...] | None:
+        t_s, counter, new, values = reading.signals[i]
+        if not new:
+            return None
+        return (t_s, counter, new, len(values[0]), *[number for row in values for number in row])
+
+    return numbers
+
 
 START: Final = "graspsense"
 DEVICE: Final = "graspsense.device"
@@ -60,13 +174,15 @@ RESULT: Final = "graspsense.result"
 """Names of the metadata records, the sections of a `TrialRecord`: how the trial was made, which gripper made it, and
 its result. Each is a map of texts. `settings` is TOML; the others are plain texts or JSON."""
 
-# Protocol to the writer process: one byte for the kind of message, then a body. Ticks and images have a fixed length;
-# metadata states its length first.
+# Protocol to the writer process: one byte for the kind of message, then a body. Ticks have a fixed length. Others state
+# their length first, and those of a topic its number, in the order in which the topics were announced.
 TICK_WIRE: Final = struct.Struct("<c" + _code(TICK_FIELDS))
-PADS_WIRE: Final = struct.Struct("<c" + _code(PADS_FIELDS))
 LENGTH_WIRE: Final = struct.Struct("<cI")
+SIGNAL_WIRE: Final = struct.Struct("<cIH")
 IS_TICK: Final = b"T"
-IS_PADS: Final = b"P"
+IS_SIGNAL: Final = b"S"
+IS_TOPIC: Final = b"A"
+"""Announces a topic: its name, the name of its type and the definition, as JSON."""
 IS_METADATA: Final = b"M"
 IS_END: Final = b"E"
 """The trial is over: finish the file and give it its final name."""

@@ -8,32 +8,37 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import zstandard
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, DataEnd, Footer, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 
+from graspsense.core.channels import declared_shape, further, no_signals, signal_type
+from graspsense.core.entries import Channel as DeclaredChannel
+from graspsense.core.entries import FastChannel, TactileArray
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.roles import Reading
-from graspsense.core.signals import CELLS, NO_PADS, Frame, Pads, Phase
+from graspsense.core.signals import Frame, Image, Pads, Phase, Reading, Samples, no_pads
 from graspsense.core.trace import SI_UNITS, Trace, trace_of
+from graspsense.core.trial import GraspEvent, event_from_json
 from graspsense.recording.layout import (
     CDR_HEADER,
     DEVICE,
-    PADS,
-    PADS_FIELDS,
     PADS_TOPIC,
     PART,
-    SCHEMAS,
+    SCALARS_TOPIC,
+    SIGNAL_TOPIC,
     START,
     TICK,
     TICK_FIELDS,
+    TICK_SCHEMA,
     TICK_TOPIC,
     VERSION,
+    Topic,
+    pads_topic,
 )
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
 from graspsense.recording.trial_record import DeviceRecord, TrialRecord
@@ -59,19 +64,34 @@ _DAMAGE: Final = (
 
 
 @frozen(kw_only=True, eq=False)
+class TopicRows:
+    """The messages of a topic, one row each, in the order of writing. Row `i` precedes the tick `before[i]`."""
+
+    topic: Topic
+    rows: NDArray[np.void]
+    before: tuple[int, ...]
+
+    def numbers(self, i: int) -> tuple[Any, ...]:
+        """Return the numbers of row `i`, as `Topic.wire` packs them."""
+        flat: list[Any] = []
+        for value in self.rows[i].item():
+            flat += value.tolist() if isinstance(value, np.ndarray) else [value]
+        return tuple(flat)
+
+
+@frozen(kw_only=True, eq=False)
 class RecordedGrasp:
     """One recorded grasp.
 
-    `ticks` has one row of `layout.TICK_FIELDS` per tick, in the order of writing, and `pads` one row of
-    `layout.PADS_FIELDS` per pad image. `pads_before[i]` is the index of the tick that image `i` precedes.
-    `complete` states whether the file has its end. If not, `damage` is the reason, and `lost` the number of messages
-    known to be missing between those that were read.
+    `ticks` has one row of `layout.TICK_FIELDS` per tick, in the order of writing. `topics` holds the messages of the
+    other topics by their names: the images of the fingertips, the further channels. `complete` states whether the file
+    has its end. If not, `damage` is the reason, and `lost` the number of messages known to be missing between those
+    that were read.
     """
 
     path: Path
     ticks: NDArray[np.void]
-    pads: NDArray[np.void]
-    pads_before: tuple[int, ...]
+    topics: Mapping[str, TopicRows]
     metadata: Mapping[str, Mapping[str, str]]
     complete: bool
     damage: str = ""
@@ -93,25 +113,123 @@ class RecordedGrasp:
         """Return everything that is stored of the trial besides its ticks. Raises DataDamaged."""
         return TrialRecord.from_sections(self.metadata, str(self.path))
 
+    @property
+    def pads(self) -> NDArray[np.void]:
+        """The images of the fingertips, one row each: `t_s`, `counter`, `left_00` and so on."""
+        found = self.topics.get(PADS_TOPIC)
+        return np.empty(0, _row_type(pads_topic(0))) if found is None else found.rows
+
+    @property
+    def channels(self) -> tuple[DeclaredChannel, ...]:
+        """The recorded arrays and further channels, as the gripper declared them or else as their messages show."""
+        declared = {channel.name: channel for channel in self.device.channels}
+        shown: list[DeclaredChannel] = []
+        for name, found in self.topics.items():
+            numbers = {field: max(number, 1) for field, _, number in found.topic.fields}
+            if name == SCALARS_TOPIC:
+                shown += [DeclaredChannel(field, "unknown") for field in numbers if field != "t_s"]
+            elif name.startswith(SIGNAL_TOPIC) and "cells" in numbers:
+                shown.append(
+                    TactileArray(name[len(SIGNAL_TOPIC) :], "unknown", rows=1, columns=numbers["cells"])
+                )
+            elif name.startswith(SIGNAL_TOPIC):
+                axes = int(found.rows["axes"][0]) if len(found.rows) else numbers["values"]
+                shown.append(
+                    FastChannel(
+                        name[len(SIGNAL_TOPIC) :],
+                        "unknown",
+                        samples=numbers["values"] // axes,
+                        axes=tuple(f"axis_{i}" for i in range(axes)),
+                    )
+                )
+        kept = []
+        for channel in shown:
+            said = declared.get(channel.name)
+            same = said is not None and declared_shape(said) == declared_shape(channel)
+            kept.append(said if same and said is not None else channel)
+        return (*(channel for channel in self.device.channels if channel.name == "pads"), *kept)
+
+    def events(self) -> tuple[GraspEvent, ...]:
+        """Return the events that the controller told; none where the recording has no result."""
+        try:
+            result = self.record().result
+            listed = () if result is None else result.details.get("events", ())
+            return tuple(event_from_json(one) for one in listed if one.get("source") == "controller")
+        except (DataDamaged, *_DAMAGE):
+            return ()
+
     def trace(self) -> Trace:
         """Return the trace of the grasp."""
-        frames, phases, commands = [], [], []
-        for row in self.ticks.tolist():
-            frames.append(Frame(*row[: len(Frame._fields)]))
-            phases.append(row[_PHASE])
-            commands.append(row[_COMMAND])
-        return trace_of(frames, phases, commands, _images(self.pads), self.units)
+        phases, commands = self.ticks["phase"].tolist(), self.ticks["command"].tolist()
+        readings = self.readings()
+        trace = trace_of(
+            [reading.frame for reading in readings],
+            phases,
+            commands,
+            self._images(),
+            self.units,
+            [reading.signals for reading in readings] if further(self.channels) else (),
+        )
+        return evolve(trace, events=self.events())
 
     def readings(self) -> tuple[Reading, ...]:
-        """Return the readings of the gripper, one per tick, each with its most recent pad image."""
-        images = _images(self.pads)
+        """Return the readings of the gripper, one per tick, each with what was new then or before."""
+        images = self._images()
+        image = no_pads(len(images[0].left) if images else 0)
+        pads_before = self.topics[PADS_TOPIC].before if images else ()
+        signals, following = self._signals(), 0
         readings: list[Reading] = []
-        image, following = NO_PADS, 0
         for k, row in enumerate(self.ticks.tolist()):
-            while following < len(images) and self.pads_before[following] <= k:
+            while following < len(images) and pads_before[following] <= k:
                 image, following = images[following], following + 1
-            readings.append(Reading(Frame(*row[: len(Frame._fields)]), image))
+            readings.append(Reading(Frame(*row[: len(Frame._fields)]), image, signals[k] if signals else ()))
         return tuple(readings)
+
+    def _images(self) -> list[Pads]:
+        rows = self.pads
+        if not len(rows):
+            return []
+        cells = (len(rows.dtype.names or ()) - 2) // 2
+        return [Pads(row[0], row[1], row[2 : 2 + cells], row[2 + cells :]) for row in rows.tolist()]
+
+    def _signals(self) -> list[Any]:
+        """Return the value of `Reading.signals` in each tick; empty where there are no further channels."""
+        channels = further(self.channels)
+        if not channels:
+            return []
+        columns = [
+            self._column(channel, nothing)
+            for channel, nothing in zip(channels, no_signals(channels), strict=True)
+        ]
+        return list(map(signal_type(channels)._make, zip(*columns, strict=True)))  # type: ignore[attr-defined]
+
+    def _column(self, channel: DeclaredChannel, nothing: Any) -> list[Any]:
+        """Return the value of a further channel in each tick, `nothing` before the first one."""
+        scalar = not isinstance(channel, TactileArray | FastChannel)
+        found = self.topics[SCALARS_TOPIC if scalar else SIGNAL_TOPIC + channel.name]
+        values: list[Any] = [nothing] * len(self.ticks)
+        names = found.rows.dtype.names or ()
+        last = nothing
+        for at, row in zip(found.before, found.rows, strict=True):
+            if at >= len(values):
+                break
+            if scalar:
+                last = float(row[names.index(channel.name)])
+            elif isinstance(channel, TactileArray):
+                last = Image(float(row["t_s"]), int(row["counter"]), tuple(row["cells"].tolist()))
+            else:
+                rows = row["values"].reshape(declared_shape(channel)).tolist()
+                new = min(max(int(row["new"]), 0), len(rows))
+                last = Samples(float(row["t_s"]), int(row["counter"]), new, tuple(map(tuple, rows)))
+            values[at] = last
+        # An image stays until the next one; samples are new in one tick only.
+        for k in range(1, len(values)):
+            if values[k] is nothing and values[k - 1] is not nothing:
+                before = values[k - 1]
+                if isinstance(before, Samples):
+                    before = Samples(before.t_s, before.counter, 0, nothing.values)
+                values[k] = before
+        return values
 
     def recording(self) -> Recording:
         """Return the grasp in the form that a gripper can replay."""
@@ -126,6 +244,7 @@ class RecordedGrasp:
             notes=(*self.device.notes, REPLAY_NOTE),
             commands=tuple(self.ticks["command"].tolist()) if known else None,
             has_release=known and bool((self.ticks["phase"] == Phase.RELEASE).any()),
+            channels=self.channels,
         )
 
 
@@ -172,10 +291,11 @@ class _PartialGrasp:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.topics: dict[int, str] = {}
+        self.layouts: dict[str, Topic] = {}
         self.schemas: dict[int, Schema] = {}
-        self.bodies: dict[str, list[bytes]] = {TICK_TOPIC: [], PADS_TOPIC: []}
+        self.bodies: dict[str, list[bytes]] = {TICK_TOPIC: []}
         self.next_number = dict.fromkeys(self.bodies, 0)
-        self.pads_before: list[int] = []
+        self.before: dict[str, list[int]] = {}
         self.metadata: dict[str, dict[str, str]] = {}
         self.lost = 0
         self.base_ns: int | None = None
@@ -219,12 +339,19 @@ class _PartialGrasp:
             raise DataDamaged(f"{self.path} is not an MCAP file: {damage or 'its header is missing'}")
         try:
             device = DeviceRecord.from_text(self.metadata.get(DEVICE, {}).get("device", "{}"))
-            ticks, pads = self._rows(TICK_TOPIC), self._rows(PADS_TOPIC)
+            topics = {
+                name: TopicRows(
+                    topic=topic,
+                    rows=np.frombuffer(b"".join(self.bodies[name]), dtype=_row_type(topic)),
+                    before=tuple(self.before[name]),
+                )
+                for name, topic in self.layouts.items()
+                if self.bodies[name]
+            }
             grasp = RecordedGrasp(
                 path=self.path,
-                ticks=ticks,
-                pads=pads,
-                pads_before=tuple(self.pads_before),
+                ticks=np.frombuffer(b"".join(self.bodies[TICK_TOPIC]), dtype=_TICK_ROW),
+                topics=topics,
                 metadata=self.metadata,
                 complete=self.ended and not damage and not self.lost,
                 damage=damage,
@@ -241,42 +368,65 @@ class _PartialGrasp:
             self.schemas[record.id] = record
         elif isinstance(record, Channel):
             schema = self.schemas.get(record.schema_id)
-            expected = SCHEMAS.get(record.topic)
-            if expected is None:
+            name = record.topic
+            if name not in (TICK_TOPIC, PADS_TOPIC, SCALARS_TOPIC) and not name.startswith(SIGNAL_TOPIC):
                 return  # a topic of another program
-            if schema is None or record.message_encoding != "cdr" or schema.data != expected[1]:
-                raise ValueError(f"the fields of {record.topic} are not those of this version")
-            self.topics[record.id] = record.topic
+            if schema is None or record.message_encoding != "cdr":
+                raise ValueError(f"the fields of {name} are not those of this version")
+            if name == TICK_TOPIC:
+                known = schema.data == TICK_SCHEMA[1]
+            else:
+                layout = Topic(name, schema.name, schema.data.decode())
+                known = _is_ours(layout) and self.layouts.setdefault(name, layout) == layout
+            if not known:
+                raise ValueError(f"the fields of {name} are not those of this version")
+            self.bodies.setdefault(name, [])
+            self.before.setdefault(name, [])
+            self.next_number.setdefault(name, 0)
+            self.topics[record.id] = name
         elif isinstance(record, Message):
             topic = self.topics.get(record.channel_id)
             if topic is None:
                 return
-            size = len(CDR_HEADER) + (TICK if topic == TICK_TOPIC else PADS).size
+            wire = TICK if topic == TICK_TOPIC else self.layouts[topic].wire
+            size = len(CDR_HEADER) + wire.size
             if len(record.data) != size or record.data[:4] != CDR_HEADER:
                 raise ValueError(f"a message of {topic} has {len(record.data)} bytes, not {size}")
             self.lost += (record.sequence - self.next_number[topic]) & 0xFFFFFFFF
             self.next_number[topic] = (record.sequence + 1) & 0xFFFFFFFF
-            if topic == PADS_TOPIC:
-                self.pads_before.append(len(self.bodies[TICK_TOPIC]))
+            if topic != TICK_TOPIC:
+                self.before[topic].append(len(self.bodies[TICK_TOPIC]))
             if self.base_ns is None:
                 (t_s,) = struct.unpack_from("<d", record.data, len(CDR_HEADER))
                 self.base_ns = record.log_time - round(t_s * 1e9)
             self.bodies[topic].append(record.data[len(CDR_HEADER) :])
 
-    def _rows(self, topic: str) -> NDArray[np.void]:
-        dtype = _TICK_ROW if topic == TICK_TOPIC else _PADS_ROW
-        return np.frombuffer(b"".join(self.bodies[topic]), dtype=dtype)
+
+def _is_ours(topic: Topic) -> bool:
+    """Return whether a topic has the fields that graspsense writes under its name."""
+    names = [name for name, _, _ in topic.fields]
+    if topic.name == PADS_TOPIC:
+        return topic.definition == pads_topic((len(names) - 2) // 2).definition
+    if topic.name == SCALARS_TOPIC:
+        return len(names) > 1 and all(kind == "d" and not number for _, kind, number in topic.fields)
+    return names in (["t_s", "counter", "cells"], ["t_s", "counter", "new", "axes", "values"])
 
 
-def _row_type(fields: tuple[str, ...], code: str) -> np.dtype[np.void]:
-    kinds = {"d": "<f8", "q": "<i8"}
-    return np.dtype([(name, kinds[letter]) for name, letter in zip(fields, code, strict=True)])
+_KINDS: Final = {"d": "<f8", "q": "<i8"}
 
 
-_TICK_ROW: Final = _row_type(TICK_FIELDS, TICK.format.removeprefix("<"))
-_PADS_ROW: Final = _row_type(PADS_FIELDS, PADS.format.removeprefix("<"))
-_PHASE: Final = TICK_FIELDS.index("phase")
-_COMMAND: Final = TICK_FIELDS.index("command")
+def _row_type(topic: Topic) -> np.dtype[np.void]:
+    return np.dtype(
+        [
+            (name, _KINDS[kind], (number,)) if number else (name, _KINDS[kind])
+            for name, kind, number in topic.fields
+        ]
+    )
+
+
+_TICK_ROW: Final = np.dtype(
+    [(name, _KINDS[code]) for name, code in zip(TICK_FIELDS, TICK.format.removeprefix("<"), strict=True)]
+)
 
 
 def _unpacked(chunk: Chunk) -> Sequence[McapRecord]:
@@ -291,7 +441,3 @@ def _unpacked(chunk: Chunk) -> Sequence[McapRecord]:
         return breakup_chunk(chunk, validate_crc=True)
     except zstandard.ZstdError as error:
         raise ValueError(f"it does not unpack: {error}") from error
-
-
-def _images(pads: NDArray[np.void]) -> list[Pads]:
-    return [Pads(row[0], row[1], row[2 : 2 + CELLS], row[2 + CELLS :]) for row in pads.tolist()]

@@ -14,23 +14,28 @@ import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
-from graspsense.core.signals import Command, Frame, Pads
+from graspsense.core.signals import Command, Reading
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import (
     IS_END,
     IS_METADATA,
-    IS_PADS,
+    IS_SIGNAL,
     IS_TICK,
+    IS_TOPIC,
     LENGTH_WIRE,
-    PADS_WIRE,
     PART,
     READY,
+    SIGNAL_WIRE,
     TICK_WIRE,
+    Topic,
+    pads_numbers,
+    pads_topic,
+    signal_topics,
 )
 from graspsense.recording.recording_info import RecordingInfo
 
@@ -39,6 +44,17 @@ RETRIES_PER_TICK: Final = 8
 """Queued messages offered with each new one; the limit keeps a tick short."""
 QUEUE_LIMIT: Final = 500_000
 ANSWER_TIMEOUT_S: Final = 60.0
+
+
+class _Channel:
+    """A topic that was announced to the writer process under a number."""
+
+    def __init__(self, number: int, topic: Topic) -> None:
+        self._number, self._wire = number, topic.wire
+
+    def pack(self, numbers: tuple[Any, ...]) -> bytes:
+        """Return the message with these numbers, in the protocol to the writer process."""
+        return SIGNAL_WIRE.pack(IS_SIGNAL, self._wire.size, self._number) + self._wire.pack(*numbers)
 
 
 class Recorder:
@@ -71,16 +87,35 @@ class Recorder:
                 fcntl.fcntl(self._fd, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
         self._waiting: deque[bytes] = deque()
         self._counter = 0
+        self._pads: _Channel | None = None
+        self._signals: list[tuple[_Channel, Callable[[Reading], tuple[Any, ...] | None]]] | None = None
+        self._announced = 0
         self._broken = False
         self._deferred = self._most_waiting = self._dropped = 0
 
-    def take(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
-        """Pass on one tick, with its pad image if that is new."""
+    def take(self, reading: Reading, phase: int, command: Command) -> None:
+        """Pass on one tick, with its images and samples if those are new."""
+        frame, pads, signals = reading
         data = TICK_WIRE.pack(IS_TICK, *frame, phase, *command)
         if pads.counter != self._counter:
             self._counter = pads.counter
-            data = PADS_WIRE.pack(IS_PADS, pads.t_s, pads.counter, *pads.left, *pads.right) + data
+            if self._pads is None:
+                self._pads = self._announce(pads_topic(len(pads.left)))
+            data = self._pads.pack(pads_numbers(pads)) + data
+        if signals:
+            if self._signals is None:
+                self._signals = [(self._announce(topic), source) for topic, source in signal_topics(signals)]
+            for channel, source in self._signals:
+                numbers = source(reading)
+                if numbers is not None:
+                    data = channel.pack(numbers) + data
         self._send(data)
+
+    def _announce(self, topic: Topic) -> _Channel:
+        body = json.dumps([topic.name, topic.type_name, topic.definition]).encode()
+        self._send(LENGTH_WIRE.pack(IS_TOPIC, len(body)) + body)
+        self._announced += 1
+        return _Channel(self._announced - 1, topic)
 
     def wait_ready(self) -> None:
         """Wait until the writer process has created its file, so that it keeps up when the fingers start to move.
@@ -159,11 +194,25 @@ class Recorder:
         if self._broken:
             return True
         try:
-            os.write(self._fd, data)  # shorter than PIPE_BUF, so the write is atomic
+            # Shorter than PIPE_BUF, so that the write is atomic; what is longer is written in parts, see _write_long.
+            if len(data) > select.PIPE_BUF:
+                return self._write_long(data)
+            os.write(self._fd, data)
         except BlockingIOError:
             return False
         except OSError:
             self._broken = True
+        return True
+
+    def _write_long(self, data: bytes) -> bool:
+        """Write data that the pipe may take in part: what it does not take is written first with the next tick."""
+        written = os.write(self._fd, data)
+        if written < len(data):
+            rest = data[written:]
+            if self._waiting and self._waiting[0] is data:
+                self._waiting[0] = rest
+                return False
+            self._waiting.appendleft(rest)
         return True
 
     def _drain(self, last: bytes) -> None:

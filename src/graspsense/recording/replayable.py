@@ -7,7 +7,8 @@ from typing import Final
 
 from attrs import field, frozen
 
-from graspsense.core.roles import Reading
+from graspsense.core.entries import Channel
+from graspsense.core.signals import Reading
 
 REPLAY_NOTE: Final = "a recording cannot react: the controller's commands have no effect on it"
 
@@ -19,6 +20,7 @@ class Recording:
     `units` names the units that are not SI units. `notes` are sentences that a reader of the result needs.
     `rate_hz` is the number of frames per unit of time. `commands` are the values that were commanded after each frame,
     if they are known, and `has_release` states whether the recording goes on until the fingers are open again.
+    `channels` are its tactile arrays and further channels.
     """
 
     name: str
@@ -28,3 +30,4 @@ class Recording:
     notes: tuple[str, ...] = ()
     commands: tuple[float, ...] | None = None
     has_release: bool = False
+    channels: tuple[Channel, ...] = ()

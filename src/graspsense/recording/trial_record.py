@@ -18,7 +18,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args
 from attrs import evolve, field, frozen
 
 from graspsense import __version__
+from graspsense.core.channels import as_json, from_json, further
 from graspsense.core.config import toml_key, toml_value
+from graspsense.core.entries import Channel, TactileArray
 from graspsense.core.errors import DataDamaged
 from graspsense.core.json_values import json_text
 from graspsense.core.trial import trial_as_json
@@ -113,11 +115,15 @@ class DeviceRecord:
     numbers: Mapping[str, float | str] = field(factory=dict)
     units: Mapping[str, str] = field(factory=dict)
     notes: tuple[str, ...] = ()
+    channels: tuple[Channel, ...] = ()
+    """Its tactile arrays, and the channels that are not part of a frame."""
 
     @classmethod
     def of(cls, device: DeviceInfo) -> DeviceRecord:
         """Return the record of an open gripper."""
-        return cls(**{name: getattr(device, name) for name in cls.__annotations__})
+        values = {name: getattr(device, name) for name in cls.__annotations__}
+        arrays = tuple(one for one in device.channels if isinstance(one, TactileArray) and one.name == "pads")
+        return cls(**{**values, "channels": (*arrays, *further(device.channels))})
 
     @property
     def label(self) -> str:
@@ -126,7 +132,9 @@ class DeviceRecord:
 
     def to_text(self) -> str:
         """Return canonical JSON."""
-        return json_text({name: getattr(self, name) for name in DeviceRecord.__annotations__})
+        values = {name: getattr(self, name) for name in DeviceRecord.__annotations__}
+        values["channels"] = [as_json(channel) for channel in self.channels]
+        return json_text(values)
 
     @classmethod
     def from_text(cls, text: str) -> DeviceRecord:
@@ -148,6 +156,7 @@ class DeviceRecord:
             numbers=dict(value.get("numbers", {})),
             units=units,
             notes=tuple(str(note) for note in notes),
+            channels=_channels(value.get("channels", [])),
         )
 
 
@@ -270,6 +279,16 @@ class TrialRecord:
         if RESULT in metadata:
             result = _decoded(f"the result in {where} cannot be read", lambda: _result(metadata[RESULT]))
         return evolve(start, device=device, result=result)
+
+
+def _channels(values: Any) -> tuple[Channel, ...]:
+    """Return channels from the description of a gripper. Raises TypeError or ValueError."""
+    if not isinstance(values, list) or not all(isinstance(value, dict) for value in values):
+        raise TypeError("the channels of the gripper are not a list of tables")
+    try:
+        return tuple(from_json(value) for value in values)
+    except KeyError as error:
+        raise ValueError(f"a channel of the gripper is not described: {error}") from error
 
 
 def json_table(text: str) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import os
+import struct
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,10 +19,11 @@ from mcap.writer import CompressionType, Writer
 
 from graspsense import __version__
 from graspsense.recording.atomic_file import sync_folder
-from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, PART, SCHEMAS, TICK_TOPIC
+from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, PART, TICK_SCHEMA, TICK_TOPIC, Topic
 from graspsense.recording.recording_info import RecordingInfo
 
 CHUNK_NS: Final = 50_000_000
+_T_S: Final = struct.Struct("<d")
 
 
 class RecordingWriter:
@@ -46,11 +48,10 @@ class RecordingWriter:
             enable_data_crcs=True,
         )
         self._mcap.start(profile="ros2", library=f"graspsense {__version__}")
-        self._channels = {}
-        for topic, (name, definition) in SCHEMAS.items():
-            schema = self._mcap.register_schema(name, "ros2msg", definition)
-            self._channels[topic] = self._mcap.register_channel(topic, "cdr", schema)
-        self._counts = dict.fromkeys(SCHEMAS, 0)
+        self._channels: dict[str, int] = {}
+        self._counts: dict[str, int] = {}
+        self._topics: list[str] = []
+        self._register(TICK_TOPIC, *TICK_SCHEMA)
         self._base_ns = base_ns
         self._chunk_log_ns = self._chunk_wall_ns = 0
         self._open_chunk = False
@@ -68,9 +69,16 @@ class RecordingWriter:
         """Write a tick, packed as `layout.TICK`."""
         self._add(TICK_TOPIC, t_s, body)
 
-    def pads(self, t_s: float, body: bytes) -> None:
-        """Write a pad image, packed as `layout.PADS`."""
-        self._add(PADS_TOPIC, t_s, body)
+    def topic(self, topic: Topic) -> int:
+        """Add a topic, and return its number."""
+        self._register(topic.name, topic.type_name, topic.definition.encode())
+        self._topics.append(topic.name)
+        return len(self._topics) - 1
+
+    def signal(self, number: int, body: bytes) -> None:
+        """Write a message of the topic with this number, packed as `Topic.wire`."""
+        (t_s,) = _T_S.unpack_from(body)
+        self._add(self._topics[number], t_s, body)
 
     def finish(self) -> RecordingInfo:
         """Finish the file, wait until the disk has it, and give it its final name."""
@@ -83,7 +91,7 @@ class RecordingWriter:
             sha256=self._out.hash.hexdigest(),
             size=self._out.size,
             ticks=self._counts[TICK_TOPIC],
-            images=self._counts[PADS_TOPIC],
+            images=self._counts.get(PADS_TOPIC, 0),
         )
 
     def leave(self) -> None:
@@ -95,6 +103,11 @@ class RecordingWriter:
         """Delete the unfinished file."""
         self.part.unlink(missing_ok=True)
         self._out.close()
+
+    def _register(self, topic: str, type_name: str, definition: bytes) -> None:
+        schema = self._mcap.register_schema(type_name, "ros2msg", definition)
+        self._channels[topic] = self._mcap.register_channel(topic, "cdr", schema)
+        self._counts[topic] = 0
 
     def _end(self) -> None:
         self._mcap.finish()  # type: ignore[no-untyped-call]

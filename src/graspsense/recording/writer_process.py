@@ -19,12 +19,14 @@ from typing import Final
 from graspsense.recording.layout import (
     IS_END,
     IS_METADATA,
-    IS_PADS,
+    IS_SIGNAL,
     IS_TICK,
+    IS_TOPIC,
     LENGTH_WIRE,
-    PADS_WIRE,
     READY,
+    SIGNAL_WIRE,
     TICK_WIRE,
+    Topic,
 )
 from graspsense.recording.writer import RecordingWriter
 
@@ -86,24 +88,34 @@ def _write_messages(file: RecordingWriter, buffer: bytearray) -> bool:
             kind = bytes(buffer[at : at + 1])
             if kind == IS_END:
                 return True
-            if kind in (IS_TICK, IS_PADS):
-                wire = TICK_WIRE if kind == IS_TICK else PADS_WIRE
-                if at + wire.size > end:
+            if kind == IS_TICK:
+                if at + TICK_WIRE.size > end:
                     break
-                t_s = wire.unpack_from(buffer, at)[1]
-                body = bytes(buffer[at + 1 : at + wire.size])
-                (file.tick if kind == IS_TICK else file.pads)(t_s, body)
-                at += wire.size
+                t_s = TICK_WIRE.unpack_from(buffer, at)[1]
+                file.tick(t_s, bytes(buffer[at + 1 : at + TICK_WIRE.size]))
+                at += TICK_WIRE.size
+            elif kind == IS_SIGNAL:
+                if at + SIGNAL_WIRE.size > end:
+                    break
+                _, length, number = SIGNAL_WIRE.unpack_from(buffer, at)
+                start = at + SIGNAL_WIRE.size
+                if start + length > end:
+                    break
+                file.signal(number, bytes(buffer[start : start + length]))
+                at = start + length
             else:
                 if at + LENGTH_WIRE.size > end:
                     break
-                assert kind == IS_METADATA
+                assert kind in (IS_METADATA, IS_TOPIC)
                 length = LENGTH_WIRE.unpack_from(buffer, at)[1]
                 start = at + LENGTH_WIRE.size
                 if start + length > end:
                     break
-                name, values = json.loads(buffer[start : start + length])
-                file.metadata(name, values)
+                if kind == IS_TOPIC:
+                    file.topic(Topic(*json.loads(buffer[start : start + length])))
+                else:
+                    name, values = json.loads(buffer[start : start + length])
+                    file.metadata(name, values)
                 at = start + length
     finally:
         del buffer[:at]

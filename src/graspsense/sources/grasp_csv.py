@@ -18,8 +18,7 @@ from typing import Final
 from urllib.parse import parse_qsl, urlencode
 
 from graspsense.core.errors import ConfigError, DataDamaged, suggestion
-from graspsense.core.roles import Reading
-from graspsense.core.signals import NO_PADS, Frame
+from graspsense.core.signals import NO_PADS, Frame, Reading
 from graspsense.recording.replayable import Recording
 from graspsense.sources.csv_columns import CsvColumns
 

@@ -23,8 +23,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.errors import ConfigError, DataDamaged, suggestion
-from graspsense.core.roles import Reading
-from graspsense.core.signals import NO_PADS, Frame
+from graspsense.core.signals import NO_PADS, Frame, Reading
 from graspsense.recording.replayable import Recording
 
 if TYPE_CHECKING:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from graspsense.core.pipeline import grasp_with
-from graspsense.core.signals import APPROACH
+from graspsense.core.signals import APPROACH, Reading
 from graspsense.recording.atomic_file import SaveFailed
-from graspsense.recording.layout import DEVICE, PADS, RESULT, START, TICK
+from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_numbers, pads_topic, signal_topics
 from graspsense.recording.trial_record import TrialRecord
 from graspsense.recording.writer import RecordingWriter
 from graspsense.sources.replay import KINDS, kind_and_name
@@ -53,11 +54,23 @@ def import_recording(
 def _write_readings(file: RecordingWriter, recording: Recording, phases: Sequence[int]) -> None:
     """Write all readings, each with the phase that the controller was in; the last one holds after its end."""
     counter = 0
+    pads_number = -1
+    sources: list[tuple[int, struct.Struct, Callable[[Reading], tuple[Any, ...] | None]]] | None = None
     after = len(recording.readings) - len(phases)
     every_phase = [*phases, *[phases[-1] if phases else APPROACH] * after]
-    for (frame, pads), phase in zip(recording.readings, every_phase, strict=True):
+    for reading, phase in zip(recording.readings, every_phase, strict=True):
+        frame, pads, signals = reading
         if pads.counter != counter:
             counter = pads.counter
-            file.pads(pads.t_s, PADS.pack(pads.t_s, pads.counter, *pads.left, *pads.right))
+            layout = pads_topic(len(pads.left))
+            if pads_number < 0:
+                pads_number = file.topic(layout)
+            file.signal(pads_number, layout.wire.pack(*pads_numbers(pads)))
+        if signals and sources is None:
+            sources = [(file.topic(topic), topic.wire, source) for topic, source in signal_topics(signals)]
+        for number, wire, source in sources or ():
+            numbers = source(reading)
+            if numbers is not None:
+                file.signal(number, wire.pack(*numbers))
         # The commands of the other program are not known.
         file.tick(frame.t_s, TICK.pack(*frame, phase, 0, math.nan, math.nan, math.nan))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from math import inf
 from typing import Final, final
 
@@ -11,10 +12,10 @@ from attrs.validators import and_, instance_of
 
 from graspsense.core.entries import KINDS as COMMAND_KINDS
 from graspsense.core.entries import Channel
-from graspsense.core.errors import DeviceLost, RecordingEnded, suggestion
-from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
+from graspsense.core.errors import DeviceLost, GraspsenseError, RecordingEnded, suggestion
+from graspsense.core.roles import DeviceInfo, SensorBackend
 from graspsense.core.setting import NAMES_INPUT, setting
-from graspsense.core.signals import CHANNELS, EFFORT, Command, Pads
+from graspsense.core.signals import CHANNELS, EFFORT, Command, Pads, Reading
 from graspsense.recording.replayable import Recording
 from graspsense.sources.icub import read_recording
 
@@ -91,20 +92,28 @@ class ReplayConfig:
 class ReplayBackend(SensorBackend[ReplayConfig]):
     """Gives the frames of a recording, one a read; commands have no effect on what has happened."""
 
-    channels = tuple(Channel(name, unit) for name, unit in CHANNELS.items())
     accepts = COMMAND_KINDS
 
     _recording: Recording | None = None
+    _kept: Recording | None = None
     _commands: tuple[float, ...] | None = None
     _next = 0
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """All channels of a frame, and those that the recording holds beside them. The recording is read for this."""
+        with suppress(GraspsenseError):  # `open` reports it
+            own = {channel.name: channel for channel in self._read().channels}
+            frame = (Channel(name, unit) for name, unit in CHANNELS.items())
+            return (*(own.pop(channel.name, channel) for channel in frame), *own.values())
+        return tuple(Channel(name, unit) for name, unit in CHANNELS.items())
 
     def open(self, seed: int) -> DeviceInfo:
         """Read the recording and describe it; the seed has no effect.
 
         Raises ConfigError if there is no such file, DataDamaged if it is not what it claims to be.
         """
-        kind, name = kind_and_name(self.config.recording)
-        recording = KINDS[kind](name)
+        recording = self._read()
         self._recording, self._commands, self._next = recording, recording.commands, 0
         return DeviceInfo(
             name=recording.name,
@@ -146,6 +155,13 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
     def report(self) -> Mapping[str, float | int | str | bool]:
         """Return which recording this is and how many of its frames were read."""
         return {"recording": self.config.recording, "frames_read": self._next}
+
+    def _read(self) -> Recording:
+        """Return the recording in the settings, read once."""
+        if self._kept is None:
+            kind, name = kind_and_name(self.config.recording)
+            self._kept = KINDS[kind](name)
+        return self._kept
 
     def _opened(self) -> Recording:
         if self._recording is None:

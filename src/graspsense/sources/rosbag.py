@@ -25,8 +25,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from graspsense.core.calibration import Cells, edge_force, masked, pad_force, tare, zero_of
 from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable, TareRefused
-from graspsense.core.roles import Reading
-from graspsense.core.signals import CELLS, NO_PADS, Frame, Pads
+from graspsense.core.signals import Frame, Pads, Reading, no_pads
 from graspsense.recording.replayable import Recording
 
 if TYPE_CHECKING:
@@ -36,6 +35,10 @@ SIDES: Final = {"l": "left", "r": "right"}
 TIP_FIELDS: Final = (("l_finger_tip", "r_finger_tip"), ("data0", "data1"))
 """Names of the fields of the two tips, since 2010 and in 2009."""
 TARE_IMAGES: Final = 6
+CELLS: Final = 22
+"""Number of cells of a fingertip of the PR2."""
+FIRST_PAD_CELL: Final = 7
+"""The first cell on its gripping face."""
 PAD_COUNTS_PER_N: Final = 1600.0
 """Counts of the sum of the fifteen cells of the gripping face under one newton (fingertip_pressure, scripts/
 fingertip_geometry.py). The driver of the gripper has the same scales: `tests/test_pr2_numbers.py`."""
@@ -218,7 +221,7 @@ def _readings(motions: Sequence[_Motion], images: Sequence[_Image], notes: list[
     pads = [Pads((one.t_ns - began_ns) * 1e-9, i, one.left, one.right) for i, one in enumerate(images, 1)]
     first = pads[:TARE_IMAGES]
     try:
-        zero = tare(first, PAD_COUNTS_PER_N)
+        zero = tare(first, PAD_COUNTS_PER_N, FIRST_PAD_CELL)
     except TareRefused as refused:
         zero = zero_of([one.left for one in first]), zero_of([one.right for one in first])
         notes.append(
@@ -232,7 +235,7 @@ def _readings(motions: Sequence[_Motion], images: Sequence[_Image], notes: list[
         velocity = motion.velocity_m_s
         if velocity != velocity and before is not None and dt_s > 0.0:
             velocity = (motion.gap_m - before.gap_m) / dt_s
-        seen = pads[n - 1] if n else NO_PADS
+        seen = pads[n - 1] if n else no_pads(CELLS)
         forces = _forces(seen.left, zero[0]), _forces(seen.right, zero[1])
         (left, edge_left), (right, edge_right) = forces
         yield Reading(
@@ -252,7 +255,7 @@ def _forces(cells: Cells, zero: Cells) -> tuple[float, float]:
         (_NAN, _NAN)
         if bad == CELLS
         else (
-            pad_force(kept, zero, PAD_COUNTS_PER_N),
+            pad_force(kept, zero, PAD_COUNTS_PER_N, FIRST_PAD_CELL),
             edge_force(kept, zero, EDGE_COUNTS_PER_N),
         )
     )

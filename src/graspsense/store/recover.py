@@ -21,8 +21,7 @@ from graspsense.core.plugins import installed
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.before_contact import before_contact
 from graspsense.recording.layout import DEVICE, PART, START, TICK
-from graspsense.recording.layout import PADS as PADS_STRUCT
-from graspsense.recording.reader import RecordedGrasp, read_recorded
+from graspsense.recording.reader import RecordedGrasp, TopicRows, read_recorded
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import FeatureValues, TrialRecord, TrialResult
 from graspsense.recording.writer import RecordingWriter
@@ -110,11 +109,15 @@ def write_copy(grasp: RecordedGrasp, path: Path) -> RecordingInfo:
         for name in (START, DEVICE):
             if name in grasp.metadata:
                 file.metadata(name, grasp.metadata[name])
-        at, t_of_pads = 0, grasp.pads["t_s"].tolist()
+        messages: list[tuple[int, int, TopicRows, int]] = []
+        for found in grasp.topics.values():
+            number = file.topic(found.topic)
+            messages += [(before, number, found, i) for i, before in enumerate(found.before)]
+        messages.sort(key=lambda message: message[0], reverse=True)
         for k, row in enumerate(grasp.ticks.tolist()):
-            while at < len(t_of_pads) and grasp.pads_before[at] <= k:
-                file.pads(t_of_pads[at], PADS_STRUCT.pack(*grasp.pads[at].item()))
-                at += 1
+            while messages and messages[-1][0] <= k:
+                _, number, found, i = messages.pop()
+                file.signal(number, found.topic.wire.pack(*found.numbers(i)))
             file.tick(row[0], TICK.pack(*row))
         for name in grasp.metadata:
             if name not in (START, DEVICE):

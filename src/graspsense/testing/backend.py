@@ -10,14 +10,14 @@ from math import inf, isfinite, isnan, nan
 from statistics import fmean, median
 from typing import Any, Final
 
-from graspsense.core.entries import KINDS, Channel
+from graspsense.core.channels import further, no_signals, shape_of
+from graspsense.core.entries import KINDS, Channel, FastChannel, TactileArray
 from graspsense.core.errors import DeviceLost, NoDevice, RecordingEnded, TareRefused, named
 from graspsense.core.guard import GuardState, guard
 from graspsense.core.roles import SensorBackend
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
 from graspsense.core.signals import (
-    CELLS,
     CHANNELS,
     EFFORT,
     FORCE,
@@ -27,6 +27,8 @@ from graspsense.core.signals import (
     Frame,
     Outcome,
     Pads,
+    Reading,
+    Samples,
 )
 from graspsense.testing import component
 from graspsense.testing.checks import CheckFailed, CheckSkipped, checks_of, demand
@@ -81,13 +83,17 @@ def opening_and_relaxing_are_accepted(subject: Subject) -> None:
 
 
 def frames_are_numbers(subject: Subject) -> None:
-    """Every field of a frame is a Python float, `status` an int; a cell image has 22 floats for each fingertip."""
-    for frame, pads in subject.session.readings:
+    """Every field of a frame is a Python float, `status` an int; cells are floats, as many as are declared."""
+    cells = _cells(subject)
+    for reading in subject.session.readings:
         demand(
-            isinstance(frame, Frame) and isinstance(pads, Pads),
-            f"read returned {type(frame).__name__} and {type(pads).__name__}: return Reading(Frame(...), Pads(...)), "
-            "with NO_PADS where there are none",
+            isinstance(reading, Reading)
+            and isinstance(reading.frame, Frame)
+            and isinstance(reading.pads, Pads),
+            f"read returned {reading!r:.80}: return Reading(Frame(...), Pads(...), signals), with NO_PADS where there "
+            "are no cells and () where there are no further channels",
         )
+        frame, pads, _ = reading
         for name, value in zip(Frame._fields, frame, strict=True):
             kind = int if name == "status" else float
             demand(
@@ -100,9 +106,25 @@ def frames_are_numbers(subject: Subject) -> None:
         )
         for side in (pads.left, pads.right):
             demand(
-                isinstance(side, tuple) and len(side) == CELLS and all(type(one) is float for one in side),
-                f"an image has the cells {side!r:.80}: give a tuple of {CELLS} floats (NaN where there is no cell)",
+                isinstance(side, tuple) and len(side) == cells and all(type(one) is float for one in side),
+                f"an image of a fingertip has the cells {side!r:.80}: give a tuple of {cells} floats, as many as the "
+                "channel 'pads' declares (NaN for a cell without a value)",
             )
+
+
+def _cells(subject: Subject) -> int:
+    """Return the declared number of cells of a fingertip; of a recording, which declares none, that of its images."""
+    for channel in subject.entry.channels:
+        if channel.name == "pads":
+            if isinstance(channel, TactileArray):
+                return channel.cells
+            demand(
+                subject.session.info.opening is None,
+                "the channel 'pads' does not say which cells there are: declare TactileArray('pads', "
+                f"{channel.unit!r}, rate, rows=..., columns=...)",
+            )
+            return len(subject.session.readings[0].pads.left)
+    return 0
 
 
 def channels_are_those_declared(subject: Subject) -> None:
@@ -110,12 +132,6 @@ def channels_are_those_declared(subject: Subject) -> None:
     session = subject.session
     declared = {one.name for one in subject.entry.channels}
     recording = session.info.opening is None
-    unknown = ", ".join(sorted(declared - CHANNELS.keys()))
-    demand(
-        not unknown,
-        f"no frame can carry the declared {unknown}: take it out of `channels`, and give slow values in `report`. The "
-        f"channels of a frame are {', '.join(CHANNELS)}",
-    )
     for name, channel in CHANNELS_OF_FIELD.items():
         values = [getattr(frame, name) for frame in session.frames]
         if channel not in declared:
@@ -140,6 +156,84 @@ def channels_are_those_declared(subject: Subject) -> None:
             bool(session.images),
             "no cell image came, and the channel 'pads' is declared: count images from 1 on, or take it out",
         )
+
+
+def signals_are_those_declared(subject: Subject) -> None:
+    """Each further channel is delivered in `Reading.signals`, in the declared shape, and has numbers."""
+    channels, session = further(subject.entry.channels), subject.session
+    nothing = no_signals(channels)
+    names = ", ".join(getattr(nothing, "_fields", ())) or "none"
+    for reading in session.readings:
+        found = getattr(reading.signals, "_fields", ())
+        demand(
+            found == getattr(nothing, "_fields", ()),
+            f"the further channels declared are {names}, and read delivers {', '.join(found) or 'none'}: fill "
+            "signal_type(self.channels) with a value for each, in this order",
+        )
+        for channel, empty, value in zip(channels, nothing, reading.signals, strict=True):
+            demand(
+                type(value) is type(empty) and shape_of(value) == shape_of(empty),
+                f"{channel.name!r} is {value!r:.80}: give {type(empty).__name__}"
+                + (f" of the declared shape {shape_of(empty)}" if shape_of(empty) else ""),
+            )
+    for channel in channels:
+        values = [getattr(reading.signals, channel.name) for reading in session.readings]
+        if isinstance(channel, TactileArray):
+            numbers = [cell for value in values if value.counter for cell in value.cells]
+        elif isinstance(channel, FastChannel):
+            numbers = [number for value in values for row in value.values[: value.new] for number in row]
+        else:
+            numbers = values
+        wrong = next((one for one in numbers if type(one) is not float or _infinite(one)), None)
+        demand(wrong is None, f"{channel.name!r} has the value {wrong!r}: give finite floats, or NaN")
+        demand(
+            not all(map(isnan, numbers)),
+            f"no number of the declared channel {channel.name!r} came in {len(values)} readings: fill it in "
+            "`Reading.signals`, or take it out of `channels`",
+        )
+
+
+def signals_have_no_gaps_or_repeats(subject: Subject) -> None:
+    """Images and samples of further channels are counted: each once, and what is lost shows in the counter."""
+    channels = further(subject.entry.channels)
+    counted = [one for one in channels if isinstance(one, TactileArray | FastChannel)]
+    if not counted:
+        raise CheckSkipped("this gripper has no further arrays or fast channels")
+    for channel in counted:
+        values = [getattr(reading.signals, channel.name) for reading in subject.session.readings]
+        taken = last_s = 0.0
+        for before, now in pairwise(values):
+            came = now.counter - before.counter
+            if isinstance(now, Samples):
+                taken += came
+                demand(
+                    0 <= now.new <= channel.samples and came >= now.new,  # type: ignore[union-attr]
+                    f"{channel.name!r} has {now.new} new samples while its counter goes from {before.counter} to "
+                    f"{now.counter}: count every sample that the sensor has taken, also those that were lost",
+                )
+                demand(
+                    all(isnan(number) for row in now.values[now.new :] for number in row),
+                    f"{channel.name!r} has numbers behind its {now.new} new samples: they repeat old ones; give NaN",
+                )
+            else:
+                taken += came
+                demand(
+                    came >= 0 and (came > 0 or repr(now) == repr(before)),
+                    f"an image of {channel.name!r} changes while its counter stays at {now.counter}: count up",
+                )
+            if came:
+                demand(
+                    now.t_s > before.t_s or before.counter == 0,
+                    f"{channel.name!r} goes from {before.t_s} to {now.t_s} s: what is new is later",
+                )
+                last_s = now.t_s
+        first_s = next((value.t_s for value in values if value.counter), 0.0)
+        if channel.rate_hz and last_s > first_s and taken > 10:
+            rate = taken / (last_s - first_s)
+            demand(
+                abs(rate - channel.rate_hz) <= FORGIVEN * channel.rate_hz,
+                f"{channel.name!r} comes at {rate:.3g} Hz and is declared at {channel.rate_hz:g} Hz: declare its rate",
+            )
 
 
 def channels_follow_from_the_settings(subject: Subject) -> None:
@@ -202,8 +296,9 @@ def rate_is_as_declared(subject: Subject) -> None:
             f"frames come at {rate:.3g} Hz, rate_hz says {info.rate_hz:g}: declare that rate (is t_s in seconds?)",
         )
     for channel in subject.entry.channels:
+        most = channel.samples if isinstance(channel, FastChannel) else 1
         demand(
-            channel.rate_hz <= info.rate_hz * (1.0 + FORGIVEN),
+            channel.rate_hz <= most * info.rate_hz * (1.0 + FORGIVEN),
             f"channel {channel.name!r} is declared at {channel.rate_hz:g} Hz, the gripper gives "
             f"{info.rate_hz:g} frames "
             "a second: declare the rate at which its value is new",
@@ -220,7 +315,7 @@ def images_count_up(subject: Subject) -> None:
             f"after image {before.counter} of {before.t_s} s comes image {now.counter} of {now.t_s} s: count up by one",
         )
     shown: dict[int, Pads] = {}
-    for frame, pads in subject.session.readings:
+    for frame, pads, _ in subject.session.readings:
         demand(
             pads.counter == 0 or pads.t_s <= frame.t_s + 1e-9,
             f"the image of {pads.t_s} s comes with the frame of {frame.t_s} s: give the last image",
@@ -646,6 +741,8 @@ CHECKS: Final = (
         frames_are_numbers,
         channels_follow_from_the_settings,
         channels_are_those_declared,
+        signals_are_those_declared,
+        signals_have_no_gaps_or_repeats,
         time_runs_forward,
         rate_is_as_declared,
         images_count_up,

@@ -8,24 +8,25 @@ from collections.abc import Iterator
 from math import isfinite, isinf, nan
 from typing import Any, Final, NamedTuple, get_type_hints
 
-from graspsense.core.entries import KINDS
+from graspsense.core.channels import further, no_signals
+from graspsense.core.entries import KINDS, Channel
 from graspsense.core.errors import named
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
 from graspsense.core.signals import (
     APPROACH,
-    CELLS,
     HOLD,
     RUNNING,
     Command,
     Frame,
     Outcome,
-    Pads,
     Phase,
+    Reading,
+    no_pads,
 )
 from graspsense.testing import component
 from graspsense.testing.checks import CheckFailed, checks_of, demand
-from graspsense.testing.model_gripper import CHANNELS_OF_FIELD, OBJECTS, model_gripper
+from graspsense.testing.model_gripper import CELLS, CHANNELS_OF_FIELD, OBJECTS, model_gripper
 from graspsense.testing.subject import Subject
 
 TICKS: Final = 4000
@@ -36,10 +37,14 @@ class Tick(NamedTuple):
     """One tick of a law: its arguments and its result."""
 
     before: Any
-    frame: Frame
-    pads: Pads
+    reading: Reading
     command: Command
     after: Any
+
+    @property
+    def frame(self) -> Frame:
+        """The frame of the reading."""
+        return self.reading.frame
 
 
 def ticks_of(subject: Subject, object_name: str = "a soft object") -> list[Tick]:
@@ -59,22 +64,23 @@ def fresh_ticks(
     """
     law = subject.create()
     step, params, state = type(law).step, law.params(), law.init()
-    gripper = model_gripper(_all_channels() if channels is None else channels, object_name)
+    gripper = model_gripper(_all_channels(subject) if channels is None else channels, object_name)
     gripper.open(0)
     gripper.tare([])
     ticks: list[Tick] = []
     for k in range(TICKS):
         if first and k == first:
             state, params = _made_again(state), _made_again(params)
-        frame, pads = gripper.read(0.1)
+        reading = gripper.read(0.1)
+        frame = reading.frame
         try:
-            command, after = step(params, state, frame, pads)
+            command, after = step(params, state, reading)
         except Exception as error:
             raise CheckFailed(
                 f"step raised {named(error)} at t = {frame.t_s:.3f} s with {object_name} between the fingers: a law "
                 "answers every frame with a command and a state; a channel that the gripper lacks is NaN"
             ) from error
-        ticks.append(Tick(state, frame, pads, command, after))
+        ticks.append(Tick(state, reading, command, after))
         state = after
         if getattr(after, "outcome", RUNNING) != RUNNING:
             break
@@ -82,12 +88,12 @@ def fresh_ticks(
     return ticks
 
 
-def _all_channels() -> set[str]:
-    return {*CHANNELS_OF_FIELD.values(), "pads"}
+def _all_channels(subject: Subject) -> set[str | Channel]:
+    return {*CHANNELS_OF_FIELD.values(), "pads", *further(subject.entry.requires)}
 
 
-def _required(subject: Subject) -> set[str]:
-    return {one.name for one in subject.entry.requires}
+def _required(subject: Subject) -> set[Channel]:
+    return set(subject.entry.requires)
 
 
 def _made_again(value: Any) -> Any:
@@ -131,18 +137,18 @@ def _demand_numbers(value: Any, what: str) -> None:
 
 
 def step_is_a_plain_function(subject: Subject) -> None:
-    """`step` is a static function of params, state, frame and pads."""
+    """`step` is a static function of params, state and reading."""
     cls: Any = subject.component.component_class()
     raw = inspect.getattr_static(cls, "step")
     demand(
         isinstance(raw, staticmethod),
         f"step of {cls.__name__} is not a static method: write a module function `step(params, state, "
-        "frame, pads)` and in "
+        "reading)` and in "
         "the class `step = staticmethod(step)`",
     )
     demand(
-        len(inspect.signature(cls.step).parameters) == 4,
-        f"step takes {inspect.signature(cls.step)}: it takes (params, state, frame, pads)",
+        len(inspect.signature(cls.step).parameters) == 3,
+        f"step takes {inspect.signature(cls.step)}: it takes (params, state, reading)",
     )
 
 
@@ -246,7 +252,7 @@ def same_tick_same_command(subject: Subject) -> None:
     ticks, law = ticks_of(subject), subject.create()
     step, params = type(law).step, law.params()
     for tick in reversed(ticks[::7]):
-        command, after = step(params, tick.before, tick.frame, tick.pads)
+        command, after = step(params, tick.before, tick.reading)
         demand(
             repr((command, after)) == repr((tick.command, tick.after)),
             f"repeated for t = {tick.frame.t_s:.3f} s, step gives {command} instead of {tick.command}: it may know "
@@ -282,8 +288,8 @@ def requires_what_it_reads(subject: Subject) -> None:
     demand(
         [repr(one.command) for one in full] == [repr(one.command) for one in own],
         "on a gripper that has only the channels it declares "
-        f"({', '.join(sorted(_required(subject))) or 'none'}) it commands something else: add what it "
-        "reads to `requires`",
+        f"({', '.join(sorted(one.name for one in _required(subject))) or 'none'}) it commands something else: add what "
+        "it reads to `requires`",
     )
 
 
@@ -292,14 +298,42 @@ def handles_frames_of_nan(subject: Subject) -> None:
     law = subject.create()
     step, params, state = type(law).step, law.params(), law.init()
     silent = Frame(0.001, 0.001, *(nan,) * 7, 0)
-    pads = Pads(0.0, 0, (nan,) * CELLS, (nan,) * CELLS)
+    reading = Reading(silent, no_pads(CELLS), no_signals(subject.entry.requires))
     try:
-        command, _ = step(params, state, silent, pads)
+        command, _ = step(params, state, reading)
     except Exception as error:
         raise CheckFailed(
             f"step raised {named(error)} on a frame of NaN: write comparisons so that NaN gives the safe result"
         ) from error
     demand(isinstance(command, Command), f"step returned {command!r} on a frame of NaN")
+
+
+def events_are_declared(subject: Subject) -> None:
+    """The events in the state are those that the class names, as bits of an integer; none is told in every tick."""
+    names = getattr(subject.component.component_class(), "events", ())
+    demand(
+        isinstance(names, tuple) and all(isinstance(name, str) and name for name in names),
+        f'`events` is {names!r}: give a tuple of names, as in ("contact", "slip")',
+    )
+    demand(len(set(names)) == len(names), f"`events` has a name twice: {', '.join(names)}")
+    state = subject.create().init()
+    demand(
+        not names or hasattr(state, "events"),
+        f"the class names the events {', '.join(names)}, and its state has no field `events: int`: add it, 0 at first",
+    )
+    for thing in OBJECTS:
+        bits = [getattr(tick.after, "events", 0) for tick in ticks_of(subject, thing)]
+        told = max(bits, default=0)
+        demand(
+            min(bits, default=0) >= 0 and told < 1 << len(names),
+            f"`events` of the state is {told if told > 0 else min(bits)}, and the class names {len(names)} events: set "
+            "bit i for the i-th name, no other",
+        )
+        for i, name in enumerate(names):
+            demand(
+                not bits or len(bits) < 2 or not all(one >> i & 1 for one in bits),
+                f"the event {name!r} is told in every tick: set its bit only in the tick in which it happens",
+            )
 
 
 def phases_are_in_order(subject: Subject) -> None:
@@ -323,7 +357,7 @@ def phases_are_in_order(subject: Subject) -> None:
 def ends_every_grasp(subject: Subject) -> None:
     """With a soft object, a hard object and nothing, it ends the grasp by itself with a valid outcome."""
     for object_name in OBJECTS:
-        gripper = model_gripper(_all_channels(), object_name)
+        gripper = model_gripper(_all_channels(subject), object_name)
         # If the controller does not end the grasp, the runner ends it after three more opening times.
         grasp = run_grasp(gripper, subject.create(), RunConfig(grasp_timeout_s=LONGEST_S))
         demand(
@@ -350,6 +384,7 @@ CHECKS: Final = (
         grasps_are_independent,
         requires_what_it_reads,
         handles_frames_of_nan,
+        events_are_declared,
         phases_are_in_order,
         ends_every_grasp,
     ),

@@ -21,7 +21,7 @@ from graspsense.core.signals import (
     VELOCITY,
     Command,
     Frame,
-    Pads,
+    Reading,
 )
 
 SPEED_M_S: Final = 0.01
@@ -69,8 +69,9 @@ def closing(kind: int, seconds: float, before_m: float, frame: Frame) -> Command
     return Command(EFFORT, effort, inf, inf)
 
 
-def step(params: GentleParams, state: GentleState, frame: Frame, pads: Pads) -> tuple[Command, GentleState]:
+def step(params: GentleParams, state: GentleState, reading: Reading) -> tuple[Command, GentleState]:
     """Close until the gap is at rest, or for six seconds."""
+    frame = reading.frame
     begun, gap, still = state.begun_t_s, state.gap_m, state.still
     if begun != begun:
         begun, gap, still = frame.t_s, frame.gap_m, RestState(frame.t_s, frame.gap_m)

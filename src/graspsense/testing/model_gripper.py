@@ -6,8 +6,22 @@ from collections.abc import Sequence
 from math import inf, nan
 from typing import TYPE_CHECKING, Any, Final
 
-from graspsense.core.roles import Controller, DeviceInfo, Reading, SensorBackend
-from graspsense.core.signals import CELLS, EFFORT, FORCE, NO_PADS, POSITION, VELOCITY, Command, Frame, Pads
+from graspsense.core.channels import declared_shape, further, no_signals
+from graspsense.core.entries import Channel, FastChannel, TactileArray
+from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
+from graspsense.core.signals import (
+    EFFORT,
+    FORCE,
+    POSITION,
+    VELOCITY,
+    Command,
+    Frame,
+    Image,
+    Pads,
+    Reading,
+    Samples,
+    no_pads,
+)
 
 if TYPE_CHECKING:
     from graspsense.core.runner import Grasp
@@ -21,6 +35,9 @@ EFFORT_LIMIT_N: Final = 100.0
 SPEED_LIMIT_M_S: Final = 0.2
 FOLLOWING_S: Final = 0.005
 TICKS_OF_AN_IMAGE: Final = 41
+CELLS: Final = 22
+FIRST_PAD_CELL: Final = 7
+"""Cells of a fingertip of the bench, where the channels do not say how many, and the first on the gripping face."""
 CHANNELS_OF_FIELD: Final = {
     "gap_m": "gap",
     "velocity_m_s": "velocity",
@@ -38,17 +55,24 @@ class ModelGripper(SensorBackend[None]):
     Between its fingers is an object of width `width_m` (0: nothing) and stiffness `stiffness_n_m`.
     """
 
-    def __init__(self, channels: frozenset[str], width_m: float, stiffness_n_m: float) -> None:
+    def __init__(self, channels: frozenset[str | Channel], width_m: float, stiffness_n_m: float) -> None:
         super().__init__(None)
-        self._absent = [field for field, name in CHANNELS_OF_FIELD.items() if name not in channels]
-        self._has_pads = "pads" in channels
+        declared = [channel for channel in channels if isinstance(channel, Channel)]
+        names = {channel.name if isinstance(channel, Channel) else channel for channel in channels}
+        self._absent = [field for field, name in CHANNELS_OF_FIELD.items() if name not in names]
+        self._has_pads = "pads" in names
+        arrays = [one.cells for one in declared if one.name == "pads" and isinstance(one, TactileArray)]
+        self._cells = arrays[0] if arrays else CELLS
+        self._further = tuple(sorted(further(declared), key=lambda channel: channel.name))
+        self._signals = no_signals(self._further)
         self._width_m, self._stiffness_n_m = width_m, stiffness_n_m
 
     def open(self, seed: int) -> DeviceInfo:
         """Begin with open fingers."""
         del seed
         self._gap, self._speed, self._effort, self._ticks = OPEN_M - 0.002, 0.0, 0.0, 0
-        self._pads = NO_PADS
+        self._pads = no_pads(self._cells)
+        self._signals = no_signals(self._further)
         return DeviceInfo(
             name="model_gripper",
             clock="virtual",
@@ -68,11 +92,26 @@ class ModelGripper(SensorBackend[None]):
             self._ticks * DT_S, DT_S, self._gap, self._speed, self._effort, force, force, 0.0, 0.0, 0
         )
         if self._has_pads and self._ticks % TICKS_OF_AN_IMAGE == 0:
-            cells = (3000.0 + 100.0 * force,) * CELLS
+            cells = (3000.0 + 100.0 * force,) * self._cells
             self._pads = Pads(frame.t_s, 1 + self._ticks // TICKS_OF_AN_IMAGE, cells, cells)
+        if self._further:
+            values = (self._value(channel, frame, force) for channel in self._further)
+            self._signals = type(self._signals)(*values)
         self._ticks += 1
         absent: dict[str, Any] = dict.fromkeys(self._absent, nan)
-        return Reading(frame._replace(**absent), self._pads)
+        return Reading(frame._replace(**absent), self._pads, self._signals)
+
+    def _value(self, channel: Channel, frame: Frame, force: float) -> Any:
+        """Return what a further channel measures in this tick: the force on a pad, on every cell and axis."""
+        last = getattr(self._signals, channel.name)
+        if isinstance(channel, TactileArray):
+            if self._ticks % TICKS_OF_AN_IMAGE:
+                return last
+            return Image(frame.t_s, last.counter + 1, (force,) * channel.cells)
+        if isinstance(channel, FastChannel):
+            rows, axes = declared_shape(channel)
+            return Samples(frame.t_s, last.counter + rows, rows, ((force,) * axes,) * rows)
+        return force
 
     def apply(self, command: Command) -> None:
         """Move by one tick under this command."""
@@ -114,6 +153,8 @@ class ModelGripper(SensorBackend[None]):
 
 def model_gripper(channels: Any, object_name: str = "a soft object") -> ModelGripper:
     """Return a model gripper with these channels and one of `OBJECTS` as the object, to drive a controller with.
+
+    A channel is a name in `signals.CHANNELS`, or a `Channel`. A further channel measures the force on a pad.
 
     >>> sorted(OBJECTS)
     ['a hard object', 'a soft object', 'nothing']

@@ -10,10 +10,11 @@ from attrs import evolve, fields
 
 from graspsense.core.features import Features, FeatureTable
 from graspsense.core.roles import DeviceInfo
-from graspsense.core.signals import CELLS, EFFORT, FIRST_PAD_CELL, Command, Outcome, Pads, Phase
+from graspsense.core.signals import EFFORT, Command, Outcome, Pads, Phase
 from graspsense.core.signals import Frame as _Frame
 from graspsense.core.trace import PAD_COLUMNS, Trace, trace_of
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
+from graspsense.testing.model_gripper import CELLS, FIRST_PAD_CELL
 
 RATE_HZ: Final = 500.0
 COLUMNS_OF_CHANNEL: Final = {

@@ -12,8 +12,8 @@ from attrs import define, field
 from graspsense.core.contact import CONTACT_FORCE_N
 from graspsense.core.errors import GraspsenseError, RecordingEnded
 from graspsense.core.guard import GuardParams, GuardState, guard
-from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
-from graspsense.core.signals import Command, Frame, Pads
+from graspsense.core.roles import DeviceInfo, SensorBackend
+from graspsense.core.signals import Command, Frame, Pads, Reading
 from graspsense.testing.checks import CheckFailed
 from graspsense.testing.gentle import EFFORT_N, closing, kind_of
 
@@ -50,7 +50,7 @@ class Session:
     def images(self) -> list[Pads]:
         """Return the cell images, each once, in order."""
         found: list[Pads] = []
-        for _, pads in self.readings:
+        for _, pads, _ in self.readings:
             if pads.counter and (not found or found[-1].counter != pads.counter):
                 found.append(pads)
         return found
@@ -112,7 +112,7 @@ def _use(
         readings.append(reading)
         if command is None:
             continue
-        frame = reading[0]
+        frame = reading.frame
         asked = command
         if isinstance(asked, int):
             before = readings[max(len(readings) - 2, 0)].frame

@@ -24,7 +24,6 @@ from attrs import frozen
 
 from graspsense.plugin_api import (
     CONTACT_FORCE_N,
-    FIRST_PAD_CELL,
     HOLD,
     RELEASE,
     Channel,
@@ -74,6 +73,8 @@ CHANNELS: Final = (
 NAMES: Final = tuple(feature.name for feature in CURVE)
 IMAGE: Final = NAMES[5:]
 LEAST_TRAVEL_M: Final = 2e-4
+FIRST_PAD_CELL: Final = 7
+"""The first cell on the gripping face of a PR2 fingertip; the rows and columns below are those of the PR2."""
 LEAST_LOSS: Final = 0.02
 """Share of the peak by which the force must fall in the hold for the relaxation to exceed the steps of the cells."""
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from graspsense.plugin_api import FeatureSetEntry, hookimpl
 
-GRASPSENSE_API = (1, 0)
+GRASPSENSE_API = (2, 0)
 
 
 @hookimpl

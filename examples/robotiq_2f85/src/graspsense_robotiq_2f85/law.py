@@ -19,8 +19,7 @@ from graspsense.plugin_api import (
     Channel,
     Command,
     Controller,
-    Frame,
-    Pads,
+    Reading,
     RestState,
     at_rest,
     setting,
@@ -92,8 +91,9 @@ class State(NamedTuple):
     still: RestState
 
 
-def step(params: CloseUntilStoppedConfig, state: State, frame: Frame, pads: Pads) -> tuple[Command, State]:
+def step(params: CloseUntilStoppedConfig, state: State, reading: Reading) -> tuple[Command, State]:
     """Close; squeeze from contact on; hold when the fingers are at rest."""
+    frame = reading.frame
     phase, outcome, seconds = state.phase, state.outcome, state.seconds + frame.dt_s
     still = update_rest(state.still, frame.t_s, frame.gap_m, params.rest_speed_m_s, params.rest_window_s)
     if outcome == RUNNING:

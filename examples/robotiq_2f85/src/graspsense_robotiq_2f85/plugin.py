@@ -12,7 +12,7 @@ from graspsense.plugin_api import (
     hookimpl,
 )
 
-GRASPSENSE_API = (1, 0)
+GRASPSENSE_API = (2, 0)
 
 
 @hookimpl

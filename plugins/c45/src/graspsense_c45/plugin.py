@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from graspsense_c45.tree import Tree
 
-GRASPSENSE_API = (1, 0)
+GRASPSENSE_API = (2, 0)
 
 
 @hookimpl

@@ -26,6 +26,7 @@ from graspsense.plugin_api import (
 )
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.emulation import emulated_body
+from graspsense_pr2_gripper.fingertip import fingertips
 from graspsense_pr2_gripper.link import LockStepLink
 from graspsense_pr2_gripper.measure import Measure
 from graspsense_pr2_gripper.opening import Opened, open_board
@@ -64,7 +65,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         Channel("force_right", "N", _PADS_RATE_HZ),
         Channel("edge_left", "N", _PADS_RATE_HZ),
         Channel("edge_right", "N", _PADS_RATE_HZ),
-        Channel("pads", "counts", _PADS_RATE_HZ),
+        fingertips(_PADS_RATE_HZ),
     )
     accepts = ("effort",)
 

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from graspsense.plugin_api import (
-    CELLS,
     EFFORT,
     Command,
     Frame,
@@ -20,6 +19,7 @@ from graspsense.plugin_api import (
     gap_and_rate,
     revolutions_at,
 )
+from graspsense_pr2_gripper.fingertip import CELLS
 from graspsense_pr2_gripper.linkage import LINKAGES
 from graspsense_pr2_gripper.protocol import (
     ACCEPTED,
@@ -129,7 +129,7 @@ class Firmware:
         reading = self._body.read(1.0)
         if reading is None:
             raise RuntimeError("the body of an emulated gripper gave no frame: it needs a virtual clock")
-        frame, pads = reading
+        frame, pads, _ = reading
         self._step += 1
         self._measure(frame)
         self._latch(pads, now_us)

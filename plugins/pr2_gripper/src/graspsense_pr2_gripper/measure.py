@@ -7,9 +7,6 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from graspsense.plugin_api import (
-    CELLS,
-    FIRST_PAD_CELL,
-    NO_PADS,
     Frame,
     LoadTable,
     Pads,
@@ -19,10 +16,12 @@ from graspsense.plugin_api import (
     gap_and_rate,
     load_of,
     masked,
+    no_pads,
     pad_force,
     tare,
 )
 from graspsense_pr2_gripper.config import Pr2Config
+from graspsense_pr2_gripper.fingertip import CELLS, FIRST_PAD_CELL
 from graspsense_pr2_gripper.linkage import LINKAGES, edge_scale
 from graspsense_pr2_gripper.protocol import LEFT_ABSENT, RIGHT_ABSENT, Identity, InputReport
 from graspsense_pr2_gripper.stream import Image
@@ -83,7 +82,7 @@ class Measure:
         self._swap, self._mirror = config.swap_fingers, (config.mirror_left, config.mirror_right)
         self._stored, self._tables = stored, tables
         self._zero: Tips | None = stored
-        self._pads = NO_PADS
+        self._pads = no_pads(CELLS)
         self._forces = _NO_FORCES
         self._first_us: int | None = None
         self._last_us = 0
@@ -121,7 +120,7 @@ class Measure:
 
     def tare(self, images: Sequence[Pads]) -> None:
         """Set the zero from these images. Raises TareRefused."""
-        zero = tare(images, self._pad_per_n, self._stored)
+        zero = tare(images, self._pad_per_n, FIRST_PAD_CELL, self._stored)
         if self._stored is None:
             for side, cells in zip(("left", "right"), zero, strict=True):
                 good = [cell for cell in cells[FIRST_PAD_CELL:] if cell]
@@ -160,8 +159,8 @@ class Measure:
         bad = left_bad + right_bad
         self.bad_cells = max(self.bad_cells, bad)
         status = BAD_CELL if bad else 0
-        left_n = pad_force(left, zero[0], self._pad_per_n)
-        right_n = pad_force(right, zero[1], self._pad_per_n)
+        left_n = pad_force(left, zero[0], self._pad_per_n, FIRST_PAD_CELL)
+        right_n = pad_force(right, zero[1], self._pad_per_n, FIRST_PAD_CELL)
         if self._tables is not None:
             left_n, left_inside = load_of(self._tables[0], left_n)
             right_n, right_inside = load_of(self._tables[1], right_n)

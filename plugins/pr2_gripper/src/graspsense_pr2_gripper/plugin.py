@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from graspsense.plugin_api import EmulatorEntry, Finding, FoundDevice, SensorBackendEntry, hookimpl
 
-GRASPSENSE_API = (1, 0)
+GRASPSENSE_API = (2, 0)
 
 
 @hookimpl

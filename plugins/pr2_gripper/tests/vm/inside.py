@@ -29,7 +29,7 @@ from graspsense.cli.main import main as graspsense
 from graspsense.cli.options import settings_of
 from graspsense.core.pipeline import grasp_with
 from graspsense.core.plugins import installed
-from graspsense.core.signals import Command, Frame, Outcome, Pads, Phase
+from graspsense.core.signals import Command, Outcome, Phase, Reading
 from graspsense.core.trial import GraspEvent, Trial
 from graspsense.plugin_api import DeviceLost, NoDevice, create
 from graspsense.store.record_grasp import record_grasp
@@ -251,13 +251,13 @@ class At:
         self.when_s = 0.0
         self.force_n = 0.0
 
-    def take(self, frame: Frame, pads: Pads, phase: int, command: Command) -> None:
+    def take(self, reading: Reading, phase: int, command: Command) -> None:
         if phase != self.phase or self.when_s:
             return
         self.tick -= 1
         if self.tick <= 0:
             self.when_s = time.monotonic()
-            self.force_n = frame.force_left_n
+            self.force_n = reading.frame.force_left_n
             self.act()
 
     def event(self, event: GraspEvent) -> None:

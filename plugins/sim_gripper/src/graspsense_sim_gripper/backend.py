@@ -8,8 +8,6 @@ from typing import Any, Final, Unpack
 from attrs import evolve
 
 from graspsense.plugin_api import (
-    CELLS,
-    NO_PADS,
     BatchBackend,
     BatchOptions,
     Channel,
@@ -24,6 +22,7 @@ from graspsense.plugin_api import (
     SimulationVariant,
     create,
     maker,
+    no_pads,
     tare,
 )
 from graspsense_sim_gripper.binding import bind_reachable
@@ -34,6 +33,7 @@ from graspsense_sim_gripper.dynamics.state import PlantState, is_finite
 from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
+from graspsense_sim_gripper.fingertip import CELLS, FIRST_PAD_CELL, fingertips
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
 from graspsense_sim_gripper.problem import GraspController
 from graspsense_sim_gripper.reduction.propose import FORCE_N, SPEED_M_S
@@ -82,7 +82,7 @@ class SimBackend(BatchBackend[SimConfig]):
             Channel("velocity", "m/s", frames_hz),
             Channel("effort", "N", frames_hz),
             *forces,
-            Channel("pads", "counts", pads_hz),
+            fingertips(pads_hz),
         )
 
     def objects(self) -> tuple[ObjectKind, ...]:
@@ -116,7 +116,7 @@ class SimBackend(BatchBackend[SimConfig]):
         zero = (CELL_OFFSET[0],) * CELLS
         self._blocks = setup.noise()
         self._buffers = PadBuffers(zero, zero, [], [])
-        self._pads = NO_PADS
+        self._pads = no_pads(CELLS)
         self._effort_n: float | None = None
         self._explains = self.config.explain
         # Compression and force at each tick since the first contact, where they are to be explained.
@@ -148,7 +148,7 @@ class SimBackend(BatchBackend[SimConfig]):
         if count != self._pads.counter:
             image = buffers.images[count - 1]
             self._pads = Pads(self._sensor.image_t_s, count, tuple(image[0]), tuple(image[1]))
-        return _reading(frame, self._pads)
+        return _reading(frame, self._pads, ())
 
     def _moved(self, effort_n: float) -> PlantState:
         """Return the plant after a tick. Raises TermFailed."""
@@ -169,7 +169,7 @@ class SimBackend(BatchBackend[SimConfig]):
         """Set the zeros of the cells to the mean of these images; an ideal sensor has none."""
         if self.config.sensor == "ideal":
             return
-        left, right = tare(images, PAD_COUNTS_PER_N)
+        left, right = tare(images, PAD_COUNTS_PER_N, FIRST_PAD_CELL)
         self._buffers = self._buffers._replace(left_zero=left, right_zero=right)
         self._sensor = apply_tare(self._sensor, self._buffers)
 

@@ -14,7 +14,6 @@ import numpy as np
 from attrs import evolve, fields
 
 from graspsense.plugin_api import (
-    CELLS,
     EFFORT,
     Command,
     ConfigError,
@@ -29,6 +28,7 @@ from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
 from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance
 from graspsense_sim_gripper.dynamics.drive import Drive, Friction
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
+from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.objects.instance import Instance, cell_weights, central_cells, sample
 from graspsense_sim_gripper.objects.library import find, split_number
 from graspsense_sim_gripper.objects.spec import ObjectSpec

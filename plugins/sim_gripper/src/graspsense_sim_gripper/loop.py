@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
-from graspsense.plugin_api import TARING, Command, Frame, Pads, TickParams, TickState
+from graspsense.plugin_api import TARING, Command, Frame, Pads, Reading, TickParams, TickState
 from graspsense_sim_gripper.dynamics.state import PlantState, is_finite
 from graspsense_sim_gripper.sensing import PadBuffers, SensorParams, SensorState, apply_tare, sense
 
@@ -78,9 +78,11 @@ class Buffers(NamedTuple):
     columns: Table
     """(9, n) The values of `COLUMNS` at each tick from the approach on."""
     phases: Any
-    """(n,) The phase of each row."""
+    """(n,) The phase of each tick, and above `EVENT_SHIFT` bits the events that the controller told in it."""
 
 
+EVENT_SHIFT: Final = 8
+"""Number of bits of a phase in `Buffers.phases`."""
 NOT_STARTED: Final = LoopState(0, 0, -1, 0, 0.0, 0)
 NOT_NEGATIVE: Final = 0x3FFFFFFF
 """After `&` with this mask the compiler knows that an index is not negative, and omits the check at each access."""
@@ -90,14 +92,12 @@ def _move_unbound(plant: PlantModel, state: PlantState, effort_n: float, dt_s: f
     raise TypeError("the loop has no plant: compose.grasp_loop binds one")
 
 
-def _control_unbound(
-    params: TickParams, state: TickState, frame: Frame, pads: Pads
-) -> tuple[Command, TickState]:
+def _control_unbound(params: TickParams, state: TickState, reading: Reading) -> tuple[Command, TickState]:
     raise TypeError("the loop has no controller: compose.grasp_loop binds one")
 
 
 move: Callable[[PlantModel, PlantState, float, float], PlantState] = _move_unbound
-control: Callable[[TickParams, TickState, Frame, Pads], tuple[Command, TickState]] = _control_unbound
+control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = _control_unbound
 
 
 def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
@@ -120,7 +120,7 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
             count = sensor.images
             buffers.image_times[count - 1] = sensor.image_t_s
             pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
-        command, state = control(params.controller, state, frame, pads)
+        command, state = control(params.controller, state, Reading(frame, pads, ()))
         past_tare = phase != TARING
         if state.phase != phase:
             if phase == TARING and count > tare_from:
@@ -132,7 +132,7 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
         if phase > TARING and past_tare:
             row = recorded & NOT_NEGATIVE
             _record(columns, row, frame, effort)
-            buffers.phases[row] = phase
+            buffers.phases[row] = phase | state.events << EVENT_SHIFT
             recorded += 1
         ticks += 1
         if state.done == 1 or state.guard.stopped == 1:

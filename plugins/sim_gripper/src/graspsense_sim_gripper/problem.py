@@ -10,9 +10,10 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import CELLS, Controller, DeviceInfo, RunConfig
+from graspsense.plugin_api import Controller, DeviceInfo, RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
+from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.objects.spec import ObjectSpec, TermParams
 from graspsense_sim_gripper.sensing import SensorParams, SensorState
 from graspsense_sim_gripper.stepping.scheme import PlantParams

@@ -15,8 +15,6 @@ import math
 from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import (
-    CELLS,
-    FIRST_PAD_CELL,
     Frame,
     ScrewLinkage,
     edge_force,
@@ -25,6 +23,7 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.drive_models import ENCODER_TICKS
 from graspsense_sim_gripper.dynamics.state import PlantState
+from graspsense_sim_gripper.fingertip import CELLS, FIRST_PAD_CELL
 
 VELOCITY_FILTER_S: Final = 0.003
 """Time constant of the velocity filter. From 10 ms on, velocity control runs into a limit cycle."""
@@ -194,8 +193,8 @@ def sense(
 def image_forces(left: CellColumn, right: CellColumn, pads: PadBuffers) -> PadForces:
     """Return the forces (N) of one cell image of both fingertips, relative to their zeros."""
     return PadForces(
-        pad_force(left, pads.left_zero, PAD_COUNTS_PER_N),
-        pad_force(right, pads.right_zero, PAD_COUNTS_PER_N),
+        pad_force(left, pads.left_zero, PAD_COUNTS_PER_N, FIRST_PAD_CELL),
+        pad_force(right, pads.right_zero, PAD_COUNTS_PER_N, FIRST_PAD_CELL),
         edge_force(left, pads.left_zero, EDGE_COUNTS_PER_N),
         edge_force(right, pads.right_zero, EDGE_COUNTS_PER_N),
     )

@@ -10,12 +10,14 @@ from typing import Literal, NamedTuple
 
 from attrs import frozen
 
-from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, Pads, setting
+from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, Reading, setting
 from graspsense.plugins.controllers.supervision import (
+    EVENTS,
     LAW_CHANNELS,
     GraspProgress,
     Supervision,
     SupervisionConfig,
+    events_of,
     not_begun,
     supervise,
     supervision,
@@ -114,15 +116,20 @@ class ForceState(NamedTuple):
     outcome: int
     progress: GraspProgress
     effort_n: float
+    events: int = 0
+    """The bits of `EVENTS` in this tick."""
 
 
-def step(params: ForceParams, state: ForceState, frame: Frame, pads: Pads) -> tuple[Command, ForceState]:
+def step(params: ForceParams, state: ForceState, reading: Reading) -> tuple[Command, ForceState]:
     """Close with the probing effort; from contact on, control the force if the loop is closed."""
+    frame = reading.frame
     progress = supervise(params.supervision, state.progress, frame)
     effort = params.loop.probing_force_n
     if progress.phase != APPROACH:
         effort = squeezing_effort(params.loop, state.effort_n, frame)
-    return Command(EFFORT, effort, inf, inf), ForceState(progress.phase, progress.outcome, progress, effort)
+    return Command(EFFORT, effort, inf, inf), ForceState(
+        progress.phase, progress.outcome, progress, effort, events_of(state.progress, progress)
+    )
 
 
 class ForceController(Controller[ForceConfig]):
@@ -131,6 +138,7 @@ class ForceController(Controller[ForceConfig]):
     requires = LAW_CHANNELS
     commands = ("effort",)
     step = staticmethod(step)
+    events = EVENTS
 
     def params(self) -> ForceParams:
         """Return the parameters of the law."""
@@ -141,4 +149,4 @@ class ForceController(Controller[ForceConfig]):
     def init(self) -> ForceState:
         """Return the state before the first tick."""
         progress = not_begun()
-        return ForceState(progress.phase, progress.outcome, progress, float(self.config.probing_force_n))
+        return ForceState(progress.phase, progress.outcome, progress, float(self.config.probing_force_n), 0)

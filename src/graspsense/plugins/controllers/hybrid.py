@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from attrs import frozen
 
-from graspsense.plugin_api import APPROACH, VELOCITY, Command, Controller, Frame, Pads, setting
+from graspsense.plugin_api import APPROACH, VELOCITY, Command, Controller, Reading, setting
 from graspsense.plugins.controllers.force import (
     ForceLoop,
     ForceLoopConfig,
@@ -20,10 +20,12 @@ from graspsense.plugins.controllers.force import (
     squeezing_effort,
 )
 from graspsense.plugins.controllers.supervision import (
+    EVENTS,
     LAW_CHANNELS,
     GraspProgress,
     Supervision,
     SupervisionConfig,
+    events_of,
     not_begun,
     supervise,
     supervision,
@@ -72,12 +74,15 @@ class HybridState(NamedTuple):
     approach_effort_n: float
     approached_t_s: float
     """Time of the last tick of the velocity loop, at which the ramp starts."""
+    events: int = 0
+    """The bits of `EVENTS` in this tick."""
 
 
-def step(params: HybridParams, state: HybridState, frame: Frame, pads: Pads) -> tuple[Command, HybridState]:
+def step(params: HybridParams, state: HybridState, reading: Reading) -> tuple[Command, HybridState]:
     """Control the velocity until both pads touch, then the force."""
+    frame = reading.frame
     progress = supervise(params.supervision, state.progress, frame)
-    _, _, _, integral, force_effort, approach_effort, contact_t = state
+    _, _, _, integral, force_effort, approach_effort, contact_t, _ = state
     if progress.phase == APPROACH:
         effort, integral = closing_effort(params.velocity, integral, frame)
         approach_effort = effort
@@ -94,7 +99,14 @@ def step(params: HybridParams, state: HybridState, frame: Frame, pads: Pads) -> 
         if progress.phase != APPROACH:
             limit = effort
     return Command(params.kind, value, limit, inf), HybridState(
-        progress.phase, progress.outcome, progress, integral, force_effort, approach_effort, contact_t
+        progress.phase,
+        progress.outcome,
+        progress,
+        integral,
+        force_effort,
+        approach_effort,
+        contact_t,
+        events_of(state.progress, progress),
     )
 
 
@@ -105,6 +117,7 @@ class HybridController(Controller[HybridConfig]):
     commands = ("effort",)
     alternatives = ("velocity",)
     step = staticmethod(step)
+    events = EVENTS
 
     def params(self) -> HybridParams:
         """Return the parameters of the law."""
@@ -129,4 +142,5 @@ class HybridController(Controller[HybridConfig]):
             float(self.config.probing_force_n),
             0.0,
             0.0,
+            0,
         )

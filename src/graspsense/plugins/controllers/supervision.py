@@ -196,6 +196,19 @@ def supervision(
     )
 
 
+EVENTS: Final = ("contact", "slip")
+"""The events that every control law of this package tells: both pads touch; the object slipped out."""
+
+
+def events_of(before: GraspProgress, after: GraspProgress) -> int:
+    """Return the bits of the `EVENTS` between two ticks."""
+    if after.phase != APPROACH and before.phase == APPROACH:
+        return 1
+    if after.outcome == SLIPPED and before.outcome != SLIPPED:
+        return 2
+    return 0
+
+
 def not_begun() -> GraspProgress:
     """Return the progress before the first tick."""
     return GraspProgress(APPROACH, RUNNING, 0, 0.0, 0.0, RestState(0.0, 0.0), 0.0, 0.0, 0.0)

@@ -11,12 +11,14 @@ from typing import Literal, NamedTuple
 
 from attrs import frozen
 
-from graspsense.plugin_api import EFFORT, VELOCITY, Command, Controller, Frame, Pads, setting
+from graspsense.plugin_api import EFFORT, VELOCITY, Command, Controller, Frame, Reading, setting
 from graspsense.plugins.controllers.supervision import (
+    EVENTS,
     LAW_CHANNELS,
     GraspProgress,
     Supervision,
     SupervisionConfig,
+    events_of,
     not_begun,
     supervise,
     supervision,
@@ -116,18 +118,19 @@ class VelocityState(NamedTuple):
     outcome: int
     progress: GraspProgress
     integral_n: float
+    events: int = 0
+    """The bits of `EVENTS` in this tick."""
 
 
-def step(
-    params: VelocityParams, state: VelocityState, frame: Frame, pads: Pads
-) -> tuple[Command, VelocityState]:
+def step(params: VelocityParams, state: VelocityState, reading: Reading) -> tuple[Command, VelocityState]:
     """Close at the given speed against any resistance."""
+    frame = reading.frame
     progress = supervise(params.supervision, state.progress, frame)
     value, integral = closing_effort(params.loop, state.integral_n, frame)
     if params.kind == VELOCITY:
         value = -params.loop.closing_speed_m_s
     return Command(params.kind, value, inf, inf), VelocityState(
-        progress.phase, progress.outcome, progress, integral
+        progress.phase, progress.outcome, progress, integral, events_of(state.progress, progress)
     )
 
 
@@ -138,6 +141,7 @@ class VelocityController(Controller[VelocityConfig]):
     commands = ("effort",)
     alternatives = ("velocity",)
     step = staticmethod(step)
+    events = EVENTS
 
     def params(self) -> VelocityParams:
         """Return the parameters of the law."""
@@ -150,4 +154,4 @@ class VelocityController(Controller[VelocityConfig]):
     def init(self) -> VelocityState:
         """Return the state before the first tick."""
         progress = not_begun()
-        return VelocityState(progress.phase, progress.outcome, progress, float(self.config.preload_n))
+        return VelocityState(progress.phase, progress.outcome, progress, float(self.config.preload_n), 0)

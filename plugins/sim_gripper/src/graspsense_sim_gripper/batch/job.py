@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -12,14 +12,16 @@ from attrs import define, evolve, field, frozen
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import (
-    CELLS,
     Controller,
+    GraspEvent,
     Outcome,
+    Phase,
     RunConfig,
     TickParams,
     TickState,
     Trace,
     ended_by_itself,
+    event_name,
     first_state,
     overdue,
     seconds_at_most,
@@ -31,8 +33,10 @@ from graspsense_sim_gripper.compiled.padding import composition_of, padded, unpa
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.exact.discretise import discretise
+from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.loop import (
     COLUMNS,
+    EVENT_SHIFT,
     NOT_STARTED,
     Buffers,
     GraspParams,
@@ -222,11 +226,11 @@ def grasp_once(
     table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
     images, times = np.asarray(buffers.pads.images[:k]), np.asarray(buffers.image_times[:k])
     if job.traces and 2 * n < len(columns[0]):
-        return finished(job, outcome, reason, plant, _trace(table.copy(), numbers.copy(), images, times))
+        return finished(job, outcome, reason, plant, _trace(job, table.copy(), numbers.copy(), images, times))
     # A trace that fills most of the buffers, or that only features are extracted from, is a view of them.
     # While a column of it is referenced, those buffers are kept, and the next grasps have new ones.
     references = sys.getrefcount(columns), sys.getrefcount(phases)
-    done = finished(job, outcome, reason, plant, _trace(table, numbers, images, times))
+    done = finished(job, outcome, reason, plant, _trace(job, table, numbers, images, times))
     if on_arrays and (sys.getrefcount(columns), sys.getrefcount(phases)) != references:
         storage.buffers = _first_images(buffers)._replace(
             columns=np.empty_like(columns), phases=np.empty_like(phases)
@@ -328,11 +332,15 @@ def _first_images(buffers: Buffers) -> Buffers:
 
 
 def _trace(
+    job: Job,
     table: NDArray[np.float64],
     phases: NDArray[np.int64],
     images: NDArray[np.float64],
     times: NDArray[np.float64],
 ) -> Trace:
+    events: tuple[GraspEvent, ...] = ()
+    if type(job.controller).events:
+        events = _take_events(type(job.controller).events, table[0], phases)
     # The runner keeps the image that had arrived when the approach began, and those after it.
     begin = 0
     if len(phases) and len(times):
@@ -345,4 +353,20 @@ def _trace(
         pad_t_s=np.array(times[begin:]),
         pad_left=images[begin:, 0].copy(),
         pad_right=images[begin:, 1].copy(),
+        events=events,
+    )
+
+
+def _take_events(
+    names: Sequence[str], times: NDArray[np.float64], phases: NDArray[np.int64]
+) -> tuple[GraspEvent, ...]:
+    """Return the events that the loop wrote above the bits of the phases, and remove them there."""
+    ticks = np.flatnonzero(phases >> EVENT_SHIFT).tolist()
+    bits = (phases[ticks] >> EVENT_SHIFT).tolist()
+    phases[ticks] &= (1 << EVENT_SHIFT) - 1
+    return tuple(
+        GraspEvent(float(times[tick]), Phase(int(phases[tick])), event_name(names, i), "controller")
+        for tick, told in zip(ticks, bits, strict=True)
+        for i in range(told.bit_length())
+        if told >> i & 1
     )

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
-from graspsense.plugin_api import Frame, bind, maker, tick
+from graspsense.plugin_api import Frame, bind, events_of, maker, tick
 from graspsense_sim_gripper.binding import Constructors, bind_reachable
 from graspsense_sim_gripper.dynamics.contact import BalanceSearch, ObjectModel, PadLoad, solve_contact
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
@@ -258,7 +258,7 @@ def guarded_loop(composition: Composition, step: ControllerStep) -> Callable[...
 
 def _loop_of(move: PlantMove, step: ControllerStep, force: Law | None) -> Callable[..., SimulationState]:
     """Return the loop with this plant; `force`: of the object, in the form that suits the interpreter."""
-    control = bind_reachable(tick, {"step": step})
+    control = bind_reachable(tick, {"step": step, "events_told": events_of(step)})
     loop = bind_reachable(grasp, {"move": move, "control": control})
     return bind_reachable(loop, {"object_force": force}, INTERPRETED) if force else loop
 

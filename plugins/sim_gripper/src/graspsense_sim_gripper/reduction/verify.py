@@ -14,7 +14,6 @@ import numpy as np
 from attrs import define, evolve, field
 
 from graspsense.plugin_api import (
-    CELLS,
     CONTACT_FORCE_N,
     HOLD,
     NotCompilable,
@@ -31,8 +30,10 @@ from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import Motion
 from graspsense_sim_gripper.exact.discretise import discretise
+from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.loop import (
     COLUMNS,
+    EVENT_SHIFT,
     NOT_STARTED,
     Buffers,
     GraspParams,
@@ -292,7 +293,7 @@ def _record(end: _Stage, bias: Bias, dt_s: float) -> GraspRecord:
         speed_m_s=columns[COLUMNS.index("velocity_m_s")],
         left_n=np.where(left_n != 0.0, left_n - bias.force_n, 0.0),
         right_n=np.where(right_n != 0.0, right_n - bias.force_n, 0.0),
-        n_rows=int(np.sum(columns[-1] <= HOLD)),
+        n_rows=int(np.sum(np.mod(columns[-1], 1 << EVENT_SHIFT) <= HOLD)),
         peak_n=progress.plant.peak_n,
     )
 
