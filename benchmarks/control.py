@@ -26,7 +26,7 @@ from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import create
 from graspsense_pr2_gripper import backend as driver
-from graspsense_pr2_gripper import opening
+from graspsense_pr2_gripper import emulation, opening
 from graspsense_pr2_gripper.backend import Pr2Backend
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.faults import Wire
@@ -87,9 +87,9 @@ class Playback(Transport):
 
 def ticks_us(grasps: int) -> list[float]:
     controller = create("controller", "hybrid")
-    opening.Wire = Recorded  # type: ignore[misc]
+    emulation.Wire = Recorded  # type: ignore[misc]
     run_grasp(Pr2Backend(EMULATED), controller, RunConfig())
-    opening.Wire = Wire  # type: ignore[misc]
+    emulation.Wire = Wire  # type: ignore[misc]
     sent = recordings[0].sent
     feature = recordings[0].firmware.feature()
     identity = decode_identity(feature)

@@ -24,17 +24,18 @@ from pathlib import Path
 import numpy as np
 
 from graspsense.core.errors import RecordingEnded
-from graspsense.core.roles import DeviceInfo, Reading, SensorBackend
+from graspsense.core.roles import DeviceInfo, SensorBackend
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
-from graspsense.core.signals import CELLS, EFFORT, Command, Frame, Pads
+from graspsense.core.signals import EFFORT, Command, Frame, Pads, Reading
 from graspsense.plugin_api import create
-from graspsense.recording.layout import PADS_FIELDS, TICK_FIELDS
+from graspsense.recording.layout import TICK_FIELDS, pads_topic
 from graspsense.recording.recorder import Recorder
 from graspsense.recording.recording_info import RecordingInfo
 
 RATE_HZ = 1000.0
 GOAL_US = 20.0
+CELLS = 22
 
 
 class Paced(SensorBackend[None]):
@@ -128,7 +129,7 @@ def main() -> None:
         "python": platform.python_version(),
         "mcap": version("mcap"),
         "rate_hz": RATE_HZ,
-        "channels": len(TICK_FIELDS) + len(PADS_FIELDS),
+        "channels": len(TICK_FIELDS) + len(pads_topic(CELLS).fields),
         "rounds": given.rounds,
         "ticks": given.rounds * ticks,
         "p50_us_without": float(np.median(np.concatenate(took[False])) * 1e6),
