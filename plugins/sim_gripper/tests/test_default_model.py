@@ -29,6 +29,8 @@ def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
     said = pipeline.grasp(object=name, seed=5).prediction
 
     assert said.label == name
+    assert said.prediction_set[0] == name
+    assert said.coverage == 0.9
     assert said.probabilities[name] == max(said.probabilities.values())
     assert any(step.startswith(("p_first ", "p_steady ", "f_steady ", "delta_t ")) for step in said.because)
     assert "simulated grasps at 20 N, 10 mm/s" in said.model
@@ -51,6 +53,11 @@ def test_nothing_there_is_unknown(pipeline):
 
     assert said.label == "unknown"
     assert said.because == ("no feature is defined: no pad felt 0.625 N",)
+
+
+def test_its_sets_are_calibrated_for_each_label():
+    assert KEPT["sets"]["unit"] == "instances"
+    assert {(units, own) for _, units, own in KEPT["sets"]["thresholds"].values()} == {(60, True)}
 
 
 def test_its_provenance_says_what_made_it():

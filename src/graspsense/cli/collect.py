@@ -119,6 +119,8 @@ def _show(word: str, trial: Trial) -> None:
         certainty = f" ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""
         style = Style.GOOD if prediction.label == word.partition("#")[0] else Style.CAUTION
         echo_entry("  prediction", f"{prediction.label}{certainty}", style, err=True, width=_LABEL)
+        if prediction.set_in_words:
+            echo_entry("  set", prediction.set_in_words, err=True, width=_LABEL)
 
 
 def _print_counts(save: str, collection: Collection, as_json: bool) -> None:

@@ -100,7 +100,10 @@ def _print(found: Evaluation) -> None:
         echo_entry("", f"{percentage(part.rate)} ({part.correct} of {part.n}) {name}")
     echo_entry("classifier", found.classifier)
     echo_entry("features", ", ".join(name for name, _ in found.features))
-    echo_entry("unknown", f"{found.unknown.words} would be called unknown")
+    echo_entry(
+        "unknown", f"{found.unknown.words} would be called unknown (false alarms: their labels are known)"
+    )
+    _print_doubt(found)
     for note in found.notes:
         echo_entry("note", note)
     echo()
@@ -121,11 +124,37 @@ def _print(found: Evaluation) -> None:
         rows = [(name, percentage(one.rate), percentages(one.interval), f"{one.correct} of {one.n}")
                 for name, one in found.by_class.items()]  # fmt: skip
         echo_table(("CLASS", "RATE", "95 %", "TRIALS"), rows)
+    if found.reliability is not None:
+        echo("\nreliability of the probabilities")
+        bins = [(percentage(one.probability), percentage(one.rate.rate), percentages(one.rate.interval),
+                 str(one.rate.n)) for one in found.reliability.curve]  # fmt: skip
+        echo_table(("MEAN PROBABILITY", "RATE", "95 %", "TRIALS"), bins)
     if found.learning_curve:
         echo("\nlearning curve")
         points = [(f"{one.trained_on:.0f}", percentage(one.rate.rate), percentages(one.rate.interval))
                   for one in found.learning_curve]  # fmt: skip
         echo_table(("TRAINING TRIALS", "RATE", "95 %"), points)
+
+
+def _print_doubt(found: Evaluation) -> None:
+    from graspsense.evaluation.intervals import percentage
+
+    sets = found.sets
+    if sets is not None and (sets.covered is None or sets.single is None):
+        echo_entry("sets", f"not measured ({sets.reason})")
+    elif sets is not None and sets.covered is not None and sets.single is not None:
+        echo_entry(
+            "sets",
+            f"{sets.covered.words} contain the true label; {100 * sets.asked:.0f} % asked for, by {sets.unit}",
+        )
+        least = min(sets.by_label, key=lambda name: sets.by_label[name].rate)
+        echo_entry("", f"{sets.mean_size:.2f} labels on average, {percentage(sets.single.rate)} of the sets have one; "
+                       f"lowest coverage: {percentage(sets.by_label[least].rate)} of {least}")  # fmt: skip
+    if found.reliability is not None:
+        error = percentage(found.reliability.calibration_error)
+        echo_entry(
+            "probability", f"Brier score {found.reliability.brier:.3f}, expected calibration error {error}"
+        )
 
 
 def _row(name: str, measured: Measurement) -> tuple[str, ...]:

@@ -110,12 +110,15 @@ def _trials(
 def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) -> None:
     from graspsense.core.features import percent
 
-    header = ("TRIAL", "PREDICTION", "CERTAINTY", *(("LABEL", "CORRECT") if labels else ()), "BECAUSE")
+    coverage = next((one.coverage for one in predictions if one.coverage is not None), None)
+    sets = () if coverage is None else (f"{100 * coverage:.0f} % SET",)
+    header = ("TRIAL", "PREDICTION", "CERTAINTY", *sets, *(("LABEL", "CORRECT") if labels else ()), "BECAUSE")
     rows = []
     for i, one in enumerate(predictions):
         certainty = percent(one.certainty) if one.certainty is not None else ""
+        of_set = () if coverage is None else (" or ".join(one.prediction_set),)
         label = (labels[i], "yes" if one.label == labels[i] else "no") if labels else ()
-        rows.append((str(i + 1), one.label, certainty, *label, "; ".join(one.because)))
+        rows.append((str(i + 1), one.label, certainty, *of_set, *label, "; ".join(one.because)))
     echo_table(header, rows, {"PREDICTION": prediction_style, "CORRECT": correct_style})
 
 
@@ -126,11 +129,19 @@ def _without_reasons(model: Model, table: FeatureTable) -> list[Prediction]:
     labels, shares = model.answers(table)
     classes = model.classifier.classes()
     warnings = model.predict(table.row(0)).warnings
+    coverage = None if model.sets is None else model.sets.coverage
     return [
         Prediction(
-            label=label, probabilities=dict(zip(classes, row, strict=True)), because=(), warnings=warnings
+            label=label,
+            probabilities=dict(zip(classes, row, strict=True)),
+            because=(),
+            warnings=warnings,
+            prediction_set=members,
+            coverage=coverage if members else None,
         )
-        for label, row in zip(labels, shares.tolist(), strict=True)
+        for label, row, members in zip(
+            labels, shares.tolist(), model.prediction_sets(table, labels, shares), strict=True
+        )
     ]
 
 
@@ -145,6 +156,8 @@ def _as_json(prediction: Prediction, truth: str | None) -> dict[str, Any]:
         "label": prediction.label,
         "probabilities": dict(prediction.probabilities),
         "support": None if prediction.support is None else list(prediction.support),
+        "prediction_set": list(prediction.prediction_set),
+        "coverage": prediction.coverage,
         "because": list(prediction.because),
     }
     return found if truth is None else {**found, "truth": truth}

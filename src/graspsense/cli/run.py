@@ -217,6 +217,8 @@ def _print_prediction(prediction: Prediction) -> None:
     """Print the label with its certainty, the reasons, the model, and the warnings about its validity."""
     certainty = f"  ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""
     echo_entry("prediction", f"{prediction.label}{certainty}", prediction_style(prediction.label))
+    if prediction.set_in_words:
+        echo_entry("set", prediction.set_in_words)
     for step in prediction.because:
         echo_entry("", step)
     echo_entry("model", prediction.model)

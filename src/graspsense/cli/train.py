@@ -60,10 +60,13 @@ def train(
     **given: Any,
 ) -> None:
     """Train a model, write it, and print what it was trained on."""
+    from attrs import evolve
+
     from graspsense.cli.progress import ProgressLine
     from graspsense.core.errors import ConfigError
     from graspsense.core.model import train as trained
     from graspsense.core.model import write_model
+    from graspsense.evaluation.doubt import calibrated_sets
 
     path = Path(out)
     if path.suffix != ".json":
@@ -83,6 +86,7 @@ def train(
         target=target,
         provenance={"command": command_line(("keep", "overwrite", "as_json"))},
     )
+    model = evolve(model, sets=calibrated_sets(learner, labelled, given["seed"]))
     write_model(path, model)
     if keep:
         from graspsense.sources.features_csv import write_labelled
@@ -100,11 +104,17 @@ def train(
                 "labels": list(model.classifier.classes()),
                 "trials": len(labelled),
                 "provenance": dict(model.provenance),
+                "sets": None if model.sets is None else model.sets.to_json(),
             }
         )
         return
     echo(f"{out}: {model.in_a_line}", indent=2)
     echo_entry("labels", ", ".join(model.classifier.classes()))
+    if model.sets is not None:
+        echo_entry("sets", model.sets.in_words)
+        if model.sets.trials:
+            share = f"{100 * model.sets.unknown / model.sets.trials:.1f} %"
+            echo_entry("unknown", f"{share} of the held-out trials are called unknown (false alarms)")
     # In one line, so that it can be copied.
     click.echo(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
 

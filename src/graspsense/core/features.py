@@ -129,7 +129,9 @@ class Prediction:
     if the model could not be applied. `because` is the reason in words and units, with one step in each item. `model`
     describes in one line what the model was trained on. `support` is None, or two
     numbers of training trials from which the probability of the label was computed: those with the label, and all of
-    those in the leaf of the tree, or among the nearest.
+    those in the leaf of the tree, or among the nearest. `prediction_set` has the labels that cannot be ruled out, the
+    most probable first: it contains the true label of a new object with the probability `coverage`. It is empty, and
+    `coverage` None, if the model is not calibrated or the trial is unknown.
     """
 
     label: str
@@ -138,6 +140,15 @@ class Prediction:
     warnings: tuple[str, ...] = field(default=(), converter=_texts)
     model: str = ""
     support: tuple[float, float] | None = None
+    prediction_set: tuple[str, ...] = field(default=(), converter=_texts)
+    coverage: float | None = None
+
+    @property
+    def set_in_words(self) -> str:
+        """The set with its coverage, such as `full_open or empty_open, 90 %`; empty without a set."""
+        if self.coverage is None:
+            return ""
+        return f"{' or '.join(self.prediction_set)}, {percent(self.coverage)}"
 
     @property
     def certainty(self) -> float | None:

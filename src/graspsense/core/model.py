@@ -21,8 +21,9 @@ import numpy as np
 from attrs import evolve, frozen
 
 from graspsense import __version__
+from graspsense.core.conformal import PredictionSets, scores_of, sets_from
 from graspsense.core.errors import ConfigError, DataDamaged, UnknownName
-from graspsense.core.features import UNKNOWN, Features, FeatureTable, Prediction
+from graspsense.core.features import UNKNOWN, Features, FeatureTable, Prediction, table_of
 from graspsense.core.firstparty import MODELS
 from graspsense.core.json_values import json_ready, settings_from_json
 from graspsense.core.novelty import Novelty, novelty_from, novelty_of
@@ -62,6 +63,8 @@ class Model:
     target: str
     novelty: Novelty
     provenance: Mapping[str, Any]
+    sets: PredictionSets | None = None
+    """Calibrated prediction sets; None in a model of an earlier version."""
 
     @property
     def simulated(self) -> bool:
@@ -103,7 +106,17 @@ class Model:
             warnings = (*prediction.warnings, *warnings)
             strange = self.novelty.unlike(chosen)
             if strange is None:
-                return evolve(prediction, warnings=warnings, model=self.in_a_line)
+                shares = np.array(
+                    [[prediction.probabilities.get(name, 0.0) for name in self.classifier.classes()]]
+                )
+                (members,) = self.prediction_sets(table_of([chosen]), [prediction.label], shares)
+                return evolve(
+                    prediction,
+                    warnings=warnings,
+                    model=self.in_a_line,
+                    prediction_set=members,
+                    coverage=self.sets.coverage if self.sets is not None and members else None,
+                )
             probabilities = prediction.probabilities
             because = (strange,)
             if not all(math.isnan(value) for value in chosen.values):
@@ -133,6 +146,22 @@ class Model:
         best = np.argmax(shares >= shares.max(axis=1, keepdims=True) - _EQUAL, axis=1).tolist()
         labels = [UNKNOWN if strange else classes[k] for strange, k in zip(unlike, best, strict=True)]
         return labels, shares
+
+    def prediction_sets(
+        self, table: FeatureTable, labels: Sequence[str], shares: NDArray[np.float64]
+    ) -> list[tuple[str, ...]]:
+        """Return the prediction set of each trial, given the predicted labels and the probabilities.
+
+        A set is empty if the trial is unknown, or if the model has no calibrated sets.
+        """
+        if self.sets is None or not self.sets.thresholds:
+            return [()] * len(table)
+        classes = self.classifier.classes()
+        scores = scores_of(shares, self.novelty.closeness(table, classes))
+        return [
+            () if label == UNKNOWN else self.sets.of(dict(zip(classes, row, strict=True)), label)
+            for label, row in zip(labels, scores.tolist(), strict=True)
+        ]
 
     def misfit(self, given: Features | FeatureTable) -> str:
         """Return why the model cannot be applied to these features; empty if it can."""
@@ -187,6 +216,7 @@ class Model:
             "features": [[name, unit] for name, unit in zip(self.names, self.units, strict=True)],
             "provenance": json_ready(self.provenance),
             "unknown": self.novelty.to_json(),
+            **({} if self.sets is None else {"sets": self.sets.to_json()}),
             "model": self.classifier.to_json(),
         }
         return {**content, "sha256": _digest(content)}
@@ -290,6 +320,7 @@ def load_model(name: str, plugins: Plugins, component: Component | None = None) 
             target=str(content["target"]),
             novelty=novelty_from(names, units, content["unknown"]),
             provenance=content["provenance"],
+            sets=sets_from(content["sets"], classifier.classes()) if "sets" in content else None,
         )
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise DataDamaged(f"model {name!r} is damaged: {type(error).__name__}: {error}") from error

@@ -65,6 +65,8 @@ def prediction_html(prediction: Prediction) -> str:
     likely = sorted(known, key=lambda pair: -pair[1])[:5]
     certainty = f", {prediction.certainty_in_words}" if prediction.certainty_in_words else ""
     parts = [sentence(f"predicted: {prediction.label}{certainty}", strong=True)]
+    if prediction.set_in_words:
+        parts.append(sentence(f"set: {prediction.set_in_words}"))
     if likely:
         parts.append(table(("class", "probability"), [(label, percent(share)) for label, share in likely]))
     parts += [sentence(step) for step in prediction.because]

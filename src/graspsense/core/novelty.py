@@ -78,6 +78,22 @@ class Novelty:
         unlike[np.isnan(values).all(axis=1)] = not self.featureless
         return unlike
 
+    def closeness(self, table: FeatureTable, classes: Sequence[str]) -> NDArray[np.float64]:
+        """Return how close each trial is to the range of each of these classes, shape (trials, classes).
+
+        It is 1 / (1 + distance) of the feature that is farthest outside, in standard deviations: 1 within the range.
+        Without a feature in common it is 0.
+        """
+        values = table.columns(self.names).values
+        columns = [self.classes.index(name) for name in classes]
+        result = np.empty((len(values), len(columns)))
+        for start in range(0, len(values), _ROWS_AT_ONCE):
+            some = values[start : start + _ROWS_AT_ONCE]
+            result[start : start + len(some)] = 1.0 / (
+                1.0 + _worst(self._outside(some[:, np.newaxis, :]))[:, columns]
+            )
+        return result
+
     def _outside(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the distance of each value from the range of each class, in standard deviations; NaN if unknown."""
         rounding = _ROUNDING * np.maximum(np.abs(values), np.finfo(np.float64).tiny / _ROUNDING)

@@ -93,6 +93,8 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
             "label": prediction.label,
             "probabilities": dict(prediction.probabilities),
             "support": None if prediction.support is None else list(prediction.support),
+            "prediction_set": list(prediction.prediction_set),
+            "coverage": prediction.coverage,
             "because": list(prediction.because),
             "warnings": list(prediction.warnings),
             "model": prediction.model,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from attrs import frozen
 
+from graspsense.core.conformal import scores_of
 from graspsense.core.errors import ConfigError
 from graspsense.core.novelty import novelty_of
 
@@ -36,9 +37,16 @@ Groups = Sequence["NDArray[np.int64]"]
 
 @frozen(eq=False)
 class Pooled:
-    """The predictions of all folds, one per trial; `unlike` marks those that the model of their fold calls unknown."""
+    """The predictions of all folds, one per trial; `unlike` marks those that the model of their fold calls unknown.
+
+    `probabilities` has shape (trials, classes), NaN for a class that is not among the labels of the group of the trial.
+    """
 
     predicted: tuple[str, ...]
+    classes: tuple[str, ...]
+    probabilities: NDArray[np.float64]
+    scores: NDArray[np.float64]
+    """The scores from which prediction sets are made, of the same shape."""
     unlike: NDArray[np.bool_]
     trained_on: float
     """Mean number of training trials per fold."""
@@ -67,9 +75,16 @@ def cross_validate(
     if the classifier cannot learn from the training trials of a fold.
     """
     predicted = [""] * len(labels)
+    all_classes = tuple(sorted(set(labels)))
+    probabilities = np.full((len(labels), len(all_classes)), np.nan)
+    scores = probabilities.copy()
     unlike = np.zeros(len(labels), dtype=np.bool_)
     sizes: list[int] = []
     for rows, of in zip(groups, folds, strict=True):
+        of_group = {labels[i] for i in rows}
+        possible = np.flatnonzero([name in of_group for name in all_classes])
+        probabilities[np.ix_(rows, possible)] = 0.0
+        scores[np.ix_(rows, possible)] = 0.0
         for fold in range(int(of.max()) + 1):
             test, training = rows[of == fold], rows[of != fold]
             if len(test) == 0:
@@ -77,14 +92,19 @@ def cross_validate(
             if share < 1.0:
                 training = thinned(training, labels, share, seed)
             known = [labels[i] for i in training]
-            answers = _predict(learner, table, training, known, test, seed)
-            unlike[test] = novelty_of(table.rows(training), known).unlike_rows(table.rows(test))
-            for i, answer in zip(test.tolist(), answers, strict=True):
-                predicted[i] = answer
+            classes, shares = _predict(learner, table, training, known, test, seed)
+            columns = np.array([all_classes.index(name) for name in classes])
+            probabilities[np.ix_(test, columns)] = shares
+            novelty = novelty_of(table.rows(training), known)
+            tested = table.rows(test)
+            scores[np.ix_(test, columns)] = scores_of(shares, novelty.closeness(tested, classes))
+            unlike[test] = novelty.unlike_rows(tested)
+            for i, k in zip(test.tolist(), shares.argmax(axis=1).tolist(), strict=True):
+                predicted[i] = classes[k]
             sizes.append(len(training))
             if progress is not None:
                 progress()
-    return Pooled(tuple(predicted), unlike, float(np.mean(sizes)))
+    return Pooled(tuple(predicted), all_classes, probabilities, scores, unlike, float(np.mean(sizes)))
 
 
 def thinned(rows: NDArray[np.int64], labels: Sequence[str], share: float, seed: int) -> NDArray[np.int64]:
@@ -105,9 +125,10 @@ def _predict(
     known: Sequence[str],
     test: NDArray[np.int64],
     seed: int,
-) -> list[str]:
+) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+    """Return the classes and their probabilities for the test trials."""
     if len(set(known)) == 1:
-        return [known[0]] * len(test)
+        return (known[0],), np.ones((len(test), 1))
     classifier = learner.create()
     try:
         classifier.fit(table.rows(training), known, seed)
@@ -115,5 +136,4 @@ def _predict(
         raise FitRefused(
             f"the classifier refused {len(known)} training trials of {len(set(known))} labels: {error}"
         ) from error
-    classes = classifier.classes()
-    return [classes[k] for k in classifier.probabilities(table.rows(test)).argmax(axis=1)]
+    return classifier.classes(), classifier.probabilities(table.rows(test))

@@ -16,6 +16,7 @@ from graspsense.core.errors import ConfigError
 from graspsense.core.labelled import ControlFeatures, Labelled, Target, class_of
 from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
+from graspsense.evaluation.doubt import reliability, set_coverage
 from graspsense.evaluation.folds import commonest, in_order, instance_held_out, stratified
 from graspsense.evaluation.intervals import (
     MIN_INSTANCES,
@@ -29,6 +30,7 @@ from graspsense.evaluation.results import CurvePoint, Evaluation, Measurement
 
 if TYPE_CHECKING:
     from graspsense.core.features import FeatureTable
+    from graspsense.evaluation.doubt import SetCoverage
     from graspsense.evaluation.folds import Folds
 
 INSTANCE_HELD_OUT: Final = "instance_held_out"
@@ -90,6 +92,8 @@ def evaluate(
         confusions={
             name: confusion(labels, pooled.predicted) for name, pooled in evaluator.pooled_by_protocol.items()
         },
+        sets=evaluator.sets(headline),
+        reliability=reliability(headline.pooled, labels, evaluator.rate_among),
     )
 
 
@@ -192,7 +196,7 @@ class _Evaluator:
 
     def rate(self, pooled: Pooled) -> RecognitionRate:
         """Return the rate of these predictions."""
-        return self._rate_of(pooled.right(self.labels))
+        return self.rate_among(pooled.right(self.labels))
 
     def by_class(self, pooled: Pooled) -> dict[str, RecognitionRate]:
         """Return the rate among the trials of each class."""
@@ -200,11 +204,18 @@ class _Evaluator:
         rows: dict[str, list[int]] = {}
         for i, label in enumerate(self.labels):
             rows.setdefault(class_of(label), []).append(i)
-        return {name: self._rate_of(right, of) for name, of in sorted(rows.items())}
+        return {name: self.rate_among(right, of) for name, of in sorted(rows.items())}
 
     def unknown(self, pooled: Pooled) -> RecognitionRate:
         """Return the share of trials that the model of their fold calls unknown, or that have no feature at all."""
-        return self._rate_of((pooled.unlike | self._featureless).tolist())
+        return self.rate_among((pooled.unlike | self._featureless).tolist())
+
+    def sets(self, headline: _Headline) -> SetCoverage:
+        """Return the coverage of the prediction sets, with the unit of exchangeability that the folds hold out."""
+        instances = self.trials.instances if headline.protocol == INSTANCE_HELD_OUT else None
+        return set_coverage(
+            headline.pooled, self.labels, instances, self.groups, headline.folds, self.rate_among
+        )
 
     def by_features(self, pooled: Pooled) -> dict[str, RecognitionRate]:
         """Return the rates among trials with features and without any; nothing if all trials have features."""
@@ -213,10 +224,12 @@ class _Evaluator:
         right = pooled.right(self.labels)
         chosen = {"with features": ~self._featureless, "without any feature": self._featureless}
         return {
-            name: self._rate_of(right, np.flatnonzero(of).tolist()) for name, of in chosen.items() if of.any()
+            name: self.rate_among(right, np.flatnonzero(of).tolist())
+            for name, of in chosen.items()
+            if of.any()
         }
 
-    def _rate_of(self, right: Sequence[bool], rows: Sequence[int] | None = None) -> RecognitionRate:
+    def rate_among(self, right: Sequence[bool], rows: Sequence[int] | None = None) -> RecognitionRate:
         """Return the rate of these trials (default: all), with the interval that their instances allow."""
         instances = self.trials.instances
         rows = range(len(right)) if rows is None else rows
@@ -342,7 +355,7 @@ class _Evaluator:
             what += " (the most frequent state of each class)"
         return correct.tolist(), Measurement(
             what,
-            self._rate_of(correct.tolist()),
+            self.rate_among(correct.tolist()),
             difference=self._difference(headline.pooled.right(self.labels), correct.tolist()),
             difference_of=headline.protocol,
         )

@@ -10,6 +10,7 @@ from attrs import field, frozen
 from graspsense.core.labelled import Target
 from graspsense.core.notebook import sentence, table
 from graspsense.evaluation.confusion import Confusion
+from graspsense.evaluation.doubt import Reliability, SetCoverage
 from graspsense.evaluation.intervals import Difference, RecognitionRate
 
 
@@ -61,7 +62,8 @@ class Evaluation:
     unknown: RecognitionRate
     """Held-out trials that the model of their fold calls unknown, or that have no feature at all.
 
-    In all rates they count by their predicted label.
+    Every trial has a known label, so this is the rate of false alarms. In all rates they count by their predicted
+    label.
     """
     learning_curve: tuple[CurvePoint, ...]
     warnings: tuple[str, ...]
@@ -71,6 +73,10 @@ class Evaluation:
     """The rate of the headline among trials with features and without any; empty if all trials have features."""
     confusions: Mapping[str, Confusion] = field(factory=dict)
     """The confusion matrix of each protocol that was measured."""
+    sets: SetCoverage | None = None
+    """The coverage of the prediction sets, on the trials and folds of the headline."""
+    reliability: Reliability | None = None
+    """How well the probabilities of the headline agree with the rate."""
 
     def __repr__(self) -> str:
         return f"<Evaluation: {self._words()}>"

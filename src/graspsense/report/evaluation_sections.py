@@ -1,4 +1,4 @@
-"""Sections of a page about an evaluation: controls, confusion matrices, the decision tree."""
+"""Sections of a page about an evaluation: controls, confusion matrices, prediction sets, the decision tree."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from html import escape
 
 from graspsense.core.tree import TreeNode
 from graspsense.evaluation.confusion import Confusion
-from graspsense.report.html import Section, bullets, folded, pair, paragraph
+from graspsense.evaluation.doubt import Reliability, SetCoverage
+from graspsense.evaluation.intervals import percentage
+from graspsense.report.html import Section, bullets, figure, folded, pair, paragraph
 from graspsense.report.matrix import confusion_table
-from graspsense.report.rates import RateRow, rates_list, rates_picture
+from graspsense.report.rates import RateRow, rates_list, rates_picture, rates_table
+from graspsense.report.svg import INKS, QUIET, AxisScale, Picture
 from graspsense.report.tree import tree_list
 
 
@@ -32,6 +35,58 @@ def confusion_section(first: tuple[str, Confusion], others: Sequence[tuple[str, 
     body = confusion_table(first[1], f"{first[0]}.")
     body += "".join(folded(name, confusion_table(matrix, f"{name}.")) for name, matrix in others)
     return Section(id="confusion", title="Confusion matrix", body=body)
+
+
+def doubt_section(sets: SetCoverage, reliability: Reliability) -> Section:
+    """Return the section with the coverage of the prediction sets and the reliability of the probabilities."""
+    text = (
+        f"A prediction set has the labels that cannot be ruled out. It shall contain the true label of "
+        f"{100 * sets.asked:.0f} % of new {'objects' if sets.unit == 'instances' else 'grasps of the same objects'}."
+    )
+    rows = []
+    if sets.covered is None or sets.mean_size is None or sets.single is None:
+        text += f" Not measured here: {sets.reason}."
+    else:
+        rows = [
+            RateRow(name="all labels", rate=sets.covered.rate, interval=sets.covered.interval, strong=True)
+        ]
+        rows += [
+            RateRow(name=name, rate=one.rate, interval=one.interval) for name, one in sets.by_label.items()
+        ]
+        text += (
+            f" In held-out grasps the sets contain it in {sets.covered.words}. They have {sets.mean_size:.2f} "
+            f"labels on average; {percentage(sets.single.rate)} have a single one."
+        )
+    probabilities = (
+        f"Where the probabilities are right, predictions of 80 % are correct in 80 of 100 grasps. The Brier score is "
+        f"{reliability.brier:.3f} (0 is perfect, 2 the worst); the expected calibration error is "
+        f"{percentage(reliability.calibration_error)}."
+    )
+    covered = rates_table("Sets that contain the true label", rows, "contain it") if rows else ""
+    return Section(
+        id="doubt",
+        title="Prediction sets and probabilities",
+        body=paragraph(text) + covered + paragraph(probabilities) + _reliability_curve(reliability),
+    )
+
+
+def _reliability_curve(reliability: Reliability) -> str:
+    """Return the rate over the probability of the predicted label, beside the line on which they are equal."""
+    picture = Picture(330)
+    x, y = AxisScale(0.0, 100.0, 44.0, picture.width - 16), AxisScale(0.0, 100.0, 280.0, 24.0)
+    picture.x_axis(x, 24, 280, "probability of the predicted label, in %")
+    picture.y_axis(y, 44.0, picture.width - 16, "recognised, in %")
+    with picture.plot(x, y, 24, 280):
+        picture.line([(x(0.0), y(0.0)), (x(100.0), y(100.0))], QUIET)
+        for point in reliability.curve:
+            at = x(100 * point.probability)
+            if point.rate.interval is not None:
+                low, high = point.rate.interval
+                picture.line([(at, y(100 * low)), (at, y(100 * high))], INKS[0])
+            words = f"{percentage(point.probability)}: {point.rate.words}"
+            picture.mark(at, y(100 * point.rate.rate), INKS[0], words=words)
+    caption = "Recognition rate over probability, in ten bins. Bars are 95 % intervals; the line is perfect agreement."
+    return figure(picture.svg(caption), caption)
 
 
 def tree_section(nodes: Sequence[TreeNode], of: str) -> Section:

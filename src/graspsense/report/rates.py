@@ -135,10 +135,10 @@ def rates_over(
     )
 
 
-def rates_table(caption: str, rows: Sequence[RateRow]) -> str:
-    """Return the rates as a table."""
+def rates_table(caption: str, rows: Sequence[RateRow], heading: str = "recognised") -> str:
+    """Return the rates as a table; `heading` says what they are the rates of."""
     cells = [(row.name, f"{100 * row.rate:.1f} %", row.interval_text) for row in rows]
-    return table(caption, ("case", "recognised", "95 % interval, %"), cells, 1)
+    return table(caption, ("case", heading, "95 % interval, %"), cells, 1)
 
 
 def rates_list(rows: Sequence[RateRow]) -> str:

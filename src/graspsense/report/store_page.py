@@ -12,7 +12,13 @@ from graspsense.core.config import SelectedComponent, select_component
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.recording.reader import read_recorded
-from graspsense.report.evaluation_sections import code, confusion_section, controls_section, tree_section
+from graspsense.report.evaluation_sections import (
+    code,
+    confusion_section,
+    controls_section,
+    doubt_section,
+    tree_section,
+)
 from graspsense.report.grasp_curve import GraspCurve, grasp_curve
 from graspsense.report.html import Page, Section, bullets, facts, folded, pair, paragraph, table
 from graspsense.report.rates import RateRow
@@ -180,6 +186,8 @@ def _evaluation_sections(
         controls_section(rows, missing, classifier),
         confusion_section((title, evaluation.confusion)),
     ]
+    if evaluation.sets is not None and evaluation.reliability is not None:
+        sections.append(doubt_section(evaluation.sets, evaluation.reliability))
     if evaluation.target != "state":
         trials = labelled.aimed(evaluation.target)
         fitted = learner.create()

@@ -1,0 +1,192 @@
+"""Prediction sets: the labels that cannot be ruled out, by split conformal prediction with held-out instances.
+
+A label belongs to the set of a trial if its score reaches a threshold. The score is the probability by the classifier;
+of equal probabilities, that label is ahead whose training trials are closer (a tree gives most labels the probability
+0). The threshold is a quantile of the scores that held-out trials gave to their true labels.
+
+Trials of one instance resemble each other, so the unit of exchangeability is the instance: each of K instances has the
+weight 1 / (K + 1), shared by its trials, and the same weight belongs to the instance that is not known yet (Y. Lee,
+R. F. Barber and R. Willett, arXiv:2306.06342, section 3). With one trial for each instance this is ordinary split
+conformal prediction (V. Vovk, A. Gammerman and G. Shafer, Algorithmic Learning in a Random World, 2005). A label with
+enough instances has a threshold of its own (class-wise sets); the other labels share that of all labels together.
+
+The scores are cross-validated, but the prediction is by the model of all trials. The coverage is therefore not
+guaranteed as with a separate calibration set: `graspsense evaluate` measures it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from attrs import frozen
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+COVERAGE: Final = 0.9
+"""Share of the trials whose set shall contain the true label."""
+_ROUNDING: Final = 1e-9
+_CLOSENESS: Final = 1e-3
+"""Weight of the closeness in a score: it only matters among probabilities that are equal, or almost."""
+
+
+def units_needed(coverage: float = COVERAGE) -> int:
+    """Return the smallest number n of calibration units with ceil((n + 1) coverage) <= n.
+
+    >>> units_needed(0.9), units_needed(0.95)
+    (9, 19)
+    """
+    n = 1
+    while math.ceil((n + 1) * coverage - _ROUNDING) > n:
+        n += 1
+    return n
+
+
+def scores_of(probabilities: NDArray[np.float64], closeness: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the scores of trials for labels, of the probabilities and of `Novelty.closeness` (0 to 1)."""
+    return probabilities + _CLOSENESS * closeness
+
+
+@frozen(kw_only=True)
+class LabelThreshold:
+    """The smallest score with which a label belongs to a set.
+
+    `units` is the number of calibration units that have trials of the label. `own` says whether the threshold is
+    computed from those alone; otherwise it is that of all labels together.
+    """
+
+    score: float
+    units: int
+    own: bool
+
+
+@frozen(kw_only=True)
+class PredictionSets:
+    """The thresholds of all labels, from trials that were predicted by a model without their unit.
+
+    `unit` is `instances` or `trials`. `thresholds` is empty if there are too few units; `reason` then says so.
+    `unknown` of the `trials` calibration trials were called unknown: the false alarms of that rule.
+    """
+
+    coverage: float
+    unit: str
+    thresholds: Mapping[str, LabelThreshold]
+    reason: str = ""
+    unknown: int = 0
+    trials: int = 0
+
+    def of(self, scores: Mapping[str, float], label: str) -> tuple[str, ...]:
+        """Return the set of a trial, the label with the largest score first; empty without thresholds.
+
+        `label` is the prediction, which is always a member.
+        """
+        if not self.thresholds:
+            return ()
+        members = [name for name, score in scores.items() if name == label or self._contains(name, score)]
+        return tuple(sorted(members, key=lambda name: (name != label, -scores[name])))
+
+    def members(self, scores: NDArray[np.float64], classes: Sequence[str]) -> NDArray[np.bool_]:
+        """Return which classes belong to the set of each trial; NaN is not a possible answer.
+
+        `scores` has shape (trials, classes). Raises KeyError if a class that is possible has no threshold.
+        """
+        inside = np.zeros(scores.shape, dtype=np.bool_)
+        for k, name in enumerate(classes):
+            possible = ~np.isnan(scores[:, k])
+            if possible.any():
+                least = self.thresholds[name].score - _ROUNDING
+                inside[possible, k] = scores[possible, k] >= least
+        inside[np.arange(len(inside)), np.nanargmax(scores, axis=1)] = True
+        return inside
+
+    def _contains(self, label: str, score: float) -> bool:
+        return score >= self.thresholds[label].score - _ROUNDING
+
+    @property
+    def in_words(self) -> str:
+        """How the sets are calibrated, and how many more units a label needs for a threshold of its own."""
+        if not self.thresholds:
+            return f"none: {self.reason}"
+        needed = units_needed(self.coverage)
+        shared = {name: one.units for name, one in self.thresholds.items() if not one.own}
+        text = f"{100 * self.coverage:.0f} % for {len(self.thresholds) - len(shared)} of {len(self.thresholds)} labels"
+        if not shared:
+            return (
+                f"{text} ({min(one.units for one in self.thresholds.values())} {self.unit} or more of each)"
+            )
+        lacking = ", ".join(f"{name} {needed - units} more" for name, units in sorted(shared.items()))
+        return (
+            f"{text}, over all labels together for the others; a label needs {needed} {self.unit}: {lacking}"
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the thresholds as values that JSON represents exactly."""
+        return {
+            "coverage": self.coverage,
+            "unit": self.unit,
+            "reason": self.reason,
+            "unknown": self.unknown,
+            "trials": self.trials,
+            "thresholds": {name: [one.score, one.units, one.own] for name, one in self.thresholds.items()},
+        }
+
+
+def sets_from(kept: Mapping[str, Any], classes: Sequence[str]) -> PredictionSets:
+    """Return the sets of a stored model. Raises KeyError, TypeError or ValueError if they do not fit its classes."""
+    thresholds = {
+        str(name): LabelThreshold(score=float(value), units=int(units), own=bool(own))
+        for name, (value, units, own) in kept["thresholds"].items()
+    }
+    if thresholds and set(thresholds) != set(classes):
+        raise ValueError("the thresholds of its prediction sets are not those of its labels")
+    return PredictionSets(
+        coverage=float(kept["coverage"]),
+        unit=str(kept["unit"]),
+        thresholds=thresholds,
+        reason=str(kept["reason"]),
+        unknown=int(kept["unknown"]),
+        trials=int(kept["trials"]),
+    )
+
+
+def sets_of(
+    true_scores: NDArray[np.float64],
+    labels: Sequence[str],
+    instances: Sequence[str] | None,
+    coverage: float = COVERAGE,
+) -> PredictionSets:
+    """Return the sets that held-out trials calibrate.
+
+    `true_scores` are the scores of the true labels, by models trained without the instance of the trial. Without
+    `instances`, each trial is a unit.
+    """
+    unit = "trials" if instances is None else "instances"
+    units = np.array([str(i) for i in range(len(labels))] if instances is None else instances)
+    given = np.array(labels)
+    needed = units_needed(coverage)
+    count = len(np.unique(units))
+    if count < needed:
+        reason = f"{count} calibration {unit}, {100 * coverage:.0f} % needs {needed}"
+        return PredictionSets(coverage=coverage, unit=unit, thresholds={}, reason=reason)
+    shared = _threshold(true_scores, units, coverage)
+    thresholds = {}
+    for name in sorted(set(labels)):
+        rows = given == name
+        of_label = len(np.unique(units[rows]))
+        own = of_label >= needed
+        value = _threshold(true_scores[rows], units[rows], coverage) if own else shared
+        thresholds[name] = LabelThreshold(score=value, units=of_label, own=own)
+    return PredictionSets(coverage=coverage, unit=unit, thresholds=thresholds)
+
+
+def _threshold(scores: NDArray[np.float64], units: NDArray[np.str_], coverage: float) -> float:
+    """Return the largest score that the weighted share `coverage` of the trials reaches."""
+    _, unit_of, trials_of_unit = np.unique(units, return_inverse=True, return_counts=True)
+    weights = 1.0 / ((len(trials_of_unit) + 1) * trials_of_unit[unit_of])
+    order = np.argsort(-scores, kind="stable")
+    reached = np.cumsum(weights[order])
+    first = int(np.searchsorted(reached, coverage - _ROUNDING))
+    return float(scores[order[min(first, len(order) - 1)]])

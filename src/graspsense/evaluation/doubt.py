@@ -1,0 +1,165 @@
+"""How far a prediction can be trusted: prediction sets from held-out trials, their coverage, and reliability."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from attrs import evolve, field, frozen
+
+from graspsense.core.conformal import COVERAGE, PredictionSets, sets_of
+from graspsense.core.errors import ConfigError
+from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
+from graspsense.evaluation.folds import instance_held_out, stratified
+from graspsense.evaluation.intervals import RecognitionRate
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.labelled import Labelled
+    from graspsense.evaluation.folds import Folds
+
+FOLDS: Final = 10
+BINS: Final = 10
+"""Number of bins of equal width in which probabilities are compared with rates."""
+
+RateOf = Callable[[Sequence[bool], Sequence[int] | None], RecognitionRate]
+
+
+@frozen(kw_only=True)
+class SetCoverage:
+    """The share of held-out trials whose prediction set contains the true label, and the size of the sets.
+
+    `mean_size` is the mean number of labels in a set, `single` the share of sets with one label. They are None if no
+    set could be calibrated; `reason` then says why.
+    """
+
+    asked: float
+    unit: str
+    covered: RecognitionRate | None = None
+    by_label: Mapping[str, RecognitionRate] = field(factory=dict)
+    mean_size: float | None = None
+    single: RecognitionRate | None = None
+    reason: str = ""
+
+
+@frozen
+class ReliabilityBin:
+    """Trials whose predicted label has about the same probability: the mean of it, and the rate of these trials."""
+
+    probability: float
+    rate: RecognitionRate
+
+
+@frozen
+class Reliability:
+    """How well probabilities agree with rates.
+
+    `brier` is the mean over the trials of the squared differences between the probabilities and the truth (0 for each
+    wrong label, 1 for the true one), summed over the labels: 0 is perfect, 2 the worst (G. W. Brier, Mon. Weather Rev.
+    78 (1950) 1). `calibration_error` is the mean over the trials of the difference between the probability of the
+    predicted label and the rate, in absolute value, of the bin that the trial is in (M. P. Naeini, G. F. Cooper and
+    M. Hauskrecht, AAAI 2015).
+    """
+
+    brier: float
+    calibration_error: float
+    curve: tuple[ReliabilityBin, ...]
+
+
+def calibrated_sets(learner: ClassifierFactory, labelled: Labelled, seed: int) -> PredictionSets:
+    """Return the prediction sets of a classifier that is trained on these trials, from cross-validation on them.
+
+    Whole instances are held out where each label has several; otherwise each trial is a unit.
+    """
+    instances = exchangeable_instances(labelled)
+    labels = labelled.labels
+    try:
+        folds = (
+            stratified(labels, min(FOLDS, len(labels)), seed)
+            if instances is None
+            else instance_held_out(labels, instances, FOLDS, seed)
+        )
+        groups = [np.arange(len(labels))]
+        pooled = cross_validate(learner, labelled.table, labels, groups, [folds], seed=seed)
+    except (FitRefused, ConfigError) as refusal:
+        unit = "trials" if instances is None else "instances"
+        return PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=str(refusal))
+    sets = sets_of(_of_truth(pooled, labels), labels, instances)
+    return evolve(sets, unknown=int(pooled.unlike.sum()), trials=len(labels))
+
+
+def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
+    """Return the instances of the trials; None if they are not known, or if a label has a single one."""
+    if labelled.instances is None:
+        return None
+    pairs = set(zip(labelled.labels, labelled.instances, strict=True))
+    several = all(sum(label == name for name, _ in pairs) > 1 for label in labelled.classes)
+    return labelled.instances if several else None
+
+
+def set_coverage(
+    pooled: Pooled,
+    labels: Sequence[str],
+    instances: Sequence[str] | None,
+    groups: Groups,
+    folds: Sequence[Folds],
+    rate_of: RateOf,
+) -> SetCoverage:
+    """Return how often the sets of held-out trials contain the true label.
+
+    The sets of a fold are calibrated with the predictions of the other folds, so that neither the model nor the
+    thresholds know the instance that they are tested on.
+    """
+    unit = "trials" if instances is None else "instances"
+    truth = _of_truth(pooled, labels)
+    inside = np.zeros(pooled.scores.shape, dtype=np.bool_)
+    for rows, of in zip(groups, folds, strict=True):
+        for fold in np.unique(of).tolist():
+            test, others = rows[of == fold], rows[of != fold].tolist()
+            sets = sets_of(
+                truth[others],
+                [labels[i] for i in others],
+                None if instances is None else [instances[i] for i in others],
+            )
+            if not sets.thresholds:
+                return SetCoverage(asked=COVERAGE, unit=unit, reason=sets.reason)
+            known = [k for k, name in enumerate(pooled.classes) if name in sets.thresholds]
+            # A label that the other folds do not have has no threshold: it is not a member of any set.
+            names = [pooled.classes[k] for k in known]
+            inside[np.ix_(test, known)] = sets.members(pooled.scores[np.ix_(test, known)], names)
+    column = {name: k for k, name in enumerate(pooled.classes)}
+    covered = [bool(inside[i, column[label]]) for i, label in enumerate(labels)]
+    sizes = inside.sum(axis=1)
+    rows_of = {name: [i for i, label in enumerate(labels) if label == name] for name in pooled.classes}
+    return SetCoverage(
+        asked=COVERAGE,
+        unit=unit,
+        covered=rate_of(covered, None),
+        by_label={name: rate_of(covered, of) for name, of in rows_of.items()},
+        mean_size=float(sizes.mean()),
+        single=rate_of((sizes == 1).tolist(), None),
+    )
+
+
+def reliability(pooled: Pooled, labels: Sequence[str], rate_of: RateOf) -> Reliability:
+    """Return how well the probabilities of held-out trials agree with the rate."""
+    given = np.nan_to_num(pooled.probabilities, nan=0.0)
+    truth = np.array(labels)[:, np.newaxis] == np.array(pooled.classes)
+    top = given.max(axis=1)
+    right = pooled.right(labels)
+    bin_of = np.minimum((top * BINS).astype(np.int64), BINS - 1)
+    curve, error = [], 0.0
+    for number in np.unique(bin_of).tolist():
+        rows = np.flatnonzero(bin_of == number)
+        point = ReliabilityBin(float(top[rows].mean()), rate_of(right, rows.tolist()))
+        curve.append(point)
+        error += len(rows) / len(labels) * abs(point.probability - point.rate.rate)
+    return Reliability(float(((given - truth) ** 2).sum(axis=1).mean()), error, tuple(curve))
+
+
+def _of_truth(pooled: Pooled, labels: Sequence[str]) -> NDArray[np.float64]:
+    """Return the score of the true label of each trial."""
+    column = {name: k for k, name in enumerate(pooled.classes)}
+    return pooled.scores[np.arange(len(labels)), [column[label] for label in labels]]

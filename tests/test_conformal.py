@@ -1,0 +1,250 @@
+"""Prediction sets and reliability: coverage on trials of which the truth is known."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from attrs import evolve
+from test_evaluate import judged, labelled, learner
+
+from graspsense.core.conformal import sets_of, units_needed
+from graspsense.core.errors import DataDamaged
+from graspsense.core.features import UNKNOWN
+from graspsense.core.model import load_model, train, write_model
+from graspsense.core.plugins import installed
+from graspsense.evaluation.doubt import calibrated_sets
+from graspsense.evaluation.json_codec import from_json, to_json
+from graspsense.evaluation.results import Evaluation
+
+NAMES = ("forest", "knn", "mlp", "svm", "tree", "c45")
+
+
+def bottles(instances=14, each=3, seed=0, spread=0.9):
+    """Full and empty bottles whose instances differ, with instances of each kind."""
+    rng = np.random.default_rng(seed)
+    labels, names, force = [], [], []
+    for k, kind in enumerate(("full", "empty")):
+        for i in range(instances):
+            own = rng.normal(2.0 * k, spread)
+            labels += [kind] * each
+            names += [f"{kind}#{i}"] * each
+            force += (own + rng.normal(0.0, 0.3, each)).tolist()
+    return labelled(labels, force, rng.normal(size=len(labels)), instances=tuple(names))
+
+
+def model_of(trials, name):
+    component = installed().find("classifier", name)
+    model = train(component, component.config_class()(), trials, name="m")
+    return evolve(model, sets=calibrated_sets(learner(name), trials, 0))
+
+
+@pytest.mark.parametrize(("coverage", "needed"), [(0.9, 9), (0.95, 19), (0.8, 4), (0.99, 99)])
+def test_units_needed_are_the_smallest_n_with_a_finite_quantile(coverage, needed):
+    assert units_needed(coverage) == needed
+
+
+def test_the_threshold_is_the_quantile_of_split_conformal_prediction():
+    truth = (
+        np.arange(1, 20) / 20.0
+    )  # 19 trials: the 18th largest is the quantile of 90 % (ceil(20 * 0.9) = 18)
+
+    sets = sets_of(truth, ["a"] * 19, None)
+
+    assert sets.thresholds["a"].score == truth[1]
+
+
+def test_many_trials_of_one_instance_count_as_one():
+    truth = np.array([0.05] * 100 + [0.5] * 20)
+    instances = ["poor"] * 100 + [f"good{i}" for i in range(20)]
+
+    by_instance = sets_of(truth, ["a"] * 120, instances)
+    by_trial = sets_of(truth, ["a"] * 120, None)
+
+    assert by_instance.thresholds["a"].score == 0.5  # reached by 20 of 21 instances: 20/22 is over 90 %
+    assert by_trial.thresholds["a"].score == 0.05
+    assert sets_of(truth[99:], ["a"] * 21, instances[99:]).thresholds == by_instance.thresholds
+
+
+def test_eight_instances_are_too_few_and_nine_are_enough():
+    few = sets_of(np.ones(80), ["a"] * 80, [str(i % 8) for i in range(80)])
+    enough = sets_of(np.ones(81), ["a"] * 81, [str(i % 9) for i in range(81)])
+
+    assert few.thresholds == {}
+    assert "8 calibration instances, 90 % needs 9" in few.in_words
+    assert few.of({"a": 1.0}, "a") == ()
+    assert enough.thresholds["a"].own
+    assert enough.thresholds["a"].units == 9
+
+
+def test_a_label_with_few_instances_shares_the_threshold_of_all():
+    truth = np.concatenate((np.linspace(0.2, 0.9, 12), [0.5, 0.6, 0.7]))
+
+    sets = sets_of(truth, ["often"] * 12 + ["seldom"] * 3, [str(i) for i in range(15)])
+
+    assert sets.thresholds["often"].own
+    assert not sets.thresholds["seldom"].own
+    assert "seldom 6 more" in sets.in_words
+
+
+def test_sets_of_new_instances_cover_90_percent():
+    covered = total = 0
+    for seed in range(6):
+        model = model_of(bottles(20, seed=seed), "knn")
+        new = bottles(40, seed=100 + seed)
+        for i in range(0, len(new), 3):  # a trial of each instance
+            said = model.predict(new.table.row(i))
+            if said.label != UNKNOWN:
+                covered += new.labels[i] in said.prediction_set
+                total += 1
+
+    assert total > 400
+    assert 0.87 < covered / total < 0.98  # 90 % is asked for; 21 units, so up to 95 % is expected
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_classifier_has_sets_that_loading_keeps_exactly(name, tmp_path):
+    trials = bottles()
+    model = model_of(trials, name)
+    write_model(tmp_path / "m.json", model)
+    loaded = load_model(str(tmp_path / "m.json"), installed())
+
+    assert model.sets is not None
+    assert loaded.sets == model.sets
+    assert {one.units for one in model.sets.thresholds.values()} == {14}
+    for i in range(0, len(trials), 5):
+        said, again = model.predict(trials.table.row(i)), loaded.predict(trials.table.row(i))
+        assert said.prediction_set == again.prediction_set
+        assert said.label in said.prediction_set
+        assert said.coverage == 0.9
+        assert said.set_in_words.endswith(", 90 %")
+
+
+def test_an_unknown_trial_and_a_model_without_calibration_have_no_set(tmp_path):
+    trials = bottles()
+    model = model_of(trials, "tree")
+    far = evolve(trials.table, values=trials.table.values + 1000.0)
+    assert model.predict(far.row(0)).label == UNKNOWN
+    assert model.predict(far.row(0)).set_in_words == ""
+    assert model.sets.trials == len(trials)
+    assert 0 <= model.sets.unknown < len(trials) / 5
+
+    write_model(tmp_path / "old.json", evolve(model, sets=None))
+    assert "sets" not in json.loads((tmp_path / "old.json").read_text())
+    assert load_model(str(tmp_path / "old.json"), installed()).predict(trials.table.row(0)).coverage is None
+
+
+def test_thresholds_of_other_labels_are_refused(tmp_path):
+    model = model_of(bottles(), "tree")
+    other = evolve(model.sets, thresholds={"full": model.sets.thresholds["full"]})
+    write_model(tmp_path / "m.json", evolve(model, sets=other))
+
+    with pytest.raises(DataDamaged, match="thresholds of its prediction sets"):
+        load_model(str(tmp_path / "m.json"), installed())
+
+
+def test_evaluate_measures_coverage_size_and_reliability_with_instances_held_out():
+    found = judged(bottles(20), "knn", controls=False, learning_curve=False)
+    again = from_json(to_json(found), Evaluation)
+
+    assert again == found
+    assert found.sets.unit == "instances"
+    assert 0.85 <= found.sets.covered.rate <= 1.0
+    assert found.sets.covered.rate >= found.headline.rate
+    assert 1.0 < found.sets.mean_size < 2.0
+    assert sum(point.rate.n for point in found.reliability.curve) == 120
+    assert 0.0 < found.reliability.brier < 0.5
+    assert found.reliability.calibration_error < 0.15
+
+
+def test_noise_gives_sets_of_both_labels():
+    trials = bottles(20)
+    noise = evolve(trials.table, values=np.random.default_rng(3).normal(size=trials.table.values.shape))
+
+    found = judged(evolve(trials, table=noise), "svm", controls=False, learning_curve=False)
+
+    assert found.sets.mean_size > 1.7
+    assert found.sets.covered.rate > 0.85
+
+
+def test_too_few_instances_have_no_coverage_with_the_reason():
+    found = judged(bottles(4), "tree", controls=False, learning_curve=False)
+
+    assert found.sets.covered is None
+    assert "90 % needs 9" in found.sets.reason
+
+
+def test_states_within_classes_are_covered_too():
+    labels = [f"{cls}:{state}" for cls in ("can", "jar") for state in ("full", "empty") for _ in range(30)]
+    rng = np.random.default_rng(0)
+    force = [(3.0 if label.endswith("full") else 0.0) + rng.normal() for label in labels]
+    found = judged(labelled(labels, force), "knn", target="state", controls=False, learning_curve=False)
+
+    assert found.sets.unit == "trials"
+    assert found.sets.covered.rate > 0.85
+    assert found.sets.mean_size <= 2.0  # only states of the class of a trial are possible
+
+
+def test_equal_probabilities_are_told_apart_by_the_closeness_of_the_training_trials():
+    trials = bottles(20, spread=0.2)
+    model = model_of(trials, "tree")
+    closeness = model.novelty.closeness(trials.table, ("full", "empty"))
+    own = np.where(np.array(trials.labels) == "full", closeness[:, 0], closeness[:, 1])
+    other = np.where(np.array(trials.labels) == "full", closeness[:, 1], closeness[:, 0])
+
+    assert (own == 1.0).all()
+    assert other.mean() < 0.9
+
+
+@pytest.fixture
+def csv_file(tmp_path):
+    trials = bottles(12)
+    lines = ["label,bottle,force [N],noise"]
+    for label, name, row in zip(trials.labels, trials.instances, trials.table.values.tolist(), strict=True):
+        lines.append(",".join((label, name, *map(repr, row))))
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    return str(tmp_path / "t.csv")
+
+
+def called(capsys, *arguments):
+    from graspsense.cli.main import main
+
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    out, err = capsys.readouterr()
+    assert not ended.value.code, err
+    return out
+
+
+def test_the_commands_print_and_keep_the_sets(csv_file, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "300")
+    model, given = str(tmp_path / "m.json"), ("--label", "label", "--instance", "bottle")
+
+    trained = called(capsys, "train", csv_file, *given, "--classifier", "knn", "--out", model)
+    listed = called(capsys, "predict", model, csv_file, *given)
+    asked = json.loads(called(capsys, "predict", model, csv_file, *given, "--json"))
+    measured = called(capsys, "evaluate", csv_file, *given, "--classifier", "knn")
+
+    assert "90 % for 2 of 2 labels (12 instances or more of each)" in trained
+    assert "of the held-out trials are called unknown (false alarms)" in trained
+    assert "90 % SET" in listed
+    assert " or " in listed
+    known = [one for one in asked["predictions"] if one["label"] != UNKNOWN]
+    assert all(one["label"] in one["prediction_set"] and one["coverage"] == 0.9 for one in known)
+    assert "contain the true label; 90 % asked for, by instances" in measured
+    assert "Brier score" in measured
+    assert "expected calibration error" in measured
+    assert "reliability of the probabilities" in measured
+
+
+def test_the_page_shows_coverage_and_reliability():
+    from graspsense.report.evaluation_sections import doubt_section
+
+    found = judged(bottles(20), "forest", controls=False, learning_curve=False)
+    few = judged(bottles(4), "tree", controls=False, learning_curve=False)
+    section = doubt_section(found.sets, found.reliability)
+
+    assert found.sets.covered.words in section.body
+    assert "<svg" in section.body
+    assert "Not measured here: 7 calibration instances" in doubt_section(few.sets, few.reliability).body
