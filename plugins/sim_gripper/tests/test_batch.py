@@ -31,8 +31,10 @@ SCENES = ["block", "can:empty_open", "toy", "none"]
 
 
 def bits(trace):
-    columns = (getattr(trace, f.name) for f in fields(Trace) if f.name != "units")
-    return b"".join(np.ascontiguousarray(column).tobytes() for column in columns)
+    columns = (getattr(trace, f.name) for f in fields(Trace) if f.name not in ("units", "signals", "events"))
+    return (
+        b"".join(np.ascontiguousarray(column).tobytes() for column in columns) + repr(trace.events).encode()
+    )
 
 
 def mixed(n):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from attrs import define, evolve, field, frozen
 
-from graspsense.core.signals import CHANNELS, Command, Frame, Image, Pads, Reading, Samples
+from graspsense.core.signals import CHANNELS, NO_PADS, Command, Frame, Image, Pads, Reading, Samples
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -140,11 +140,14 @@ class TraceRecorder:
     images: list[Pads] = field(factory=list, init=False)
     signals: list[Any] = field(factory=list, init=False)
     events: list[GraspEvent] = field(factory=list, init=False)
+    pads: Pads = field(default=NO_PADS, init=False)
+    """The last image, which has as many cells also before the first one."""
 
     def add(self, reading: Reading, phase: int, command: Command) -> None:
         """Add one tick, and its cell image if the counter of the image is new."""
         frame, pads, signals = reading
         self.frames.append(frame)
+        self.pads = pads
         if signals:
             self.signals.append(signals)
         self.phases.append(phase)
@@ -156,6 +159,9 @@ class TraceRecorder:
     def trace(self) -> Trace:
         """Return the trace of the ticks collected so far."""
         trace = trace_of(self.frames, self.phases, self.commands, self.images, self.units, self.signals)
+        if not self.images:
+            none = np.empty((0, len(self.pads.left)))
+            trace = evolve(trace, pad_left=none, pad_right=none.copy())
         return evolve(trace, events=tuple(self.events))
 
 

@@ -19,13 +19,15 @@ from types import TracebackType
 from typing import IO, Any, Final
 
 import numpy as np
-from attrs import asdict, fields
+from attrs import asdict, evolve, fields
 
-from graspsense.plugin_api import Controller, Outcome, RunConfig, Trace, create, recipe_of
+from graspsense.plugin_api import Controller, GraspEvent, Outcome, Phase, RunConfig, Trace, create, recipe_of
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, finished, grasp_plain
 from graspsense_sim_gripper.config import SimConfig
 
-_ARRAYS: Final = tuple(column.name for column in fields(Trace) if column.name != "units")
+_ARRAYS: Final = tuple(
+    column.name for column in fields(Trace) if column.name not in ("units", "signals", "events")
+)
 
 
 Json = Any
@@ -94,11 +96,23 @@ class PlainProcess:
             raise NotHandedOver(answer["refused"])
         job = self._scenes.job
         results = []
-        for scene, seed, (outcome, reason, values) in zip(scenes, seeds, answer["done"], strict=True):
+        for scene, seed, (outcome, reason, values, told) in zip(scenes, seeds, answer["done"], strict=True):
             initial = self._scenes.setup(scene, seed).state
             trace = _read_trace(traces) if job.traces or job.extract is not None else None
+            if trace is not None:
+                trace = evolve(trace, events=tuple(_event(*event) for event in told))
             results.append(finished(job, Outcome(outcome), reason, _like(initial, values), trace))
         return results
+
+
+def _told(grasp: FinishedGrasp) -> list[list[Any]]:
+    """Return the events that the controller told, as JSON values."""
+    events = () if grasp.kept is None else grasp.kept.events
+    return [[event.t_s, int(event.phase), event.what] for event in events]
+
+
+def _event(t_s: float, phase: int, what: str) -> GraspEvent:
+    return GraspEvent(t_s, Phase(phase), what, "controller")
 
 
 def main() -> None:
@@ -127,7 +141,9 @@ def main() -> None:
             for grasp in done:
                 if grasp.kept is not None:
                     _write_trace(traces, grasp.kept)
-            answer = {"done": [[grasp.outcome.value, grasp.reason, grasp.state] for grasp in done]}
+            answer = {
+                "done": [[grasp.outcome.value, grasp.reason, grasp.state, _told(grasp)] for grasp in done]
+            }
             line = _line({**answer, "bytes": traces.tell()})
         except Exception as error:
             what = "a plain grasp" if scenes is not None else "the controller"
