@@ -393,3 +393,14 @@ def test_a_replayed_trial_has_the_trace_of_the_grasp_to_the_last_bit(
         assert before.tobytes() == now.tobytes(), name
     assert replayed.features.values == grasp.trial.features.values
     assert replayed.outcome == grasp.trial.outcome
+
+
+def test_a_recording_offers_the_rate_at_which_it_was_recorded(tmp_path: Path) -> None:
+    settings = resolve(options=["classifier.type=none"])
+    with Store.open(tmp_path) as store:
+        record_grasp(store, settings, installed(), labels={}, origin="run")
+    replay = ReplayBackend(ReplayConfig(recording=f"store:{tmp_path}#1"))
+    rates = {channel.name: channel.rate_hz for channel in replay.channels}
+
+    assert rates.pop("pads") == pytest.approx(24.4, rel=0.02)
+    assert set(rates.values()) == {1000.0}

@@ -5,9 +5,16 @@ import os
 import signal
 import subprocess
 import sys
+from math import inf
 
 import pytest
+from attrs import evolve
+from grippers import Scripted, bottle, squeezing
 
+from graspsense.core.config import resolve
+from graspsense.core.dry_run import dry_run
+from graspsense.core.entries import Channel
+from graspsense.core.signals import VELOCITY, Command
 from graspsense.store.store import Store
 
 COMMAND = [sys.executable, "-m", "graspsense"]
@@ -266,3 +273,32 @@ def test_a_label_and_the_object_of_a_simulated_gripper_agree(tmp_path):
     assert "label and object must agree" in refused.stderr
     with Store.read(store) as opened:
         assert len(opened.page()) == 1
+
+
+class CommandedInVelocity(Scripted):
+    """A gripper on a clock of its own that takes velocities only."""
+
+    channels = (Channel("gap", "m", 1000.0), Channel("force_left", "N", 1000.0))
+    accepts = ("velocity",)
+
+    def open(self, seed):
+        opening, relaxed = (Command(VELOCITY, speed, inf, inf) for speed in (0.03, 0.0))
+        return evolve(super().open(seed), opening=opening, relaxed=relaxed)
+
+    def dry_run_backend(self):
+        return self
+
+
+def test_a_dry_run_shows_what_a_gripper_commanded_in_velocity_is_commanded():
+    settings = resolve(options=["controller.type=velocity", "controller.sends=velocity"])
+    gripper = CommandedInVelocity(squeezing, bottle, clock="device")
+    rehearsed = dry_run(gripper, settings.controller.create(), settings.run)
+    phases = {phase.phase: phase for phase in rehearsed.phases}
+
+    for name in ("opening", "approach", "squeeze", "release"):
+        assert phases[name].seconds > 0.0
+        assert phases[name].kinds == ("velocity",)
+    assert phases["opening"].fastest_m_s > 0.0
+    # Until the contact, the guard keeps the speed and the effort of a gripper with a clock of its own low.
+    assert phases["approach"].fastest_m_s <= settings.run.first_speed_m_s
+    assert 0.0 < phases["approach"].most_n <= settings.run.first_effort_n

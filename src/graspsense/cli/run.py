@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 EXIT_ABORTED: Final = 4
 EXIT_NOT_KEPT: Final = 2
+MANY_GUARDED: Final = 0.1
+"""Share of the ticks of a grasp from which on `run` names the settings by which the guard limits the approach."""
 
 
 @click.command(short_help="Perform one grasp.")
@@ -205,7 +207,10 @@ def print_trial(trial: Trial) -> None:
         echo_entry("note", note)
     counts = trial.counts
     if counts.get("guarded"):
-        echo_entry("note", f"the guard limited {counts['guarded']} of {counts['ticks']} ticks")
+        first = ""
+        if trial.device.clock == "device" and counts["guarded"] > MANY_GUARDED * counts["ticks"]:
+            first = ": until a contact, run.first_speed_m_s and run.first_effort_n limit this gripper"
+        echo_entry("note", f"the guard limited {counts['guarded']} of {counts['ticks']} ticks{first}")
     if counts.get("late"):
         echo_entry("note", f"{counts['late']} of {counts['ticks']} frames came late")
     if trial.seconds_simulated is not None:
@@ -270,6 +275,7 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
         rows = [
             (
                 one.phase,
+                ", ".join(one.kinds) or "none",
                 f"{one.seconds:.2f} s",
                 f"{one.least_n:+.1f} to {one.most_n:+.1f} N",
                 f"{one.fastest_m_s * 1e3:.0f} mm/s",
@@ -277,5 +283,7 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
             )
             for one in rehearsed.phases
         ]
-        echo_table(("PHASE", "FOR", "EFFORT (+ squeezes)", "FASTEST", "BY THE GUARD"), rows)
+        echo_table(("PHASE", "COMMAND", "FOR", "EFFORT (+ squeezes)", "FASTEST", "BY THE GUARD"), rows)
+        if not any(one.seconds for one in rehearsed.phases):
+            echo("the emulated gripper was commanded nothing: this rehearsal shows nothing of the real one")
     echo("nothing was opened")

@@ -25,6 +25,7 @@ SOURCES: Final = """\b
       FILE.csv     a feature table, one line per trial;
                    --label names the column of the label
       NAME:FOLDER  a data set of a plugin, such as icub:FOLDER
+      store:DIR    the labelled trials of a store
       simulated    grasps of the simulated gripper
     """
 

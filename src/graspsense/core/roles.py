@@ -120,7 +120,11 @@ class SensorBackend(ABC, Generic[ConfigT]):
         self.config = config
 
     def objects(self) -> Sequence[ObjectKind]:
-        """Return the kinds of object that this backend can simulate; empty if it grasps real objects."""
+        """Return the kinds of object that this backend can simulate; empty if it grasps real objects.
+
+        `ObjectKind(name="foam", states=("dry", "wet"), default=True)` stands for `foam:dry` and `foam:wet`; without
+        `states`, for `foam`. Simulated trials for which the user names no objects are of the kinds with `default`.
+        """
         return ()
 
     def with_object(self, name: str) -> SensorBackend[ConfigT]:
@@ -128,6 +132,9 @@ class SensorBackend(ABC, Generic[ConfigT]):
 
         `name` is a full name of `objects()`, or any other name that the backend knows. A name that it does not know
         raises UnknownName, at the latest in `open`. Raises ConfigError if the backend cannot be given an object.
+
+        Simulated and collected trials append the number of an instance, as in `foam:dry#2`: a backend whose objects
+        do not differ ignores what follows `#`. Usually `return type(self)(attrs.evolve(self.config, object=name))`.
         """
         raise ConfigError(
             f"{type(self).__name__} grasps real objects, so it cannot be given the object {name!r}. "
@@ -161,7 +168,11 @@ class SensorBackend(ABC, Generic[ConfigT]):
 
     @abstractmethod
     def apply(self, command: Command) -> None:
-        """Apply this command until the next one. Raises DeviceLost."""
+        """Apply this command until the next one. Raises DeviceLost.
+
+        The guard has limited the command. With a device clock, it limits effort and speed to `run.first_effort_n` and
+        `run.first_speed_m_s` (by default 12 N and 15 mm/s) until a pad touches, so a fast approach needs larger ones.
+        """
 
     @abstractmethod
     def tare(self, images: Sequence[Pads]) -> None:
@@ -185,6 +196,7 @@ class SensorBackend(ABC, Generic[ConfigT]):
     def dry_run_backend(self) -> SensorBackend[Any] | None:
         """Return an emulated gripper that takes the same commands, for a dry run; None if there is none.
 
+        Usually `return type(self)(attrs.evolve(self.config, host="fake"))`, or whichever setting emulates it.
         Its `DeviceInfo.clock` is `device` if that of the real gripper is, so that the same limits hold.
         """
         return None

@@ -231,6 +231,12 @@ class RecordedGrasp:
                 values[k] = before
         return values
 
+    def _rate_of_ticks(self) -> float:
+        """Return the number of ticks per unit of time, from their times; 1000 where these do not increase."""
+        times = self.ticks["t_s"]
+        elapsed = float(times[-1] - times[0]) if len(times) else 0.0
+        return (len(times) - 1) / elapsed if elapsed > 0.0 else 1000.0
+
     def recording(self) -> Recording:
         """Return the grasp in the form that a gripper can replay."""
         units = {name: unit for name, unit in self.units.items() if SI_UNITS.get(name) != unit}
@@ -239,7 +245,7 @@ class RecordedGrasp:
         return Recording(
             name=f"recording {self.path.name} of {self.device.name or 'an unknown gripper'}",
             readings=self.readings(),
-            rate_hz=self.device.rate_hz or 1000.0,
+            rate_hz=self.device.rate_hz or self._rate_of_ticks(),
             units=units,
             notes=(*self.device.notes, REPLAY_NOTE),
             commands=tuple(self.ticks["command"].tolist()) if known else None,

@@ -88,6 +88,19 @@ class ReplayConfig:
     )
 
 
+def _rate_hz(recording: Recording, channel: str) -> float:
+    """Return the rate at which a recording has this channel of a frame; 0 if its times are not in seconds."""
+    if recording.units.get("t", "s") != "s":
+        return 0.0
+    if channel != "pads":
+        return recording.rate_hz
+    images = {
+        reading.pads.counter: reading.pads.t_s for reading in recording.readings if reading.pads.counter
+    }
+    seconds = max(images.values()) - min(images.values()) if images else 0.0
+    return (len(images) - 1) / seconds if seconds > 0.0 else 0.0
+
+
 @final
 class ReplayBackend(SensorBackend[ReplayConfig]):
     """Gives the frames of a recording, one a read; commands have no effect on what has happened."""
@@ -103,8 +116,9 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
     def channels(self) -> tuple[Channel, ...]:
         """All channels of a frame, and those that the recording holds beside them. The recording is read for this."""
         with suppress(GraspsenseError):  # `open` reports it
-            own = {channel.name: channel for channel in self._read().channels}
-            frame = (Channel(name, unit) for name, unit in CHANNELS.items())
+            recording = self._read()
+            own = {channel.name: channel for channel in recording.channels}
+            frame = (Channel(name, unit, _rate_hz(recording, name)) for name, unit in CHANNELS.items())
             return (*(own.pop(channel.name, channel) for channel in frame), *own.values())
         return tuple(Channel(name, unit) for name, unit in CHANNELS.items())
 
