@@ -200,7 +200,7 @@ frequency_hz = {frequency}
 @pytest.mark.slow
 def test_steps_resolve_a_fast_oscillation_in_the_grasp_and_after_the_release(tmp_path):
     # The oscillation has the period of a tick: steps of a tick see it at one phase only, and are unstable after the
-    # release. The solution with steps of 2 us peaks at 17.738 N.
+    # release. Fixed steps of 10 us peak at 17.738 N.
     file = tmp_path / "slosh.toml"
     file.write_text(SLOSH.format(mass=0.1, frequency=1000.0))
     for accuracy, settings in ((0.01, {}), (0.001, {"accuracy": 0.001}), (0.001, {"fidelity": "reference"})):

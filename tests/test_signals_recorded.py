@@ -1,0 +1,212 @@
+"""Tactile arrays, fast channels and further channels: through a grasp, its recording, replay and export."""
+
+from __future__ import annotations
+
+import sys
+from math import inf, isnan
+
+import numpy as np
+import pytest
+from attrs import frozen
+
+from graspsense import load_pipeline
+from graspsense.core.pipeline import grasp_with
+from graspsense.core.plugins import IsolatedPlugins
+from graspsense.core.trace import ImageTrace, SampleTrace
+from graspsense.plugin_api import (
+    EFFORT,
+    Channel,
+    Command,
+    DeviceInfo,
+    FastChannel,
+    Features,
+    FeatureSet,
+    FeatureSetEntry,
+    Image,
+    Reading,
+    Samples,
+    SensorBackend,
+    SensorBackendEntry,
+    TactileArray,
+    hookimpl,
+)
+from graspsense.recording.export_trace import write_npz
+from graspsense.recording.reader import read_recorded
+from graspsense.store.record_grasp import record_grasp
+from graspsense.store.store import Store
+from graspsense.testing.model_gripper import ModelGripper
+
+HERE = sys.modules[__name__]
+PALM = TactileArray("palm", "N", 100.0, rows=2, columns=3)
+ACCELERATION = FastChannel("acceleration", "m/s2", 3000.0, samples=3, axes=("x", "y"))
+TEMPERATURE = Channel("motor_temperature", "K", 1000.0)
+FRAME = tuple(
+    Channel(name, unit, 1000.0)
+    for name, unit in (
+        *(("gap", "m"), ("velocity", "m/s"), ("effort", "N")),
+        *(("force_left", "N"), ("force_right", "N")),
+    )
+)
+LOST_AT = 700
+"""The tick before which five samples of the acceleration are lost."""
+
+
+@frozen(kw_only=True)
+class NoKeys:
+    pass
+
+
+class Palm(SensorBackend[NoKeys]):
+    """The model gripper with a palm of 2 x 3 cells, an accelerometer of three samples a tick, and a thermometer.
+
+    Every number follows from the tick, so that a test knows what has to be in the recording.
+    """
+
+    channels = (*FRAME, PALM, ACCELERATION, TEMPERATURE)
+    accepts = ("effort",)
+
+    def open(self, seed):
+        self._fingers = ModelGripper(frozenset(self.channels), 0.05, 1500.0)
+        self._fingers.open(seed)
+        self._tick, self._sampled = -1, 0
+        return DeviceInfo(
+            name="palm",
+            clock="virtual",
+            simulated=True,
+            rate_hz=1000.0,
+            effort_limit_n=100.0,
+            speed_limit_m_s=0.2,
+            opening=Command(EFFORT, -15.0, inf, inf),
+            relaxed=Command(EFFORT, 0.0, inf, inf),
+        )
+
+    def read(self, timeout_s):
+        frame, pads, signals = self._fingers.read(timeout_s)
+        self._tick += 1
+        tick = self._tick
+        image = signals.palm
+        if image.counter:
+            image = Image(image.t_s, image.counter, tuple(image.counter + 0.1 * i for i in range(6)))
+        self._sampled += 3 + (5 if tick == LOST_AT else 0)
+        # Every tenth tick has two new samples only.
+        new = 2 if tick % 10 == 9 else 3
+        self._sampled -= 3 - new
+        rows = tuple((self._sampled - new + k, -1.0) if k < new else (float("nan"),) * 2 for k in range(3))
+        samples = Samples(frame.t_s, self._sampled, new, rows)
+        own = signals._replace(palm=image, acceleration=samples, motor_temperature=300.0 + tick)
+        return Reading(frame, pads, own)
+
+    def apply(self, command):
+        self._fingers.apply(command)
+
+    def tare(self, images):
+        pass
+
+    def close(self):
+        pass
+
+
+class Shaking(FeatureSet[NoKeys]):
+    """Two features of the further channels, so that a replay is judged by what a user's features read."""
+
+    def extract(self, trace):
+        hottest = float(trace.signals["motor_temperature"].max())
+        mean = float(trace.signals["acceleration"].values[:, 0].mean())
+        return Features(names=("hottest", "mean"), values=(hottest, mean), units=("K", "m/s2"), reasons={})
+
+
+@hookimpl
+def graspsense_sensor_backends():
+    return [SensorBackendEntry(name="palm", target=f"{__name__}:Palm", summary="a gripper with a palm")]
+
+
+@hookimpl
+def graspsense_feature_sets():
+    from graspsense.plugin_api import Feature
+
+    return [
+        FeatureSetEntry(
+            name="shaking",
+            target=f"{__name__}:Shaking",
+            config=f"{__name__}:NoKeys",
+            summary="acceleration and temperature",
+            requires=(
+                FastChannel("acceleration", "m/s2", samples=3, axes=("x", "y")),
+                Channel("motor_temperature", "K"),
+            ),
+            features=(
+                Feature("hottest", "K", "highest temperature of the motor"),
+                Feature("mean", "m/s2", "mean acceleration"),
+            ),
+        )
+    ]
+
+
+GRASPSENSE_API = (2, 0)
+
+
+@pytest.fixture
+def recorded(tmp_path, monkeypatch):
+    """One grasp: the trial, the path of its recording, and the plugins."""
+    monkeypatch.setitem(sys.modules, __name__, HERE)
+    options = ["gripper.type=palm", "features.type=shaking", "classifier.type=none"]
+    with IsolatedPlugins() as plugins, Store.open(tmp_path / "trials") as store:
+        plugins.add(HERE, "lab-hand")
+        settings = load_pipeline(options=options, plugins=plugins).settings
+        trial = record_grasp(store, settings, plugins, labels={}, origin="run").trial
+        (path,) = (tmp_path / "trials" / "recordings").glob("*.mcap")
+        yield trial, path, plugins
+
+
+def same(before, now):
+    if isinstance(before, np.ndarray):
+        return before.tobytes() == now.tobytes()
+    arrays = ("t_s", "cells") if isinstance(before, ImageTrace) else ("t_s", "values")
+    return all(getattr(before, name).tobytes() == getattr(now, name).tobytes() for name in arrays)
+
+
+def test_the_trace_has_each_sample_and_image_once_and_counts_the_lost_ones(recorded):
+    trial, _, _ = recorded
+    palm, acceleration = trial.trace.signals["palm"], trial.trace.signals["acceleration"]
+    assert isinstance(palm, ImageTrace)
+    assert isinstance(acceleration, SampleTrace)
+    counters = palm.cells[:, 0]
+    assert np.array_equal(np.diff(counters), np.ones(len(counters) - 1))
+    numbers = acceleration.values[:, 0]
+    assert not np.isnan(numbers).any()
+    steps = np.diff(numbers)
+    assert sorted(set(steps.tolist())) == [1.0, 6.0]
+    assert (steps == 6.0).sum() == 1
+    assert acceleration.lost == 5
+    assert (np.diff(acceleration.t_s) > 0.0).all()
+
+
+def test_the_recording_has_the_same_signals_to_the_last_bit(recorded):
+    trial, path, _ = recorded
+    read = read_recorded(path).trace()
+    assert set(read.signals) == {"palm", "acceleration", "motor_temperature"}
+    for name, signal in trial.trace.signals.items():
+        assert same(signal, read.signals[name]), name
+    assert read.signals["acceleration"].lost == 5
+
+
+def test_a_replay_gives_the_same_signals_and_features(recorded):
+    trial, path, plugins = recorded
+    options = [f"gripper.recording={path}", "features.type=shaking", "classifier.type=none"]
+    settings = load_pipeline(options=["gripper.type=replay", *options], plugins=plugins).settings
+    again = grasp_with(settings, plugins)
+    assert again.features.values == trial.features.values
+    assert not any(isnan(value) for value in again.features.values)
+    for name, signal in trial.trace.signals.items():
+        assert same(signal, again.trace.signals[name]), name
+
+
+def test_an_export_has_the_signals_as_arrays(recorded, tmp_path):
+    trial, path, _ = recorded
+    write_npz(tmp_path / "grasp.npz", read_recorded(path))
+    signals = trial.trace.signals
+    with np.load(tmp_path / "grasp.npz") as exported:
+        assert np.array_equal(exported["signal_palm"], signals["palm"].cells)
+        assert np.array_equal(exported["signal_acceleration_t_s"], signals["acceleration"].t_s)
+        assert np.array_equal(exported["signal_acceleration"], signals["acceleration"].values)
+        assert np.array_equal(exported["signal_motor_temperature"], signals["motor_temperature"])
