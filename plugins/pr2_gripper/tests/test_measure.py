@@ -12,7 +12,7 @@ from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.linkage import LINKAGES
 from graspsense_pr2_gripper.measure import BAD_CELL, BEYOND_TABLE, Measure
 from graspsense_pr2_gripper.protocol import LEFT_ABSENT, InputReport
-from graspsense_pr2_gripper.stream import Image
+from graspsense_pr2_gripper.stream import RawImage
 
 TIP = tuple(3000.0 + i for i in range(22))
 
@@ -21,13 +21,13 @@ def report(ticks: int = 0, velocity_mtick_s: int = 0, status: int = 0, time_us: 
     return InputReport(0, time_us, ticks, velocity_mtick_s, 0, status, 0, (), 1, 0, (0, 0, 0, 0), 0, 0)
 
 
-def image(counter: int, left: dict[int, int] | None = None, right: dict[int, int] | None = None) -> Image:
+def image(counter: int, left: dict[int, int] | None = None, right: dict[int, int] | None = None) -> RawImage:
     """An image with these counts over the zero of `TIP` on these cells."""
     cells = [int(TIP[i]) + over.get(i, 0) for over in (left or {}, right or {}) for i in range(22)]
-    return Image(counter, 1000 * counter, tuple(cells))
+    return RawImage(counter, 1000 * counter, tuple(cells))
 
 
-def raw(base: Image, at: int, value: int) -> Image:
+def raw(base: RawImage, at: int, value: int) -> RawImage:
     return base._replace(cells=(*base.cells[:at], value, *base.cells[at + 1 :]))
 
 
@@ -94,7 +94,7 @@ def test_cell_that_does_not_answer_adds_no_force_and_is_flagged(dead: int, devic
 
 def test_whole_tip_that_does_not_answer_has_no_force(device_identity: Any) -> None:
     measure = tared(device_identity())
-    dead = Image(9, 0, (0,) * 22 + tuple(int(c) for c in TIP))
+    dead = RawImage(9, 0, (0,) * 22 + tuple(int(c) for c in TIP))
     frame = measure.reading(report(), dead).frame
     assert math.isnan(frame.force_left_n)
     assert frame.force_right_n == pytest.approx(0.0)
@@ -119,7 +119,7 @@ def test_mirroring_swaps_the_z_sides_of_one_tip(device_identity: Any) -> None:
     """Left column i is cells 7+i+3k, the mirrored one 9-i+3k; side 1 and 6, corner 2 and 5, tip 3 and 4."""
     measure = Measure(device_identity(), Pr2Config(mirror_left=True), None, None)
     cells = tuple(range(100, 144))
-    pads = measure.reading(report(), Image(1, 0, cells)).pads
+    pads = measure.reading(report(), RawImage(1, 0, cells)).pads
     assert pads.left[:7] == (100, 106, 105, 104, 103, 102, 101)
     for k in range(5):
         assert pads.left[7 + 3 * k : 10 + 3 * k] == (109 + 3 * k, 108 + 3 * k, 107 + 3 * k)

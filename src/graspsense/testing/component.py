@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -10,7 +11,7 @@ from typing import Any, Final
 import attrs
 
 from graspsense.core.config import build, toml_key, toml_value
-from graspsense.core.errors import PluginUnavailable
+from graspsense.core.errors import ConfigError, PluginUnavailable
 from graspsense.core.roles import ClassifierConfig
 from graspsense.core.setting import unit_of_name
 from graspsense.core.strict import keys_of, plain
@@ -29,7 +30,12 @@ def classes_can_be_imported(subject: Subject) -> None:
     try:
         subject.component.config_class()
         subject.component.component_class()
-        subject.component.declared()
+        config = None
+        with contextlib.suppress(ConfigError):  # the checks of the settings report it
+            config = subject.config()
+        # Channels that depend on settings without defaults are known only with these.
+        if config is not None or not subject.component.channels_vary():
+            subject.component.declared(config)
     except PluginUnavailable as error:
         if isinstance(error.__cause__, ImportError) and not subject.component.entry.needs:
             raise CheckFailed(f"{error}\n    {ADVICE_ON_IMPORTS}") from error

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple, final
 from graspsense.plugin_api import DeviceLost
 from graspsense_pr2_gripper.clock import DeviceClock
 from graspsense_pr2_gripper.protocol import InputReport
-from graspsense_pr2_gripper.stream import Image, Restarted, Stream
+from graspsense_pr2_gripper.stream import RawImage, Restarted, Stream
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
 
 READ_S: Final = 0.05
@@ -31,7 +31,7 @@ class Arrival(NamedTuple):
     """A report, the last complete cell image, and the time at which the host read it (monotonic, s)."""
 
     report: InputReport
-    image: Image | None
+    image: RawImage | None
     host_s: float
 
 

@@ -24,7 +24,7 @@ from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.fingertip import CELLS, FIRST_PAD_CELL
 from graspsense_pr2_gripper.linkage import LINKAGES, edge_scale
 from graspsense_pr2_gripper.protocol import LEFT_ABSENT, RIGHT_ABSENT, Identity, InputReport
-from graspsense_pr2_gripper.stream import Image
+from graspsense_pr2_gripper.stream import RawImage
 
 BAD_CELL: Final = 1 << 16
 """Status: a cell of the last image is dead and left out of the forces."""
@@ -89,7 +89,7 @@ class Measure:
         self.bad_cells = 0
         """Largest number of dead cells in one image."""
 
-    def reading(self, report: InputReport, image: Image | None) -> Reading:
+    def reading(self, report: InputReport, image: RawImage | None) -> Reading:
         """Return the reading of this report, with the last complete cell image."""
         if self._first_us is None:
             self._first_us = report.time_us
@@ -135,7 +135,7 @@ class Measure:
         if self._pads.counter:
             self._compute_forces()
 
-    def _take(self, image: Image) -> None:
+    def _take(self, image: RawImage) -> None:
         cells = tuple(map(float, image.cells))
         left, right = cells[:CELLS], cells[CELLS:]
         if self._swap:

@@ -25,7 +25,7 @@ RESTARTED: Final = 32
 """Number of consecutive reports with old sequence numbers after which the device counts as restarted."""
 
 
-class Image(NamedTuple):
+class RawImage(NamedTuple):
     """A complete cell image: `counter` increases by one with each, `cells` are the 44 of the board in its order."""
 
     counter: int
@@ -57,7 +57,7 @@ class Stream:
 
     def __init__(self) -> None:
         self.counts = Counts()
-        self.image: Image | None = None
+        self.image: RawImage | None = None
         """The last complete image."""
         self._last = -1
         self._missing: dict[int, None] = {}
@@ -131,4 +131,4 @@ class Stream:
         self._cells[first : first + SLICE_CELLS] = report.cells
         if self._have == _ALL_SLICES:
             counts.images += 1
-            self.image = Image(counts.images, self._taken_us, tuple(self._cells))
+            self.image = RawImage(counts.images, self._taken_us, tuple(self._cells))
