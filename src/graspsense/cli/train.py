@@ -20,6 +20,7 @@ from graspsense.cli.terminal import echo, echo_entry, talk
 
 if TYPE_CHECKING:
     from graspsense.core.labelled import Labelled
+    from graspsense.core.model import Model
 
 
 @click.command(
@@ -95,19 +96,25 @@ def train(
     for note in labelled.notes:
         talk(f"note: {note}")
     if as_json:
-        echo_json(
-            {
-                "model": out,
-                "classifier": model.component,
-                "target": target,
-                "features": list(model.names),
-                "labels": list(model.classifier.classes()),
-                "trials": len(labelled),
-                "provenance": dict(model.provenance),
-                "sets": None if model.sets is None else model.sets.to_json(),
-            }
-        )
-        return
+        echo_json({"model": out, **_as_values(model), "trials": len(labelled)})
+    else:
+        _say_trained(out, model)
+
+
+def _as_values(model: Model) -> dict[str, Any]:
+    """Return what was trained as plain values."""
+    return {
+        "classifier": model.component,
+        "target": model.target,
+        "features": list(model.names),
+        "labels": list(model.classifier.classes()),
+        "provenance": dict(model.provenance),
+        "sets": None if model.sets is None else model.sets.to_json(),
+    }
+
+
+def _say_trained(out: str, model: Model) -> None:
+    """Print what was trained, and the command that tells how good it is."""
     echo(f"{out}: {model.in_a_line}", indent=2)
     echo_entry("labels", ", ".join(model.classifier.classes()))
     if model.sets is not None:

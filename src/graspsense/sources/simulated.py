@@ -133,7 +133,7 @@ def plan_trials(settings: Settings, groups: Sequence[Group], seed: int) -> Simul
     """Return the trials to simulate. Raises ConfigError if the gripper is not simulated or there are no trials."""
     kinds = simulated_objects(settings)
     groups = tuple(group.with_defaults(kinds) for group in groups)
-    if kinds and not any(group.objects for group in groups):
+    if kinds and not any(group.objects or group.named for group in groups):
         names = ", ".join(kind.name for kind in kinds)
         raise ConfigError(f"no kind of object of this gripper is a default: name --objects, any of {names}")
     trials = [trial for group in groups for trial in group.planned(kinds)]
