@@ -11,6 +11,7 @@ from parts import CHANNELS_OF_HAND, Hand, HandConfig
 from graspsense import load_pipeline
 from graspsense.core.plugins import IsolatedPlugins
 from graspsense.plugin_api import CHANNELS, Channel, SensorBackend, SensorBackendEntry, hookimpl, setting
+from graspsense.sources.simulated import Group, plan_trials
 from graspsense.store.dataset import labelled_store
 from graspsense.store.labels import labels_of
 from graspsense.store.record_grasp import record_grasp
@@ -58,3 +59,9 @@ def test_a_trial_is_simulated_where_the_gripper_says_so_and_not_by_its_settings(
 
         assert [one.simulated for one in store.page()] == [emulated] * 2
     assert labelled_store(str(tmp_path / "trials")).provenance["simulated"] is emulated
+
+
+def test_a_group_may_name_its_objects_by_label_alone():
+    settings = load_pipeline(options=["gripper.type=sim", "classifier.type=none"]).settings
+    group = Group(named={"odwalla:full_open": "odwalla_worn:full_open"}, instances=2, trials=1)
+    assert plan_trials(settings, [group], 0).labels == ("odwalla:full_open",) * 2
