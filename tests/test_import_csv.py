@@ -1,6 +1,7 @@
 """Other people's squeezes: a CSV whose columns their user names, through the pipeline and into a store."""
 
 import json
+import re
 import sys
 
 import pytest
@@ -158,6 +159,14 @@ def test_it_is_kept_whole_with_its_label_and_its_features_worked_out_by_hand(squ
     code, out, err = run(capsys, "replay", f"{store}#1", "--json")
     assert code == 0, err
     assert json.loads(out)["features"] == features
+    # The page has the same phases, and its axis begins at the contact, not at the first line of the file.
+    code, _, err = run(capsys, "report", store, "--out", tmp_path / "page")
+    assert code == 0, err
+    page = (tmp_path / "page" / "report.html").read_text()
+    approach, squeeze = map(float, re.search(r"approach for ([\d.]+), squeeze for ([\d.]+)", page).groups())
+    assert approach == pytest.approx(1.0, abs=0.1)
+    assert squeeze == pytest.approx(0.55, abs=0.1)
+    assert "seconds since both pads touched" in page
 
 
 def test_options_of_a_csv_with_another_kind_are_refused(tmp_path, capsys):

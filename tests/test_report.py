@@ -349,7 +349,7 @@ def test_the_page_of_a_store_that_cannot_be_judged(tmp_path):
         keep(store, None)
     page = store_page(str(tmp_path / "trials"))
 
-    assert page.answer.startswith("There are 1 grasps, but no recognition rate: ")
+    assert page.answer.startswith("There is 1 grasp, but no recognition rate: ")
     assert "One grasp, from the approach to rest" in Reader(page.html()).text
 
 

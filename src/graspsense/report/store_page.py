@@ -142,7 +142,8 @@ def _curves(store: Store) -> list[GraspCurve]:
 
 def _answer(evaluation: Evaluation | None, total: int, problem: str) -> str:
     if evaluation is None:
-        return f"There are {total} grasps, but no recognition rate: {problem}."
+        grasps = "There is 1 grasp" if total == 1 else f"There are {total} grasps"
+        return f"{grasps}, but no recognition rate: {problem}."
     return verdict(evaluation)
 
 
