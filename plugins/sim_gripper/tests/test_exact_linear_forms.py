@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.exact.discretise import applicable, discretise
+from graspsense_sim_gripper.exact.discretise import discretise, why_not_exact
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.terms.registry import TERMS
 from graspsense_sim_gripper.terms.term import OwnContact
@@ -72,7 +72,7 @@ def test_a_terms_linear_form_is_its_law(name, data):
 def reason(change, spec):
     config = evolve(LINEAR, **change)
     setup = unverified_setup(config, spec, 0)
-    why = applicable(config, setup)
+    why = why_not_exact(config, setup)
     assert (discretise(config, setup) is None) == bool(why)
     return why
 

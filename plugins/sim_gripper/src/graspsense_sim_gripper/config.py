@@ -58,7 +58,8 @@ class SimConfig:
     )
     scheme: Literal["auto", "explicit", "implicit"] = setting(
         default="auto",
-        meaning="Prescribes the scheme of the steps, for a study.",
+        meaning="Integration scheme: `explicit` (velocity Verlet) or `implicit` (TR-BDF2); `auto` lets the scene "
+        "decide.",
     )
     step_s: float | None = setting(
         default=None,

@@ -19,7 +19,7 @@ from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import LinearForm, OwnContact, TermParams
 
 
-def applicable(config: SimConfig, setup: GraspSetup) -> str:
+def why_not_exact(config: SimConfig, setup: GraspSetup) -> str:
     """Return the reason why exact discretisation does not apply to a grasp, or an empty string if it applies.
 
     This is the only place that decides between time steps and the matrix exponential. Time steps are prescribed by the
@@ -49,9 +49,9 @@ def discretise(
     """Return the plant with the matrices of its modes, and their shape; None if exact discretisation does not apply.
 
     `on_arrays`: store the matrices in arrays, for compiled code; otherwise in lists, which the interpreter indexes
-    faster. Raises TypeError as `applicable` does.
+    faster. Raises TypeError as `why_not_exact` does.
     """
-    if applicable(config, setup):
+    if why_not_exact(config, setup):
         return None
     found = _tables(setup, on_arrays=on_arrays)
     assert found is not None

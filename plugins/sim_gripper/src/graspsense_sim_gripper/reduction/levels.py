@@ -33,14 +33,14 @@ class LevelScale(NamedTuple):
 
     model: float
     """`model_tol` over the accuracy."""
-    steps: float = 1.0
-    """The accuracy over `step_tol`."""
+    refinement: float = 1.0
+    """The accuracy over `step_tol`: how much more exact the steps are than what is asked for."""
     min_steps: int = 1
     """As in `Level`."""
 
     def at(self, accuracy: float) -> Level:
         """Return the level for this accuracy."""
-        return Level(self.model * accuracy, accuracy / self.steps, self.min_steps)
+        return Level(self.model * accuracy, accuracy / self.refinement, self.min_steps)
 
 
 FULL_SCALES: Final = (LevelScale(0.0), LevelScale(0.0, 10.0, 4), LevelScale(0.0, 100.0, 32))
@@ -57,7 +57,7 @@ REFERENCE_SCALES: Final = {
     10.0: LevelScale(0.0, 100.0, 8),
     100.0: LevelScale(0.0, 1000.0, 32),
 }
-"""The scale of the full model that a candidate is compared with, by the `steps` of the candidate's own scale."""
+"""The scale of the full model that a candidate is compared with, by the `refinement` of the candidate's own scale."""
 
 
 def scales_for(fidelity: Literal["scene", "full", "reference"], spread: bool) -> tuple[LevelScale, ...]:

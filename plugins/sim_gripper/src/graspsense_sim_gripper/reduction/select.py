@@ -139,7 +139,7 @@ def _first_accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reducti
 
 def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:
     """Return the scale of the full model that a candidate of this scale is compared with."""
-    reference = REFERENCE_SCALES[scale.steps]
+    reference = REFERENCE_SCALES[scale.refinement]
     factor = 2 if config.accuracy <= FINE else 1
     return reference._replace(min_steps=factor * reference.min_steps)
 
