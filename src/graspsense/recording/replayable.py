@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
+import struct
 from collections.abc import Mapping
 from typing import Final
 
 from attrs import field, frozen
 
 from graspsense.core.entries import Channel
-from graspsense.core.signals import Reading
+from graspsense.core.signals import Frame, Reading
 
 REPLAY_NOTE: Final = "a recording cannot react: the controller's commands have no effect on it"
 
@@ -31,3 +33,19 @@ class Recording:
     commands: tuple[float, ...] | None = None
     has_release: bool = False
     channels: tuple[Channel, ...] = ()
+
+
+_FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
+
+
+def content_sha256(recording: Recording) -> str:
+    """Return a hash of the frames and pad images: equal for the same grasp under another file name or label."""
+    content = hashlib.sha256()
+    counter = 0
+    for reading in recording.readings:
+        content.update(_FRAME.pack(*reading.frame))
+        pads = reading.pads
+        if pads.counter != counter:
+            counter = pads.counter
+            content.update(struct.pack(f"<{2 * len(pads.left)}d", *pads.left, *pads.right))
+    return content.hexdigest()

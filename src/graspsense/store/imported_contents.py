@@ -1,0 +1,59 @@
+"""Which contents a store has imported: the same grasp twice would be in training and test data at once."""
+
+from __future__ import annotations
+
+import json
+from typing import Final
+
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.recording.reader import read_recorded
+from graspsense.recording.replayable import content_sha256
+from graspsense.store.store import Store
+
+CONTENT: Final = "content_sha256"
+"""Key of the provenance of an imported trial: the hash of its frames, by `content_sha256`."""
+
+
+class ImportedContents:
+    """The contents of the imported trials of a store that are not set aside.
+
+    A trial of an earlier version has no hash in its provenance; its recording is read.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._folder = store.folder
+        self._trials: dict[str, int] = {}
+        rows = store.query(
+            """SELECT trial.id, trial.recording, detail.provenance FROM trial JOIN detail ON detail.trial = trial.id
+            WHERE trial.origin = 'import' AND trial.set_aside IS NULL ORDER BY trial.id"""
+        )
+        for number, recording, provenance in rows:
+            sha256 = _stated(provenance)
+            if sha256 is None:
+                try:
+                    sha256 = content_sha256(read_recorded(store.recording_path(recording)).recording())
+                except (ConfigError, DataDamaged):
+                    continue  # `graspsense verify` reports it
+            self._trials.setdefault(sha256, number)
+
+    def refuse(self, sha256: str, source: str) -> None:
+        """Raise ConfigError if the store has this content already; `source` names what is imported."""
+        number = self._trials.get(sha256)
+        if number is not None:
+            raise ConfigError(
+                f"{source} has the same content as trial {number} of the store in {self._folder}. A grasp that is "
+                "stored twice is in training and test data at once, which makes every rate too high. To import it "
+                f"again with other options, first set that trial aside: graspsense trials aside {self._folder}#{number}"
+            )
+
+    def add(self, sha256: str, number: int) -> None:
+        """Note the content of a trial that was just imported."""
+        self._trials.setdefault(sha256, number)
+
+
+def _stated(provenance: str) -> str | None:
+    try:
+        stated = json.loads(provenance).get(CONTENT)
+    except (ValueError, AttributeError):
+        return None
+    return stated if isinstance(stated, str) else None
