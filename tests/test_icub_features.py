@@ -73,7 +73,7 @@ def test_features_are_relative_to_the_first_frame_and_the_variant_adds_it_back(f
     assert absolute.values[:3, 2] - relative.values[:3, 2] == pytest.approx(0.1 * 15 * 12)
     assert (absolute.values[:3, 3:] == relative.values[:3, 3:])[~np.isnan(relative.values[:3, 3:])].all()
     assert np.isnan(relative.values[3:]).all()
-    assert any("3 of 6 grasps have no contact on both sides" in note for note in found.notes)
+    assert any("3 of 6 grasps have no contact as the feature set needs it" in note for note in found.notes)
     assert relative.units == ("m", "m", "N", "frame", "m/frame", "N/frame")
 
 

@@ -34,11 +34,16 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:
 
 @hookimpl
 def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
-    """Return the six features of Table I of the paper."""
+    """Return the six features of Table I of the paper, and those of the whole force curve."""
     yield FeatureSetEntry(
         name="chitta",
         target="graspsense.plugins.features.chitta:ChittaFeatures",
         summary="the six features of Table I (Chitta, Piccoli, Sturm 2010)",
+    )
+    yield FeatureSetEntry(
+        name="curve",
+        target="graspsense.plugins.features.curve:CurveFeatures",
+        summary="stiffness, work, relaxation, hysteresis and shape of the whole force curve",
     )
 
 

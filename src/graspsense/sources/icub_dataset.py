@@ -70,7 +70,9 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
         )
     without = int(np.isnan(table.values).all(axis=1).sum())
     if without:
-        notes.append(f"{without} of {len(grasps)} grasps have no contact on both sides, and so no features")
+        notes.append(
+            f"{without} of {len(grasps)} grasps have no contact as the feature set needs it, and so no features"
+        )
     variants = {}
     if set(_SHIFTED_BY) <= set(table.names):
         what = "the same features plus the gap and the force of the first frame (p_first, p_steady, f_steady)"

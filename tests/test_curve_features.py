@@ -1,0 +1,259 @@
+"""Features of the whole force curve: laws that hold for every curve, and figures of real recordings."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from attrs import evolve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from graspsense.core.signals import Frame, Phase
+from graspsense.core.trace import SI_UNITS, Trace, trace_of
+from graspsense.plugins.features.curve import NAMES, CurveConfig, CurveFeatures
+from graspsense.testing.samples import copied, squeeze
+
+FEATURES = CurveFeatures(CurveConfig())
+HOLD_NAMES = {"relaxation", "relaxation_time", "creep", "hold_t25", "hold_t50", "hold_t75"}
+RELEASE_NAMES = {
+    "hysteresis",
+    "residual_compression",
+    "unloading_stiffness",
+    "release_x75",
+    "release_x50",
+    "release_x25",
+}
+
+
+def grasp(
+    t_s, *, stiffness=4000.0, exponent=1.0, relaxing=0.2, tau_s=0.08, second=0.9, noise=0.0, units=SI_UNITS
+):
+    """A grasp sampled at these times: touch at 0.5 s, 4 mm of squeeze until 1 s, hold until 1.6 s, release until 2.2 s.
+
+    The force is that of a spring, F = k d (x / d)^n with the depth d = 4 mm, which loses a share in the hold. The
+    right pad has a share of that of the left.
+    """
+    t_s = np.asarray(t_s, dtype=np.float64)
+    gap = np.interp(t_s, [0.0, 0.5, 1.0, 1.6, 2.2], [0.065, 0.060, 0.056, 0.056, 0.066])
+    x = np.maximum(0.060 - gap, 0.0)
+    lost = np.where(t_s > 1.0, relaxing * (1.0 - np.exp(-(t_s - 1.0) / tau_s)), 0.0)
+    left = stiffness * 0.004 * (x / 0.004) ** exponent * (1.0 - lost)
+    pads = [left, second * left]
+    if noise:
+        rng = np.random.default_rng(3)
+        pads = [pad + noise * rng.normal(size=len(t_s)) for pad in pads]
+    phases = np.select(
+        [t_s < 0.5, t_s < 1.0, t_s < 1.6], [Phase.APPROACH, Phase.SQUEEZE, Phase.HOLD], Phase.RELEASE
+    )
+    steps = np.diff(t_s, prepend=t_s[:1])
+    frames = [
+        Frame(t, dt, g, 0.0, 0.0, left, right, math.nan, math.nan, 0)
+        for t, dt, g, left, right in zip(*(a.tolist() for a in (t_s, steps, gap, *pads)), strict=True)
+    ]
+    return trace_of(frames, phases.tolist(), [0.0] * len(frames), [], units)
+
+
+EVEN = np.arange(0.0, 2.2, 0.001)
+
+
+def defined(features):
+    return {name for name, value in zip(features.names, features.values, strict=True) if value == value}
+
+
+def test_a_spring_with_known_constants():
+    f = FEATURES.extract(grasp(EVEN))
+    assert not f.reasons
+    # The mean of both pads has 0.95 of the stiffness of the left one.
+    for name in ("stiffness_25", "stiffness_50", "stiffness_75"):
+        assert f[name] == pytest.approx(3800.0, rel=1e-3)
+    assert f["curvature"] == pytest.approx(0.0, abs=2e-3)
+    # The largest force is a mean over 50 ms, so a loss that begins at once is seen by so much later.
+    assert f["relaxation"] == pytest.approx(0.2, rel=0.15)
+    assert f["relaxation_time"] == pytest.approx(0.08, rel=0.2)
+    assert f["unloading_stiffness"] == pytest.approx(0.8 * 3800.0, rel=1e-3)
+    # The release returns 80 % of the work, but for the triangle between no force and contact at either end.
+    assert f["hysteresis"] == pytest.approx(0.2, abs=0.01)
+    # The first pad to touch, and to let go, has the share 0.9: 0.625 N of 3600 N/m.
+    assert f["contact_gap"] == pytest.approx(0.060 - 0.625 / 3600.0, abs=1e-6)
+    assert f["pad_difference"] == pytest.approx(0.1 / 1.9)
+    assert f.units[NAMES.index("loading_work")] == "J"
+
+
+@pytest.mark.parametrize(("exponent", "stiffens"), [(1.5, True), (2.0, True), (0.7, False)])
+def test_curvature_and_stiffness_agree_on_what_stiffens(exponent, stiffens):
+    f = FEATURES.extract(grasp(EVEN, exponent=exponent))
+    assert (f["stiffness_75"] > 1.1 * f["stiffness_25"]) == stiffens
+    assert (f["curvature"] > 0.05) == stiffens
+    # The slope of k d (x/d)^n at half of the largest force: n k (1/2)^(1 - 1/n).
+    expected = exponent * 3800.0 * 0.5 ** (1.0 - 1.0 / exponent)
+    assert f["stiffness_50"] == pytest.approx(expected, rel=0.05)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([400, 800, 1500]), st.sampled_from([0.7, 1.0, 1.8]))
+def test_uneven_samples_of_the_same_curve_give_the_same_features(seed, n, exponent):
+    """The density of the samples varies by a factor of ten along the grasp, and gives no stretch more weight."""
+    rng = np.random.default_rng(seed)
+    density = np.interp(EVEN, np.linspace(0.0, 2.2, 8), rng.uniform(0.1, 1.0, 8))
+    share = np.cumsum(density) / density.sum()
+    uneven = np.interp((np.arange(n) + rng.uniform(0.0, 1.0, n)) / n, share, EVEN)
+    even = FEATURES.extract(grasp(EVEN, exponent=exponent))
+    other = FEATURES.extract(grasp(np.unique(np.concatenate(([0.0], uneven, [EVEN[-1]]))), exponent=exponent))
+    assert defined(other) == defined(even) == set(NAMES)
+    for name in NAMES:
+        scale = {"curvature": 1.0, "residual_compression": 0.004, "creep": 0.004, "hysteresis": 1.0}
+        rel = 0.15 if name == "relaxation_time" else 0.06
+        assert other[name] == pytest.approx(even[name], rel=rel, abs=0.02 * scale.get(name, 0.0)), name
+
+
+def test_repeated_forces_between_cell_images_do_not_shift_the_curve():
+    """Forces that come every 41 ms and are repeated in between are not paired with the gaps in between."""
+    trace = copied(grasp(EVEN))
+    held = (np.arange(len(EVEN)) // 41) * 41
+    trace = evolve(trace, force_left_n=trace.force_left_n[held], force_right_n=trace.force_right_n[held])
+    stairs, even = FEATURES.extract(trace), FEATURES.extract(grasp(EVEN))
+    for name in ("contact_gap", "stiffness_25", "stiffness_50", "stiffness_75", "unloading_stiffness"):
+        assert stairs[name] == pytest.approx(even[name], rel=0.02), name
+    assert stairs["hysteresis"] == pytest.approx(even["hysteresis"], abs=0.03)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.3, 1.0), st.floats(0.6, 2.0))
+def test_swapping_the_fingers_changes_nothing(second, exponent):
+    trace = grasp(EVEN[::4], second=second, exponent=exponent)
+    swapped = evolve(trace, force_left_n=trace.force_right_n, force_right_n=trace.force_left_n)
+    assert FEATURES.extract(swapped).values == pytest.approx(FEATURES.extract(trace).values, nan_ok=True)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.1, 10.0), st.floats(0.1, 10.0), st.floats(0.1, 10.0))
+def test_features_scale_with_their_units(length, force, time):
+    """In other units of gap, force and time, each feature is the same quantity."""
+    trace = grasp(EVEN[::4], exponent=1.3)
+    scaled = evolve(
+        trace,
+        t_s=trace.t_s * time,
+        gap_m=trace.gap_m * length,
+        force_left_n=trace.force_left_n * force,
+        force_right_n=trace.force_right_n * force,
+    )
+    config = CurveConfig(contact_force_n=0.625 * force, window_s=0.05 * time, least_travel_m=2e-5 * length)
+    of = {
+        "1": 1.0, "m": length, "N": force, "s": time, "J": force * length, "N/m": force / length,
+    }  # fmt: skip
+    before, after = FEATURES.extract(trace), CurveFeatures(config).extract(scaled)
+    for name, unit, a, b in zip(NAMES, before.units, before.values, after.values, strict=True):
+        assert b == pytest.approx(a * of[unit], rel=1e-6, abs=1e-9 * of[unit]), name
+
+
+def test_noise_of_the_pads_does_not_bias_stiffness_and_force():
+    quiet = FEATURES.extract(grasp(EVEN))
+    noisy = FEATURES.extract(grasp(EVEN, noise=0.3))
+    assert noisy["peak_force"] == pytest.approx(quiet["peak_force"], rel=0.02)
+    for name in ("stiffness_25", "stiffness_50", "stiffness_75", "loading_work", "unloading_stiffness"):
+        assert noisy[name] == pytest.approx(quiet[name], rel=0.08), name
+
+
+def test_a_grasp_without_hold_or_release_lacks_only_their_features():
+    whole = grasp(EVEN)
+    squeezed = FEATURES.extract(whole.until(1.0))
+    assert defined(squeezed) == set(NAMES) - HOLD_NAMES - RELEASE_NAMES
+    assert "no hold" in squeezed.reasons["relaxation"]
+    held = FEATURES.extract(whole.until(1.5))
+    assert defined(held) == set(NAMES) - RELEASE_NAMES
+    assert "ends before the release" in held.reasons["hysteresis"]
+    for name in ("stiffness_50", "contact_gap", "curvature"):
+        assert squeezed[name] == pytest.approx(held[name], rel=0.05, abs=0.01), name
+
+
+def test_a_recording_without_phases_has_the_same_features():
+    trace = grasp(EVEN)
+    recording = evolve(trace, phase=np.full(len(trace), int(Phase.APPROACH)))
+    given_, without = FEATURES.extract(trace), FEATURES.extract(recording)
+    assert defined(without) == set(NAMES)
+    for name in set(NAMES) - {"creep"}:
+        assert without[name] == pytest.approx(given_[name], rel=0.08, abs=0.02), name
+
+
+@pytest.mark.parametrize("absent", [math.nan, 0.0])
+def test_a_single_pad_suffices(absent):
+    """The other pad gives no number, or touches nothing."""
+    both = grasp(EVEN, second=1.0)
+    alone = evolve(both, force_right_n=np.full(len(both), absent))
+    f, expected = FEATURES.extract(alone), FEATURES.extract(both)
+    assert set(f.reasons) == {"pad_difference"}
+    for name in set(NAMES) - {"pad_difference"}:
+        assert f[name] == pytest.approx(expected[name]), name
+
+
+def test_a_rigid_object_has_forces_but_no_stiffness():
+    trace = grasp(EVEN)
+    rigid = evolve(trace, gap_m=np.maximum(trace.gap_m, 0.05999))
+    f = FEATURES.extract(rigid)
+    assert {"peak_force", "loading_time", "relaxation", "load_t50"} <= defined(f)
+    assert "below least_travel_m" in f.reasons["stiffness_50"]
+
+
+def test_units_of_a_recording_carry_over():
+    f = FEATURES.extract(grasp(EVEN[::20], units={**SI_UNITS, "t": "frame"}))
+    assert f.units[NAMES.index("loading_time")] == "frame"
+    assert f.units[NAMES.index("stiffness_50")] == "N/m"
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.floats(0.0, 0.09) | st.just(math.nan),
+            st.floats(-1.0, 100.0) | st.just(math.nan),
+            st.floats(-1.0, 100.0) | st.just(math.nan),
+            st.sampled_from([0.0, 0.001, 0.03]),
+            st.sampled_from([int(phase) for phase in Phase]),
+        ),
+        max_size=60,
+    )
+)
+def test_every_trace_gives_numbers_or_reasons(rows):
+    t_s = np.cumsum([row[3] for row in rows])
+    frames = [
+        Frame(float(t), 0.001, gap, 0.0, 0.0, left, right, 0.0, 0.0, 0)
+        for t, (gap, left, right, _, _) in zip(t_s, rows, strict=True)
+    ]
+    trace: Trace = trace_of(frames, [row[4] for row in rows], [0.0] * len(rows), [])
+    f = FEATURES.extract(trace)
+    for name, value in zip(f.names, f.values, strict=True):
+        assert not math.isinf(value)
+        assert (value != value) == bool(f.reasons.get(name)), name
+
+
+@pytest.mark.skipif(
+    "GRASPSENSE_ICUB" not in os.environ,
+    reason="needs the iCub Grasp Dataset: name its folder in GRASPSENSE_ICUB",
+)
+def test_most_features_of_the_icub_recordings_are_defined_where_there_is_contact():
+    from graspsense.plugin_api import create
+    from graspsense.sources.icub_dataset import read_dataset
+
+    table = read_dataset(os.environ["GRASPSENSE_ICUB"], create("feature-set", "graspsense/curve")).table
+    known = ~np.isnan(table.values)
+    touched = known.any(axis=1)
+    # Table I needs both pads and rest: 133 grasps have any of its features, 96 all of them.
+    assert (len(table), int(touched.sum())) == (203, 167)
+    before_release = [name not in RELEASE_NAMES for name in table.names]
+    assert known[touched][:, before_release].mean() > 0.85
+    assert not known[:, np.logical_not(before_release)].any(), "the recordings end before the release"
+
+
+def test_the_synthetic_squeeze_of_the_checks_has_all_features():
+    assert defined(FEATURES.extract(squeeze())) == set(NAMES)
+
+
+def test_the_documentation_lists_every_feature_with_its_unit():
+    page = (Path(__file__).parents[1] / "docs" / "features.md").read_text(encoding="utf-8")
+    for feature in CurveFeatures.features:
+        row = next(line for line in page.splitlines() if line.startswith("|") and f"`{feature.name}`" in line)
+        assert feature.unit in [unit.strip() for unit in row.split("|")[2].split(",")], feature.name
