@@ -127,7 +127,7 @@ def test_version_is_that_of_the_distribution():
         (
             ["plugins", "show", "replai"],
             "graspsense: no plugin or component named 'replai'. "
-            "Known: chitta, curve, force, forest, graspsense, hybrid, knn, mlp, replay, svm, tree, velocity. "
+            "Known: catch22, chitta, curve, force, forest, graspsense, hybrid, knn, mlp, replay, svm, tree, velocity. "
             "Did you mean 'replay'?\n",
         ),
     ],

@@ -34,7 +34,7 @@ def graspsense_controllers() -> Iterable[ControllerEntry]:
 
 @hookimpl
 def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
-    """Return the six features of Table I of the paper, and those of the whole force curve."""
+    """Return the six features of Table I of the paper, and those of the whole force curve by two sets."""
     yield FeatureSetEntry(
         name="chitta",
         target="graspsense.plugins.features.chitta:ChittaFeatures",
@@ -44,6 +44,12 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
         name="curve",
         target="graspsense.plugins.features.curve:CurveFeatures",
         summary="stiffness, work, relaxation, hysteresis and shape of the whole force curve",
+    )
+    yield FeatureSetEntry(
+        name="catch22",
+        target="graspsense.plugins.features.catch22:Catch22Features",
+        summary="22 characteristics of the force over time (pycatch22)",
+        needs="pip install 'graspsense[catch22]' (pycatch22 has the licence GPL-3.0)",
     )
 
 

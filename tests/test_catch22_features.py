@@ -1,0 +1,53 @@
+"""The characteristics of pycatch22 as a feature set."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from graspsense.core.errors import PluginUnavailable
+from graspsense.core.plugins import Plugins
+from graspsense.plugin_api import create
+from graspsense.testing.samples import squeeze
+
+
+def extract(trace):
+    return create("feature-set", "graspsense/catch22").extract(trace)
+
+
+def test_force_and_duration_do_not_count_but_the_course_does():
+    trace = squeeze()
+    # Twice the contact force as well, so that the contact is at the same time.
+    stronger = evolve(trace, force_left_n=2.0 * trace.force_left_n, force_right_n=2.0 * trace.force_right_n)
+    twice = create("feature-set", "graspsense/catch22", contact_force_n=1.25).extract(stronger)
+    assert twice.values == pytest.approx(extract(trace).values, rel=1e-6)
+    slower = evolve(trace, t_s=3.0 * trace.t_s)
+    assert extract(slower).values == pytest.approx(extract(trace).values, rel=1e-6)
+    relaxed = extract(trace.until(1.85))
+    squeezed = extract(trace.until(1.45))
+    assert squeezed["stretch_decreasing"] < relaxed["stretch_decreasing"]
+
+
+def test_half_of_the_samples_give_nearly_the_same():
+    trace = squeeze()
+    columns = {
+        name: getattr(trace, name)[::2] for name in ("t_s", "gap_m", "force_left_n", "force_right_n", "phase")
+    }
+    f, half = extract(trace), extract(evolve(trace, **columns))
+    close = np.isclose(f.values, half.values, rtol=0.05, atol=0.02)
+    assert close.sum() >= 19, dict(zip(f.names, zip(f.values, half.values, strict=True), strict=True))
+
+
+def test_a_grasp_without_contact_or_course_has_none_with_the_reason():
+    assert "never felt" in extract(squeeze(contacts=(-1.0, -1.0))).reasons["trev"]
+    assert "fewer than 8 samples" in extract(squeeze().until(1.022)).reasons["trev"]
+
+
+def test_without_pycatch22_the_message_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pycatch22", None)
+    monkeypatch.delitem(sys.modules, "graspsense.plugins.features.catch22", raising=False)
+    with pytest.raises(PluginUnavailable, match=r"graspsense\[catch22\]"):
+        Plugins.discover().find("feature-set", "catch22").config_class()
