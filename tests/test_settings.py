@@ -9,15 +9,28 @@ from attrs import frozen
 
 from graspsense import load_pipeline
 from graspsense.cli.main import main
-from graspsense.core.config import ImplausibleSettings, resolve, settings_from, to_toml
+from graspsense.core.config import ImplausibleSettings, resolve, settings_from, to_toml, without_followers
 from graspsense.core.errors import ConfigError
+from graspsense.core.layers import Layer
 from graspsense.core.plugins import installed
+from graspsense.core.roles import DeviceInfo
 from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import tick_params
 from graspsense.core.setting import unit_of_name
+from graspsense.core.signals import EFFORT, Command
 from graspsense.core.strict import keys_of
 from graspsense.experiments.experiment import read_experiment
 from graspsense.plugin_api import setting
 
+INFO = DeviceInfo(
+    name="bench",
+    clock="device",
+    rate_hz=1000.0,
+    effort_limit_n=50.0,
+    speed_limit_m_s=0.1,
+    opening=None,
+    relaxed=Command(EFFORT, 0.0, math.inf, math.inf),
+)
 EMULATED = ["gripper.transport=emulated", "classifier.type=none"]
 
 
@@ -206,3 +219,29 @@ def test_config_show_describes_the_keys_of_a_table(capsys):
     assert code == 0
     assert "# drop: Probability that a report is lost. [0 to 1; default 0.0]\n" in out
     assert tomllib.loads(out)["gripper"]["faults"]["drop"] == 0.0
+
+
+def test_the_contact_threshold_stands_once():
+    """Features use that of the controller, unless they are given another one."""
+    one = resolve(options=["controller.contact_force_n=1.25"])
+    assert one.values["features"]["contact_force_n"] == 1.25
+    assert one.origins["features.contact_force_n"] == "controller.contact_force_n"
+    assert tick_params(INFO, one.controller.create(), one.run).guard.contact_force_n == 1.25
+    other = resolve(options=["controller.contact_force_n=1.25", "features.contact_force_n=0.5"])
+    assert other.values["features"]["contact_force_n"] == 0.5
+    assert resolve().origins["features.contact_force_n"] == "default"
+
+
+def test_an_implausible_threshold_is_said_once():
+    with pytest.raises(ImplausibleSettings) as told:
+        resolve(options=["controller.contact_force_n=500"])
+    assert str(told.value).count("500 N is not plausible") == 1
+
+
+def test_a_recorded_threshold_follows_an_option_too():
+    recorded = without_followers(resolve(options=["controller.contact_force_n=1.25"]).values)
+    assert "contact_force_n" not in recorded["features"]
+    again = resolve(
+        experiment=Layer.of(recorded, "a recording"), options=["controller.contact_force_n=0.25"], force=True
+    )
+    assert again.values["features"]["contact_force_n"] == 0.25

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from textwrap import indent, wrap
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from attrs import frozen
+from attrs import fields, frozen
 
 from graspsense import __version__
 from graspsense.core.entries import TABLE_OF_ROLE, Role
@@ -27,6 +28,7 @@ from graspsense.core.layers import (
     read_layer,
 )
 from graspsense.core.plugins import Component, Plugins, installed
+from graspsense.core.setting import followed_settings
 from graspsense.core.strict import (
     InvalidValue,
     ValidationFailed,
@@ -54,6 +56,7 @@ __all__ = [
     "select_component",
     "settings_from",
     "to_toml",
+    "without_followers",
 ]
 
 NONE: Final = "none"
@@ -181,7 +184,7 @@ def _resolved_layers(
         cls: type
         if table == "run":
             component, cls, called = None, RunConfig, "[run]"
-            merged = _merged(layers, table, None)
+            merged, followed = _merged(layers, table, None), frozenset[str]()
         else:
             found = _component(layers, table, plugins, complaints)
             if found is None:
@@ -191,6 +194,7 @@ def _resolved_layers(
             merged = _merged(layers, table, component)
             if table == "controller" and "gripper" in chosen:
                 _choose_sent_kind(merged, component, chosen["gripper"])
+            followed = _follow(merged, cls, table, values)
         config: Any
         try:
             config = structured({k: v for k, v in merged.values.items() if k != "type"}, cls, called)
@@ -198,7 +202,8 @@ def _resolved_layers(
             complaints += [_complaint(merged, problem) for problem in misfit.under(table)]
             continue
         if not force:
-            doubts += [_complaint(merged, one.under(table)) for one in implausible_values(config)]
+            of_table = [one for one in implausible_values(config) if one.path[0] not in followed]
+            doubts += [_complaint(merged, one.under(table)) for one in of_table]
         if component is None:
             run = config
             values[table] = plain(config)
@@ -247,6 +252,43 @@ def _choose_sent_kind(merged: Merged, controller: Component, gripper: SelectedCo
         merged.owner[controller.table, "sends"] = Layer.of(
             {}, f"{gripper.component.qualified} accepts {kind}"
         )
+
+
+def _follow(
+    merged: Merged, config_class: type, table: str, values: Mapping[str, Mapping[str, Any]]
+) -> frozenset[str]:
+    """Give the keys that follow a key of a table before this one, and are not set, its value; return these keys."""
+    given = set()
+    defaults = {field.name: field.default for field in fields(config_class)}
+    for key, path in followed_settings(config_class).items():
+        owner, _, name = path.partition(".")
+        value = values.get(owner, {}).get(name)
+        if key not in merged.values and value is not None and value != defaults[key]:
+            merged.values[key] = value
+            merged.owner[table, key] = Layer.of({}, path)
+            given.add(key)
+    return frozenset(given)
+
+
+def without_followers(
+    values: Mapping[str, Mapping[str, Any]], plugins: Plugins | None = None
+) -> dict[str, dict[str, Any]]:
+    """Return complete tables without the keys that follow another one and have its value.
+
+    Settings that are resolved from these tables and an option for the key that is followed are consistent again.
+    """
+    plugins = installed() if plugins is None else plugins
+    kept = {table: dict(keys) for table, keys in values.items()}
+    for table, keys in kept.items():
+        role, name = _ROLE_OF_TABLE.get(table), keys.get("type")
+        if role is None or not isinstance(name, str):
+            continue
+        with suppress(UnknownName, PluginUnavailable):
+            for key, path in followed_settings(plugins.find(role, name).config_class()).items():
+                owner, _, of = path.partition(".")
+                if key in keys and values.get(owner, {}).get(of) == keys[key]:
+                    del keys[key]
+    return kept
 
 
 def build(component: Component, values: Mapping[str, Any]) -> Any:

@@ -82,7 +82,7 @@ def tick_params(info: DeviceInfo, controller: Controller[Any], run: RunConfig) -
             speed_limit_m_s=info.speed_limit_m_s,
             first_effort_n=run.first_effort_n if real else infinite,
             first_speed_m_s=run.first_speed_m_s if real else infinite,
-            contact_force_n=CONTACT_FORCE_N,
+            contact_force_n=getattr(controller.config, "contact_force_n", CONTACT_FORCE_N),
         ),
         law=controller.params(),
     )

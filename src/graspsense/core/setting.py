@@ -23,6 +23,7 @@ from attrs import frozen, validators
 
 _DECLARATION: Final = "graspsense.setting"
 _EFFECT: Final = "graspsense.effect"
+_FOLLOWS: Final = "graspsense.follows"
 
 CHANGES_NO_RESULT: Final[Mapping[str, Any]] = {_EFFECT: "changes no result"}
 """Effect of a setting that changes what is reported, or how fast, but not the result beyond its stated accuracy."""
@@ -83,6 +84,7 @@ def setting(
     plausible: tuple[float, float] | None = None,
     validator: Callable[[Any, Any, Any], None] | None = None,
     effect: Mapping[str, Any] | None = None,
+    follows: str = "",
 ) -> Any:
     """Return the attrs field of a setting.
 
@@ -91,6 +93,8 @@ def setting(
     are refused unless the user adds `--force`. A key with a `Literal` type accepts its values only. None is accepted
     where it is the default. `validator` is a further validator of attrs. `effect` is `CHANGES_NO_RESULT` or
     `NAMES_INPUT`; a setting without either is part of the set-up: two grasps that differ in it are not comparable.
+    `follows` names the setting that owns the value (`controller.contact_force_n`): where a pipeline does not give this
+    one, and has that one, their values are equal.
 
     Raises TypeError if the declaration contradicts itself.
 
@@ -101,10 +105,7 @@ def setting(
     """
     if not meaning.strip():
         raise TypeError("a setting needs a meaning: say in a sentence what its value does")
-    if (minimum is not None and above is not None) or (maximum is not None and below is not None):
-        raise TypeError(
-            "a setting has one lower and one upper limit: `minimum` or `above`, `maximum` or `below`"
-        )
+    _refuse_two_limits(minimum, above, maximum, below)
     if plausible is not None and not plausible[0] < plausible[1]:
         raise TypeError(f"the plausible range {plausible} is empty: write (smallest, largest)")
     number = (
@@ -126,15 +127,36 @@ def setting(
     )
     if plausible is not None and implausible(declaration, default):
         raise TypeError(f"the default {default} is not in the plausible range {plausible}")
-    metadata = {_DECLARATION: declaration, **(effect or {})}
+    metadata = {_DECLARATION: declaration, **(effect or {}), **({_FOLLOWS: follows} if follows else {})}
     if factory is not None:
         return attrs.field(factory=factory, validator=check, metadata=metadata)
     return attrs.field(default=default, validator=check, metadata=metadata)
 
 
+def _refuse_two_limits(
+    minimum: float | None, above: float | None, maximum: float | None, below: float | None
+) -> None:
+    """Raise TypeError for two lower or two upper limits."""
+    if (minimum is not None and above is not None) or (maximum is not None and below is not None):
+        raise TypeError(
+            "a setting has one lower and one upper limit: `minimum` or `above`, `maximum` or `below`"
+        )
+
+
 def declared(field: attrs.Attribute[Any]) -> Declaration:
     """Return what this field of a config class declares."""
     return cast(Declaration, field.metadata.get(_DECLARATION, Declaration()))
+
+
+def followed_settings(config_class: type) -> dict[str, str]:
+    """Return the names of the settings of this class that follow another one, with the name of that one."""
+    if not attrs.has(config_class):
+        return {}
+    return {
+        field.name: str(field.metadata[_FOLLOWS])
+        for field in attrs.fields(config_class)
+        if _FOLLOWS in field.metadata
+    }
 
 
 def unit_of_name(key: str) -> str:

@@ -8,7 +8,8 @@ time or shortly after it, the features are missing.
 from __future__ import annotations
 
 import math
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
 
 import numpy as np
 
@@ -31,7 +32,12 @@ NAMES: Final = (
 _UNITS: Final = ("m", "m/s", "N", "N", "N")
 
 
-def before_contact(trace: Trace) -> Features:
+def contact_force_of(settings: Mapping[str, Mapping[str, Any]]) -> float:
+    """Return the contact threshold of these settings (N): that of the controller, which features follow."""
+    return float(settings.get("controller", {}).get("contact_force_n", CONTACT_FORCE_N))
+
+
+def before_contact(trace: Trace, contact_force_n: float = CONTACT_FORCE_N) -> Features:
     """Return the features from before contact; they are missing, with the reason, if contact came too early."""
     approach = np.flatnonzero(trace.phase == APPROACH)
     if not len(approach):
@@ -39,7 +45,7 @@ def before_contact(trace: Trace) -> Features:
     start = trace.t_s[approach[0]]
     if trace.t_s[approach[-1]] < start + SPAN_S:
         return _missing(f"the approach took less than {SPAN_S:g} s")
-    felt = np.maximum(trace.force_left_n, trace.force_right_n) >= CONTACT_FORCE_N
+    felt = np.maximum(trace.force_left_n, trace.force_right_n) >= contact_force_n
     if bool((felt & (trace.t_s <= start + SPAN_S + GUARD_S)).any()):
         return _missing(f"a pad felt a force in the first {SPAN_S + GUARD_S:g} s of the approach")
     span = approach[trace.t_s[approach] <= start + SPAN_S]

@@ -24,7 +24,7 @@ from graspsense.core.entries import Channel, TactileArray
 from graspsense.core.errors import DataDamaged
 from graspsense.core.json_values import json_text
 from graspsense.core.trial import trial_as_json
-from graspsense.recording.before_contact import before_contact
+from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.layout import DEVICE, RESULT, START, VERSION
 from graspsense.recording.provenance import provenance
 
@@ -182,7 +182,9 @@ class TrialResult:
             outcome=trial.outcome.words,
             reason=trial.reason,
             features=FeatureValues.of(trial.features),
-            before_contact=FeatureValues.of(before_contact(trial.trace)),
+            before_contact=FeatureValues.of(
+                before_contact(trial.trace, contact_force_of(trial.run.settings))
+            ),
             details={key: printed[key] for key in DETAILS},
         )
 

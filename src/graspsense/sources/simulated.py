@@ -21,7 +21,7 @@ from graspsense.core.roles import BatchBackend, DeviceInfo, FeatureSet
 from graspsense.core.runner import run_grasp
 from graspsense.core.strict import plain
 from graspsense.core.wiring import check
-from graspsense.recording.before_contact import before_contact
+from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.controls import controls
 
 if TYPE_CHECKING:
@@ -230,6 +230,7 @@ class _Extraction:
 
     name: str
     feature_set: FeatureSet[Any]
+    contact_force_n: float
 
     def __call__(self, trace: Trace) -> tuple[Features, Features]:
         """Return the features, and those from before contact."""
@@ -239,7 +240,7 @@ class _Extraction:
             raise ComponentFailed(
                 f"feature set {self.name} failed on a simulated grasp: {named(error)}"
             ) from error
-        return features, before_contact(trace)
+        return features, before_contact(trace, self.contact_force_n)
 
 
 def _grasps(
@@ -247,7 +248,9 @@ def _grasps(
 ) -> Iterator[tuple[Features, Features, Trace | None]]:
     """Yield the features of each trial, those from before contact, and its trace if `traces` asks for it."""
     backend, controller = settings.gripper.create(), settings.controller.create()
-    extract = _Extraction(settings.features.component.qualified, settings.features.create())
+    extract = _Extraction(
+        settings.features.component.qualified, settings.features.create(), contact_force_of(settings.values)
+    )
     total = len(plan.scenes)
     if isinstance(backend, BatchBackend):
         # A trace has half a megabyte, so traces come in batches.

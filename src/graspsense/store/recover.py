@@ -19,7 +19,7 @@ from graspsense.core.errors import ConfigError, DataDamaged, GraspsenseError
 from graspsense.core.features import Features
 from graspsense.core.plugins import installed
 from graspsense.recording.atomic_file import SaveFailed
-from graspsense.recording.before_contact import before_contact
+from graspsense.recording.before_contact import before_contact, contact_force_of
 from graspsense.recording.layout import DEVICE, PART, START, TICK
 from graspsense.recording.reader import RecordedGrasp, TopicRows, read_recorded
 from graspsense.recording.recording_info import RecordingInfo
@@ -193,7 +193,7 @@ def _aborted(grasp: RecordedGrasp, record: TrialRecord) -> TrialResult:
         outcome="aborted",
         reason=why,
         features=_features(trace, record, why),
-        before_contact=FeatureValues.of(before_contact(trace)),
+        before_contact=FeatureValues.of(before_contact(trace, contact_force_of(record.settings))),
     )
 
 

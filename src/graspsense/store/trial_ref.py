@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from graspsense.core.config import NONE
+from graspsense.core.config import NONE, without_followers
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.layers import Layer
 from graspsense.recording.reader import RecordedGrasp, read_recorded
@@ -43,5 +43,5 @@ def recorded_settings(kind: str, name: str) -> Layer:
     `kind` is `store` or `mcap`, as in the setting `gripper.recording` of `replay`. Raises ConfigError, DataDamaged.
     """
     grasp = stored_grasp(name) if kind == "store" else read_recorded(name)
-    values = {"classifier": {"type": NONE}, **grasp.record().settings}
+    values = {"classifier": {"type": NONE}, **without_followers(grasp.record().settings)}
     return Layer.of({k: v for k, v in values.items() if k != "gripper"}, f"the recording {grasp.path.name}")

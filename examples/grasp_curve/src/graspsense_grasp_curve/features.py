@@ -88,7 +88,8 @@ class GraspCurveConfig:
         unit="N",
         above=0.0,
         plausible=(0.01, 20.0),
-        meaning="Force on each pad at contact.",
+        meaning="Force on each pad at contact; that of the controller unless it is given here.",
+        follows="controller.contact_force_n",
     )
 
 

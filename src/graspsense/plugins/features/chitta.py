@@ -56,21 +56,27 @@ class ChittaConfig:
         unit="N",
         above=0.0,
         plausible=(0.01, 20.0),
-        meaning="tau_1 of the paper: the force on each pad from which on it touches the object.",
+        meaning="tau_1 of the paper: the force on each pad from which on it touches the object; that of the controller "
+        "unless it is given here.",
+        follows="controller.contact_force_n",
     )
     rest_speed_m_s: float = setting(
         default=REST_SPEED_M_S,
         unit="m/s",
         above=0.0,
         plausible=(1e-7, 0.05),
-        meaning="tau_2 of the paper, below which the speed must stay throughout the window.",
+        meaning="tau_2 of the paper, below which the speed must stay throughout the window; that of the controller "
+        "unless it is given here.",
+        follows="controller.rest_speed_m_s",
     )
     rest_window_s: float = setting(
         default=REST_WINDOW_S,
         unit="s",
         above=0.0,
         plausible=(0.001, 5.0),
-        meaning="Time for which the speed must stay below rest_speed_m_s.",
+        meaning="Time for which the speed must stay below rest_speed_m_s; that of the controller unless it is given "
+        "here.",
+        follows="controller.rest_window_s",
     )
 
 
