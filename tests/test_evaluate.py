@@ -20,6 +20,7 @@ from graspsense.evaluation.crossval import thinned
 from graspsense.evaluation.evaluate import evaluate
 from graspsense.evaluation.json_codec import from_json, to_json
 from graspsense.evaluation.results import Evaluation
+from graspsense.report.verdict import verdict
 
 
 def learner(name="c45"):
@@ -137,6 +138,67 @@ def test_what_is_known_before_the_contact_is_a_warning_only_where_it_tells(leak)
     assert any("before contact" in warning for warning in found.warnings) is leak
     assert found.controls["before_contact"].what == "posture before the grasp"
     assert (found.controls["before_contact"].rate.rate > 0.4) is leak
+
+
+def before(values, **more):
+    return ControlFeatures(table=table(values, names=("gap_at_start",)), what="the gap at the start", **more)
+
+
+def test_a_control_without_any_feature_is_not_measured_instead_of_passing():
+    """Sixty trials that begin in contact: their control from before contact would be chance, which proves nothing."""
+    labels, width, force = four_states(15)
+    control = before(np.full(60, np.nan), missing="a pad felt a force in the first 0.6 s of the approach")
+    found = judged(labelled(labels, width, force, before_contact=control))
+
+    measured = found.controls["before_contact"]
+    assert measured.rate is None
+    assert measured.reason == (
+        "0 of 60 trials have such features: a pad felt a force in the first 0.6 s of the approach"
+    )
+    assert f"was not measured: {measured.reason}" in verdict(found)
+
+
+def test_a_control_is_measured_on_the_trials_that_have_its_features():
+    """Half of the trials begin in contact. In the others the gap at the start is the label."""
+    labels, width, force = four_states()
+    leaking = np.where(np.arange(120) < 60, np.nan, np.array([STATES.index(label) for label in labels]))
+    control = before(leaking, missing="a pad felt a force")
+    found = judged(labelled(labels, width, force, before_contact=control)).controls["before_contact"]
+
+    assert (found.rate.correct, found.rate.n) == (60, 60)
+    assert found.what == "the gap at the start; 60 of 120 trials have such features: a pad felt a force"
+    # The headline of the same sixty trials, of which it misses some.
+    assert -0.5 < found.difference.value < 0.0
+
+
+def test_too_few_trials_with_a_feature_are_not_measured():
+    labels, width, force = four_states()
+    one = np.where(np.arange(120) == 7, 0.08, np.nan)
+    found = judged(labelled(labels, width, force, before_contact=before(one))).controls["before_contact"]
+    assert found.rate is None
+    assert found.reason == "1 of 120 trials have such features; these are too few to learn from"
+
+
+@pytest.mark.parametrize("leak", [True, False])
+def test_the_first_line_of_imported_recordings_is_a_control_of_its_own(leak):
+    labels, width, force = four_states()
+    gap = width if leak else np.random.default_rng(3).normal(size=120)
+    control = ControlFeatures(table=table(gap, names=("gap_first",)), what="the first frame")
+    found = judged(labelled(labels, width, force, first_line=control))
+    assert any("from the first line of the recording" in warning for warning in found.warnings) is leak
+    assert ("The first line of the recording alone" in verdict(found)) is leak
+    assert "first_line" not in judged(labelled(labels, width, force)).controls
+
+
+@pytest.mark.parametrize("squeeze_adds", [True, False])
+def test_a_width_that_is_as_good_as_all_features_is_a_warning(squeeze_adds):
+    rng = np.random.default_rng(4)
+    labels = ["can", "jar"] * 60
+    width = np.array([60.0, 55.0] * 60) + 3.0 * rng.normal(size=120)
+    force = np.array([9.0, 3.0 if squeeze_adds else 9.0] * 60) + rng.normal(size=120)
+    control = ControlFeatures(table=table(width, names=("p_first",)), what="p_first alone")
+    found = judged(labelled(labels, width, force, width=control))
+    assert any("the width alone reaches" in warning for warning in found.warnings) is not squeeze_adds
 
 
 def test_what_cannot_be_measured_is_null_with_a_reason():

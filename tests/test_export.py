@@ -165,7 +165,7 @@ def test_labelled_trials_of_a_store_are_a_data_set(folder):
     found = labelled_store(str(folder))
     assert found.labels == ("can:full_open", "can:it's open")
     assert found.instances == ("can#1", "can#2")
-    assert found.order == (1, 2)
+    assert found.order == (0, 1)
     assert found.table.names == ("p_first", "f_steady")
     assert found.table.values[0].tolist() == [0.066, 5.5]
     assert math.isnan(found.table.values[1, 1])

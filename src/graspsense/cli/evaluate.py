@@ -110,8 +110,8 @@ def _print(found: Evaluation) -> None:
     controls = {name: one for name, one in found.controls.items() if name not in found.protocols}
     measured = {name: one for name, one in {**found.protocols, **controls}.items() if one.rate is not None}
     echo_table(
-        ("PROTOCOL OR CONTROL", "RATE", "95 %", "LOWER BY, IN POINTS", "WHAT"),
-        [_row(name, one) for name, one in measured.items()],
+        ("PROTOCOL OR CONTROL", "RATE", "95 %", "TRIALS", "LOWER BY, IN POINTS", "WHAT"),
+        [_row(name, one, found.headline.n) for name, one in measured.items()],
     )
     for name, one in {**found.protocols, **controls}.items():
         if one.rate is None:
@@ -157,7 +157,7 @@ def _print_doubt(found: Evaluation) -> None:
         )
 
 
-def _row(name: str, measured: Measurement) -> tuple[str, ...]:
+def _row(name: str, measured: Measurement, trials: int) -> tuple[str, ...]:
     from graspsense.evaluation.intervals import percentage, percentages
 
     assert measured.rate is not None
@@ -166,6 +166,7 @@ def _row(name: str, measured: Measurement) -> tuple[str, ...]:
         name,
         percentage(rate.rate),
         percentages(rate.interval),
+        f"{rate.n} of {trials}",
         "" if measured.difference is None else measured.difference.points,
         f"{measured.what}{f' (compared with {measured.difference_of})' if measured.difference_of else ''}",
     )

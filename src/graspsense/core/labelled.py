@@ -21,10 +21,14 @@ TARGETS: Final[tuple[Target, ...]] = ("both", "class", "state")
 
 @frozen(kw_only=True, eq=False)
 class ControlFeatures:
-    """Other features of the same trials, evaluated as a baseline; `what` describes them in words."""
+    """Other features of the same trials, evaluated as a baseline; `what` describes them in words.
+
+    `missing` is the most frequent reason why a trial has none of them, if any has none.
+    """
 
     table: FeatureTable
     what: str
+    missing: str = ""
 
 
 @frozen(kw_only=True, eq=False)
@@ -34,7 +38,8 @@ class Labelled:
     `labels` are `class:state`, or a class alone. `instances` identify the individual object of each trial
     (`odwalla#3`); None if that was not recorded, with the reason in `no_instances`. `order` numbers the trials in the
     order of recording. `before_contact` are features from before contact only, None with the reason in
-    `no_before_contact`; `width` is the width alone. `variants` are further tables to evaluate. If rates on these
+    `no_before_contact`; `first_line` are the numbers of the first frame alone, if the trials were imported; `width` is
+    the width alone. `variants` are further tables to evaluate. If rates on these
     trials say nothing about other objects, `no_interval` is the reason, and they get no interval. `notes` tell what a
     reader of a rate must know, `provenance` how the trials were made.
     """
@@ -49,6 +54,7 @@ class Labelled:
     no_order: str = ""
     before_contact: ControlFeatures | None = None
     no_before_contact: str = ""
+    first_line: ControlFeatures | None = None
     width: ControlFeatures | None = None
     no_width: str = ""
     variants: Mapping[str, ControlFeatures] = field(factory=dict)
@@ -82,11 +88,9 @@ class Labelled:
             instances=None if self.instances is None else _picked(self.instances, numbers),
             order=None if self.order is None else _picked(self.order, numbers),
             before_contact=_control_rows(self.before_contact, which),
+            first_line=_control_rows(self.first_line, which),
             width=_control_rows(self.width, which),
-            variants={
-                name: ControlFeatures(table=one.table.rows(which), what=one.what)
-                for name, one in self.variants.items()
-            },
+            variants={name: evolve(one, table=one.table.rows(which)) for name, one in self.variants.items()},
         )
 
     def of_class(self, name: str) -> Labelled:
@@ -127,4 +131,4 @@ def _picked(column: Sequence[Any], numbers: Sequence[int]) -> tuple[Any, ...]:
 
 
 def _control_rows(control: ControlFeatures | None, which: NDArray[np.int64]) -> ControlFeatures | None:
-    return None if control is None else ControlFeatures(table=control.table.rows(which), what=control.what)
+    return None if control is None else evolve(control, table=control.table.rows(which))

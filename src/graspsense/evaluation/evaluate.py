@@ -29,6 +29,8 @@ from graspsense.evaluation.intervals import (
 from graspsense.evaluation.results import CurvePoint, Evaluation, Measurement
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from graspsense.core.features import FeatureTable
     from graspsense.evaluation.doubt import SetCoverage
     from graspsense.evaluation.folds import Folds
@@ -127,7 +129,8 @@ class _Evaluator:
         self.warnings: list[str] = []
         self.stratified_name = f"stratified_{k}_fold"
         self.pooled_by_protocol: dict[str, Pooled] = {}
-        self.pooled_by_control: dict[str, Pooled] = {}
+        self.predicted_by_control: dict[str, tuple[Pooled, list[int]]] = {}
+        """The predictions of the controls with other features, and the trials that these are of."""
         self._note_small_labels()
         self._note_few_instances()
 
@@ -161,6 +164,7 @@ class _Evaluator:
                 "features from before contact only",
                 trials.no_before_contact,
             ),
+            **self._first_line(headline),
             "width_only": self._other_features(
                 "width_only", trials.width, headline, "the width alone", trials.no_width
             ),
@@ -171,8 +175,9 @@ class _Evaluator:
         }
         for name, control in trials.variants.items():
             controls[name] = self._other_features(name, control, headline)
-        self._warn_of_early_recognition(controls["before_contact"], majority_correct)
+        self._warn_of_early_recognition(controls, majority_correct)
         self._warn_of_leaks(controls)
+        self._warn_of_width(controls["width_only"], headline)
         return controls
 
     def learning_curve(self, headline: _Headline) -> tuple[CurvePoint, ...]:
@@ -239,8 +244,17 @@ class _Evaluator:
             self.trials.no_interval,
         )
 
-    def _difference(self, first: Sequence[bool], second: Sequence[bool]) -> Difference:
-        return difference(first, second, self.trials.instances)
+    def _difference(
+        self, first: Sequence[bool], second: Sequence[bool], rows: Sequence[int] | None = None
+    ) -> Difference:
+        """Return the difference of two rates on these trials (default: all)."""
+        instances = self.trials.instances
+        rows = range(len(first)) if rows is None else rows
+        return difference(
+            [first[i] for i in rows],
+            [second[i] for i in rows],
+            None if instances is None else [instances[i] for i in rows],
+        )
 
     def _note_small_labels(self) -> None:
         counts = Counter(self.labels)
@@ -270,9 +284,11 @@ class _Evaluator:
         folds: Sequence[Folds],
         share: float = 1.0,
         labels: Sequence[str] | None = None,
+        groups: Groups | None = None,
     ) -> Pooled:
         """Cross-validate and report progress under this name. Raises FitRefused."""
         labels = self.labels if labels is None else labels
+        groups = self.groups if groups is None else groups
         total = sum(int(of.max()) + 1 for of in folds)
         done = 0
 
@@ -283,13 +299,16 @@ class _Evaluator:
                 self.progress(name, done, total)
 
         return cross_validate(
-            self.learner, table, labels, self.groups, folds, seed=self.seed, share=share, progress=step
+            self.learner, table, labels, groups, folds, seed=self.seed, share=share, progress=step
         )
 
-    def _against(self, what: str, pooled: Pooled, other: Pooled, other_name: str) -> Measurement:
-        """Return the rate of `pooled` with its difference to another protocol."""
-        by = self._difference(other.right(self.labels), pooled.right(self.labels))
-        return Measurement(what, self.rate(pooled), difference=by, difference_of=other_name)
+    def _against(
+        self, what: str, pooled: Pooled, other: Pooled, other_name: str, rows: Sequence[int] | None = None
+    ) -> Measurement:
+        """Return the rate of `pooled` with its difference to another protocol, both on these trials (default: all)."""
+        right = pooled.right(self.labels)
+        by = self._difference(other.right(self.labels), right, rows)
+        return Measurement(what, self.rate_among(right, rows), difference=by, difference_of=other_name)
 
     def _instance_held_out(self, plain: Pooled) -> tuple[_Headline | None, Measurement]:
         what = f"at most {self.k} folds of whole instances: no model was trained on the object that it is tested on"
@@ -334,15 +353,37 @@ class _Evaluator:
         default: str = "",
         reason: str = "",
     ) -> Measurement:
-        """Measure the rate with other features on the folds of the headline."""
+        """Measure the rate with other features on the folds of the headline, among the trials that have any of them.
+
+        Trials without such a feature would be given the most frequent label, so that a control could seem to pass
+        because it measured nothing.
+        """
         if control is None:
             return Measurement(default, reason=reason or "these trials have no such features")
+        having: NDArray[np.bool_] = np.array(~np.isnan(control.table.values).all(axis=1))
+        n, of = int(having.sum()), len(having)
+        why = f": {control.missing}" if control.missing else ""
+        having_words = f"{n} of {of} trials have such features{why}"
+        if n == 0:
+            return Measurement(control.what, reason=having_words)
+        groups, folds = _among(having, self.groups, headline.folds)
+        if not groups:
+            return Measurement(control.what, reason=f"{having_words}; these are too few to learn from")
         try:
-            pooled = self._pooled(name, control.table, headline.folds)
+            pooled = self._pooled(name, control.table, folds, groups=groups)
         except FitRefused as refusal:
             return Measurement(control.what, reason=str(refusal))
-        self.pooled_by_control[name] = pooled
-        return self._against(control.what, pooled, headline.pooled, headline.protocol)
+        rows = np.sort(np.concatenate(list(groups))).tolist()
+        self.predicted_by_control[name] = (pooled, rows)
+        what = control.what if len(rows) == of else f"{control.what}; {having_words}"
+        return self._against(what, pooled, headline.pooled, headline.protocol, rows)
+
+    def _first_line(self, headline: _Headline) -> dict[str, Measurement]:
+        """Measure the rate with the first frame alone, if the trials were imported."""
+        control = self.trials.first_line
+        return (
+            {} if control is None else {"first_line": self._other_features("first_line", control, headline)}
+        )
 
     def _majority(self, headline: _Headline) -> tuple[list[bool], Measurement]:
         """Return which trials have the most frequent label of their group, and the rate of predicting that label."""
@@ -401,15 +442,31 @@ class _Evaluator:
             labels[np.concatenate([blocks[k] for k in rng.permutation(len(blocks))])] = given
         return [str(label) for label in labels]
 
-    def _warn_of_early_recognition(self, control: Measurement, majority_correct: Sequence[bool]) -> None:
-        if control.rate is None:
-            return
-        correct = self.pooled_by_control["before_contact"].right(self.labels)
-        if self._difference(correct, majority_correct).is_positive:
+    def _warn_of_early_recognition(
+        self, controls: Mapping[str, Measurement], majority_correct: Sequence[bool]
+    ) -> None:
+        for name, when in (
+            ("before_contact", "before contact"),
+            ("first_line", "the first line of the recording"),
+        ):
+            control = controls.get(name)
+            if control is None or control.rate is None:
+                continue
+            pooled, rows = self.predicted_by_control[name]
+            if self._difference(pooled.right(self.labels), majority_correct, rows).is_positive:
+                majority = float(np.mean([majority_correct[i] for i in rows]))
+                self.warnings.append(
+                    f"{percentage(control.rate.rate)} are recognised from {when} ({control.what}); the most "
+                    f"frequent label alone gives {percentage(majority)}. The recording itself reveals the labels"
+                )
+
+    def _warn_of_width(self, control: Measurement, headline: _Headline) -> None:
+        """Warn if the width alone may be as good as all features."""
+        by = control.difference
+        if control.rate is not None and by is not None and by.interval is not None and not by.is_positive:
             self.warnings.append(
-                f"{percentage(control.rate.rate)} are recognised from before contact ({control.what}); the most "
-                f"frequent label alone gives {percentage(float(np.mean(majority_correct)))}. The recording itself "
-                "reveals the labels"
+                f"the width alone reaches {percentage(control.rate.rate)}, and the rate of {headline.protocol} is not "
+                f"shown to be higher (by {by.words}): the squeeze is not shown to add anything"
             )
 
     def _warn_of_leaks(self, controls: Mapping[str, Measurement]) -> None:
@@ -420,6 +477,19 @@ class _Evaluator:
             by = controls[name].difference
             if by is not None and by.is_positive:
                 self.warnings.append(f"the rate of {name} is lower by {by.words}: {why}")
+
+
+def _among(
+    having: NDArray[np.bool_], groups: Groups, folds: Sequence[Folds]
+) -> tuple[list[NDArray[np.int64]], list[Folds]]:
+    """Return groups and folds of the trials in a mask, without groups that are not in several folds."""
+    kept_groups, kept_folds = [], []
+    for rows, of in zip(groups, folds, strict=True):
+        kept = having[rows]
+        if len(np.unique(of[kept])) > 1:
+            kept_groups.append(rows[kept])
+            kept_folds.append(of[kept])
+    return kept_groups, kept_folds
 
 
 def _trials_for(labelled: Labelled, target: Target, notes: list[str]) -> Labelled:

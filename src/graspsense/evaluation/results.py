@@ -18,8 +18,10 @@ from graspsense.evaluation.intervals import Difference, RecognitionRate
 class Measurement:
     """A rate under one protocol or control, or the reason why it could not be measured.
 
-    `what` defines it. `difference` is the rate of the protocol named in `difference_of`, minus this rate.
-    `permutation_p` is the p-value of the headline among shuffled labels, None for all other controls.
+    `what` defines it. A control with other features is measured on the trials that have any of them: `rate.n` is their
+    number, and its `difference` is on the same trials. `difference` is the rate of the protocol named in
+    `difference_of`, minus this rate. `permutation_p` is the p-value of the headline among shuffled labels, None for all
+    other controls.
     """
 
     what: str

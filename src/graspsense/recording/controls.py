@@ -17,12 +17,15 @@ if TYPE_CHECKING:
 
 BEFORE_CONTACT: Final = f"the first {SPAN_S:g} s of the approach: gap, velocity, effort and pad forces"
 
+FIRST_LINE: Final = "the first frame of the recording alone: gap, velocity, effort and pad forces"
+
 
 class Controls(TypedDict):
     """The fields of `Labelled` that hold the control tables, or the reasons why there are none."""
 
     before_contact: ControlFeatures | None
     no_before_contact: str
+    first_line: ControlFeatures | None
     width: ControlFeatures | None
     no_width: str
 
@@ -33,13 +36,16 @@ def controls(
     *,
     before_what: str = BEFORE_CONTACT,
     no_before: str = "",
+    before_missing: str = "",
+    first_line: FeatureTable | None = None,
     width_meaning: str = "",
 ) -> Controls:
     """Return the controls of a table of features.
 
     `before_contact` holds features of the same trials from before contact, None with the reason in `no_before`.
-    `before_what` says what these are, `width_meaning` what the width means in these data. The width is the feature
-    that an installed feature set declares as such.
+    `before_what` says what these are, and `before_missing` why a trial has none of them. `first_line` holds the numbers
+    of the first frame of trials that were imported. `width_meaning` says what the width means in these data. The width
+    is the feature that an installed feature set declares as such.
     """
     name = width_feature(table.names)
     width = None
@@ -49,8 +55,9 @@ def controls(
     return Controls(
         before_contact=None
         if before_contact is None
-        else ControlFeatures(table=before_contact, what=before_what),
+        else ControlFeatures(table=before_contact, what=before_what, missing=before_missing),
         no_before_contact=no_before if before_contact is None else "",
+        first_line=None if first_line is None else ControlFeatures(table=first_line, what=FIRST_LINE),
         width=width,
         no_width="" if width is not None else "none of the features is declared to be the width",
     )

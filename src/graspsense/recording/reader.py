@@ -291,6 +291,30 @@ def read_recorded(path: str | Path, *, salvage: bool = False) -> RecordedGrasp:
     return reading.grasp(damage, salvage)
 
 
+def read_first_frame(path: Path) -> Frame | None:
+    """Return the first frame of a recording, reading no more of it than needed; None if it has none.
+
+    Raises ConfigError if the file cannot be opened, DataDamaged if it cannot be read up to the first frame.
+    """
+    reading = _PartialGrasp(path)
+    try:
+        with path.open("rb") as file:
+            for record in StreamReader(
+                file, emit_chunks=True, validate_crcs=True, record_size_limit=LARGEST_RECORD
+            ).records:
+                damage = reading.take(record)
+                ticks = reading.bodies[TICK_TOPIC]
+                if damage:
+                    raise DataDamaged(f"the recording {path} is damaged: {damage}")
+                if ticks:
+                    return Frame(*TICK.unpack(ticks[0])[: len(Frame._fields)])
+    except OSError as error:
+        raise ConfigError(f"the recording {path} cannot be read: {error.strerror}") from error
+    except _DAMAGE as error:
+        raise DataDamaged(f"the recording {path} is damaged: {error}") from error
+    return None
+
+
 class _PartialGrasp:
     """The parts of a recording that have been read so far."""
 

@@ -11,6 +11,7 @@ def verdict(evaluation: Evaluation) -> str:
     """Return the rate with its interval, the comparison with guessing, and what the controls say about its origin."""
     sentences = [_rate(evaluation), _against_guessing(evaluation.controls.get("majority_class"))]
     sentences.append(_before_contact(evaluation))
+    sentences.append(_first_line(evaluation))
     sentences.append(_width(evaluation.controls.get("width_only")))
     return " ".join(filter(None, sentences))
 
@@ -61,13 +62,24 @@ def _before_contact(evaluation: Evaluation) -> str:
     if control is None:
         return ""
     if control.rate is None or majority is None or majority.rate is None:
-        return "Whether the recording reveals the labels before contact was not measured."
+        why = "" if control.rate is not None else f": {control.reason}"
+        return f"Whether the recording reveals the labels before contact was not measured{why}."
     before = percentage(control.rate.rate)
     if any("from before contact" in warning for warning in evaluation.warnings):
         return f"But {before} are recognised before any contact: the recording reveals the labels, so do not trust it."
     if control.difference is not None and control.difference.interval is None:
         return f"Before contact {before} are recognised, on too few instances to say what that means."
     return f"Before contact {before} are recognised, so the recording does not explain the rate."
+
+
+def _first_line(evaluation: Evaluation) -> str:
+    control = evaluation.controls.get("first_line")
+    if control is None or control.rate is None:
+        return ""
+    if any("from the first line" in warning for warning in evaluation.warnings):
+        share = percentage(control.rate.rate)
+        return f"The first line of the recording alone gives {share}: the recording reveals the labels."
+    return ""
 
 
 def _width(control: Measurement | None) -> str:

@@ -15,6 +15,10 @@ CONTROLS: Final[Mapping[str, tuple[str, str]]] = {
         "before contact",
         "what the recording reveals before contact: a rate above guessing means that it reveals the labels",
     ),
+    "first_line": (
+        "first line",
+        "what the first frame of an imported recording reveals: a rate above guessing means that it reveals the labels",
+    ),
     "width_only": ("width alone", "what the first contact shows, without any squeeze"),
     "instance_held_out": ("new objects", "no grasp of the same object was used for training"),
     "stratified_10_fold": (

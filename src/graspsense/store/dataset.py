@@ -7,7 +7,9 @@ or did not end by themselves are left out.
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +18,9 @@ from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import FeatureTable
 from graspsense.core.labelled import Labelled
 from graspsense.recording.controls import controls
+from graspsense.store.first_line import first_lines
 from graspsense.store.store import COUNTS, Store
+from graspsense.store.time_recorded import order_recorded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -56,15 +60,20 @@ def labelled_store(folder: str) -> Labelled:
         newest = store.trial(newest_number)
         sets = dict(store.query("SELECT id, features FROM feature_set"))
         rows = store.query(
-            f"""SELECT id, label, instance, "values", before_contact, before_set, simulated, recipe {counting}
-            AND feature_set = ? ORDER BY id""",
+            f"""SELECT label, instance, "values", before_contact, before_set, simulated, recipe, made_at, origin,
+            recording, detail.labels, missing_before FROM trial JOIN detail ON detail.trial = trial.id
+            WHERE {COUNTS} AND label IS NOT NULL AND feature_set = ? ORDER BY id""",
             (feature_set,),
         )
+        columns = list(zip(*rows, strict=True))
+        labels, instances, values, before, before_sets, simulated, recipes = columns[:7]
+        made_at, origins, recordings, texts, missing_before = columns[7:]
+        first_line = first_lines(store, recordings, origins)
         ((total,),) = store.query(f"SELECT count(*) {counting}")
         unused = _unused(store)
-    numbers, labels, instances, values, before, before_sets, simulated, recipes = zip(*rows, strict=True)
     table = _unpacked_table(folder, sets[feature_set], values)
     same_before = len(set(before_sets)) == 1
+    order, no_order = order_recorded(made_at, origins, texts)
     unnamed = sum(instance is None for instance in instances)
     return Labelled(
         source=f"store:{folder}",
@@ -72,11 +81,14 @@ def labelled_store(folder: str) -> Labelled:
         labels=labels,
         instances=None if unnamed else instances,
         no_instances=f"{unnamed} trials do not name the individual object (can:full_open#2)",
-        order=numbers,
+        order=order,
+        no_order=no_order,
         **controls(
             table,
             _unpacked_table(folder, sets[before_sets[0]], before) if same_before else None,
             no_before="the trials do not have the same features from before contact",
+            before_missing=_most_frequent_reason(missing_before),
+            first_line=first_line,
         ),
         notes=tuple(_notes(len(rows), total, len(set(recipes)), sum(simulated))) + unused,
         provenance={
@@ -87,6 +99,15 @@ def labelled_store(folder: str) -> Labelled:
             "components": newest.record.provenance.get("components", {}),
         },
     )
+
+
+def _most_frequent_reason(missing: Sequence[str]) -> str:
+    """Return the most frequent of the reasons why features are missing, given those of each trial as JSON."""
+    reasons: Counter[str] = Counter()
+    for text in missing:
+        with suppress(ValueError, AttributeError, TypeError):
+            reasons.update(set(json.loads(text).values()))
+    return reasons.most_common(1)[0][0] if reasons else ""
 
 
 def _unused(store: Store) -> tuple[str, ...]:

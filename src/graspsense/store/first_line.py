@@ -1,0 +1,47 @@
+"""The first frame of imported trials, as the features of a control: what a recording tells before anything happens."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.features import FeatureTable
+from graspsense.core.signals import CHANNELS
+from graspsense.recording.reader import read_first_frame
+
+if TYPE_CHECKING:
+    from graspsense.store.store import Store
+
+_FIELDS: Final[Mapping[str, str]] = {
+    "gap": "gap_m",
+    "velocity": "velocity_m_s",
+    "effort": "effort_n",
+    "force_left": "force_left_n",
+    "force_right": "force_right_n",
+}
+"""Channel to its field of a frame."""
+NAMES: Final = tuple(f"{channel}_first" for channel in _FIELDS)
+UNITS: Final = tuple(CHANNELS[channel] for channel in _FIELDS)
+
+
+def first_lines(store: Store, recordings: Sequence[str], origins: Sequence[str]) -> FeatureTable | None:
+    """Return the numbers of the first frame of each trial, NaN if it was not imported; None if none was.
+
+    A recording that is lost or damaged has none; `graspsense verify` reports it.
+    """
+    if "import" not in origins:
+        return None
+    values = np.full((len(recordings), len(NAMES)), np.nan)
+    for row, (recording, origin) in enumerate(zip(recordings, origins, strict=True)):
+        if origin != "import":
+            continue
+        with suppress(ConfigError, DataDamaged):
+            frame = read_first_frame(store.recording_path(recording))
+            if frame is not None:
+                values[row] = [getattr(frame, field) for field in _FIELDS.values()]
+    values[np.isinf(values)] = np.nan
+    return FeatureTable(names=NAMES, units=UNITS, values=values)

@@ -1,0 +1,80 @@
+"""The order in which trials were recorded: by the time of the grasp, not of an import."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Final
+
+RECORDED_AT: Final = "recorded_at"
+"""Key of the labels of an imported trial: the time at which it was recorded, in ISO 8601."""
+ORDER: Final = "order"
+"""Key of the labels of an imported trial: its number in the order of recording, where no time is known."""
+
+
+def order_recorded(
+    made_at: Sequence[str], origins: Sequence[str], labels: Sequence[str]
+) -> tuple[tuple[int, ...] | None, str]:
+    """Return the position of each trial in the order of recording, or None with the reason.
+
+    `labels` are the labels of the recordings as JSON. A trial that was grasped by graspsense was recorded when it was
+    made. An imported one says so in its labels, by `recorded_at`, or all of them by `order`.
+    """
+    stated = [_labels(text) for text in labels]
+    if set(origins) == {"import"} and all(ORDER in one and RECORDED_AT not in one for one in stated):
+        numbers = [_number(one[ORDER]) for one in stated]
+        known = [number for number in numbers if number is not None]
+        if len(known) == len(numbers):
+            return _positions(known), ""
+    times = [
+        _time(one.get(RECORDED_AT, "")) if origin == "import" else _time(made)
+        for made, origin, one in zip(made_at, origins, stated, strict=True)
+    ]
+    known_times = [time for time in times if time is not None]
+    if len(known_times) < len(times):
+        unknown = len(times) - len(known_times)
+        return None, (
+            f"{unknown} of {len(times)} trials were imported without the time at which they were recorded "
+            f"({RECORDED_AT} of a manifest)"
+        )
+    return _positions(known_times), ""
+
+
+def recorded_at(made_at: str, origin: str, labels: str) -> str | None:
+    """Return the time at which a trial was recorded, in ISO 8601; None if an import does not say it."""
+    stated = made_at if origin != "import" else _labels(labels).get(RECORDED_AT, "")
+    return stated if _time(stated) is not None else None
+
+
+def _positions(values: Sequence[float]) -> tuple[int, ...]:
+    """Return the rank of each value; equal ones keep their order."""
+    ranks = [0] * len(values)
+    for rank, row in enumerate(sorted(range(len(values)), key=lambda row: values[row])):
+        ranks[row] = rank
+    return tuple(ranks)
+
+
+def _labels(text: str) -> Mapping[str, str]:
+    try:
+        value = json.loads(text)
+    except ValueError:
+        return {}
+    return value if isinstance(value, dict) else {}
+
+
+def _time(text: str) -> float | None:
+    try:
+        time = datetime.fromisoformat(text)
+    except (TypeError, ValueError):
+        return None
+    # A time without a zone is taken as UTC: only the order matters.
+    return (time if time.tzinfo is not None else time.replace(tzinfo=UTC)).timestamp()
+
+
+def _number(text: str) -> float | None:
+    try:
+        number = float(text)
+    except (TypeError, ValueError):
+        return None
+    return number if number - number == 0.0 else None
