@@ -14,7 +14,7 @@ from graspsense.cli.main import main
 from graspsense.core.errors import ConfigError, PluginUnavailable
 from graspsense.sources.features_csv import read_labelled
 from graspsense.store.changes import set_aside
-from graspsense.store.dataset import labelled_store, read_dataset
+from graspsense.store.dataset import labelled_store
 from graspsense.store.store import Store
 
 
@@ -174,15 +174,6 @@ def test_labelled_trials_of_a_store_are_a_data_set(folder):
     assert found.provenance["simulated"]
     assert any("simulated" in note for note in found.notes)
     assert found.provenance["settings"]["controller"]["probing_force_n"] == 20.0
-
-
-def test_other_features_than_those_kept_are_refused(folder):
-    from graspsense.plugin_api import create
-
-    assert len(read_dataset(str(folder), create("feature-set", "chitta"))) == 2
-    other = create("feature-set", "chitta", force="left")
-    with pytest.raises(ConfigError, match="have no effect"):
-        read_dataset(str(folder), other)
 
 
 def test_a_store_without_labels_says_how_to_get_some(tmp_path):

@@ -141,9 +141,12 @@ def trials_of(source: str, progress: ProgressLine, given: Mapping[str, Any]) -> 
     return labelled_trials(
         described,
         settings=lambda: _settings(given, None),
-        features=lambda: _alone("features", "chitta", given).create(),
+        features=lambda: _alone("features", "chitta", given, source).create(),
+        options=given["options"],
         seed=given["seed"],
-        progress=lambda done, total: progress("grasping", done, total),
+        progress=lambda done, total: progress(
+            "grasping" if kind == SIMULATED else "extracting features", done, total
+        ),
     )
 
 
@@ -155,7 +158,7 @@ def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) ->
         chosen = _settings(given, classifier).classifier
         assert chosen is not None
         return chosen
-    return _alone("classifier", classifier or DEFAULT_CLASSIFIER, given)
+    return _alone("classifier", classifier or DEFAULT_CLASSIFIER, given, source)
 
 
 def command_line(without: Sequence[str], command: str = "") -> str:
@@ -201,22 +204,24 @@ def _settings(given: Mapping[str, Any], classifier: str | None) -> Settings:
     return settings
 
 
-def _alone(table: str, name: str, given: Mapping[str, Any]) -> SelectedComponent:
+def _alone(table: str, name: str, given: Mapping[str, Any], source: str) -> SelectedComponent:
     """Return a component outside of any pipeline, with the keys that options give it."""
     from graspsense.core.config import SelectedComponent, build
     from graspsense.core.entries import TABLE_OF_ROLE
     from graspsense.core.errors import ConfigError
     from graspsense.core.layers import Merged, option_layers
     from graspsense.core.plugins import installed
+    from graspsense.sources.trial_source import STORE
+    from graspsense.store.extract_again import CHANGEABLE
 
     layers, complaints = option_layers(given["options"])
     merged = Merged()
+    tables = ("classifier", *(CHANGEABLE if source.startswith(STORE) else ("features",)))
     for layer in layers:
         for key, values in layer.values.items():
-            if key not in ("classifier", "features") or not isinstance(values, dict):
-                complaints.append(
-                    f"{layer.typed}: here only keys of [classifier] and [features] have a meaning"
-                )
+            if key not in tables or not isinstance(values, dict):
+                known = " and ".join((", ".join(f"[{one}]" for one in tables[:-1]), f"[{tables[-1]}]"))
+                complaints.append(f"{layer.typed}: here only keys of {known} have a meaning")
             elif key == table:
                 merged.add((), values, layer)
     if complaints:

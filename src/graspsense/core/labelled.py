@@ -9,6 +9,7 @@ from attrs import evolve, field, frozen
 
 from graspsense.core.errors import ConfigError, suggestion
 from graspsense.core.features import FeatureTable
+from graspsense.core.target_value import TargetValue
 
 if TYPE_CHECKING:
     import numpy as np
@@ -58,6 +59,8 @@ class Labelled:
     width: ControlFeatures | None = None
     no_width: str = ""
     variants: Mapping[str, ControlFeatures] = field(factory=dict)
+    value: TargetValue | None = None
+    """A number to predict in place of the label; a trial without a label has an empty one."""
     notes: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(factory=dict)
 
@@ -89,6 +92,9 @@ class Labelled:
             order=None if self.order is None else _picked(self.order, numbers),
             before_contact=_control_rows(self.before_contact, which),
             first_line=_control_rows(self.first_line, which),
+            value=None
+            if self.value is None
+            else evolve(self.value, values=_picked(self.value.values, numbers)),
             width=_control_rows(self.width, which),
             variants={name: evolve(one, table=one.table.rows(which)) for name, one in self.variants.items()},
         )

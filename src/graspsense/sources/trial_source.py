@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from graspsense.core.trace import Trace
 
 SIMULATED: Final = "simulated"
+STORE: Final = "store:"
 Kind = Literal["CSV", "data set", "simulated"]
 
 
@@ -43,6 +44,8 @@ class TrialSource(Group):
     """CSV: the columns to learn from; empty for all columns of numbers."""
     before: tuple[str, ...] = ()
     """CSV: columns that are known before contact."""
+    value: str | None = None
+    """CSV, store: the column, or the number among the labels, that is to be predicted in place of the label."""
     unreliable: bool = False
     """Data set: whether to include trials that its author calls unreliable."""
 
@@ -78,6 +81,7 @@ def load_trials(
         described,
         settings=settings,
         features=lambda: settings().features.create(),
+        options=options,
         seed=seed,
         progress=progress,
     )
@@ -102,21 +106,31 @@ def labelled_trials(
     *,
     settings: Callable[[], Settings],
     features: Callable[[], FeatureSet[Any]],
+    options: Sequence[str] = (),
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
     on_trace: Callable[[int, str, Trace], None] | None = None,
 ) -> Labelled:
     """Return the trials that a source describes.
 
-    `settings` is called if trials are simulated, `features` if a data set extracts features from recordings. `seed`
-    and `on_trace` are for the simulator. Raises ConfigError, DataDamaged.
+    `settings` is called if trials are simulated, `features` if a data set extracts features from recordings. With
+    `options` as after `-o`, except those of the classifier, the features of a store are extracted again. `seed` and
+    `on_trace` are for the simulator. Raises ConfigError, DataDamaged.
     """
+    changed = [option for option in options if option.partition(".")[0].strip() != "classifier"]
+    if source.value is not None and source.kind != "CSV" and not source.source.startswith(STORE):
+        raise ConfigError(f"{source.source} has no numbers to predict: they are in a CSV file or in a store")
     if source.kind == "simulated":
         found = simulated(
             settings(), groups=groups_of(source), seed=seed, progress=progress, on_trace=on_trace
         )
     elif source.kind == "CSV":
         found = _csv(source)
+    elif source.source.startswith(STORE) and (changed or source.value is not None):
+        from graspsense.store.dataset import labelled_store
+
+        folder = source.source.removeprefix(STORE)
+        found = labelled_store(folder, changed, value=source.value, progress=progress)
     else:
         found = _data_set(source, features())
     return found.of_class(source.only) if source.only else found

@@ -1,23 +1,30 @@
 """The labelled trials of a store as a table of features, for `train`, `predict` and `evaluate`.
 
-The features are those that were extracted when the trials were recorded. Trials that are incomplete, were set aside,
-or did not end by themselves are left out.
+The features are those that were extracted when the trials were recorded, or, with other settings, those that are
+extracted again from the recordings. Trials that are incomplete, were set aside, or did not end by themselves are left
+out.
 """
 
 from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Sequence
-from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from attrs import fields_dict, frozen
 
+from graspsense.core.config import Flag
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import FeatureTable
 from graspsense.core.labelled import Labelled
+from graspsense.core.strict import plain
+from graspsense.core.target_value import TargetValue, values_of_labels
 from graspsense.recording.controls import controls
+from graspsense.recording.provenance import recipe
+from graspsense.recording.trial_record import FeatureValues
+from graspsense.store.extract_again import ExtractedAgain, extract_again
 from graspsense.store.first_line import first_lines
 from graspsense.store.store import COUNTS, Store
 from graspsense.store.time_recorded import order_recorded
@@ -27,86 +34,209 @@ if TYPE_CHECKING:
 
     from graspsense.core.roles import FeatureSet
 
+Progress = Callable[[int, int], None]
+
 
 def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = False) -> Labelled:
     """Return the labelled trials of the store in this folder; the data set `store:FOLDER`.
 
-    Raises ConfigError if there is no store or no labelled trial, or if `features` has other than default settings;
-    DataDamaged.
+    The features are extracted again if `features` has other than default settings. Raises ConfigError if there is no
+    store or no labelled trial, DataDamaged.
     """
     del unreliable
-    if features.config != type(features.config)():
-        raise ConfigError(
-            "a store holds the features that were extracted when its trials were recorded, so options for [features] "
-            "have no effect. Leave them out, or extract other features from a recording with `graspsense replay`"
-        )
-    return labelled_store(folder)
+    default, given = plain(type(features.config)()), plain(features.config)
+    changed = {key: value for key, value in given.items() if value != default[key]}
+    flags = [Flag("features", f"features.{key}", value) for key, value in changed.items()]
+    return labelled_store(folder, flags=flags)
 
 
-def labelled_store(folder: str) -> Labelled:
+@frozen(kw_only=True)
+class _Rows:
+    """The columns of the trials that are used, one item per trial in each."""
+
+    id: tuple[int, ...]
+    label: tuple[str | None, ...]
+    instance: tuple[str | None, ...]
+    values: tuple[bytes, ...]
+    before_contact: tuple[bytes, ...]
+    before_set: tuple[int, ...]
+    simulated: tuple[int, ...]
+    recipe: tuple[str, ...]
+    made_at: tuple[str, ...]
+    origin: tuple[str, ...]
+    recording: tuple[str, ...]
+    outcome: tuple[str, ...]
+    labels: tuple[str, ...]
+    missing_before: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.id)
+
+    def picked(self, rows: Sequence[int]) -> _Rows:
+        """Return these rows."""
+        return _Rows(**{name: tuple(getattr(self, name)[i] for i in rows) for name in _COLUMNS})
+
+
+_COLUMNS: Final = tuple(fields_dict(_Rows))
+
+
+def labelled_store(
+    folder: str,
+    options: Sequence[str] = (),
+    *,
+    flags: Sequence[Flag] = (),
+    value: str | None = None,
+    progress: Progress | None = None,
+) -> Labelled:
     """Return the labelled trials of the store in this folder that have the feature set of the newest one.
 
-    Raises ConfigError if there is no store or no labelled trial, DataDamaged.
+    With `options` as after `-o` (`features.contact_force_n=0.1`), or `flags`, the features of all labelled trials are
+    extracted again with these settings. With `value`, the trials are those that have this number among their labels,
+    and it is the target. Raises ConfigError if there is no store or no such trial, DataDamaged.
     """
-    counting = f"FROM trial WHERE {COUNTS} AND label IS NOT NULL"
+    wanted = COUNTS if value is not None else f"{COUNTS} AND label IS NOT NULL"
     with Store.read(folder) as store:
-        newest_row = store.query(f"SELECT id, feature_set {counting} ORDER BY id DESC LIMIT 1")
-        if not newest_row:
-            raise ConfigError(
-                f"the store in {folder} has no labelled trial that ended by itself. Record some with `graspsense "
-                f"collect --save {folder} --labels ...`"
-            )
-        ((newest_number, feature_set),) = newest_row
+        newest_number, feature_set = _newest(store, wanted)
         newest = store.trial(newest_number)
-        sets = dict(store.query("SELECT id, features FROM feature_set"))
-        rows = store.query(
-            f"""SELECT label, instance, "values", before_contact, before_set, simulated, recipe, made_at, origin,
-            recording, detail.labels, missing_before FROM trial JOIN detail ON detail.trial = trial.id
-            WHERE {COUNTS} AND label IS NOT NULL AND feature_set = ? ORDER BY id""",
-            (feature_set,),
-        )
-        columns = list(zip(*rows, strict=True))
-        labels, instances, values, before, before_sets, simulated, recipes = columns[:7]
-        made_at, origins, recordings, texts, missing_before = columns[7:]
-        first_line = first_lines(store, recordings, origins)
-        ((total,),) = store.query(f"SELECT count(*) {counting}")
-        unused = _unused(store)
-    table = _unpacked_table(folder, sets[feature_set], values)
-    same_before = len(set(before_sets)) == 1
-    order, no_order = order_recorded(made_at, origins, texts)
-    unnamed = sum(instance is None for instance in instances)
+        changed = (*options, *(flag.key for flag in flags))
+        rows = _read_rows(store, wanted, None if changed else feature_set)
+        target, notes = None, [] if changed else _of_recording(store, wanted, len(rows))
+        if value is not None:
+            rows, target = _with_value(rows, value, folder, notes)
+        settings, components = newest.recipe, newest.record.provenance.get("components", {})
+        if changed:
+            extracted = extract_again(store, rows.id, options, flags=flags, progress=progress)
+            rows, tables = _tables_again(rows, extracted.trials, changed, notes)
+            # The gripper is the one that grasped, not the replay.
+            settings = {**recipe(extracted.settings), "gripper": settings.get("gripper", {})}
+            components = {**extracted.components, "gripper": components.get("gripper", "")}
+        else:
+            tables = _stored_tables(store, folder, rows, feature_set)
+        first_line, unused = first_lines(store, rows.recording, rows.origin), _unused(store)
+    order, no_order = order_recorded(rows.made_at, rows.origin, rows.labels)
     return Labelled(
         source=f"store:{folder}",
-        table=table,
-        labels=labels,
-        instances=None if unnamed else instances,
-        no_instances=f"{unnamed} trials do not name the individual object (can:full_open#2)",
+        table=tables.features,
+        labels=tuple(label or "" for label in rows.label),
+        instances=None if None in rows.instance else tuple(str(one) for one in rows.instance),
+        no_instances=f"{rows.instance.count(None)} trials do not name the individual object (can:full_open#2)",
         order=order,
         no_order=no_order,
         **controls(
-            table,
-            _unpacked_table(folder, sets[before_sets[0]], before) if same_before else None,
+            tables.features,
+            tables.before,
             no_before="the trials do not have the same features from before contact",
-            before_missing=_most_frequent_reason(missing_before),
+            before_missing=tables.before_missing,
             first_line=first_line,
         ),
-        notes=tuple(_notes(len(rows), total, len(set(recipes)), sum(simulated))) + unused,
+        value=target,
+        notes=(*notes, *_notes(len(set(rows.recipe)), sum(rows.simulated), len(rows)), *unused),
         provenance={
-            "simulated": any(simulated),
+            "simulated": any(rows.simulated),
             "store": str(folder),
             "newest_trial": newest_number,
-            "settings": newest.recipe,
-            "components": newest.record.provenance.get("components", {}),
+            "settings": settings,
+            "components": components,
         },
     )
 
 
-def _most_frequent_reason(missing: Sequence[str]) -> str:
-    """Return the most frequent of the reasons why features are missing, given those of each trial as JSON."""
+def _newest(store: Store, wanted: str) -> tuple[int, int]:
+    """Return the number of the newest wanted trial, and of its feature set. Raises ConfigError if there is none."""
+    rows = store.query(f"SELECT id, feature_set FROM trial WHERE {wanted} ORDER BY id DESC LIMIT 1")
+    if not rows:
+        raise ConfigError(
+            f"the store in {store.folder} has no labelled trial that ended by itself. Record some with `graspsense "
+            f"collect --save {store.folder} --labels ...`"
+        )
+    ((number, feature_set),) = rows
+    return int(number), int(feature_set)
+
+
+@frozen(kw_only=True)
+class _Tables:
+    """The features of the trials, and those from before contact (None if trials differ in their names)."""
+
+    features: FeatureTable
+    before: FeatureTable | None
+    before_missing: str
+
+
+def _read_rows(store: Store, wanted: str, feature_set: int | None) -> _Rows:
+    """Return the rows of the wanted trials, with `feature_set` only those that have it."""
+    columns = ", ".join(
+        f"detail.{name}" if name in ("labels", "missing_before") else f'trial."{name}"' for name in _COLUMNS
+    )
+    of_set = "" if feature_set is None else " AND feature_set = ?"
+    rows = store.query(
+        f"""SELECT {columns} FROM trial JOIN detail ON detail.trial = trial.id
+        WHERE {wanted}{of_set} ORDER BY trial.id""",
+        () if feature_set is None else (feature_set,),
+    )
+    return _Rows(**dict(zip(_COLUMNS, zip(*rows, strict=True), strict=True)))
+
+
+def _with_value(rows: _Rows, name: str, folder: str, notes: list[str]) -> tuple[_Rows, TargetValue]:
+    """Return the rows that have this number among their labels, and the numbers."""
+    unit, values = values_of_labels(name, rows.labels, f"the store in {folder}")
+    having = [i for i, number in enumerate(values) if number == number]
+    if len(having) < len(values):
+        notes.append(f"{len(values) - len(having)} trials are left out: they have no {name}")
+    target = TargetValue(name=name, unit=unit, values=tuple(values[i] for i in having))
+    return rows.picked(having), target
+
+
+def _stored_tables(store: Store, folder: str, rows: _Rows, feature_set: int) -> _Tables:
+    sets = dict(store.query("SELECT id, features FROM feature_set"))
+    same_before = len(set(rows.before_set)) == 1
+    return _Tables(
+        features=_unpacked_table(folder, sets[feature_set], rows.values),
+        before=_unpacked_table(folder, sets[rows.before_set[0]], rows.before_contact)
+        if same_before
+        else None,
+        before_missing=_most_frequent_reason([json.loads(text) for text in rows.missing_before]),
+    )
+
+
+def _tables_again(
+    rows: _Rows, trials: Sequence[ExtractedAgain], changed: Sequence[str], notes: list[str]
+) -> tuple[_Rows, _Tables]:
+    """Return the rows and tables of trials that were extracted again, without those that have other features."""
+    names = trials[-1].features.features
+    same = [i for i, trial in enumerate(trials) if trial.features.features == names]
+    if len(same) < len(trials):
+        notes.append(
+            f"{len(trials) - len(same)} trials are left out: their features have other names or units than those of "
+            "the newest trial"
+        )
+    notes.append(f"the features were extracted again from the recordings, with {', '.join(changed)}")
+    outcomes = Counter(
+        f"{rows.outcome[i]} to {trials[i].outcome}" for i in same if rows.outcome[i] != trials[i].outcome
+    )
+    if outcomes:
+        words = ", ".join(f"{n} from {change}" for change, n in outcomes.most_common())
+        notes.append(f"outcomes that change with these settings: {words}")
+    kept = [trials[i] for i in same]
+    before_names = kept[-1].before_contact.features
+    same_before = all(trial.before_contact.features == before_names for trial in kept)
+    return rows.picked(same), _Tables(
+        features=_table([trial.features for trial in kept]),
+        before=_table([trial.before_contact for trial in kept]) if same_before else None,
+        before_missing=_most_frequent_reason([trial.before_contact.reasons for trial in kept]),
+    )
+
+
+def _table(trials: Sequence[FeatureValues]) -> FeatureTable:
+    names, units = zip(*trials[0].features, strict=True)
+    values = np.array([[np.nan if v is None else v for v in trial.values] for trial in trials], np.float64)
+    return FeatureTable(names=names, units=units, values=values)
+
+
+def _most_frequent_reason(missing: Sequence[Mapping[str, str]]) -> str:
+    """Return the most frequent of the reasons why features of these trials are missing; empty without any."""
     reasons: Counter[str] = Counter()
-    for text in missing:
-        with suppress(ValueError, AttributeError, TypeError):
-            reasons.update(set(json.loads(text).values()))
+    for one in missing:
+        reasons.update(set(one.values()))
     return reasons.most_common(1)[0][0] if reasons else ""
 
 
@@ -129,12 +259,19 @@ def _unused(store: Store) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _notes(used: int, total: int, recipes: int, simulated: int) -> list[str]:
+def _of_recording(store: Store, wanted: str, used: int) -> list[str]:
+    """Return notes on features that were extracted when the trials were recorded."""
+    ((total,),) = store.query(f"SELECT count(*) FROM trial WHERE {wanted}")
     notes = ["the features are those extracted when the trials were recorded"]
     if total != used:
         notes.append(
             f"{total - used} trials are left out: their features differ from those of the newest trial"
         )
+    return notes
+
+
+def _notes(recipes: int, simulated: int, used: int) -> list[str]:
+    notes = []
     if recipes > 1:
         notes.append(
             f"the trials were recorded with {recipes} different settings of gripper, controller or features"

@@ -58,7 +58,8 @@ class CurveConfig:
         unit="N",
         above=0.0,
         plausible=(0.01, 20.0),
-        meaning="Force on each pad from which on it touches the object.",
+        meaning="Force on each pad from which on it touches; that of the controller unless it is given here.",
+        follows="controller.contact_force_n",
     )
     window_s: float = setting(
         default=0.05,

@@ -1,0 +1,126 @@
+"""`graspsense features`: the features of a store, extracted again with other settings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from graspsense.cli.output import echo_json, file_to_write, refuse_existing
+from graspsense.cli.terminal import echo, echo_entry, echo_table
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from graspsense.core.labelled import Labelled
+
+
+@click.command(short_help="Extract the features of a store again.")
+@click.argument("source", metavar="store:DIR")
+@click.option(
+    "-o",
+    "options",
+    metavar="TABLE.KEY=VALUE",
+    multiple=True,
+    required=True,
+    help="Change a key of [features], [controller] or [run]: -o controller.contact_force_n=0.1. Can be repeated.",
+)
+@click.option(
+    "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
+)
+@click.option("--overwrite", is_flag=True, help="Replace the file of --keep if it exists.")
+@click.option("--json", "as_json", is_flag=True, help="Print the comparison as JSON.")
+def features(source: str, options: tuple[str, ...], keep: str | None, overwrite: bool, as_json: bool) -> None:
+    """Extract the features of every labelled trial of a store again, and compare them with the stored ones.
+
+    Each recording is replayed with the changed settings, as `graspsense replay` does. The store does not change.
+    `train`, `predict` and `evaluate` take the same -o.
+    """
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.core.errors import ConfigError
+    from graspsense.sources.trial_source import STORE
+    from graspsense.store.dataset import labelled_store
+
+    if not source.startswith(STORE):
+        raise ConfigError(
+            f"{source!r} is not a store: write store:DIR. For one recording there is `graspsense replay`"
+        )
+    if not overwrite:
+        refuse_existing(keep)
+    folder = source.removeprefix(STORE)
+    before = labelled_store(folder)
+    with ProgressLine() as progress:
+        after = labelled_store(
+            folder, options, progress=lambda done, total: progress("extracting features", done, total)
+        )
+    if keep:
+        from graspsense.sources.features_csv import write_labelled
+
+        write_labelled(Path(keep), after)
+    rows = _rows(before, after)
+    if as_json:
+        echo_json(
+            {
+                "source": source,
+                "options": list(options),
+                "trials": len(after),
+                "features": rows,
+                "notes": list(after.notes),
+                "file": keep,
+            }
+        )
+        return
+    echo_table(
+        ("FEATURE", "UNIT", "TRIALS BEFORE", "NOW", "MEDIAN BEFORE", "NOW"),
+        [
+            (one["name"], one["unit"], _count(one["trials_before"], before), _count(one["trials"], after),
+             _number(one["median_before"]), _number(one["median"]))
+            for one in rows
+        ],
+    )  # fmt: skip
+    echo()
+    for note in after.notes:
+        echo_entry("note", note)
+    if keep:
+        echo_entry("written", keep)
+
+
+def _rows(before: Labelled, after: Labelled) -> list[dict[str, Any]]:
+    """Return for each feature in how many trials it is defined, and its median, before and now."""
+    import numpy as np
+
+    def known(labelled: Labelled, name: str) -> NDArray[np.float64]:
+        if name not in labelled.table.names:
+            return np.empty(0)
+        values = labelled.table.columns([name]).values[:, 0]
+        return values[~np.isnan(values)]
+
+    rows = []
+    names = dict.fromkeys((*after.table.names, *before.table.names))
+    units = {
+        **dict(zip(before.table.names, before.table.units, strict=True)),
+        **dict(zip(after.table.names, after.table.units, strict=True)),
+    }
+    for name in names:
+        was, now = known(before, name), known(after, name)
+        rows.append(
+            {
+                "name": name,
+                "unit": units[name],
+                "trials_before": len(was),
+                "trials": len(now),
+                "median_before": float(np.median(was)) if len(was) else None,
+                "median": float(np.median(now)) if len(now) else None,
+            }
+        )
+    return rows
+
+
+def _count(n: int, labelled: Labelled) -> str:
+    return f"{n} of {len(labelled)}"
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"

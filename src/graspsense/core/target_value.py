@@ -1,0 +1,83 @@
+"""A number to predict for each trial: a force at break, a ripeness, a fill level.
+
+A trial has such numbers among its labels, under a heading with the unit as in a CSV file: `break_force [N]` is 2.62.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Sequence
+from typing import Final
+
+from attrs import frozen
+
+from graspsense.core.errors import ConfigError, suggestion
+
+_HEADING: Final = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]")
+
+
+@frozen(kw_only=True)
+class TargetValue:
+    """The numbers to predict, one for each trial, with their name and unit (empty if it is not known)."""
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+
+
+def name_and_unit(heading: str) -> tuple[str, str]:
+    """Return the name and the unit of a heading.
+
+    >>> name_and_unit("break_force [N]"), name_and_unit("ripeness")
+    (('break_force', 'N'), ('ripeness', ''))
+    """
+    match = _HEADING.fullmatch(heading)
+    return (match["name"], match["unit"].strip()) if match else (heading, "")
+
+
+def values_of_labels(name: str, labels: Sequence[str], where: str) -> tuple[str, list[float]]:
+    """Return the unit of a number and its value in each trial, NaN where a trial does not have it.
+
+    `labels` are those of each trial as JSON. Raises ConfigError if no trial has the number, if its values are not
+    numbers, or if it has several units.
+    """
+    units: dict[str, None] = {}
+    known: set[str] = set()
+    values = []
+    for text in labels:
+        value = math.nan
+        for heading, cell in json.loads(text).items():
+            called, unit = name_and_unit(heading)
+            number = _number(cell)
+            if number is not None and heading not in ("label", "instance", "order"):
+                known.add(called)
+            if called != name:
+                continue
+            if number is None:
+                raise ConfigError(
+                    f"{name} of a trial of {where} is {str(cell)[:40]!r}, which is not a finite number"
+                )
+            units[unit] = None
+            value = number
+        values.append(value)
+    if not units:
+        have = (
+            f"There are: {', '.join(sorted(known))}." if known else "Its trials have no numbers to predict."
+        )
+        raise ConfigError(
+            f"no trial of {where} has a value {name!r}. {have}{suggestion(name, sorted(known))} A trial gets one "
+            "when it is recorded: collect --value, or a column of the manifest of an import"
+        )
+    if len(units) > 1:
+        raise ConfigError(f"{name} has several units in {where}: {', '.join(map(repr, units))}")
+    return next(iter(units)), values
+
+
+def _number(cell: object) -> float | None:
+    try:
+        number = float(str(cell))
+    except ValueError:
+        return None
+    return number if math.isfinite(number) else None

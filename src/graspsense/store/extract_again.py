@@ -1,0 +1,127 @@
+"""Features of stored trials, extracted again from their recordings with other settings.
+
+Each recording is replayed with the settings that it was made with and the changed ones, as `graspsense replay` does:
+the controller decides again when contact and rest are, so that other thresholds act on phases and features alike.
+Nothing in the store changes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from attrs import evolve, frozen
+
+from graspsense.core.config import NONE, Flag, Settings, resolve, without_followers
+from graspsense.core.errors import ComponentFailed, ConfigError, named
+from graspsense.core.layers import Layer
+from graspsense.core.runner import run_grasp
+from graspsense.core.wiring import check
+from graspsense.recording.before_contact import before_contact, contact_force_of
+from graspsense.recording.trial_record import FeatureValues
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from graspsense.store.store import Store
+
+CHANGEABLE: Final = ("features", "controller", "run")
+"""Tables of settings that a recorded grasp can be evaluated with again; its gripper is the recording."""
+
+
+@frozen(kw_only=True)
+class ExtractedAgain:
+    """The outcome and the features of one trial under other settings."""
+
+    outcome: str
+    features: FeatureValues
+    before_contact: FeatureValues
+
+
+@frozen(kw_only=True)
+class ExtractedTrials:
+    """Trials under other settings, with the settings and components of the last of them."""
+
+    trials: tuple[ExtractedAgain, ...]
+    settings: Mapping[str, Mapping[str, Any]]
+    components: Mapping[str, str]
+
+
+def extract_again(
+    store: Store,
+    numbers: Sequence[int],
+    options: Sequence[str] = (),
+    *,
+    flags: Sequence[Flag] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> ExtractedTrials:
+    """Return the features of these trials with changed settings; `options` are as typed after `-o`.
+
+    `flags` are changes that did not come as text. Raises ConfigError if a setting is not one of `CHANGEABLE` or wrong,
+    DataDamaged if a recording is lost or damaged, and ComponentFailed if a feature set fails.
+    """
+    _refuse_other_tables(options)
+    resolved: dict[str, Settings] = {}
+    trials = []
+    settings = None
+    for done, number in enumerate(numbers):
+        recorded = store.trial(number).record.settings
+        own = {table: keys for table, keys in recorded.items() if table != "gripper"}
+        text = json.dumps(own, sort_keys=True)
+        recording = f"store:{store.folder}#{number}"
+        if text not in resolved:
+            resolved[text] = _resolved(own, recording, options, flags)
+        settings = resolved[text]
+        trials.append(_extracted(settings, recording))
+        if progress is not None:
+            progress(done + 1, len(numbers))
+    if settings is None:
+        raise ConfigError(f"the store in {store.folder} has no trial to extract features from")
+    return ExtractedTrials(
+        trials=tuple(trials), settings=dict(settings.values), components=dict(settings.components)
+    )
+
+
+def _refuse_other_tables(options: Sequence[str]) -> None:
+    for option in options:
+        table = option.partition(".")[0].strip()
+        if table not in CHANGEABLE:
+            raise ConfigError(
+                f"-o {option}: a stored grasp can be evaluated again with other keys of "
+                f"{', '.join(f'[{one}]' for one in CHANGEABLE)} only; its gripper is the recording"
+            )
+
+
+def _resolved(
+    own: Mapping[str, Any], recording: str, options: Sequence[str], flags: Sequence[Flag]
+) -> Settings:
+    values = {**without_followers(own), "classifier": {"type": NONE}}
+    replay = (Flag("STORE", "gripper.type", "replay"), Flag("STORE", "gripper.recording", recording))
+    # The settings of the recording have been accepted when it was made.
+    settings = resolve(
+        "default",
+        experiment=Layer.of(values, "the recording"),
+        options=options,
+        flags=(*flags, *replay),
+        force=True,
+    )
+    check(settings)
+    return settings
+
+
+def _extracted(settings: Settings, recording: str) -> ExtractedAgain:
+    gripper = settings.gripper
+    backend = gripper.component.create(evolve(gripper.config, recording=recording))
+    grasp = run_grasp(backend, settings.controller.create(), settings.run)
+    try:
+        features = settings.features.create().extract(grasp.trace)
+    except Exception as error:
+        raise ComponentFailed(
+            f"feature set {settings.features.component.qualified} failed on {recording}: {named(error)}"
+        ) from error
+    return ExtractedAgain(
+        outcome=grasp.outcome.words,
+        features=FeatureValues.of(features),
+        before_contact=FeatureValues.of(before_contact(grasp.trace, contact_force_of(settings.values))),
+    )

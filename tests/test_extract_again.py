@@ -1,0 +1,142 @@
+"""Features of a whole store with other thresholds: from its recordings, without a change of the store."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from kept import frame, keep
+
+from graspsense.cli.main import main
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.sources.features_csv import read_labelled
+from graspsense.store.dataset import labelled_store, read_dataset
+from graspsense.store.store import Store
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Six trials whose pads reach 0.01 N and 0.02 N more in each tick; the stored width is that of other settings."""
+    with Store.open(tmp_path / "trials") as store:
+        for k in range(6):
+            keep(store, ("can:full", "can:empty")[k % 2], f"can#{k}")
+    return str(tmp_path / "trials")
+
+
+@pytest.fixture
+def run(capsys):
+    def command(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main(list(map(str, arguments)))
+        out, err = capsys.readouterr()
+        return ended.value.code, out, err
+
+    return command
+
+
+def gap_at(force_n):
+    """Return the gap at which both pads have reached this force: the left one is the weaker."""
+    return frame(next(k for k in range(120) if frame(k).force_left_n >= force_n)).gap_m
+
+
+@pytest.mark.parametrize("table", ["controller", "features"])
+def test_other_thresholds_give_other_features_of_the_same_trials(folder, table):
+    stored = labelled_store(folder)
+    again = labelled_store(folder, [f"{table}.contact_force_n=0.2"])
+
+    assert (again.labels, again.instances, again.order) == (stored.labels, stored.instances, stored.order)
+    assert stored.table.values[:, 0].tolist() == [0.066] * 6
+    assert again.table.columns(["p_first"]).values[:, 0].tolist() == [gap_at(0.2)] * 6
+    assert again.width.table.values[:, 0].tolist() == [gap_at(0.2)] * 6
+    # What a model that is trained on them says of its training data.
+    assert again.provenance["settings"]["features"]["contact_force_n"] == 0.2
+    assert again.provenance["settings"]["gripper"]["type"] == "graspsense-sim-gripper/sim"
+    assert any(
+        f"extracted again from the recordings, with {table}.contact_force_n=0.2" in one for one in again.notes
+    )
+    assert any("outcomes that change with these settings: 6 from steady to" in one for one in again.notes)
+    assert labelled_store(folder).table.values.tobytes() == stored.table.values.tobytes()
+
+
+def test_another_feature_set_can_be_tried_on_a_store(folder):
+    again = labelled_store(folder, ["features.type=curve"])
+    assert "contact_gap" in again.table.names
+    assert len(again.table.names) > 6
+    assert again.provenance["components"]["features"].startswith("graspsense/curve")
+
+
+def test_the_settings_of_an_experiment_are_used_for_a_store(folder):
+    from graspsense.plugin_api import create
+
+    left = read_dataset(folder, create("feature-set", "chitta", force="left", contact_force_n=0.5))
+    assert left.table.columns(["p_first"]).values[0, 0] == gap_at(0.5)
+
+
+@pytest.mark.parametrize(
+    ("option", "says"),
+    [
+        (
+            "gripper.object=can:full",
+            r"other keys of \[features\], \[controller\], \[run\] only; its gripper is",
+        ),
+        ("classifier.leaf=3", "other keys of"),
+        ("features.contact_force=1", "Did you mean 'contact_force_n'"),
+        ("features.contact_force_n=-1", "must be > 0"),
+        ("features.type=curv", "curve"),
+        ("nonsense", "other keys of"),
+    ],
+)
+def test_what_cannot_be_changed_is_told(folder, option, says):
+    with pytest.raises(ConfigError, match=says):
+        labelled_store(folder, [option])
+
+
+def test_a_lost_recording_is_told(folder):
+    with Store.read(folder) as store:
+        store.recording_path(store.summary(3).recording).unlink()
+    with pytest.raises(DataDamaged, match=r"the recording of trial 3 .* is lost"):
+        labelled_store(folder, ["features.force=left"])
+
+
+def test_the_command_compares_and_keeps(folder, run, tmp_path):
+    kept = tmp_path / "again.csv"
+    arguments = ("features", f"store:{folder}", "-o", "controller.contact_force_n=2", "--keep", kept)
+    code, out, err = run(*arguments, "--json")
+    assert code == 0, err
+    told = json.loads(out)
+    # The left pad reaches 1.19 N at most.
+    assert [one for one in told["features"] if one["name"] == "p_first"] == [
+        {
+            "name": "p_first",
+            "unit": "m",
+            "trials_before": 6,
+            "trials": 0,
+            "median_before": 0.066,
+            "median": None,
+        }
+    ]
+    assert kept.read_text().startswith("label,instance,order,p_first [m]")
+    code, _, err = run(*arguments)
+    assert (code, "already exists" in err) == (2, True)
+    code, out, _ = run(*arguments[:4], "--overwrite", "--keep", kept, "-o", "controller.contact_force_n=0.2")
+    assert code == 0
+    assert "6 of 6" in out
+    assert read_labelled(kept, "label").table.columns(["p_first"]).values[0, 0] == gap_at(0.2)
+
+
+def test_a_store_is_asked_for(folder, run):
+    code, _, err = run("features", folder, "-o", "features.force=left")
+    assert (code, "write store:DIR" in err) == (2, True)
+
+
+def test_train_uses_the_features_of_its_options(folder, run, tmp_path):
+    out = tmp_path / "m.json"
+    options = ("-o", "features.contact_force_n=0.2", "-o", "classifier.min_leaf=1", "--classifier", "tree")
+    code, _, err = run("train", f"store:{folder}", "--out", out, *options)
+    assert code == 0, err
+    assert json.loads(out.read_text())["provenance"]["settings"]["features"]["contact_force_n"] == 0.2
+    code, _, err = run(
+        "train", f"store:{folder}", "--out", out, "--overwrite", "-o", "gripper.object=can:full"
+    )
+    assert code == 2
+    assert "only keys of [classifier], [features], [controller] and [run] have a meaning" in err
