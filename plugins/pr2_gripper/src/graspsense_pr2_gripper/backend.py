@@ -24,6 +24,7 @@ from graspsense.plugin_api import (
     stored_tables,
     stored_zero,
 )
+from graspsense_pr2_gripper.accelerometer import CHANNEL as ACCELERATION
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.emulation import emulated_body
 from graspsense_pr2_gripper.fingertip import fingertips
@@ -43,6 +44,16 @@ from graspsense_pr2_gripper.protocol import (
 
 _RATE_HZ: Final = 1000.0
 _PADS_RATE_HZ: Final = 24.39
+_CHANNELS: Final = (
+    Channel("gap", "m", _RATE_HZ),
+    Channel("velocity", "m/s", _RATE_HZ),
+    Channel("effort", "N", _RATE_HZ),
+    Channel("force_left", "N", _PADS_RATE_HZ),
+    Channel("force_right", "N", _PADS_RATE_HZ),
+    Channel("edge_left", "N", _PADS_RATE_HZ),
+    Channel("edge_right", "N", _PADS_RATE_HZ),
+    fingertips(_PADS_RATE_HZ),
+)
 OPENING_N: Final = -20.0
 """Effort that opens the fingers. The authors' recordings show 17 and 20 N, opening, between squeezes."""
 TARE_IMAGES: Final = 6
@@ -57,16 +68,6 @@ TEST_NUMBER: Final = (0x1209, 0x0001)
 class Pr2Backend(SensorBackend[Pr2Config]):
     """Reads and commands one gripper over the transport in the settings."""
 
-    channels = (
-        Channel("gap", "m", _RATE_HZ),
-        Channel("velocity", "m/s", _RATE_HZ),
-        Channel("effort", "N", _RATE_HZ),
-        Channel("force_left", "N", _PADS_RATE_HZ),
-        Channel("force_right", "N", _PADS_RATE_HZ),
-        Channel("edge_left", "N", _PADS_RATE_HZ),
-        Channel("edge_right", "N", _PADS_RATE_HZ),
-        fingertips(_PADS_RATE_HZ),
-    )
     accepts = ("effort",)
 
     _opened: Opened | None = None
@@ -74,6 +75,11 @@ class Pr2Backend(SensorBackend[Pr2Config]):
     _lost_serial = ""
     _stands_in = False
     _sent = _echo = _heard_us = 0
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The frame and the fingertips, and the acceleration of the palm unless the settings say that there is none."""
+        return (*_CHANNELS, ACCELERATION) if self.config.accelerometer else _CHANNELS
 
     def objects(self) -> Sequence[ObjectKind]:
         """Return the objects of the backend behind an emulated gripper; a real gripper has none."""
@@ -124,7 +130,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         else:
             self._heard_us = report.time_us
         self._echo = report.echo
-        return self._measure.reading(report, arrival.image)
+        return self._measure.reading(report, arrival.image, arrival.words, arrival.sampled)
 
     def apply(self, command: Command) -> None:
         """Send an effort within the limits of the device. Raises DeviceLost.
@@ -193,6 +199,8 @@ class Pr2Backend(SensorBackend[Pr2Config]):
         if "friction" in found:
             _, closing, _ = stored_friction(found["friction"])
             notes.append(f"breakaway {min(closing):.1f} to {max(closing):.1f} N, closing")
+        if config.accelerometer and not identity.accelerometer_g:
+            notes.append("the board has no accelerometer: the channel acceleration stays empty")
         if emulation is not None:
             notes += ["emulated: no gripper was touched", *emulation.body_info.notes]
         elif (config.vendor_id, config.product_id) == TEST_NUMBER:

@@ -137,6 +137,10 @@ class Pr2Config:
         meaning="Swap the left tip's -z and +z sides: sources disagree on where side cell 1 lies.",
     )
     mirror_right: bool = setting(default=False, meaning="Swap the right tip's -z and +z sides.")
+    accelerometer: bool = setting(
+        default=True,
+        meaning="Whether the accelerometer of the palm is read, as the channel acceleration; false: there is none.",
+    )
     pace: Literal["lock-step", "device"] = setting(
         default="lock-step",
         meaning="Emulated only. lock-step: each read advances the time by a millisecond. device: real time, in a "

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
+from attrs import fields_dict, has
+
 from graspsense.plugin_api import ConfigError, DeviceInfo, SensorBackend, create
+from graspsense_pr2_gripper.accelerometer import RANGE_G, has_accelerometer
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.faults import Wire
 from graspsense_pr2_gripper.firmware import Firmware
@@ -33,11 +36,17 @@ class Emulation(NamedTuple):
 
 
 def emulated_body(config: Pr2Config) -> SensorBackend[Any]:
-    """Return the backend that the emulated board drives, not yet opened. Raises ConfigError."""
+    """Return the backend that the emulated board drives, not yet opened. Raises ConfigError.
+
+    A body with a setting `acceleration` simulates the acceleration of its palm, unless the board has no accelerometer.
+    """
     values = dict(config.body_config)
     if config.object is not None:
         values["object"] = config.object
     body: SensorBackend[Any] = create("sensor-backend", config.body, **values)
+    own = type(body.config)
+    if config.accelerometer and has(own) and "acceleration" in fields_dict(own):
+        body = create("sensor-backend", config.body, **{"acceleration": True, **values})
     return body
 
 
@@ -63,6 +72,6 @@ def emulated_board(config: Pr2Config, seed: int) -> Emulation:
         image_period_us=IMAGE_PERIOD_US,
         watchdog_ms=WATCHDOG_MS,
         encoder_ticks_rev=ENCODER_TICKS,
-        accelerometer_g=0,
+        accelerometer_g=RANGE_G if has_accelerometer(body.channels) else 0,
     )
     return Emulation(Wire(Firmware(body, identity), config.faults, seed), body, info)

@@ -15,10 +15,12 @@ from graspsense.plugin_api import (
     Command,
     Frame,
     Pads,
+    Samples,
     SensorBackend,
     gap_and_rate,
     revolutions_at,
 )
+from graspsense_pr2_gripper.accelerometer import word_of
 from graspsense_pr2_gripper.fingertip import CELLS
 from graspsense_pr2_gripper.linkage import LINKAGES
 from graspsense_pr2_gripper.protocol import (
@@ -35,6 +37,7 @@ from graspsense_pr2_gripper.protocol import (
     OWN_LIMIT,
     REFUSED,
     RIGHT_ABSENT,
+    SAMPLES_MISSED,
     SLICE_CELLS,
     SLICES,
     Identity,
@@ -49,7 +52,10 @@ _LARGEST: Final = 2**31 - 1
 
 
 class Firmware:
-    """A board with this identity that drives `body`, which has been opened."""
+    """A board with this identity that drives `body`, which has been opened.
+
+    Its accelerometer is the channel `acceleration` of the body; without it, `identity.accelerometer_g` must be 0.
+    """
 
     def __init__(self, body: SensorBackend[Any], identity: Identity) -> None:
         self.identity = identity
@@ -75,6 +81,9 @@ class Firmware:
         self._slice = 0
         self._gone_out = True
         self._cells = [0] * IMAGE_CELLS
+        self._range_g = identity.accelerometer_g
+        self._counter = 0
+        """Number of samples that the accelerometer of the body had taken at the last report."""
 
     def run_on(self) -> float:
         """Advance the time without a host until the motor is relaxed; return the time (s) that this took.
@@ -129,10 +138,11 @@ class Firmware:
         reading = self._body.read(1.0)
         if reading is None:
             raise RuntimeError("the body of an emulated gripper gave no frame: it needs a virtual clock")
-        frame, pads, _ = reading
+        frame, pads, signals = reading
         self._step += 1
         self._measure(frame)
         self._latch(pads, now_us)
+        words = self._sampled(signals.acceleration) if self._range_g else ()
         report = InputReport(
             sequence=(self._step - 1) & 0xFFFFFFFF,
             time_us=now_us,
@@ -141,7 +151,7 @@ class Firmware:
             effort_un=0 if math.isnan(frame.effort_n) else _clamped(frame.effort_n * 1e6),
             status=self._status,
             echo=self._echo,
-            samples=(),
+            samples=words,
             image=self._image,
             slice=self._slice,
             cells=tuple(self._cells[self._slice * SLICE_CELLS :][:SLICE_CELLS]),  # type: ignore[arg-type]
@@ -174,6 +184,14 @@ class Firmware:
             _, self._rate_m_rev = gap_and_rate(self._link, ticks / ticks_rev)
         self._velocity_mtick_s = _clamped(frame.velocity_m_s / self._rate_m_rev * ticks_rev * 1e3)
         self._velocity_um_s = frame.velocity_m_s * 1e6
+
+    def _sampled(self, samples: Samples) -> tuple[int, ...]:
+        """Return the words of the new samples, and set the status bit if some were missed."""
+        self._status &= ~SAMPLES_MISSED
+        if samples.counter - self._counter > samples.new:
+            self._status |= SAMPLES_MISSED
+        self._counter = samples.counter
+        return tuple(word_of(sample, self._range_g) for sample in samples.values[: samples.new])
 
     def _latch(self, pads: Pads, now_us: int) -> None:
         if pads.counter in (0, self._body_image) or not self._gone_out:

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple, final
 
 from graspsense.plugin_api import DeviceLost
 from graspsense_pr2_gripper.clock import DeviceClock
-from graspsense_pr2_gripper.protocol import InputReport
+from graspsense_pr2_gripper.protocol import MAX_SAMPLES, InputReport
 from graspsense_pr2_gripper.stream import RawImage, Restarted, Stream
 from graspsense_pr2_gripper.transports.interface import Transport, TransportGone
 
@@ -28,11 +28,17 @@ JOIN_S: Final = 1.0
 
 
 class Arrival(NamedTuple):
-    """A report, the last complete cell image, and the time at which the host read it (monotonic, s)."""
+    """A report, the last complete cell image, and the time at which the host read it (monotonic, s).
+
+    `words` are the last samples of the accelerometer that have come without a gap since the arrival before, at most
+    `MAX_SAMPLES`; `sampled` is the number of samples that it has taken.
+    """
 
     report: InputReport
     image: RawImage | None
     host_s: float
+    words: tuple[int, ...]
+    sampled: int
 
 
 class Link(ABC):
@@ -48,6 +54,13 @@ class Link(ABC):
         """Number of reports that a newer one replaced before the driver read them."""
         self.gone = ""
         """The reason why the device is gone; empty while it is connected."""
+
+    def _arrival(self, report: InputReport, host_s: float, skipped: Arrival | None) -> Arrival:
+        """Return a report of the stream as an arrival; `skipped`: the arrival that it replaces."""
+        stream, words = self.stream, report.samples
+        if skipped is not None and skipped.sampled + len(words) == stream.sampled:
+            words = (*skipped.words, *words)[-MAX_SAMPLES:]
+        return Arrival(report, stream.image, host_s, words, stream.sampled)
 
     @abstractmethod
     def next(self, timeout_s: float) -> Arrival | None:
@@ -85,10 +98,12 @@ class LockStepLink(Link):
                 newest = None
                 data = read(self._period_s)
                 while data:
-                    newest = take(data) or newest
+                    report = take(data)
+                    if report is not None:
+                        newest = self._arrival(report, time.monotonic(), newest)
                     data = read(0.0)
                 if newest is not None:
-                    return Arrival(newest, self.stream.image, time.monotonic())
+                    return newest
         except (TransportGone, Restarted) as gone:
             self.gone = _lost(gone)
             raise DeviceLost(self.gone) from gone
@@ -152,11 +167,10 @@ class ThreadedLink(Link):
                 if clock.age_s(report.time_us * 1e-6, host_s) > OLDEST_S:
                     self.discarded += 1
                     continue
-                arrival = Arrival(report, stream.image, host_s)
                 with self._arrived:
                     if self._newest is not None:
                         self.skipped += 1
-                    self._newest = arrival
+                    self._newest = self._arrival(report, host_s, self._newest)
                     self._arrived.notify()
         except (TransportGone, Restarted) as gone:
             with self._arrived:

@@ -20,6 +20,7 @@ from graspsense.plugin_api import (
     pad_force,
     tare,
 )
+from graspsense_pr2_gripper.accelerometer import Accelerometer
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.fingertip import CELLS, FIRST_PAD_CELL
 from graspsense_pr2_gripper.linkage import LINKAGES, edge_scale
@@ -82,6 +83,7 @@ class Measure:
         self._swap, self._mirror = config.swap_fingers, (config.mirror_left, config.mirror_right)
         self._stored, self._tables = stored, tables
         self._zero: Tips | None = stored
+        self._accelerometer = Accelerometer(identity.accelerometer_g) if config.accelerometer else None
         self._pads = no_pads(CELLS)
         self._forces = _NO_FORCES
         self._first_us: int | None = None
@@ -89,8 +91,10 @@ class Measure:
         self.bad_cells = 0
         """Largest number of dead cells in one image."""
 
-    def reading(self, report: InputReport, image: RawImage | None) -> Reading:
-        """Return the reading of this report, with the last complete cell image."""
+    def reading(
+        self, report: InputReport, image: RawImage | None, words: tuple[int, ...] = (), sampled: int = 0
+    ) -> Reading:
+        """Return the reading of this report, with the last complete cell image and the new samples (see `Arrival`)."""
         if self._first_us is None:
             self._first_us = report.time_us
             self._last_us = report.time_us - self._period_us
@@ -116,7 +120,9 @@ class Measure:
             status | forces.status,
         )
         self._last_us = report.time_us
-        return Reading(frame, self._pads)
+        if self._accelerometer is None:
+            return Reading(frame, self._pads)
+        return Reading(frame, self._pads, self._accelerometer.signals(frame.t_s, words, sampled))
 
     def tare(self, images: Sequence[Pads]) -> None:
         """Set the zero from these images. Raises TareRefused."""

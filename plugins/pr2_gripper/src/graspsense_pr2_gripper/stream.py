@@ -59,6 +59,8 @@ class Stream:
         self.counts = Counts()
         self.image: RawImage | None = None
         """The last complete image."""
+        self.sampled = 0
+        """Number of samples that the accelerometer has taken. Each lost report counts as the report after it."""
         self._last = -1
         self._missing: dict[int, None] = {}
         self._from_the_past = 0
@@ -83,12 +85,15 @@ class Stream:
                     return None
                 self._remember(report.sequence, ahead - 1)
                 counts.lost += ahead - 1
+                self.sampled += len(report.samples) * (ahead - 1)
         self._last = report.sequence
         self._from_the_past = 0
         counts.reports += 1
         counts.accelerometer_samples += len(report.samples)
+        self.sampled += len(report.samples)
         if report.status & SAMPLES_MISSED:
             counts.accelerometer_missed += 1
+            self.sampled += 1
         if report.image:
             self._gather(report)
         return report

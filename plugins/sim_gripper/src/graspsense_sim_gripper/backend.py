@@ -14,6 +14,7 @@ from graspsense.plugin_api import (
     Command,
     Controller,
     DeviceInfo,
+    Frame,
     Grasped,
     ObjectKind,
     Pads,
@@ -35,6 +36,7 @@ from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.fingertip import CELLS, FIRST_PAD_CELL, fingertips
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
+from graspsense_sim_gripper.palm import PalmBuffers, PalmSignals, channel, palm_signals
 from graspsense_sim_gripper.problem import GraspController
 from graspsense_sim_gripper.reduction.propose import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.reduction.select import select
@@ -45,6 +47,9 @@ from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
 SIDES: Final = ("left", "right")
+
+NOISE_TICKS: Final = 512
+"""Ticks for which the noise of the palm is drawn at once."""
 
 _sense = bind_reachable(sense, {}, INTERPRETED)
 _reading = maker(Reading)
@@ -83,6 +88,7 @@ class SimBackend(BatchBackend[SimConfig]):
             Channel("effort", "N", frames_hz),
             *forces,
             fingertips(pads_hz),
+            *((channel(frames_hz),) if self.config.acceleration else ()),
         )
 
     def objects(self) -> tuple[ObjectKind, ...]:
@@ -116,6 +122,9 @@ class SimBackend(BatchBackend[SimConfig]):
         zero = (CELL_OFFSET[0],) * CELLS
         self._blocks = setup.noise()
         self._buffers = PadBuffers(zero, zero, [], [])
+        self._palm, self._palm_state = setup.palm, setup.palm_state
+        self._palm_noise = setup.palm_noise() if setup.has_palm else None
+        self._palm_buffers = PalmBuffers([], ())
         self._pads = no_pads(CELLS)
         self._effort_n: float | None = None
         self._explains = self.config.explain
@@ -148,7 +157,17 @@ class SimBackend(BatchBackend[SimConfig]):
         if count != self._pads.counter:
             image = buffers.images[count - 1]
             self._pads = Pads(self._sensor.image_t_s, count, tuple(image[0]), tuple(image[1]))
-        return _reading(frame, self._pads, ())
+        return _reading(frame, self._pads, self._further_signals(frame) if self._palm else ())
+
+    def _further_signals(self, frame: Frame) -> PalmSignals:
+        """Return the samples of the palm in this tick."""
+        noise = self._palm_buffers.noise
+        if self._palm_noise is not None and self._ticks >= len(noise):
+            noise.extend(self._palm_noise(NOISE_TICKS).tolist())
+        signals, self._palm_state = palm_signals(
+            self._palm, self._palm_state, self._state, frame.t_s, frame.dt_s, self._ticks, self._palm_buffers
+        )
+        return signals
 
     def _moved(self, effort_n: float) -> PlantState:
         """Return the plant after a tick. Raises TermFailed."""

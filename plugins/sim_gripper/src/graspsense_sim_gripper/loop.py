@@ -40,6 +40,8 @@ class GraspParams(NamedTuple):
     controller: TickParams
     dt_s: float
     max_ticks: int
+    palm: Any = ()
+    """`PalmParams`; () without an accelerometer."""
 
 
 class LoopState(NamedTuple):
@@ -66,6 +68,8 @@ class SimulationState(NamedTuple):
     plant: PlantState
     sensor: SensorState
     controller: TickState
+    palm: Any = ()
+    """`PalmState`; () without an accelerometer."""
 
 
 class Buffers(NamedTuple):
@@ -79,6 +83,8 @@ class Buffers(NamedTuple):
     """(9, n) The values of `COLUMNS` at each tick from the approach on."""
     phases: Any
     """(n,) The phase of each tick, and above `EVENT_SHIFT` bits the events that the controller told in it."""
+    palm: Any = ()
+    """`PalmBuffers`; () without an accelerometer."""
 
 
 EVENT_SHIFT: Final = 8
@@ -96,6 +102,20 @@ def _control_unbound(params: TickParams, state: TickState, reading: Reading) -> 
     raise TypeError("the loop has no controller: compose.grasp_loop binds one")
 
 
+def _no_signals(
+    params: Any, state: Any, plant: PlantState, t_s: float, dt_s: float, tick: int, buffers: Any
+) -> tuple[Any, Any]:
+    return (), state
+
+
+def _keep_nothing(signals: Any, buffers: Any, row: int) -> None:
+    pass
+
+
+further_signals: Callable[..., tuple[Any, Any]] = _no_signals
+"""What gives `Reading.signals`: `palm.palm_signals` of a gripper with an accelerometer."""
+keep_signals: Callable[[Any, Any, int], None] = _keep_nothing
+"""What records them: `palm.keep_samples` of a gripper with an accelerometer."""
 move: Callable[[PlantModel, PlantState, float, float], PlantState] = _move_unbound
 control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = _control_unbound
 
@@ -110,7 +130,7 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
     dt_s, pad_buffers, columns = params.dt_s, buffers.pads, buffers.columns
     images = pad_buffers.images
     ticks, recorded, phase, tare_from, effort, failed = progress.loop
-    plant, sensor, state = progress.plant, progress.sensor, progress.controller
+    plant, sensor, state, palm = progress.plant, progress.sensor, progress.controller, progress.palm
     capacity = len(columns[0])
     count = sensor.images
     pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
@@ -120,7 +140,8 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
             count = sensor.images
             buffers.image_times[count - 1] = sensor.image_t_s
             pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
-        command, state = control(params.controller, state, Reading(frame, pads, ()))
+        signals, palm = further_signals(params.palm, palm, plant, ticks * dt_s, dt_s, ticks, buffers.palm)
+        command, state = control(params.controller, state, Reading(frame, pads, signals))
         past_tare = phase != TARING
         if state.phase != phase:
             if phase == TARING and count > tare_from:
@@ -133,6 +154,7 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
             row = recorded & NOT_NEGATIVE
             _record(columns, row, frame, effort)
             buffers.phases[row] = phase | state.events << EVENT_SHIFT
+            keep_signals(signals, buffers.palm, row)
             recorded += 1
         ticks += 1
         if state.done == 1 or state.guard.stopped == 1:
@@ -142,7 +164,8 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
         if not is_finite(plant):
             failed = 1
             break
-    return SimulationState(LoopState(ticks, recorded, phase, tare_from, effort, failed), plant, sensor, state)
+    ended = LoopState(ticks, recorded, phase, tare_from, effort, failed)
+    return SimulationState(ended, plant, sensor, state, palm)
 
 
 def before_failure(

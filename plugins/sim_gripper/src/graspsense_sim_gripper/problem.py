@@ -15,12 +15,15 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.objects.spec import ObjectSpec, TermParams
+from graspsense_sim_gripper.palm import NUMBERS, PalmParams, PalmState
 from graspsense_sim_gripper.sensing import SensorParams, SensorState
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 
 IMAGES_PER_BLOCK: Final = 64
 """Number of cell images whose noise is drawn at once."""
 
+PalmNoise = Callable[[int], NDArray[np.float64]]
+"""Draws the noise of the palm in the next ticks: standard normal numbers (ticks, NUMBERS)."""
 ControllerStep = Callable[..., Any]
 """The step of a controller, with parameters and state of its own types."""
 
@@ -59,6 +62,14 @@ class GraspSetup:
     dt_s: float
     rng: np.random.Generator
     """The generator of the seed, after all of the above was drawn. It is not advanced any more."""
+    palm: PalmParams | tuple[()] = ()
+    """The palm of a gripper with an accelerometer."""
+    palm_state: PalmState | tuple[()] = ()
+
+    @property
+    def has_palm(self) -> bool:
+        """Whether the gripper has an accelerometer."""
+        return bool(self.palm)
 
     def noise(self) -> Iterator[NDArray[np.float64]]:
         """Yield the noise of the cell images: standard normal numbers in arrays of shape (IMAGES_PER_BLOCK, 2 CELLS).
@@ -70,6 +81,16 @@ class GraspSetup:
         rng.bit_generator.state = self.rng.bit_generator.state
         while True:
             yield rng.standard_normal((IMAGES_PER_BLOCK, 2 * CELLS))
+
+    def palm_noise(self) -> PalmNoise:
+        """Return a function that draws the noise of the palm in the next ticks, as many as it is asked for.
+
+        Its numbers are another stream of the same seed, so that all others are the same without an accelerometer.
+        """
+        seed = self.rng.bit_generator.seed_seq
+        assert isinstance(seed, np.random.SeedSequence)
+        rng = np.random.default_rng(np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, 0)))
+        return lambda ticks: rng.standard_normal((ticks, NUMBERS))
 
 
 @frozen(kw_only=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -17,6 +17,7 @@ from graspsense.plugin_api import (
     Outcome,
     Phase,
     RunConfig,
+    SampleTrace,
     TickParams,
     TickState,
     Trace,
@@ -45,7 +46,8 @@ from graspsense_sim_gripper.loop import (
     has_ended,
 )
 from graspsense_sim_gripper.objects.library import split_number
-from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
+from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers, sample_trace
+from graspsense_sim_gripper.problem import GraspController, GraspSetup, PalmNoise, Problem
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sensing import PadBuffers
@@ -225,12 +227,16 @@ def grasp_once(
     columns, phases = buffers.columns, buffers.phases
     table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
     images, times = np.asarray(buffers.pads.images[:k]), np.asarray(buffers.image_times[:k])
+    signals: dict[str, SampleTrace] = {}
+    if setup.has_palm:
+        signals["acceleration"] = sample_trace(table[0], np.asarray(buffers.palm.samples)[:, :n])
     if job.traces and 2 * n < len(columns[0]):
-        return finished(job, outcome, reason, plant, _trace(job, table.copy(), numbers.copy(), images, times))
+        trace = _trace(job, table.copy(), numbers.copy(), images, times, signals)
+        return finished(job, outcome, reason, plant, trace)
     # A trace that fills most of the buffers, or that only features are extracted from, is a view of them.
     # While a column of it is referenced, those buffers are kept, and the next grasps have new ones.
     references = sys.getrefcount(columns), sys.getrefcount(phases)
-    done = finished(job, outcome, reason, plant, _trace(job, table, numbers, images, times))
+    done = finished(job, outcome, reason, plant, _trace(job, table, numbers, images, times, signals))
     if on_arrays and (sys.getrefcount(columns), sys.getrefcount(phases)) != references:
         storage.buffers = _first_images(buffers)._replace(
             columns=np.empty_like(columns), phases=np.empty_like(phases)
@@ -259,29 +265,37 @@ def _run(
     buffers.pads.images[-1] = math.nan
     zeros = np.full((2, CELLS), CELL_OFFSET[0])
     buffers = buffers._replace(pads=buffers.pads._replace(left_zero=zeros[0], right_zero=zeros[1]))
+    palm_noise = None
+    if setup.has_palm:
+        palm_noise, ticks = setup.palm_noise(), len(buffers.phases)
+        buffers = buffers._replace(palm=PalmBuffers(palm_noise(ticks), np.zeros((NUMBERS, ticks))))
     if not on_arrays:
         # The interpreter indexes lists faster than arrays.
         buffers = _as_lists(buffers)
     exact = discretise(job.config, setup, on_arrays=on_arrays)
+    most_ticks = math.ceil(seconds_at_most(job.run) / setup.dt_s)
     params = GraspParams(
         plant=setup.plant if exact is None else exact[0],
         sensor=setup.sensor,
         controller=job.params,
         dt_s=setup.dt_s,
-        max_ticks=math.ceil(seconds_at_most(job.run) / setup.dt_s),
+        max_ticks=most_ticks,
+        palm=setup.palm,
     )
-    progress = SimulationState(NOT_STARTED, setup.state, setup.sensor_state, job.initial)
+    progress = SimulationState(NOT_STARTED, setup.state, setup.sensor_state, job.initial, setup.palm_state)
     while True:
+        if setup.has_palm:
+            params = params._replace(max_ticks=min(most_ticks, len(buffers.palm.noise)))
         start, progress = progress, loop(params, progress, buffers)
         if progress.loop.failed == 1:
             plant = before_failure(loop, params, start, buffers, progress)
             return progress._replace(plant=plant), buffers
-        if has_ended(progress.controller) or progress.loop.ticks >= params.max_ticks:
+        if has_ended(progress.controller) or progress.loop.ticks >= most_ticks:
             return progress, buffers
         if not ideal and progress.sensor.images == len(buffers.pads.images):
             buffers = _with_more_images(buffers, next(blocks))
         else:
-            buffers = _with_more_ticks(buffers)
+            buffers = _with_more_ticks(buffers, palm_noise)
         if not on_arrays:
             buffers = _as_lists(buffers)
 
@@ -297,7 +311,8 @@ def _draw_noise(noise: NDArray[np.float64], blocks: Iterator[NDArray[np.float64]
 
 def _as_lists(buffers: Buffers) -> Buffers:
     pads = PadBuffers(*(np.asarray(array).tolist() for array in buffers.pads))
-    return Buffers(pads, *(np.asarray(array).tolist() for array in buffers[1:]))
+    palm = PalmBuffers(*(np.asarray(array).tolist() for array in buffers.palm)) if buffers.palm else ()
+    return Buffers(pads, *(np.asarray(array).tolist() for array in buffers[1:-1]), palm)
 
 
 def _with_more_images(buffers: Buffers, noise: NDArray[np.float64]) -> Buffers:
@@ -311,12 +326,19 @@ def _with_more_images(buffers: Buffers, noise: NDArray[np.float64]) -> Buffers:
     )
 
 
-def _with_more_ticks(buffers: Buffers) -> Buffers:
+def _with_more_ticks(buffers: Buffers, palm_noise: PalmNoise | None) -> Buffers:
     """Return buffers for twice as many ticks; they begin with the same values."""
-    columns, phases = np.asarray(buffers.columns), np.asarray(buffers.phases)
+    columns, phases, palm = np.asarray(buffers.columns), np.asarray(buffers.phases), buffers.palm
+    if palm_noise is not None:
+        noise, samples = np.asarray(palm.noise), np.asarray(palm.samples)
+        palm = PalmBuffers(
+            np.concatenate([noise, palm_noise(len(noise))]),
+            np.concatenate([samples, np.zeros_like(samples)], axis=1),
+        )
     return buffers._replace(
         columns=np.concatenate([columns, np.zeros_like(columns)], axis=1),
         phases=np.concatenate([phases, np.zeros_like(phases)]),
+        palm=palm,
     )
 
 
@@ -337,6 +359,7 @@ def _trace(
     phases: NDArray[np.int64],
     images: NDArray[np.float64],
     times: NDArray[np.float64],
+    signals: Mapping[str, SampleTrace],
 ) -> Trace:
     events: tuple[GraspEvent, ...] = ()
     if type(job.controller).events:
@@ -353,6 +376,7 @@ def _trace(
         pad_t_s=np.array(times[begin:]),
         pad_left=images[begin:, 0].copy(),
         pad_right=images[begin:, 1].copy(),
+        signals=signals,
         events=events,
     )
 

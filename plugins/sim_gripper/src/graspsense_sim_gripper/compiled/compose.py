@@ -19,6 +19,7 @@ from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion,
 from graspsense_sim_gripper.exact.modes import Shape
 from graspsense_sim_gripper.exact.propagate import bind_move
 from graspsense_sim_gripper.loop import SimulationState, grasp
+from graspsense_sim_gripper.palm import keep_samples, palm_signals
 from graspsense_sim_gripper.problem import ControllerStep
 from graspsense_sim_gripper.sensing import SensorState
 from graspsense_sim_gripper.stepping.advance import advance, move
@@ -189,11 +190,15 @@ class Composition(NamedTuple):
     """Whether the steps of a tick are halved until the result no longer changes."""
     lags: bool = False
     """Whether the force of the drive lags behind the command."""
+    has_palm: bool = False
+    """Whether the gripper has an accelerometer."""
 
 
-def composition(kinds: tuple[str, ...], plant: PlantParams, shape: Shape | None) -> Composition:
+def composition(
+    kinds: tuple[str, ...], plant: PlantParams, shape: Shape | None, *, has_palm: bool = False
+) -> Composition:
     """Return the composition of a loop for this plant; `shape` is that of its exact discretisation, or None."""
-    return Composition(kinds, shape, plant.steps.settle > 0.0, plant.drive.lag_s > 0.0)
+    return Composition(kinds, shape, plant.steps.settle > 0.0, plant.drive.lag_s > 0.0, has_palm)
 
 
 @lru_cache(maxsize=64)
@@ -246,20 +251,25 @@ def grasp_loop(
 ) -> Callable[..., SimulationState]:
     """Return the loop of a grasp for a controller with this step; `interpreted` False: in the form that is compiled."""
     force = sum_of_active(active_laws(composition.kinds)) if interpreted else None
-    return _loop_of(composed_move(composition, interpreted=False), step, force)
+    return _loop_of(composed_move(composition, interpreted=False), step, force, composition.has_palm)
 
 
 @lru_cache(maxsize=64)
 def guarded_loop(composition: Composition, step: ControllerStep) -> Callable[..., SimulationState]:
     """Return the loop of a grasp by steps in the interpreter, in which a law that raises an exception gives NaN."""
     force = sum_of_active([_guarded(law) for law in active_laws(composition.kinds)])
-    return _loop_of(_step_move(composition), step, force)
+    return _loop_of(_step_move(composition), step, force, composition.has_palm)
 
 
-def _loop_of(move: PlantMove, step: ControllerStep, force: Law | None) -> Callable[..., SimulationState]:
+def _loop_of(
+    move: PlantMove, step: ControllerStep, force: Law | None, has_palm: bool
+) -> Callable[..., SimulationState]:
     """Return the loop with this plant; `force`: of the object, in the form that suits the interpreter."""
     control = bind_reachable(tick, {"step": step, "events_told": events_of(step)})
-    loop = bind_reachable(grasp, {"move": move, "control": control})
+    parts: dict[str, Any] = {"move": move, "control": control}
+    if has_palm:
+        parts |= {"further_signals": palm_signals, "keep_signals": keep_samples}
+    loop = bind_reachable(grasp, parts)
     return bind_reachable(loop, {"object_force": force}, INTERPRETED) if force else loop
 
 

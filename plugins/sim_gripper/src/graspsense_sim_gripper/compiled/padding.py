@@ -80,7 +80,7 @@ def composition_of(config: SimConfig, setup: GraspSetup, *, pad: bool = True) ->
     """Return the composition in which a grasp is compiled; not `pad`: with the object's own terms."""
     exact = discretise(config, setup, on_arrays=True)
     kinds = layout_of(setup).kinds if pad else setup.kinds
-    return composition(kinds, setup.plant, None if exact is None else exact[1])
+    return composition(kinds, setup.plant, None if exact is None else exact[1], has_palm=setup.has_palm)
 
 
 def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetup:

@@ -42,6 +42,7 @@ from graspsense_sim_gripper.loop import (
     before_failure,
     has_ended,
 )
+from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers
 from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
 from graspsense_sim_gripper.reduction.candidates import reduced
 from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
@@ -175,7 +176,11 @@ class TrialGrasps:
             state = state._replace(motion=Motion(near, state.motion.speed_rev_s, *gap_and_rate(link, near)))
         run = self._runner(setup, from_open)
         controller = first_state(self.controller.controller.init())
-        stage = _Stage(SimulationState(NOT_STARTED, state, setup.sensor_state, controller), (), from_open)
+        stage = _Stage(
+            SimulationState(NOT_STARTED, state, setup.sensor_state, controller, setup.palm_state),
+            (),
+            from_open,
+        )
         while not has_ended(stage.progress.controller) and stage.progress.loop.ticks < self._max_ticks():
             motion = stage.progress.plant.motion
             closing = max(-motion.speed_rev_s * motion.jacobian_m_rev, MIN_CLOSING_M_S)
@@ -202,13 +207,14 @@ class TrialGrasps:
                 contact = progress.plant.contact._replace(left=fresh.left, right=fresh.right)
                 progress = progress._replace(plant=progress.plant._replace(contact=contact))
             plant = made.plant._replace(steps=steps) if exact is None else exact
-            grasp_params = GraspParams(plant, made.sensor, params, setup.dt_s, until)
+            grasp_params = GraspParams(plant, made.sensor, params, setup.dt_s, until, made.palm)
             while not has_ended(progress.controller) and progress.loop.ticks < until:
                 table = np.zeros((len(COLUMNS), min(until - progress.loop.ticks, CAPACITY)))
                 phases = np.zeros(table.shape[1], np.int64)
                 recorded = (table, phases) if on_arrays else (table.tolist(), phases.tolist())
                 progress = progress._replace(loop=progress.loop._replace(recorded=0))
-                start, written = progress, Buffers(*buffers, *recorded)
+                palm = _palm_buffers(on_arrays, table.shape[1]) if made.has_palm else ()
+                start, written = progress, Buffers(*buffers, *recorded, palm)
                 progress = loop(grasp_params, start, written)
                 if progress.loop.failed == 1:
                     before = before_failure(loop, grasp_params, start, written, progress)
@@ -237,7 +243,7 @@ class TrialGrasps:
         made = padded(setup, self.padding) if on_arrays else setup
         exact = discretise(self.config, made, on_arrays=on_arrays)
         shape = None if exact is None else exact[1]
-        composed = composition(made.kinds, made.plant, shape)
+        composed = composition(made.kinds, made.plant, shape, has_palm=made.has_palm)
         model = None if exact is None else exact[0]
         if not on_arrays:
             return False, grasp_loop(composed, self.controller.step), made, model
@@ -277,6 +283,12 @@ def _ideal_buffers(on_arrays: bool) -> tuple[PadBuffers, Any]:
         return PadBuffers(zero[0], zero[1], noise, images), np.zeros(1)
     left, right = zero.tolist()
     return PadBuffers(left, right, noise.tolist(), images.tolist()), [0.0]
+
+
+def _palm_buffers(on_arrays: bool, ticks: int) -> PalmBuffers:
+    """Return buffers for the palm of an ideal sensor, which reads the first row of the noise only."""
+    noise, samples = np.zeros((1, NUMBERS)), np.zeros((NUMBERS, ticks))
+    return PalmBuffers(noise, samples) if on_arrays else PalmBuffers(noise.tolist(), samples.tolist())
 
 
 def _record(end: _Stage, bias: Bias, dt_s: float) -> GraspRecord:
