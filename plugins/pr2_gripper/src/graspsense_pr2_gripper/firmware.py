@@ -20,7 +20,7 @@ from graspsense.plugin_api import (
     gap_and_rate,
     revolutions_at,
 )
-from graspsense_pr2_gripper.accelerometer import word_of
+from graspsense_pr2_gripper.accelerometer import has_accelerometer, word_of
 from graspsense_pr2_gripper.fingertip import CELLS
 from graspsense_pr2_gripper.linkage import LINKAGES
 from graspsense_pr2_gripper.protocol import (
@@ -54,7 +54,7 @@ _LARGEST: Final = 2**31 - 1
 class Firmware:
     """A board with this identity that drives `body`, which has been opened.
 
-    Its accelerometer is the channel `acceleration` of the body; without it, `identity.accelerometer_g` must be 0.
+    It sends the samples of the channel `acceleration` of the body; none where the body or the board has none.
     """
 
     def __init__(self, body: SensorBackend[Any], identity: Identity) -> None:
@@ -82,6 +82,7 @@ class Firmware:
         self._gone_out = True
         self._cells = [0] * IMAGE_CELLS
         self._range_g = identity.accelerometer_g
+        self._has_accelerometer = self._range_g > 0 and has_accelerometer(body.channels)
         self._counter = 0
         """Number of samples that the accelerometer of the body had taken at the last report."""
 
@@ -142,7 +143,7 @@ class Firmware:
         self._step += 1
         self._measure(frame)
         self._latch(pads, now_us)
-        words = self._sampled(signals.acceleration) if self._range_g else ()
+        words = self._sampled(signals.acceleration) if self._has_accelerometer else ()
         report = InputReport(
             sequence=(self._step - 1) & 0xFFFFFFFF,
             time_us=now_us,

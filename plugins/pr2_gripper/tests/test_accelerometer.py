@@ -1,0 +1,234 @@
+"""The accelerometer of the palm: from the words of a report to a recording, and what is lost on the way."""
+
+from __future__ import annotations
+
+import fcntl
+import math
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from graspsense import load_pipeline
+from graspsense.core.runner import run_grasp
+from graspsense.plugin_api import RunConfig, Samples, create
+from graspsense.recording.export_trace import write_npz
+from graspsense.recording.reader import read_recorded
+from graspsense_pr2_gripper import emulation
+from graspsense_pr2_gripper.accelerometer import CHANNEL, Accelerometer, word_of
+from graspsense_pr2_gripper.backend import Pr2Backend
+from graspsense_pr2_gripper.config import FaultConfig, Pr2Config
+from graspsense_pr2_gripper.faults import Wire
+from graspsense_pr2_gripper.link import LockStepLink
+from graspsense_pr2_gripper.protocol import (
+    SAMPLES_MISSED,
+    InputReport,
+    axes,
+    decode_input,
+    encode_input,
+)
+from graspsense_pr2_gripper.stream import Stream
+from graspsense_pr2_gripper.transports.interface import Transport
+
+NEAR: dict[str, Any] = {"object": "can:empty_open", "body_config": {"open_gap_m": 0.075}}
+"""A can, and fingers that stand near it: a grasp of half the ticks."""
+EMULATED = Pr2Config(transport="emulated", calibration="none", **NEAR)
+
+
+def report(sequence: int, words: tuple[int, ...], status: int = 0) -> bytes:
+    return encode_input(
+        InputReport(sequence, 1000 * sequence, 0, 0, 0, status, 0, words, 0, 0, (0, 0, 0, 0), 1, 0)
+    )
+
+
+def values(samples: Samples) -> list[tuple[float, ...]]:
+    return list(samples.values[: samples.new])
+
+
+def of_words(words: list[int]) -> np.ndarray:
+    """The accelerations that these words stand for, by the definition of the protocol."""
+    return np.array([[count * (8 * 9.81 / 512) for count in axes(word)] for word in words])
+
+
+class Sent(Wire):
+    """A wire that keeps the samples that the board sent."""
+
+    words: ClassVar[list[tuple[int, tuple[int, ...]]]] = []
+
+    def step(self) -> list[bytes]:
+        arriving = super().step()
+        for data in arriving:
+            decoded = decode_input(data)
+            self.words.append((decoded.time_us, decoded.samples))
+        return arriving
+
+
+class Waiting(Transport):
+    """Reports that wait all at once, as after a program that was held up."""
+
+    def __init__(self, *reports: bytes) -> None:
+        self.reports = list(reports)
+
+    def read(self, timeout_s: float) -> bytes:
+        return self.reports.pop(0) if self.reports else b""
+
+    def write(self, report: bytes) -> None:
+        pass
+
+    def feature(self, report_id: int) -> bytes:
+        return b""
+
+    def close(self) -> None:
+        pass
+
+
+def test_a_word_holds_three_signed_axes_and_is_limited_to_the_full_scale() -> None:
+    def back(sample: tuple[float, ...]) -> tuple[float, ...]:
+        read: Samples = Accelerometer(8).signals(0.0, (word_of(sample, 8),), 1).acceleration
+        return read.values[0]
+
+    step = 8 * 9.81 / 512
+    assert back((0.0, -9.81, 9.81)) == (0.0, -64 * step, 64 * step)
+    assert back((0.4 * step, 1.6 * step, -0.6 * step)) == (0.0, 2 * step, -step)
+    assert back((1e3, -1e3, 0.0)) == (511 * step, -512 * step, 0.0)
+
+
+def test_a_tick_has_the_declared_shape_and_nan_behind_what_is_new() -> None:
+    for words in ((), (1,), (1, 2, 3), (1, 2, 3, 4)):
+        block: Samples = Accelerometer(2).signals(1.5, words, 10).acceleration
+        assert (block.t_s, block.counter, block.new) == (1.5, 10, len(words))
+        assert [len(row) for row in block.values] == [3] * CHANNEL.samples
+        assert all(math.isnan(number) for row in block.values[block.new :] for number in row)
+
+
+def test_lost_reports_and_samples_that_the_board_missed_are_counted() -> None:
+    stream = Stream()
+    stream.take(report(7, (1, 2, 3)))
+    stream.take(report(10, (4, 5, 6)))
+    assert stream.sampled == 12, "two reports of three samples are lost"
+    stream.take(report(11, (7, 8, 9, 10), SAMPLES_MISSED))
+    assert stream.sampled == 17, "at least one more than the report holds"
+
+
+def test_samples_of_a_report_that_was_skipped_come_with_the_next_one() -> None:
+    link = LockStepLink(Waiting(report(1, (1, 2)), report(2, (3, 4))), 1e-3)
+    arrival = link.next(1e-3)
+    assert arrival is not None
+    assert (arrival.words, arrival.sampled) == ((1, 2, 3, 4), 4)
+
+
+def test_samples_before_a_gap_are_not_joined_to_those_after_it() -> None:
+    link = LockStepLink(Waiting(report(1, (1, 2)), report(3, (5, 6))), 1e-3)
+    arrival = link.next(1e-3)
+    assert arrival is not None
+    assert (arrival.words, arrival.sampled) == ((5, 6), 6)
+
+
+def test_every_sample_that_the_board_sends_reaches_the_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Sent, "words", [])
+    monkeypatch.setattr(emulation, "Wire", Sent)
+    trace = run_grasp(Pr2Backend(EMULATED), create("controller", "hybrid"), RunConfig(seed=1)).trace
+    acceleration = trace.signals["acceleration"]
+    assert acceleration.lost == 0
+    assert len(acceleration.values) == 3 * len(trace)
+    # The trace begins with the approach, and ends before the fingers have opened.
+    words = [word for _, samples in Sent.words for word in samples]
+    sent = of_words(words)
+    first = next(
+        i for i in range(len(sent)) if sent[i : i + 30].tobytes() == acceleration.values[:30].tobytes()
+    )
+    assert sent[first : first + len(acceleration.values)].tobytes() == acceleration.values.tobytes()
+
+
+def test_reports_that_are_dropped_show_as_lost_samples() -> None:
+    config = Pr2Config(transport="emulated", calibration="none", faults=FaultConfig(drop=0.05), **NEAR)
+    ended = run_grasp(Pr2Backend(config), create("controller", "hybrid"), RunConfig(seed=1))
+    acceleration = ended.trace.signals["acceleration"]
+    assert 0.02 < acceleration.lost / len(acceleration.values) < 0.1
+    assert (np.diff(acceleration.t_s) > 0.0).all()
+
+
+def test_a_board_without_an_accelerometer_grasps_as_before_and_says_so() -> None:
+    old = Pr2Config(
+        transport="emulated",
+        calibration="none",
+        object="can:empty_open",
+        body_config={"open_gap_m": 0.075, "acceleration": False},
+    )
+    with_it, without = (
+        run_grasp(Pr2Backend(config), create("controller", "hybrid"), RunConfig(seed=1))
+        for config in (EMULATED, old)
+    )
+    assert "the board has no accelerometer" in " ".join(without.device.notes)
+    assert len(without.trace.signals["acceleration"].values) == 0
+    assert without.trace.gap_m.tobytes() == with_it.trace.gap_m.tobytes()
+    assert without.trace.force_left_n.tobytes() == with_it.trace.force_left_n.tobytes()
+
+
+def test_the_channel_can_be_left_out_by_the_settings() -> None:
+    backend = Pr2Backend(Pr2Config(transport="emulated", calibration="none", accelerometer=False, **NEAR))
+    assert CHANNEL not in backend.channels
+    ended = run_grasp(backend, create("controller", "hybrid"), RunConfig(seed=1))
+    assert ended.trace.signals == {}
+
+
+PROGRAM = """
+import os, signal, sys
+from pathlib import Path
+from graspsense import load_pipeline
+from graspsense.recording.layout import DEVICE, START
+from graspsense.recording.recorder import Recorder
+from graspsense.recording.trial_record import TrialRecord
+
+pipeline = load_pipeline(options=sys.argv[2:])
+record = TrialRecord.begin(pipeline.settings, {}, "run")
+recorder = Recorder(Path(sys.argv[1]))
+recorder.metadata(START, record.section(START))
+recorder.wait_ready()
+ticks = 0
+
+class Killing:
+    def take(self, reading, phase, command):
+        global ticks
+        ticks += 1
+        if ticks == 500:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+pipeline.grasp(seed=1, sinks=[recorder, Killing()])
+"""
+
+
+def test_samples_survive_a_killed_program_a_replay_and_an_export_to_the_last_bit(tmp_path: Path) -> None:
+    options = [
+        *("gripper.type=pr2", "gripper.transport=emulated", "gripper.calibration=none"),
+        *("gripper.object='can:empty_open'", "gripper.body_config.open_gap_m=0.075", "classifier.type=none"),
+    ]
+    path = tmp_path / "grasp.mcap"
+    killed = subprocess.run([sys.executable, "-c", PROGRAM, str(path), *options], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    part = path.with_name("grasp.mcap.part")
+    with part.open("rb") as file:
+        # The writer holds the lock until it has written all that it was given.
+        fcntl.flock(file, fcntl.LOCK_SH)
+    trace = load_pipeline(options=options).grasp(seed=1).trace
+    complete = trace.signals["acceleration"]
+
+    read = read_recorded(part, salvage=True)
+    found = read.trace().signals["acceleration"]
+    assert len(read) == 500
+    assert found.values.tobytes() == complete.values[:1500].tobytes()
+    assert found.t_s.tobytes() == complete.t_s[:1500].tobytes()
+    assert CHANNEL.samples == next(one for one in read.channels if one.name == "acceleration").samples
+
+    whole = tmp_path / "whole.mcap"
+    part.rename(whole)
+    options = ["gripper.type=replay", f"gripper.recording={whole}", "classifier.type=none"]
+    again = load_pipeline(options=options).grasp().trace.signals["acceleration"]
+    assert again.values.tobytes() == found.values.tobytes()
+    write_npz(tmp_path / "grasp.npz", read)
+    with np.load(tmp_path / "grasp.npz") as exported:
+        assert exported["signal_acceleration"].tobytes() == found.values.tobytes()
