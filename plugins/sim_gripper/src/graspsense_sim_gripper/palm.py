@@ -54,24 +54,42 @@ GEAR_M_S2_REV_S: Final = 0.01
 for gentle motion and of 5 m/s2 for fast motion."""
 
 
-class PalmParams(NamedTuple):
-    """The palm, its arm and its sensor. A third of a tick maps displacement and speed (x, v) linearly, and a force."""
+class Arm(NamedTuple):
+    """The gripper on its arm."""
 
-    finger_m: float
-    half_gap0_m: float
     mass_kg: float
     stiffness_n_m: float
     damping_n_s_m: float
+
+
+class ThirdOfTick(NamedTuple):
+    """The displacement x and the speed v after a third of a tick, as linear functions of both and of the mean force."""
+
     x_of_x: float
     x_of_v: float
+    x_of_n: float
     v_of_x: float
     v_of_v: float
-    x_of_n: float
     v_of_n: float
-    noisy: int
-    """1: with noise; 0: an ideal sensor, for which the row 0 of the noise is read and multiplied by zero."""
+
+
+class Noise(NamedTuple):
+    """The noise of the sensor."""
+
+    present: int
+    """1: with noise; 0: an ideal sensor, for which row 0 of the noise is read and multiplied by zero."""
     floor_m_s2: float
     gear_m_s2_rev_s: float
+
+
+class PalmParams(NamedTuple):
+    """The palm: the swing of the fingers, the arm, and the noise."""
+
+    finger_m: float
+    half_gap0_m: float
+    arm: Arm
+    third: ThirdOfTick
+    noise: Noise
 
 
 class PalmState(NamedTuple):
@@ -121,18 +139,16 @@ def palm_params(link: ScrewLinkage, dt_s: float, *, ideal: bool) -> PalmParams:
     return PalmParams(
         finger_m=link.finger_m,
         half_gap0_m=link.half_gap0_m,
-        mass_kg=PALM_KG,
-        stiffness_n_m=stiffness,
-        damping_n_s_m=2.0 * decay * PALM_KG,
-        x_of_x=x_of_x,
-        x_of_v=sine,
-        v_of_x=v_of_x,
-        v_of_v=cosine - decay * sine,
-        x_of_n=(1.0 - x_of_x) / stiffness,
-        v_of_n=-v_of_x / stiffness,
-        noisy=0 if ideal else 1,
-        floor_m_s2=0.0 if ideal else FLOOR_M_S2,
-        gear_m_s2_rev_s=0.0 if ideal else GEAR_M_S2_REV_S,
+        arm=Arm(PALM_KG, stiffness, 2.0 * decay * PALM_KG),
+        third=ThirdOfTick(
+            x_of_x=x_of_x,
+            x_of_v=sine,
+            x_of_n=(1.0 - x_of_x) / stiffness,
+            v_of_x=v_of_x,
+            v_of_v=cosine - decay * sine,
+            v_of_n=-v_of_x / stiffness,
+        ),
+        noise=Noise(0, 0.0, 0.0) if ideal else Noise(1, FLOOR_M_S2, GEAR_M_S2_REV_S),
     )
 
 
@@ -151,31 +167,33 @@ def palm_signals(
     rate, difference = motion.speed_rev_s * motion.jacobian_m_rev, contact.left_n - contact.right_n
     swing_n = swing_force(params, motion.gap_m, rate, (rate - rate0) / dt_s)
     change = (difference - difference0) / SAMPLES
-    noise = buffers.noise[tick if params.noisy == 1 else 0]
-    gear = params.gear_m_s2_rev_s * motion.speed_rev_s
-    spread = math.sqrt(params.floor_m_s2 * params.floor_m_s2 + gear * gear)
+    arm, third_of_tick = params.arm, params.third
+    present, floor, gear_m_s2_rev_s = params.noise
+    noise = buffers.noise[tick if present == 1 else 0]
+    gear = gear_m_s2_rev_s * motion.speed_rev_s
+    spread = math.sqrt(floor * floor + gear * gear)
 
     force1 = difference0 + change
     force2 = force1 + change
-    x, x_rate = _advanced(params, x, x_rate, swing_n)
-    y, y_rate = _advanced(params, y, y_rate, difference0 + 0.5 * change)
+    x, x_rate = _advanced(third_of_tick, x, x_rate, swing_n)
+    y, y_rate = _advanced(third_of_tick, y, y_rate, difference0 + 0.5 * change)
     first = (
-        _acceleration(params, x, x_rate, swing_n) + spread * noise[0],
-        _acceleration(params, y, y_rate, force1) + spread * noise[1],
+        _acceleration(arm, x, x_rate, swing_n) + spread * noise[0],
+        _acceleration(arm, y, y_rate, force1) + spread * noise[1],
         FREE_FALL_M_S2 + spread * noise[2],
     )
-    x, x_rate = _advanced(params, x, x_rate, swing_n)
-    y, y_rate = _advanced(params, y, y_rate, force1 + 0.5 * change)
+    x, x_rate = _advanced(third_of_tick, x, x_rate, swing_n)
+    y, y_rate = _advanced(third_of_tick, y, y_rate, force1 + 0.5 * change)
     second = (
-        _acceleration(params, x, x_rate, swing_n) + spread * noise[3],
-        _acceleration(params, y, y_rate, force2) + spread * noise[4],
+        _acceleration(arm, x, x_rate, swing_n) + spread * noise[3],
+        _acceleration(arm, y, y_rate, force2) + spread * noise[4],
         FREE_FALL_M_S2 + spread * noise[5],
     )
-    x, x_rate = _advanced(params, x, x_rate, swing_n)
-    y, y_rate = _advanced(params, y, y_rate, force2 + 0.5 * change)
+    x, x_rate = _advanced(third_of_tick, x, x_rate, swing_n)
+    y, y_rate = _advanced(third_of_tick, y, y_rate, force2 + 0.5 * change)
     third = (
-        _acceleration(params, x, x_rate, swing_n) + spread * noise[6],
-        _acceleration(params, y, y_rate, difference) + spread * noise[7],
+        _acceleration(arm, x, x_rate, swing_n) + spread * noise[6],
+        _acceleration(arm, y, y_rate, difference) + spread * noise[7],
         FREE_FALL_M_S2 + spread * noise[8],
     )
     rows = (first, second, third, (math.nan, math.nan, math.nan))
@@ -214,11 +232,11 @@ def swing_force(params: PalmParams, gap_m: float, rate_m_s: float, rate_m_s2: fl
     return SWINGING_KG * (sine * rate_m_s2 + rate_m_s * rate_m_s / (2.0 * radius * square)) / cosine
 
 
-def _advanced(params: PalmParams, x: float, rate: float, force_n: float) -> tuple[float, float]:
+def _advanced(third: ThirdOfTick, x: float, rate: float, force_n: float) -> tuple[float, float]:
     """Return displacement and speed after a third of a tick under a constant force."""
-    after = params.x_of_x * x + params.x_of_v * rate + params.x_of_n * force_n
-    return after, params.v_of_x * x + params.v_of_v * rate + params.v_of_n * force_n
+    after = third.x_of_x * x + third.x_of_v * rate + third.x_of_n * force_n
+    return after, third.v_of_x * x + third.v_of_v * rate + third.v_of_n * force_n
 
 
-def _acceleration(params: PalmParams, x: float, rate: float, force_n: float) -> float:
-    return (force_n - params.stiffness_n_m * x - params.damping_n_s_m * rate) / params.mass_kg
+def _acceleration(arm: Arm, x: float, rate: float, force_n: float) -> float:
+    return (force_n - arm.stiffness_n_m * x - arm.damping_n_s_m * rate) / arm.mass_kg
