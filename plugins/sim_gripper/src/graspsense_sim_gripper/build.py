@@ -32,7 +32,7 @@ from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.objects.instance import Instance, cell_weights, central_cells, sample
 from graspsense_sim_gripper.objects.library import find, split_number
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.palm import AT_REST, PalmParams, palm_params
+from graspsense_sim_gripper.palm import AT_REST, palm_params
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.reduction.candidates import reduce_plant
 from graspsense_sim_gripper.reduction.levels import step_tolerance
@@ -140,9 +140,10 @@ def _setup(
     if instance is not None and reduction is not None:
         plant = reduce_plant(plant, instance.kinds, reduction)
     sensor = _sensor(config, instance, rng)
-    palm: PalmParams | tuple[()] = ()
+    palm: dict[str, Any] = {}
     if config.acceleration:
-        palm = palm_params(_linkage(config), 1.0 / config.rate_hz, ideal=config.sensor == "ideal")
+        params = palm_params(_linkage(config), 1.0 / config.rate_hz, ideal=config.sensor == "ideal")
+        palm = {"palm": params, "palm_state": AT_REST}
     return GraspSetup(
         kinds=instance.kinds if instance else (),
         terms=instance.terms if instance else (),
@@ -152,8 +153,7 @@ def _setup(
         sensor_state=initial_sensor(sensor, state),
         dt_s=1.0 / config.rate_hz,
         rng=rng,
-        palm=palm,
-        palm_state=AT_REST if palm else (),
+        **palm,
     )
 
 

@@ -15,7 +15,7 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.objects.spec import ObjectSpec, TermParams
-from graspsense_sim_gripper.palm import NUMBERS, PalmParams, PalmState
+from graspsense_sim_gripper.palm import NUMBERS
 from graspsense_sim_gripper.sensing import SensorParams, SensorState
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 
@@ -62,9 +62,10 @@ class GraspSetup:
     dt_s: float
     rng: np.random.Generator
     """The generator of the seed, after all of the above was drawn. It is not advanced any more."""
-    palm: PalmParams | tuple[()] = ()
-    """The palm of a gripper with an accelerometer."""
-    palm_state: PalmState | tuple[()] = ()
+    palm: Any = ()
+    """`PalmParams` of a gripper with an accelerometer, otherwise ()."""
+    palm_state: Any = ()
+    """Its `PalmState`, otherwise ()."""
 
     @property
     def has_palm(self) -> bool:
