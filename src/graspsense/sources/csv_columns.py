@@ -34,7 +34,7 @@ class CsvColumns:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        header, self.lines, rows = _rows(path, _text(path))
+        header, self.lines, rows = _rows(path, text_of(path))
         self.units: dict[str, str] = {}
         self.names: list[str] = []
         for heading in header:
@@ -153,7 +153,8 @@ def _rows(path: Path, text: str) -> tuple[list[str], list[int], list[list[str]]]
     return header, lines, rows
 
 
-def _text(path: Path) -> str:
+def text_of(path: Path) -> str:
+    """Return the text of a file in UTF-8. Raises ConfigError if it cannot be read, DataDamaged if it is not text."""
     try:
         data = path.read_bytes()
     except OSError as error:

@@ -1,0 +1,196 @@
+"""The columns of a grasp of another program, in SI units: checks, and the recording that they are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from attrs import evolve, field, frozen
+
+from graspsense.core.channels import signal_type
+from graspsense.core.entries import Channel, TactileArray
+from graspsense.core.errors import DataDamaged
+from graspsense.core.signals import NO_PADS, Frame, Image, Reading
+from graspsense.recording.replayable import Recording
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[np.float64]
+
+PLAUSIBLE: Final = {
+    "gap": (-0.05, 0.5, "m", "mm"),
+    "force": (-2000.0, 2000.0, "N", "mN"),
+    "effort": (-5000.0, 5000.0, "N", "mN"),
+    "velocity": (-5.0, 5.0, "m/s", "mm/s"),
+    "time between samples": (0.0, 1.0, "s", "ms"),
+}
+"""Quantity to its plausible range, the unit of that, and the unit that a column out of range is most likely in."""
+
+
+@frozen(kw_only=True, eq=False)
+class GraspColumns:
+    """The samples of a grasp: each column has shape (n,), each array in `arrays` has shape (n, cells).
+
+    `units` names the units that are not SI, by `t`, `gap`, `force` or the name of a further channel. `notes` say how
+    the columns came about.
+    """
+
+    source: str
+    t_s: Numbers
+    gap_m: Numbers
+    left_n: Numbers
+    right_n: Numbers
+    effort_n: Numbers | None = None
+    velocity_m_s: Numbers | None = None
+    scalars: Mapping[str, Numbers] = field(factory=dict)
+    arrays: Mapping[str, Numbers] = field(factory=dict)
+    units: Mapping[str, str] = field(factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.t_s)
+
+    @property
+    def force_n(self) -> Numbers:
+        """The mean force of both pads."""
+        mean: Numbers = (self.left_n + self.right_n) / 2.0
+        return mean
+
+    def rows(self, which: Any, part: str = "") -> GraspColumns:
+        """Return these samples (a slice, numbers, or a mask); `part` says in words which they are."""
+        return evolve(
+            self,
+            source=f"{self.source}, {part}" if part else self.source,
+            t_s=self.t_s[which],
+            gap_m=self.gap_m[which],
+            left_n=self.left_n[which],
+            right_n=self.right_n[which],
+            effort_n=None if self.effort_n is None else self.effort_n[which],
+            velocity_m_s=None if self.velocity_m_s is None else self.velocity_m_s[which],
+            scalars={name: values[which] for name, values in self.scalars.items()},
+            arrays={name: values[which] for name, values in self.arrays.items()},
+        )
+
+
+def checked_recording(columns: GraspColumns, *, rate_hz: float | None = None) -> Recording:
+    """Return the recording that these columns are; `rate_hz` is that of a single sample.
+
+    Raises DataDamaged if a value is missing, if the time does not increase, or if a value is in another unit.
+    """
+    steps = _time_steps(columns, rate_hz)
+    _check_complete(columns)
+    _check_plausible(columns, "gap", "gap", columns.gap_m)
+    _check_plausible(columns, "force", "force", columns.left_n, columns.right_n)
+    _check_plausible(columns, "effort", "force", *(() if columns.effort_n is None else (columns.effort_n,)))
+    velocities = columns.velocity_m_s
+    if velocities is None:
+        velocities = np.diff(columns.gap_m, prepend=columns.gap_m[:1]) / steps
+    _check_plausible(columns, "velocity", "gap", *(() if columns.velocity_m_s is None else (velocities,)))
+    _check_plausible(columns, "time between samples", "t", np.array([np.median(steps)]))
+    channels = _channels(columns)
+    return Recording(
+        name=columns.source,
+        readings=tuple(_readings(columns, steps, velocities, channels)),
+        rate_hz=1.0 / float(np.median(steps)),
+        units=_units(columns.units),
+        notes=columns.notes,
+        channels=channels,
+    )
+
+
+def _time_steps(columns: GraspColumns, rate_hz: float | None) -> Numbers:
+    """Return the time between samples (s), that of the first sample equal to the second's. Raises DataDamaged."""
+    if len(columns) == 1 and rate_hz is not None:
+        return np.array([1.0 / rate_hz])
+    if len(columns) < 2:
+        raise DataDamaged(f"{columns.source} has {len(columns)} samples; a grasp needs at least two")
+    check_increasing(columns)
+    steps = np.diff(columns.t_s)
+    return np.concatenate((steps[:1], steps))
+
+
+def check_increasing(columns: GraspColumns) -> None:
+    """Raise DataDamaged with the sample at which the time does not increase."""
+    wrong = np.flatnonzero(~(np.diff(columns.t_s) > 0.0))
+    if len(wrong):
+        k = int(wrong[0])
+        before, after = columns.t_s[k].item(), columns.t_s[k + 1].item()
+        raise DataDamaged(
+            f"{columns.source}: the time goes from {before!r} to {after!r} at sample {k + 2}; it must increase. "
+            'If rows are repeated, write duplicates = "drop" in the manifest; if they come from several grasps, split '
+            "the file"
+        )
+
+
+def _check_complete(columns: GraspColumns) -> None:
+    named = {"gap": columns.gap_m, "left force": columns.left_n, "right force": columns.right_n}
+    for what, values in named.items():
+        missing = np.flatnonzero(~np.isfinite(values))
+        if len(missing) == len(values):
+            raise DataDamaged(f"{columns.source}: the {what} has no number")
+        if len(missing):
+            raise DataDamaged(
+                f"{columns.source}: the {what} is missing or infinite at sample {missing[0] + 1}"
+            )
+
+
+def _check_plausible(columns: GraspColumns, quantity: str, unit_of: str, *values: Numbers) -> None:
+    """Raise DataDamaged if a value is far from those of any gripper, as it is in another unit."""
+    if columns.units.get(unit_of, "") or not values:
+        return
+    low, high, unit, other = PLAUSIBLE[quantity]
+    every = np.concatenate(values)
+    extreme = float(every[int(np.argmax(np.maximum(every - high, low - every)))])
+    if not low <= extreme <= high:
+        counts = ", in counts [counts]" if quantity == "force" else ""
+        raise DataDamaged(
+            f"{columns.source}: the {quantity} reaches {extreme:g} {unit}, which no gripper has. Plausible is "
+            f"{low:g} to {high:g} {unit}. If the column is in {other}, write its unit behind it: [{other}]{counts}"
+        )
+
+
+def _units(units: Mapping[str, str]) -> dict[str, str]:
+    """Return the units of the channels of a frame that are not SI units."""
+    t, gap, force = units.get("t", ""), units.get("gap", ""), units.get("force", "")
+    found = {"t": t, "gap": gap, "velocity": f"{gap or 'm'}/{t or 's'}" if gap or t else ""}
+    found |= dict.fromkeys(("force_left", "force_right"), force)
+    return {name: unit for name, unit in found.items() if unit}
+
+
+def _channels(columns: GraspColumns) -> tuple[Channel, ...]:
+    scalars = [Channel(name, columns.units.get(name, "1")) for name in columns.scalars]
+    arrays = [
+        TactileArray(name, columns.units.get(name, "counts"), finger=name, rows=1, columns=values.shape[1])
+        for name, values in columns.arrays.items()
+    ]
+    return (*scalars, *arrays)
+
+
+def _readings(
+    columns: GraspColumns, steps: Numbers, velocities: Numbers, channels: Sequence[Channel]
+) -> list[Reading]:
+    n = len(columns)
+    absent = [math.nan] * n
+    efforts = absent if columns.effort_n is None else columns.effort_n.tolist()
+    times = columns.t_s.tolist()
+    further: list[Any] = [()] * n
+    if channels:
+        make = signal_type(channels)._make  # type: ignore[attr-defined]
+        series: list[list[Any]] = [values.tolist() for values in columns.scalars.values()]
+        series += [
+            [
+                Image(t_s, k, tuple(cells))
+                for k, (t_s, cells) in enumerate(zip(times, values.tolist(), strict=True), 1)
+            ]
+            for values in columns.arrays.values()
+        ]
+        further = list(map(make, zip(*series, strict=True)))
+    frames = zip(
+        times, steps.tolist(), columns.gap_m.tolist(), velocities.tolist(), efforts, columns.left_n.tolist(),
+        columns.right_n.tolist(), absent, absent, [0] * n, strict=True,
+    )  # fmt: skip
+    return [Reading(Frame(*frame), NO_PADS, signals) for frame, signals in zip(frames, further, strict=True)]

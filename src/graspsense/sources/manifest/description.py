@@ -1,0 +1,194 @@
+"""A manifest: a TOML file that says which files are recordings of grasps, and what their columns mean."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from attrs import Attribute, frozen
+
+from graspsense.core.errors import ConfigError
+from graspsense.core.layers import read_toml
+from graspsense.core.setting import setting
+from graspsense.core.strict import ValidationFailed, structured
+from graspsense.sources.manifest.expression import Expression, ExpressionError, parse
+
+Text = str | tuple[str, ...]
+"""An expression, or several of which the first is used whose columns exist."""
+QUANTITIES: Final = ("time", "gap", "force", "left", "right", "effort", "velocity")
+_AMOUNT: Final = re.compile(r"(?P<number>\d+(?:\.\d+)?)\s*(?P<unit>samples?|s|ms)")
+
+
+def _is_regex(_config: object, _attribute: Attribute[str], value: str) -> None:
+    try:
+        re.compile(value)
+    except re.error as error:
+        raise ValueError(f"{value!r} is not a regular expression: {error}") from None
+
+
+def _is_amount(_config: object, _attribute: Attribute[str], value: str) -> None:
+    if value and _AMOUNT.fullmatch(value) is None:
+        raise ValueError(
+            f'{value!r} is neither a number of samples nor of seconds: write "10 samples" or "0.2 s"'
+        )
+
+
+@frozen(kw_only=True)
+class Manifest:
+    """The keys of a manifest."""
+
+    folder: str = setting(default=".", meaning="Folder of the files, relative to the manifest.")
+    files: Text = setting(
+        default=(),
+        meaning="Patterns of paths: `*` is any text in a name, `{name}` the same with a name, `{name:d}` digits.",
+    )
+    list: str = setting(
+        default="",
+        meaning="CSV file with a column `file`; each further column is a field of that row's grasp.",
+    )
+    start: str = setting(
+        default="",
+        validator=_is_regex,
+        meaning="Regular expression of the line that begins each grasp in a text file; its named groups are fields.",
+    )
+    split: str = setting(
+        default="",
+        meaning='How a file is split: a column with a value for each grasp, "force" to find the squeezes, or "rows".',
+    )
+    time: Text = setting(default=(), meaning="Time.")
+    rate_hz: float = setting(
+        default=0.0, unit="Hz", minimum=0.0, meaning="Samples a second where there is no time."
+    )
+    gap: Text = setting(default=(), meaning="Distance between the fingertips, which falls on closing.")
+    force: Text = setting(default=(), meaning="Force of both pads, where there is only one.")
+    left: Text = setting(
+        default=(), meaning="Force of the left pad, or of the finger or fingers of one side."
+    )
+    right: Text = setting(default=(), meaning="Force of the right pad.")
+    effort: Text = setting(default=(), meaning="Effort of the drive, positive when squeezing.")
+    velocity: Text = setting(default=(), meaning="Rate of the gap, negative on closing.")
+    channels: Mapping[str, str] = setting(
+        factory=dict, meaning='Further channels: a name and an expression with its unit, `f1 = "F1 [N]"`.'
+    )
+    zero: str = setting(
+        default="",
+        validator=_is_amount,
+        meaning='What the zero of the forces is taken from: "10 samples" or "0.2 s" at the beginning.',
+    )
+    cut: Literal["", "rupture", "release"] = setting(
+        default="", meaning="Where a grasp ends before the end of its samples."
+    )
+    resample_hz: float = setting(
+        default=0.0, unit="Hz", minimum=0.0, meaning="Rate to which a grasp is resampled; 0 for as it is."
+    )
+    duplicates: Literal["refuse", "drop"] = setting(
+        default="refuse", meaning="What to do with a sample that has the time of the one before."
+    )
+    label: str = setting(default="", meaning="The label, from fields: `{fruit}:{state}`.")
+    instance: str = setting(default="", meaning="The individual object, from fields.")
+    recorded: str = setting(default="", meaning="The time of the recording, from fields.")
+    order: str = setting(
+        default="", meaning="A number that increases in the order of recording, from fields."
+    )
+    values: Mapping[str, str] = setting(
+        factory=dict,
+        meaning="Properties of the grasp: an expression with its unit, or a file beside it with one number.",
+    )
+
+
+@frozen(kw_only=True)
+class ReadManifest:
+    """A manifest with its expressions parsed. `place` is the file, `base` the folder of the recordings."""
+
+    place: Path
+    base: Path
+    keys: Manifest
+    expressions: Mapping[str, tuple[Expression, ...]]
+    channels: Mapping[str, Expression]
+    values: Mapping[str, Expression]
+    beside: Mapping[str, str]
+    """Values that are in a file beside the recording: name to the name of that file."""
+
+
+def read_manifest(place: Path) -> ReadManifest:
+    """Read a manifest. Raises ConfigError that names every mistake with its line."""
+    layer = read_toml(place, str(place), "manifest")
+    try:
+        keys = structured(layer.values, Manifest, "a manifest")
+    except ValidationFailed as misfit:
+        raise ConfigError("\n".join(layer.complain(one) for one in misfit.problems)) from None
+    problems: list[str] = []
+
+    def parsed(path: tuple[str | int, ...], text: str) -> Expression | None:
+        try:
+            return parse(text)
+        except ExpressionError as error:
+            problems.append(f"{layer.where(path)}: {'.'.join(str(one) for one in path)}: {error}")
+            return None
+
+    found: dict[str, Any] = {name: [] for name in QUANTITIES}
+    for name in QUANTITIES:
+        given = getattr(keys, name)
+        for text in (given,) if isinstance(given, str) else given:
+            found[name].append(parsed((name,), text))
+    beside = {
+        name: text for name, text in keys.values.items() if re.fullmatch(r"[^'\"*/+()]+\.(npy|txt|csv)", text)
+    }
+    channels = {name: parsed(("channels", name), text) for name, text in keys.channels.items()}
+    values = {
+        name: parsed(("values", name), text) for name, text in keys.values.items() if name not in beside
+    }
+    problems += [f"{layer.where(path)}: {why}" for path, why in _contradictions(keys)]
+    if problems:
+        raise ConfigError("\n".join(problems))
+    return ReadManifest(
+        place=place,
+        base=place.parent / Path(keys.folder).expanduser(),
+        keys=keys,
+        expressions={name: tuple(parts) for name, parts in found.items()},
+        channels=channels,  # type: ignore[arg-type]
+        values=values,  # type: ignore[arg-type]
+        beside=beside,
+    )
+
+
+def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
+    """Return what is missing or contradicts itself, each with the key it belongs to."""
+    found: list[tuple[tuple[str, ...], str]] = []
+    if bool(keys.files) == bool(keys.list):
+        found.append(
+            (("files",), 'name the files, either by patterns (files = "{label}/*.csv") or by a list')
+        )
+    if not keys.gap and keys.split != "rows":
+        found.append((("gap",), 'a grasp needs its gap: gap = "COLUMN [mm]", or "0.06 - COLUMN*0.001"'))
+    if keys.force and (keys.left or keys.right):
+        found.append((("force",), "force stands for both pads: give it alone, or left and right"))
+    if not keys.force and bool(keys.left) != bool(keys.right):
+        found.append((("left",) if keys.left else ("right",), "give left and right, or force for both pads"))
+    if not keys.force and not keys.left:
+        found.append((("force",), "a grasp needs its force: force, or left and right"))
+    if (
+        not keys.label
+        and not keys.list
+        and not any("{label" in one for one in _patterns(keys))
+        and "?P<label>" not in keys.start
+    ):
+        found.append((("label",), 'no label: write label = "{field}", or {label} in the pattern of files'))
+    return found
+
+
+def _patterns(keys: Manifest) -> tuple[str, ...]:
+    return (keys.files,) if isinstance(keys.files, str) else keys.files
+
+
+def samples_of(amount: str, t_s: Any) -> int:
+    """Return how many samples at the beginning an amount such as `10 samples` or `0.2 s` stands for."""
+    match = _AMOUNT.fullmatch(amount)
+    assert match is not None
+    number = float(match["number"])
+    if match["unit"].startswith("sample"):
+        return max(1, min(int(number), len(t_s)))
+    seconds = number * (1e-3 if match["unit"] == "ms" else 1.0)
+    return max(1, int((t_s - t_s[0] < seconds).sum()))

@@ -1,0 +1,283 @@
+"""Expressions over the columns of a file: `0.06 - Pos*0.001`, `max(f1, f2)`, `norm('opto1_?')`, `x - first(x)`.
+
+Python's parser reads an expression, and only the nodes listed here are accepted and computed with numpy: numbers,
+columns, `+ - * /`, signs, parentheses, and the functions in `FUNCTIONS`. Nothing is ever executed.
+
+A column is named as it is if Python allows it as a name, and in quotes otherwise: `'stamp ms'*0.001`. Within quotes,
+`*` and `?` stand for any characters, so that `'taxel_*'` names several columns; a column with several components, as a
+matrix of a MAT file has, counts as several as well. `force[2]` is the component with this index, counted from 0.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any, Final, NoReturn
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.core.errors import ConfigError, suggestion
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+LONGEST: Final = 2000
+"""Limit on the characters of an expression."""
+MOST_NAMED: Final = 24
+"""Limit on the columns that an error lists."""
+
+Values = Any
+"""A float array of shape (n,) for one column, (n, k) for several."""
+
+FOLDS: Final[Mapping[str, Callable[[Any], Any]]] = {
+    "sum": lambda a: a.sum(axis=1),
+    "mean": lambda a: a.mean(axis=1),
+    "max": lambda a: a.max(axis=1),
+    "min": lambda a: a.min(axis=1),
+    "norm": lambda a: np.sqrt((a * a).sum(axis=1)),
+}
+"""Functions that fold several columns into one, row by row."""
+OVER_TIME: Final[Mapping[str, Callable[[Any], Any]]] = {
+    "first": lambda a: a[:1],
+    "last": lambda a: a[-1:],
+    "peak": lambda a: np.nanmax(a, axis=0, keepdims=True),
+}
+"""Functions of one column over the whole grasp: its first value, its last one, its largest one."""
+PLAIN: Final[Mapping[str, Callable[[Any], Any]]] = {"abs": np.abs, "sqrt": np.sqrt}
+FUNCTIONS: Final = (*FOLDS, *OVER_TIME, *PLAIN)
+
+_OPERATORS: Final[Mapping[type[ast.operator], Callable[[Any, Any], Any]]] = {
+    ast.Add: np.add,
+    ast.Sub: np.subtract,
+    ast.Mult: np.multiply,
+    ast.Div: np.divide,
+}
+_UNIT: Final = re.compile(r"(?P<text>.*\S)\s*\[(?P<unit>[^\[\]']*[^\[\]'\d\s][^\[\]']*)\]\s*", re.DOTALL)
+
+
+class ExpressionError(ConfigError):
+    """An expression that cannot be used; the message shows the place."""
+
+
+@frozen
+class Expression:
+    """An expression over columns, parsed and checked, and the unit that stands behind it in brackets (`[counts]`)."""
+
+    text: str
+    unit: str
+    tree: ast.expr
+
+    def columns(self, known: Sequence[str]) -> tuple[str, ...]:
+        """Return which of these columns it uses. Raises ExpressionError if it names one that is not among them."""
+        return tuple(
+            dict.fromkeys(name for node in _names(self.tree) for name in self._matching(node, known))
+        )
+
+    def values(self, columns: Mapping[str, NDArray[np.float64]], rows: int) -> NDArray[np.float64]:
+        """Return its value in each of the rows: shape (rows,), or (rows, k) if it stands for several columns.
+
+        Raises ExpressionError.
+        """
+        with np.errstate(all="ignore"):
+            value = self._value(self.tree, columns)
+        shape = (rows, *value.shape[1:]) if value.ndim else (rows,)
+        return np.array(np.broadcast_to(value, shape), dtype=np.float64)
+
+    def numbers(self, columns: Mapping[str, NDArray[np.float64]], rows: int) -> NDArray[np.float64]:
+        """Return its value in each of the rows as one column. Raises ExpressionError if it stands for several."""
+        values = self.values(columns, rows)
+        if values.ndim > 1:
+            self._refuse(
+                self.tree, f"it gives {values.shape[1]} columns; fold them into one: {', '.join(FOLDS)}(...)"
+            )
+        return values
+
+    def _value(self, node: ast.expr, columns: Mapping[str, Values]) -> Values:
+        if isinstance(node, ast.Constant) and not isinstance(node.value, str):
+            return np.float64(node.value)
+        if isinstance(node, ast.Name | ast.Constant):
+            found = [columns[name] for name in self._matching(node, tuple(columns))]
+            return found[0] if len(found) == 1 else np.column_stack(found)
+        if isinstance(node, ast.UnaryOp):
+            value = self._value(node.operand, columns)
+            return -value if isinstance(node.op, ast.USub) else value
+        if isinstance(node, ast.BinOp):
+            left, right = self._value(node.left, columns), self._value(node.right, columns)
+            left, right = _aligned(left, right)
+            if left.ndim == right.ndim == 2 and left.shape[1] != right.shape[1]:
+                self._refuse(
+                    node, f"{left.shape[1]} columns and {right.shape[1]} columns do not fit together"
+                )
+            return _OPERATORS[type(node.op)](left, right)
+        if isinstance(node, ast.Subscript):
+            value, index = self._value(node.value, columns), int(node.slice.value)  # type: ignore[attr-defined]
+            components = value.shape[1] if value.ndim == 2 else 1
+            if index >= components:
+                self._refuse(node, f"there is no component {index}: it has {components}, counted from 0")
+            return value[:, index] if value.ndim == 2 else value
+        assert isinstance(node, ast.Call)
+        assert isinstance(node.func, ast.Name)
+        arguments = [self._value(one, columns) for one in node.args]
+        return self._called(node, node.func.id, arguments)
+
+    def _called(self, node: ast.Call, name: str, arguments: list[Values]) -> Values:
+        if name in FOLDS:
+            rows = max((len(one) for one in arguments if one.ndim), default=1)
+            parts = [
+                np.broadcast_to(one if one.ndim == 2 else np.reshape(one, (-1, 1)), (rows, *_width(one)))
+                for one in arguments
+            ]
+            together = np.column_stack(parts)
+            if together.shape[1] < 2:
+                self._refuse(
+                    node,
+                    f"{name} folds several columns into one in each row, and this is one column. Name several, "
+                    "as in max(f1, f2) or sum('taxel_*'). Over the grasp there are first(x), last(x) and peak(x)",
+                )
+            return FOLDS[name](together)
+        (argument,) = arguments
+        if name in OVER_TIME:
+            if not argument.ndim:
+                self._refuse(node, f"{name} needs a column")
+            return OVER_TIME[name](argument)
+        return PLAIN[name](argument)
+
+    def _matching(self, node: ast.expr, known: Sequence[str]) -> tuple[str, ...]:
+        name = _name_in(node)
+        if name in known:
+            return (name,)
+        quoted = isinstance(node, ast.Constant)
+        found = (
+            tuple(one for one in known if fnmatchcase(one, name)) if quoted and set("*?") & set(name) else ()
+        )
+        if not found:
+            listed = ", ".join(map(_shown, known[:MOST_NAMED]))
+            more = f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
+            what = (
+                f"no column matches {name!r}" if quoted and set("*?") & set(name) else f"no column {name!r}"
+            )
+            self._refuse(node, f"{what}. Columns: {listed or 'none'}{more}.{suggestion(name, known)}")
+        return found
+
+    def _refuse(self, node: ast.expr, why: str) -> NoReturn:
+        raise _error(self.text, node.col_offset, why)
+
+
+def parse(text: str) -> Expression:
+    """Return the expression that this text is. Raises ExpressionError that shows the place of what is not allowed."""
+    match = _UNIT.fullmatch(text)
+    body, unit = (match["text"], match["unit"].strip()) if match else (text.strip(), "")
+    if not body:
+        raise ExpressionError(
+            f"{text!r} is empty: name a column, or compute with columns as in 0.06 - Pos*0.001"
+        )
+    if len(body) > LONGEST:
+        raise ExpressionError(f"an expression has at most {LONGEST} characters, and this has {len(body)}")
+    if "\n" in body or "\0" in body:
+        raise ExpressionError("an expression is a single line")
+    try:
+        # Python counts columns in bytes of UTF-8, and reports no place after some errors.
+        tree = ast.parse(body, mode="eval").body
+    except SyntaxError as error:
+        raise _error(
+            body,
+            (error.offset or 1) - 1,
+            "this is not an expression. A column whose name has spaces or other signs is written in quotes: "
+            "'stamp ms'*0.001",
+        ) from None
+    except (ValueError, RecursionError, MemoryError):
+        raise ExpressionError(f"{body[:60]!r} is not an expression, or is nested too deep") from None
+    _check(tree, body, 0)
+    return Expression(text=body, unit=unit, tree=tree)
+
+
+def _check(node: ast.AST, text: str, depth: int) -> None:
+    """Raise ExpressionError at the first node that is not in the closed list."""
+    at = getattr(node, "col_offset", 0)
+    if depth > 50:
+        raise _error(text, at, "it is nested too deep")
+    inner: Sequence[ast.AST] = ()
+    if isinstance(node, ast.Constant):
+        if type(node.value) not in (int, float, str):
+            raise _error(text, at, f"{node.value!r} is not a number")
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd | ast.USub):
+        inner = (node.operand,)
+    elif isinstance(node, ast.BinOp):
+        if type(node.op) not in _OPERATORS:
+            raise _error(text, at, "there are + - * /, and the functions " + ", ".join(FUNCTIONS))
+        inner = (node.left, node.right)
+    elif isinstance(node, ast.Subscript):
+        index = node.slice
+        if not (isinstance(index, ast.Constant) and type(index.value) is int and index.value >= 0):
+            raise _error(text, at, "write the number of a component in brackets, counted from 0: force[2]")
+        inner = (node.value,)
+    elif isinstance(node, ast.Call):
+        inner = _checked_call(node, text, at)
+    elif not isinstance(node, ast.Name):
+        kind = type(node).__name__
+        raise _error(
+            text, at, f"{kind} is not allowed here: there are numbers, columns, + - * / and functions"
+        )
+    for one in inner:
+        _check(one, text, depth + 1)
+
+
+def _checked_call(node: ast.Call, text: str, at: int) -> Sequence[ast.AST]:
+    name = node.func.id if isinstance(node.func, ast.Name) else ""
+    if name not in FUNCTIONS:
+        raise _error(
+            text,
+            at,
+            f"no function {name or 'of this kind'}. There are {', '.join(FUNCTIONS)}.{suggestion(name, FUNCTIONS)}",
+        )
+    if node.keywords or any(isinstance(one, ast.Starred) for one in node.args):
+        raise _error(text, at, f"{name} takes columns, separated by commas")
+    if not node.args or (name not in FOLDS and len(node.args) != 1):
+        wanted = "at least one argument" if name in FOLDS else "one argument"
+        raise _error(text, at, f"{name} takes {wanted}, and here are {len(node.args)}")
+    return node.args
+
+
+def _names(node: ast.expr) -> Iterator[ast.expr]:
+    """Yield every node that names a column; the name of a function does not."""
+    if isinstance(node, ast.Name) or (isinstance(node, ast.Constant) and isinstance(node.value, str)):
+        yield node
+    elif isinstance(node, ast.Call):
+        for argument in node.args:
+            yield from _names(argument)
+    elif isinstance(node, ast.BinOp):
+        yield from _names(node.left)
+        yield from _names(node.right)
+    elif isinstance(node, ast.UnaryOp):
+        yield from _names(node.operand)
+    elif isinstance(node, ast.Subscript):
+        yield from _names(node.value)
+
+
+def _name_in(node: ast.expr) -> str:
+    return node.id if isinstance(node, ast.Name) else str(node.value)  # type: ignore[attr-defined]
+
+
+def _aligned(left: Values, right: Values) -> tuple[Values, Values]:
+    """Return both with a second axis where one of them has several columns."""
+    if left.ndim == 1 and right.ndim == 2:
+        left = left[:, None]
+    elif right.ndim == 1 and left.ndim == 2:
+        right = right[:, None]
+    return left, right
+
+
+def _width(value: Values) -> tuple[int, ...]:
+    return (value.shape[1] if value.ndim == 2 else 1,)
+
+
+def _shown(name: str) -> str:
+    return name if name.isidentifier() else f"'{name}'"
+
+
+def _error(text: str, at: int, why: str) -> ExpressionError:
+    before = len(text.encode()[:at].decode(errors="ignore"))
+    return ExpressionError(f"{why}\n    {text}\n    {' ' * before}^")

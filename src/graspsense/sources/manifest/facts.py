@@ -1,0 +1,120 @@
+"""What is known of a grasp beside its samples: label, individual object, time of recording, order, and properties."""
+
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.sources.manifest.available import AvailableColumns, number_in
+from graspsense.sources.manifest.description import ReadManifest
+from graspsense.sources.manifest.files import NamedFile
+from graspsense.sources.manifest.table import Table
+
+_FIELD: Final = re.compile(r"\{(\w+)\}")
+_NOT_IN_LABELS: Final = re.compile(r"[\s#,]+")
+_STAMP: Final = re.compile(r"(\d{4})-?(\d\d)-?(\d\d)[T _-]?(\d\d):?(\d\d):?(\d\d)(?:\.\d+)?")
+
+
+def _filled(manifest: ReadManifest, key: str, template: str, table: Table) -> str:
+    """Return a template filled from the facts and columns of a table. Raises ConfigError, DataDamaged."""
+
+    def value(match: re.Match[str]) -> str:
+        text = table.value(match[1])
+        if text is None:
+            known = ", ".join((*table.fields, *table.texts, *table.numbers))
+            raise ConfigError(
+                f"{manifest.place}: {key}: {table.source} has no field or column {match[1]!r}. It has: {known}"
+            )
+        return text
+
+    return _FIELD.sub(value, template)
+
+
+def _given(manifest: ReadManifest, key: str, table: Table) -> str:
+    """Return what the manifest says for this key, or the field of that name."""
+    template = getattr(manifest.keys, key)
+    return _filled(manifest, key, template, table) if template else table.fields.get(key, "")
+
+
+def label_of(manifest: ReadManifest, table: Table) -> str:
+    """Return the label of a grasp, with `_` for spaces. Raises ConfigError, DataDamaged."""
+    text = _NOT_IN_LABELS.sub("_", _given(manifest, "label", table).strip())
+    if not text:
+        raise ConfigError(f"{manifest.place}: {table.source} has no label")
+    return text
+
+
+def instance_of(manifest: ReadManifest, table: Table) -> str:
+    """Return what identifies the individual object, empty if that is not known. Raises ConfigError, DataDamaged."""
+    return _NOT_IN_LABELS.sub("_", _given(manifest, "instance", table).strip()).replace(":", "_")
+
+
+def order_of(manifest: ReadManifest, table: Table) -> float | None:
+    """Return the place of a grasp in the order of recording. Raises ConfigError, DataDamaged."""
+    text = _given(manifest, "order", table)
+    number = number_in(text)
+    if text and number is None:
+        raise ConfigError(f"{manifest.place}: order: {text!r} of {table.source} is not a number")
+    return number
+
+
+def recorded_at_of(manifest: ReadManifest, table: Table) -> str:
+    """Return the time of the recording in ISO 8601, from a time stamp or a number of seconds since 1970."""
+    text = _given(manifest, "recorded", table)
+    if not text:
+        return ""
+    stamp = _STAMP.fullmatch(text.removesuffix("Z"))
+    number = number_in(text)
+    try:
+        if stamp is not None:
+            return datetime(*(int(one) for one in stamp.groups()), tzinfo=UTC).isoformat()  # type: ignore[misc, arg-type]
+        if number is not None:
+            while number > 1e11:  # milliseconds, microseconds or nanoseconds
+                number /= 1e3
+            return datetime.fromtimestamp(number, UTC).isoformat()
+        return datetime.fromisoformat(text).isoformat()
+    except (ValueError, OverflowError, OSError):
+        raise ConfigError(
+            f"{manifest.place}: recorded: {text!r} of {table.source} is not a time: write 2024-11-24T15:13:19, "
+            "20241124_151319, or seconds since 1970"
+        ) from None
+
+
+def values_of(manifest: ReadManifest, file: NamedFile, table: Table) -> dict[str, float]:
+    """Return the properties of a grasp, under their names with units. Raises ConfigError, DataDamaged."""
+    found = AvailableColumns(manifest, table)
+    values = {}
+    for name, expression in manifest.values.items():
+        column = found.computed(f"values.{name}", lambda one=expression: one.numbers(found, len(table)))  # type: ignore[misc]
+        if np.ptp(column) > 0.0:
+            raise ConfigError(
+                f"{manifest.place}: values.{name} changes during {table.source}: take peak(...), "
+                "first(...) or last(...)"
+            )
+        values[f"{name} [{expression.unit}]" if expression.unit else name] = float(column[0])
+    for name, beside in manifest.beside.items():
+        number = _number_beside(file.path.parent / _filled(manifest, f"values.{name}", beside, table))
+        if number is not None:
+            values[name] = number
+    return values
+
+
+def _number_beside(path: Path) -> float | None:
+    """Return the single number in a file, None if there is no such file. Raises DataDamaged."""
+    if not path.is_file():
+        return None
+    if path.suffix == ".npy":
+        try:
+            return float(np.load(path, allow_pickle=False).reshape(()))
+        except (OSError, ValueError, TypeError) as error:
+            raise DataDamaged(f"{path} does not hold a single number: {error}") from None
+    text = path.read_text(encoding="utf-8", errors="replace").strip()
+    number = number_in(text)
+    if number is None:
+        raise DataDamaged(f"{path} does not hold a single number, but {text[:40]!r}")
+    return number

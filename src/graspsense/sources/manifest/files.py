@@ -1,0 +1,126 @@
+"""The files that a manifest names: by patterns with fields, or by a list."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Final
+
+from attrs import frozen
+
+from graspsense.core.errors import ConfigError
+from graspsense.sources.csv_columns import CsvColumns, is_missing
+from graspsense.sources.manifest.description import ReadManifest
+
+_FIELD: Final = re.compile(r"\{(?P<name>\w+)(?P<digits>:d)?\}|(?P<deep>\*\*/)|(?P<any>\*)|(?P<one>\?)")
+
+
+@frozen(kw_only=True)
+class NamedFile:
+    """A file with the facts that its path, or its row of a list, tells.
+
+    `rows` are the first and the last row that are used, counted from 1, if only a part of the file is.
+    """
+
+    path: Path
+    fields: dict[str, str]
+    rows: tuple[int, int] | None = None
+
+
+def files_of(manifest: ReadManifest) -> list[NamedFile]:
+    """Return the files in the order of their names, with numbers in them ordered as numbers. Raises ConfigError."""
+    if not manifest.base.is_dir():
+        raise ConfigError(
+            f"{manifest.place}: there is no folder {manifest.base}. The key folder is relative to the manifest"
+        )
+    keys = manifest.keys
+    found = list(_listed(manifest)) if keys.list else list(_matching(manifest))
+    if not found:
+        patterns = (keys.files,) if isinstance(keys.files, str) else keys.files
+        some = [name for name, _ in _tree(manifest.base)][:5]
+        raise ConfigError(
+            f"{manifest.place}: no file in {manifest.base} matches {' or '.join(map(repr, patterns))}. "
+            + (f"It contains, for example: {', '.join(some)}" if some else "The folder is empty")
+        )
+    return found
+
+
+def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
+    given = manifest.keys.files
+    patterns = [_pattern(manifest, one) for one in ((given,) if isinstance(given, str) else given)]
+    for name, path in _tree(manifest.base):
+        match = next(filter(None, (pattern.fullmatch(name) for pattern in patterns)), None)
+        if match is not None:
+            yield NamedFile(path=path, fields=match.groupdict())
+
+
+def _pattern(manifest: ReadManifest, text: str) -> re.Pattern[str]:
+    """Return the regular expression of a pattern. Raises ConfigError."""
+    parts, end, names = [], 0, set()
+    for match in _FIELD.finditer(text):
+        parts.append(re.escape(text[end : match.start()]))
+        end = match.end()
+        if match["deep"]:
+            parts.append("(?:.+/)?")
+        elif match["one"]:
+            parts.append("[^/]")
+        elif match["any"]:
+            parts.append("[^/]*")
+        elif match["name"] in names:
+            parts.append(f"(?P={match['name']})")
+        else:
+            names.add(match["name"])
+            parts.append(f"(?P<{match['name']}>{r'[0-9]+' if match['digits'] else '[^/]+'})")
+    try:
+        return re.compile("".join([*parts, re.escape(text[end:])]))
+    except re.error as error:
+        raise ConfigError(f"{manifest.place}: files: {text!r} is not a pattern: {error}") from None
+
+
+def _tree(base: Path) -> Iterator[tuple[str, Path]]:
+    """Yield every file below a folder by its path from there; the folder of a ROS 2 bag counts as a file."""
+    found = []
+    for folder, folders, names in os.walk(base):
+        folders[:] = [one for one in folders if not one.startswith(".")]
+        if "metadata.yaml" in names:
+            folders.clear()
+            found.append(Path(folder))
+        else:
+            found += [Path(folder) / name for name in names if not name.startswith(".")]
+    shown = [(path.relative_to(base).as_posix(), path) for path in found]
+    return iter(sorted(shown, key=lambda one: natural_key(one[0])))
+
+
+def natural_key(name: str) -> Sequence[tuple[int, int, str]]:
+    """Return the key by which names are sorted so that `data_2` stands before `data_10`."""
+    return [(0, int(one), "") if one.isdecimal() else (1, 0, one) for one in re.split(r"(\d+)", name)]
+
+
+def _listed(manifest: ReadManifest) -> Iterator[NamedFile]:
+    """Yield the files of a list. Raises ConfigError, or DataDamaged with the line."""
+    place = manifest.place.parent / manifest.keys.list
+    columns = CsvColumns(place)
+    for k, name in enumerate(columns.complete_column("file", "the file of each grasp")):
+        row = {
+            one: cells[k]
+            for one, cells in columns.cells.items()
+            if one != "file" and not is_missing(cells[k])
+        }
+        path = manifest.base / name
+        if not path.exists():
+            raise ConfigError(f"{place}, line {columns.lines[k]}: there is no file {path}")
+        yield NamedFile(path=path, fields=row, rows=_rows(place, columns.lines[k], row))
+
+
+def _rows(place: Path, line: int, row: dict[str, str]) -> tuple[int, int] | None:
+    given = [row.pop(name, "") for name in ("first_row", "last_row")]
+    if not any(given):
+        return None
+    if not all(one.isdecimal() for one in given) or not 1 <= int(given[0]) <= int(given[1]):
+        raise ConfigError(
+            f"{place}, line {line}: first_row and last_row are {given[0]!r} and {given[1]!r}: give two numbers of "
+            "rows, counted from 1, the first not behind the last"
+        )
+    return int(given[0]), int(given[1])

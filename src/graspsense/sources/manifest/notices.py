@@ -1,0 +1,61 @@
+"""What looks wrong in the columns of a grasp, each with the option that mends it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from graspsense.sources.grasp_columns import GraspColumns
+
+BEGINS_LOADED: Final = 0.25
+"""Share of its range above which the force of the first sample is that of a contact, or of a wrong zero."""
+MILLIMETRES: Final = 0.5
+"""A gap beyond this (m) is in another unit."""
+
+
+def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
+    """Yield a sentence for each thing that looks wrong; `zeroed`: the zero of the forces is from the first samples."""
+    if len(columns) < 2:
+        return
+    force, gap = columns.force_n, columns.gap_m
+    low, high, start = float(force.min()), float(force.max()), float(force[0])
+    peak = int(force.argmax())
+    if abs(low) > abs(high) and low < 0.0:
+        yield "the force is negative where it is largest: is it a pull? Turn its sign: -FORCE"
+    moved, span = float(gap[peak] - gap[0]), float(np.ptp(gap))
+    if span > 0.0 and moved > 0.2 * span:
+        yield (
+            "the gap rises while the force rises: is it a position that grows on closing? Write the gap as a "
+            'difference: gap = "0.1 - POSITION"'
+        )
+    if not columns.units.get("gap") and float(np.abs(gap).max()) > MILLIMETRES:
+        yield 'the gap is too large for metres: if it is in millimetres, write gap = "COLUMN [mm]"'
+    if not columns.units.get("force"):
+        pads = np.concatenate((columns.left_n, columns.right_n))
+        if high - low > 20.0 and bool((pads == np.round(pads)).all()):
+            yield (
+                "the forces are whole numbers, as counts of a sensor are: give a factor to newtons, or write "
+                'force = "COLUMN [counts]"'
+            )
+    if high > low and start - low > BEGINS_LOADED * (high - low):
+        if zeroed:
+            yield (
+                "the recording begins in contact, so the zero of its first samples removes a part of the force: leave "
+                "zero out, and subtract the known zero of the sensor"
+            )
+        else:
+            yield (
+                "the recording begins in contact: there is no approach, so features from before the contact are "
+                'missing. If the fingers were free, the sensor has an offset: zero = "10 samples"'
+            )
+    elif not zeroed and high > low and abs(start) > BEGINS_LOADED * (high - low):
+        yield 'the force does not begin at zero: if the fingers were free then, write zero = "10 samples"'
+    steps = np.diff(columns.t_s)
+    usual = float(np.median(steps))
+    if float(steps.max()) > 20.0 * usual > 0.0:
+        yield (
+            f"the time jumps by {float(steps.max()):.3g} s, where {usual:.3g} s are usual: does the file hold several "
+            'grasps? split = "force" finds them, split = "COLUMN" splits it by a column'
+        )

@@ -1,0 +1,124 @@
+"""Recordings that a manifest describes: `manifest:FILE.toml`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.sources.grasp_columns import checked_recording
+from graspsense.sources.manifest.description import ReadManifest, read_manifest
+from graspsense.sources.manifest.facts import instance_of, label_of, order_of, recorded_at_of, values_of
+from graspsense.sources.manifest.files import NamedFile, files_of
+from graspsense.sources.manifest.notices import notices_of
+from graspsense.sources.manifest.samples import samples
+from graspsense.sources.manifest.steps import cut_at, resampled, squeezes
+from graspsense.sources.manifest.table import Table
+
+
+def read_recordings(place: str) -> Iterator[LabelledRecording]:
+    """Yield every grasp of a manifest with its label. Raises ConfigError, DataDamaged."""
+    manifest = read_manifest(Path(place).expanduser())
+    for file in files_of(manifest):
+        for table in tables_of(manifest, file):
+            yield from grasps_in(manifest, file, table)
+
+
+def tables_of(manifest: ReadManifest, file: NamedFile) -> list[Table]:
+    """Return the tables of a file, each with the facts of its path. Raises ConfigError, DataDamaged."""
+    read = _format(manifest, file.path)
+    tables = [table.with_fields(file.fields) for table in read(file.path)]
+    if file.rows is not None:
+        first, last = file.rows
+        if last > len(tables[0]):
+            raise DataDamaged(f"{file.path} has {len(tables[0])} rows, and the list names row {last}")
+        tables = [tables[0].rows(slice(first - 1, last), f"rows {first} to {last}")]
+    split = manifest.keys.split
+    if split == "rows":
+        return [table.rows(slice(k, k + 1), f"row {k + 1}") for table in tables for k in range(len(table))]
+    if split and split != "force":
+        return [part for table in tables for part in _by_column(table, split)]
+    return tables
+
+
+def grasps_in(manifest: ReadManifest, file: NamedFile, table: Table) -> Iterator[LabelledRecording]:
+    """Yield the grasps of a table: several only where squeezes are to be found. Raises ConfigError, DataDamaged."""
+    keys = manifest.keys
+    columns = samples(manifest, table)
+    for part in squeezes(columns) if keys.split == "force" else [columns]:
+        cut = cut_at(part, keys.cut) if keys.cut else part
+        notices = tuple(notices_of(cut, zeroed=bool(keys.zero)))
+        yield LabelledRecording(
+            recording=checked_recording(
+                resampled(cut, keys.resample_hz) if keys.resample_hz else cut, rate_hz=keys.rate_hz or 1.0
+            ),
+            source=cut.source,
+            label=label_of(manifest, table),
+            instance=instance_of(manifest, table),
+            recorded_at=recorded_at_of(manifest, table),
+            order=order_of(manifest, table),
+            values=values_of(manifest, file, table),
+            notices=notices,
+        )
+
+
+def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[Table]]:
+    """Return the function that reads a file of this suffix. Raises ConfigError."""
+    suffix = path.suffix.lower()
+    if suffix in (".csv", ".tsv", ".txt", ".dat", ".data", ""):
+        if path.is_dir():
+            return _bag(manifest)
+        from graspsense.sources.manifest.text_format import read_text
+
+        return lambda file: read_text(file, manifest.keys.start)
+    if suffix in (".npy", ".npz", ".mat"):
+        from graspsense.sources.manifest import array_format
+
+        return {".npy": array_format.read_npy, ".npz": array_format.read_npz, ".mat": array_format.read_mat}[
+            suffix
+        ]
+    if suffix in (".parquet", ".pq"):
+        from graspsense.sources.manifest.parquet_format import read_parquet
+
+        return read_parquet
+    if suffix in (".bag", ".mcap", ".db3"):
+        return _bag(manifest)
+    raise ConfigError(
+        f"{path}: no reader for {suffix} files. There are text files (.csv, .tsv, .txt, .dat), .npy, .npz, .mat, "
+        ".parquet, .mcap and ROS bags"
+    )
+
+
+def _bag(manifest: ReadManifest) -> Callable[[Path], list[Table]]:
+    from graspsense.sources.manifest.ros_format import read_bag
+
+    texts = [one.text for parts in manifest.expressions.values() for one in parts]
+    texts += [one.text for one in (*manifest.channels.values(), *manifest.values.values())]
+    topics = {match[1] for text in texts for match in re.finditer(r"['\"](/[^.'\"*?]+)\.", text)}
+    return lambda path: read_bag(path, topics)
+
+
+def _by_column(table: Table, column: str) -> list[Table]:
+    """Return a table for each value of a column, in the order in which the values occur. Raises ConfigError."""
+    values: Sequence[Any]
+    if column in table.texts:
+        values = table.texts[column]
+    elif column in table.numbers and table.numbers[column].ndim == 1:
+        values = table.numbers[column].tolist()
+    else:
+        known = ", ".join((*table.numbers, *table.texts))
+        raise ConfigError(f"split: {table.source} has no column {column!r}. Columns: {known}")
+    rows: dict[Any, list[int]] = {}
+    for k, value in enumerate(values):
+        rows.setdefault(value, []).append(k)
+    return [
+        table.rows(
+            np.array(which), f"{column} {value:g}" if isinstance(value, float) else f"{column} {value}"
+        )
+        for value, which in rows.items()
+    ]

@@ -1,0 +1,119 @@
+"""ROS bags and MCAP files of ROS messages as tables, read by rosbags.
+
+Every number in a message is a column, `/topic.field.field`; an array of numbers is a column with components. The rows
+are the messages of the topic, among those that are used, that has the most; each other topic holds its last value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable, named
+from graspsense.sources.manifest.table import Numbers, Table
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
+
+MOST_COMPONENTS: Final = 4096
+"""An array with more numbers is a picture, and is left out."""
+STAMP: Final = ("sec", "nanosec")
+
+
+def read_bag(path: Path, topics: Collection[str] = ()) -> list[Table]:
+    """Return the numbers in a ROS 1 bag, a folder of a ROS 2 bag, or an MCAP file.
+
+    `topics` are those to read; with none, all. Raises PluginUnavailable without rosbags, ConfigError, DataDamaged.
+    """
+    if not path.exists():
+        raise ConfigError(f"{path} cannot be read: there is no such file")
+    messages: dict[str, list[tuple[int, dict[str, Any]]]] = {}
+    for topic, t_ns, message in _messages(path, topics):
+        messages.setdefault(topic, []).append((t_ns, dict(_numbers_in(message, topic))))
+    messages = {topic: found for topic, found in messages.items() if found[0][1]}
+    if not messages:
+        raise DataDamaged(f"{path} has no messages with numbers")
+    clock = max(messages, key=lambda topic: len(messages[topic]))
+    times = np.array([t_ns for t_ns, _ in messages[clock]], dtype=np.int64)
+    order = np.argsort(times, kind="stable")
+    times = times[order]
+    numbers: dict[str, Numbers] = {}
+    for found in messages.values():
+        found.sort(key=lambda one: one[0])
+        last = np.searchsorted([t_ns for t_ns, _ in found], times, side="right") - 1
+        for name, example in found[0][1].items():
+            width = np.size(example)
+            rows = [one.get(name, np.full(width, np.nan)) for _, one in found]
+            if any(np.size(row) != width for row in rows):
+                continue  # an array whose length changes has no fixed columns
+            values = np.array(rows, dtype=np.float64).reshape(len(rows), -1)[np.maximum(last, 0)]
+            values[last < 0] = np.nan
+            numbers[name] = values[:, 0] if values.shape[1] == 1 else values
+    return [Table(source=path.name, numbers=numbers, t_s=times.astype(np.float64) * 1e-9)]
+
+
+def _messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
+    """Yield topic, time (ns) and message. The time is that of the header, or that of the recording if it has none."""
+    try:
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise PluginUnavailable(
+            f'reading ROS bags and MCAP files needs rosbags: {error}\n  try: pip install "graspsense[ros]"'
+        ) from error
+    try:
+        if path.suffix == ".mcap":
+            yield from _mcap_messages(path, topics)
+            return
+        from rosbags.highlevel import AnyReader
+
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            wanted: list[Connection] = [
+                one for one in reader.connections if not topics or one.topic in topics
+            ]
+            for connection, recorded_ns, raw in reader.messages(connections=wanted):
+                message = reader.deserialize(raw, connection.msgtype)
+                yield connection.topic, _stamp_ns(message) or recorded_ns, message
+    except (DataDamaged, PluginUnavailable):
+        raise
+    except Exception as error:  # rosbags raises various exceptions on damaged files
+        raise DataDamaged(f"{path} cannot be read as a ROS bag: {named(error)}") from error
+
+
+def _mcap_messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
+    """Yield the messages of a single MCAP file, which rosbags reads only within the folder of a bag."""
+    from mcap.reader import make_reader
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.EMPTY)
+    with path.open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages(topics=list(topics) or None):
+            if schema is None or schema.encoding != "ros2msg" or channel.message_encoding != "cdr":
+                continue
+            if schema.name not in store.fielddefs:
+                store.register(get_types_from_msg(schema.data.decode(), schema.name))
+            value = store.deserialize_cdr(message.data, schema.name)
+            yield channel.topic, _stamp_ns(value) or message.log_time, value
+
+
+def _stamp_ns(message: Any) -> int:
+    stamp = getattr(getattr(message, "header", None), "stamp", None)
+    return stamp.sec * 1_000_000_000 + stamp.nanosec if stamp is not None else 0
+
+
+def _numbers_in(value: Any, name: str) -> Iterator[tuple[str, Any]]:
+    """Yield the name and the value of each number, and of each array of numbers, in a message."""
+    for field in getattr(value, "__dataclass_fields__", ()):
+        if field.startswith("__"):
+            continue
+        inner, here = getattr(value, field), f"{name}.{field}"
+        if isinstance(inner, bool | int | float):
+            yield here, float(inner)
+        elif (
+            isinstance(inner, np.ndarray) and inner.dtype.kind in "fiub" and 0 < inner.size <= MOST_COMPONENTS
+        ):
+            yield here, inner.astype(np.float64)
+        elif hasattr(inner, "__dataclass_fields__") and field != "header":
+            yield from _numbers_in(inner, here)

@@ -1,0 +1,121 @@
+"""The samples of a table as a manifest describes them: time, gap, forces and further channels."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.sources.grasp_columns import GraspColumns
+from graspsense.sources.manifest.available import AvailableColumns
+from graspsense.sources.manifest.description import ReadManifest, samples_of
+from graspsense.sources.manifest.steps import without_duplicates
+from graspsense.sources.manifest.table import Numbers, Table
+
+
+def samples(manifest: ReadManifest, table: Table) -> GraspColumns:
+    """Return the samples of a table as the manifest describes them. Raises ConfigError, DataDamaged."""
+    keys, found = manifest.keys, AvailableColumns(manifest, table)
+    if not len(table):
+        raise DataDamaged(f"{table.source} has no rows")
+    notes = [f"{len(table)} samples of {table.source}"]
+    t_s = _times(manifest, table, found)
+    scalars, arrays, units = _channels(manifest, table, found)
+    zero = samples_of(keys.zero, t_s) if keys.zero else 0
+    if zero:
+        notes.append(f"zero of the forces: the mean of the first {zero} samples")
+        for name, values in (*scalars.items(), *arrays.items()):
+            if units.get(name, "") in ("N", "counts"):
+                values -= values[:zero].mean(axis=0)
+    found.update(scalars)
+    found.update(arrays)
+    expressions = manifest.expressions
+    both = found.value("force", expressions["force"], "force")
+    left = both or found.value("left", expressions["left"], "force")
+    right = both or found.value("right", expressions["right"], "force")
+    gap = found.value("gap", expressions["gap"], "gap") or (np.zeros(len(table)), "unknown")
+    assert left is not None  # the manifest was checked for them
+    assert right is not None
+    if left[1] != right[1]:
+        raise ConfigError(
+            f"{manifest.place}: left is in {left[1] or 'N'} and right in {right[1] or 'N'}: use one unit"
+        )
+    left_n, right_n = left[0].copy(), right[0].copy()
+    if zero:
+        left_n -= left_n[:zero].mean()
+        right_n -= right_n[:zero].mean()
+    notes += _folds(manifest)
+    effort = found.value("effort", expressions["effort"], "effort")
+    velocity = found.value("velocity", expressions["velocity"], "velocity")
+    columns = GraspColumns(
+        source=table.source,
+        t_s=t_s,
+        gap_m=gap[0],
+        left_n=left_n,
+        right_n=right_n,
+        effort_n=None if effort is None else effort[0],
+        velocity_m_s=None if velocity is None else velocity[0],
+        scalars=scalars,
+        arrays=arrays,
+        units={
+            **units,
+            "gap": gap[1],
+            "force": left[1],
+            "t": "" if _has_time(manifest, table, found) else "sample",
+        },
+        notes=tuple(notes),
+    )
+    return without_duplicates(columns) if keys.duplicates == "drop" else columns
+
+
+def _folds(manifest: ReadManifest) -> list[str]:
+    """Return sentences on what stands for the two pads."""
+    expressions = manifest.expressions
+    if expressions["force"]:
+        return ["a single force was recorded; it is used for both pads"]
+    texts = [expressions[side][0].text for side in ("left", "right")]
+    return [f"the left pad is {texts[0]}, the right pad is {texts[1]}"]
+
+
+def _has_time(manifest: ReadManifest, table: Table, found: AvailableColumns) -> bool:
+    return bool(
+        manifest.keys.rate_hz or table.t_s is not None or any(map(found.has, manifest.expressions["time"]))
+    )
+
+
+def _times(manifest: ReadManifest, table: Table, found: AvailableColumns) -> Numbers:
+    """Return the time of each row (s), from 0 on. Raises ConfigError."""
+    parts = manifest.expressions["time"]
+    missing = not any(map(found.has, parts))
+    given = None if missing and manifest.keys.rate_hz else found.value("time", parts, "time")
+    if given is not None:
+        return given[0] - given[0][0]
+    if table.t_s is not None:
+        return table.t_s - table.t_s[0]
+    if manifest.keys.rate_hz:
+        return np.arange(len(table)) / manifest.keys.rate_hz
+    if len(table) == 1:
+        return np.zeros(1)
+    columns = ", ".join(table.numbers)
+    raise ConfigError(
+        f'{manifest.place}: {table.source} has no time: write time = "COLUMN [ms]", or rate_hz = 100 where there is no '
+        f"such column. Columns: {columns}"
+    )
+
+
+def _channels(
+    manifest: ReadManifest, table: Table, found: AvailableColumns
+) -> tuple[dict[str, Numbers], dict[str, Numbers], dict[str, str]]:
+    """Return the further channels with one number a sample, the arrays, and the units of both. Raises ConfigError."""
+    scalars: dict[str, Numbers] = {}
+    arrays: dict[str, Numbers] = {}
+    units: dict[str, str] = {}
+    for name, expression in manifest.channels.items():
+        if not name.isidentifier() or not name[:1].islower() or name in ("gap", "effort", "velocity", "pads"):
+            raise ConfigError(
+                f"{manifest.place}: channels: {name!r} cannot be the name of a channel: write small letters, digits "
+                "and underscores, a letter first, and no name of a channel of every gripper"
+            )
+        values = found.computed(f"channels.{name}", lambda one=expression: one.values(found, len(table)))  # type: ignore[misc]
+        (scalars if values.ndim == 1 else arrays)[name] = values
+        units[name] = expression.unit or "1"
+    return scalars, arrays, units

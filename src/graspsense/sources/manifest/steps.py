@@ -1,0 +1,121 @@
+"""The steps from the samples of a file to one grasp: duplicates, squeezes, cutting and resampling."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from attrs import evolve
+
+from graspsense.core.errors import DataDamaged
+from graspsense.sources.grasp_columns import GraspColumns, check_increasing
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+RUPTURE_FALL: Final = 0.3
+"""Share of its peak by which the force falls when an object ruptures."""
+RELEASED: Final = 0.1
+"""Share of its peak below which the force is when the object is released."""
+LOADED: Final = 0.2
+"""Share of the range of the force above which an object is held, where squeezes are to be found."""
+FEWEST: Final = 3
+"""Fewest samples of a squeeze that is found."""
+
+
+def without_duplicates(columns: GraspColumns) -> GraspColumns:
+    """Return the samples without those that have the time of the one before."""
+    new = np.concatenate(([True], np.diff(columns.t_s) != 0.0))
+    dropped = len(new) - int(new.sum())
+    if not dropped:
+        return columns
+    kept = columns.rows(new)
+    return evolve(
+        kept, notes=(*kept.notes, f"{dropped} samples with the time of the one before were dropped")
+    )
+
+
+def squeezes(columns: GraspColumns) -> list[GraspColumns]:
+    """Return each squeeze of a recording, with the approach before it. Raises DataDamaged if there is none.
+
+    An object is held while the force exceeds its lowest values by a fifth of its range. A squeeze begins halfway
+    after the one before, where both fingers are free.
+    """
+    force = columns.force_n
+    low, high = np.percentile(force, [5.0, 99.5])
+    held = force > low + LOADED * (high - low)
+    edges = np.flatnonzero(np.diff(held.astype(np.int8)))
+    begins = [0, *(edges + 1).tolist()]
+    runs = [
+        (begin, end)
+        for begin, end in zip(begins, [*begins[1:], len(held)], strict=True)
+        if held[begin] and end - begin >= FEWEST
+    ]
+    if not runs or not high > low:
+        raise DataDamaged(f"{columns.source}: no squeeze was found, because its force never rises")
+    bounds = [
+        0,
+        *((end + begin) // 2 for (_, end), (begin, _) in pairwise(runs)),
+        len(held),
+    ]
+    return [
+        columns.rows(slice(start, end), f"squeeze {k}") for k, (start, end) in enumerate(pairwise(bounds), 1)
+    ]
+
+
+def cut_at(columns: GraspColumns, where: str) -> GraspColumns:
+    """Return the samples up to the rupture or the release of the object; all of them if there is none.
+
+    At a rupture the force falls by 30 % of its peak while the fingers do not open; it ends with the peak before. At the
+    release the force falls below 10 % of its peak.
+    """
+    end = _rupture(columns.force_n) if where == "rupture" else _release(columns.force_n)
+    if end is None:
+        note = f"no {where} was found: all samples are used"
+        return evolve(columns, notes=(*columns.notes, note))
+    cut = columns.rows(slice(0, end))
+    return evolve(
+        cut, notes=(*cut.notes, f"cut at the {where}, after {columns.t_s[end - 1] - columns.t_s[0]:.3g} s")
+    )
+
+
+def _rupture(force: NDArray[np.float64]) -> int | None:
+    floor = float(force.min())
+    peaks = np.maximum.accumulate(force) - floor
+    # Noise before the contact falls by a large share of itself.
+    loaded = peaks > LOADED * float(peaks[-1])
+    fallen = np.flatnonzero(loaded & (force - floor < (1.0 - RUPTURE_FALL) * peaks))
+    return int(np.argmax(force[: fallen[0]])) + 1 if len(fallen) else None
+
+
+def _release(force: NDArray[np.float64]) -> int | None:
+    peak = int(force.argmax())
+    floor = float(force.min())
+    released = np.flatnonzero(force[peak:] - floor < RELEASED * (force[peak] - floor))
+    return peak + int(released[0]) if len(released) else None
+
+
+def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
+    """Return the columns at this rate, interpolated. Raises DataDamaged if the time does not increase."""
+    t = columns.t_s
+    check_increasing(columns)
+    times = t[0] + np.arange(int((t[-1] - t[0]) * rate_hz + 1e-9) + 1) / rate_hz
+
+    def along(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        if values.ndim == 1:
+            return np.interp(times, t, values)
+        return np.column_stack([np.interp(times, t, column) for column in values.T])
+
+    return evolve(
+        columns,
+        t_s=times,
+        gap_m=along(columns.gap_m),
+        left_n=along(columns.left_n),
+        right_n=along(columns.right_n),
+        effort_n=None if columns.effort_n is None else along(columns.effort_n),
+        velocity_m_s=None if columns.velocity_m_s is None else along(columns.velocity_m_s),
+        scalars={name: along(values) for name, values in columns.scalars.items()},
+        arrays={name: along(values) for name, values in columns.arrays.items()},
+        notes=(*columns.notes, f"resampled to {rate_hz:g} Hz"),
+    )

@@ -1,0 +1,83 @@
+"""A file, or a part of it, as named columns: numbers where a column has numbers, text elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from attrs import field, frozen
+from numpy.typing import NDArray
+
+from graspsense.core.errors import DataDamaged
+
+Numbers = NDArray[np.float64]
+
+
+@frozen(kw_only=True, eq=False)
+class Table:
+    """The columns of a file or of a part of it.
+
+    `numbers` holds the columns of numbers: shape (n,), or (n, k) for one with k components; a missing value is NaN.
+    `texts` holds the others. `fields` are facts that hold for all rows, such as those of a header line or of the
+    file's path. `t_s` is the time of each row (s) where the format has one.
+    """
+
+    source: str
+    """The file, and the part of it, in words."""
+    numbers: Mapping[str, Numbers] = field(factory=dict)
+    texts: Mapping[str, Sequence[str]] = field(factory=dict)
+    fields: Mapping[str, str] = field(factory=dict)
+    t_s: Numbers | None = None
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        for column in (*self.numbers.values(), *self.texts.values()):
+            return len(column)
+        return 0
+
+    def value(self, name: str) -> str | None:
+        """Return the only value of a field or of a column as text, None if there is neither.
+
+        Raises DataDamaged if the column has several values.
+        """
+        if name in self.fields:
+            return self.fields[name]
+        if name in self.texts:
+            values = set(self.texts[name])
+        elif name in self.numbers and self.numbers[name].ndim == 1:
+            values = {_shown(float(one)) for one in np.unique(self.numbers[name])}
+        else:
+            return None
+        if len(values) != 1:
+            some = ", ".join(sorted(values)[:4])
+            raise DataDamaged(
+                f"{self.source}: column {name!r} has {len(values)} values ({some}, ...) in one squeeze, so it cannot "
+                f'name it. Split the file by it: split = "{name}"'
+            )
+        return values.pop()
+
+    def rows(self, which: Any, part: str = "") -> Table:
+        """Return these rows (a slice, numbers, or a mask); `part` says in words which they are."""
+        index = np.arange(len(self))[which].tolist()
+        return Table(
+            source=f"{self.source}, {part}" if part else self.source,
+            numbers={name: values[which] for name, values in self.numbers.items()},
+            texts={name: [values[i] for i in index] for name, values in self.texts.items()},
+            fields=self.fields,
+            t_s=None if self.t_s is None else self.t_s[which],
+        )
+
+    def with_fields(self, fields: Mapping[str, str]) -> Table:
+        """Return the table with these facts beside its own."""
+        return Table(
+            source=self.source,
+            numbers=self.numbers,
+            texts=self.texts,
+            fields={**fields, **self.fields},
+            t_s=self.t_s,
+        )
+
+
+def _shown(value: float) -> str:
+    return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
