@@ -131,6 +131,8 @@ _TABLE: Final[Table] = {
     },
     "Data sets": {
         "labelled": ("ControlFeatures", "Labelled"),
+        "recording.labelled_recording": ("LabelledRecording",),
+        "recording.replayable": ("Recording",),
     },
     "Tests of a plugin": {
         "testing.conformance": ("parametrize_checks",),

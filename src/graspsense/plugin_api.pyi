@@ -134,6 +134,8 @@ from graspsense.core.tree import TreeNode as TreeNode
 # Data sets
 from graspsense.core.labelled import ControlFeatures as ControlFeatures
 from graspsense.core.labelled import Labelled as Labelled
+from graspsense.recording.labelled_recording import LabelledRecording as LabelledRecording
+from graspsense.recording.replayable import Recording as Recording
 
 # Tests of a plugin
 from graspsense.testing.conformance import parametrize_checks as parametrize_checks

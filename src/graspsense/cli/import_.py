@@ -2,30 +2,40 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 import click
 
 from graspsense.cli.output import echo_json
-from graspsense.cli.terminal import Style, echo
+from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from graspsense.core.config import Settings
+    from graspsense.sources.import_sources import ImportedRecording
+    from graspsense.sources.import_summary import ImportSummary
 
 
 @click.command("import", short_help="Import recordings of other programs.")
-@click.argument("sources", nargs=-1, required=True, metavar="FILE.csv|KIND:NAME...")
-@click.option("--save", metavar="DIR", required=True, help="Store for the trials.")
+@click.argument("sources", nargs=-1, required=True, metavar="FILE.csv|MANIFEST.toml|KIND:NAME...")
+@click.option("--save", metavar="DIR", help="Store for the trials.")
+@click.option("--check", is_flag=True, help="Only print what was understood, and draw one grasp.")
+@click.option("--plot", metavar="FILE.png", help="--check: the picture.  [default: import-check.png]")
 @click.option("--label", metavar="CLASS:STATE", help="Label of the object: can:full_open#2.")
-@click.option("--time", metavar="COLUMN", help="CSV: column of the time, in s.")
-@click.option("--gap", metavar="COLUMN", help="CSV: column of the gap, in m. For mm: POS*0.001.")
+@click.option("--time", metavar="EXPRESSION", help='CSV: time. In ms: --time "STAMP [ms]".')
+@click.option("--gap", metavar="EXPRESSION", help='CSV: gap. In mm: --gap "60 - POS [mm]".')
 @click.option(
     "--force",
     "forces",
-    metavar="COLUMN",
+    metavar="EXPRESSION",
     multiple=True,
-    help="CSV: column of the force, in N. Repeat it for two pads.",
+    help='CSV: force, as "max(F1, F2)". Repeat it for two pads.',
 )
-@click.option("--effort", metavar="COLUMN", help="CSV: column of the effort, in N.")
+@click.option("--effort", metavar="EXPRESSION", help="CSV: effort, in N.")
 @click.option(
-    "--velocity",
-    metavar="COLUMN",
-    help="CSV: column of the velocity of the gap, in m/s; negative when closing.",
+    "--velocity", metavar="EXPRESSION", help="CSV: velocity of the gap, in m/s; negative when closing."
 )
 @click.option(
     "--pipeline",
@@ -43,7 +53,9 @@ from graspsense.cli.terminal import Style, echo
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def import_(
     sources: tuple[str, ...],
-    save: str,
+    save: str | None,
+    check: bool,
+    plot: str | None,
     label: str | None,
     time: str | None,
     gap: str | None,
@@ -56,42 +68,198 @@ def import_(
 ) -> None:
     """Import recorded grasps as trials, each with its recording, features and label.
 
-    A FILE.csv needs --time, --gap and --force. KIND:NAME is a file of another reader, for example rosbag:FILE.bag.
+    MANIFEST.toml names the files, their labels and their columns (docs/import.md). A FILE.csv is one grasp and needs
+    --time, --gap and --force. KIND:NAME is a file of another reader, or the folder of a data set.
     """
-    from graspsense.core.config import Flag, ImplausibleSettings, resolve
+    from graspsense.core.errors import ConfigError
+    from graspsense.sources.import_sources import is_csv, recordings_to_import
+
+    given = _columns({"time": time, "gap": gap, "effort": effort, "velocity": velocity}, forces)
+    for source in sources:
+        if given and not is_csv(source):
+            raise click.UsageError(f"--{next(iter(given))} is for a CSV; {source} is none")
+    if not check and save is None:
+        raise click.UsageError(
+            "name a store for the trials: --save DIR. Or look at the recordings first: --check"
+        )
+    if plot is not None and not check:
+        raise click.UsageError("--plot is for --check")
+    chosen = _Chosen(pipeline, options)
+    recordings = [one for source in sources for one in recordings_to_import(source, given, label)]
+    if not recordings:
+        raise ConfigError(f"{', '.join(sources)}: no recordings")
+    chosen.fit(recordings)
+    if save is None or check:
+        _show(recordings, chosen, Path(plot or "import-check.png"), as_json)
+    else:
+        _import(save, recordings, chosen, as_json)
+
+
+def _columns(named: Mapping[str, str | None], forces: Sequence[str]) -> dict[str, list[str]]:
+    """Return the expressions of a CSV by quantity."""
+    given = {what: [text] for what, text in named.items() if text is not None}
+    return {**given, "force": list(forces)} if forces else given
+
+
+class _Chosen:
+    """The settings of an import: those of the pipeline, and thresholds from the recordings where none is given."""
+
+    def __init__(self, pipeline: str, options: Sequence[str]) -> None:
+        from graspsense.core.wiring import check
+
+        self._pipeline, self._options = pipeline, tuple(options)
+        self._added: tuple[str, ...] = ()
+        self.words = ""
+        self._settings = self._resolved(
+            "csv:the first recording"
+        )  # a mistake in them is told before files are read
+        check(self._settings)
+
+    def fit(self, recordings: Sequence[ImportedRecording]) -> None:
+        """Choose the thresholds that are not given."""
+        from graspsense.sources.noise_thresholds import thresholds_for
+
+        found = thresholds_for([one.labelled.recording for one in recordings])
+        open_keys = {key for key in found.settings if self._settings.origins.get(key) == "default"}
+        self.words = found.words if open_keys or not found.settings else "thresholds: those that are given"
+        self._added = tuple(f"{key}={found.settings[key]!r}" for key in sorted(open_keys))
+
+    def settings(self, recording: ImportedRecording) -> Settings:
+        """Return the settings under which a recording is replayed. Raises ConfigError."""
+        return self._resolved(recording.name)
+
+    def _resolved(self, name: str) -> Settings:
+        from graspsense.core.config import Flag, ImplausibleSettings, resolve
+        from graspsense.core.errors import ConfigError
+
+        flags = (
+            Flag("--gripper", "gripper.type", "replay"),
+            Flag("SOURCE", "gripper.recording", name),
+        )
+        try:
+            return resolve(self._pipeline, options=(*self._added, *self._options), flags=flags)
+        except ImplausibleSettings as error:  # whose advice, --force, names a column here
+            raise ConfigError(str(error)) from None
+
+
+def _import(save: str, recordings: Sequence[ImportedRecording], chosen: _Chosen, as_json: bool) -> None:
+    """Import the recordings and print what became of each."""
+    from graspsense.cli.progress import ProgressLine
     from graspsense.core.errors import ConfigError
     from graspsense.core.plugins import installed
-    from graspsense.core.wiring import check
-    from graspsense.sources.grasp_csv import named
     from graspsense.sources.importing import import_recording
-    from graspsense.store.labels import labels_of
+    from graspsense.store.imported_contents import AlreadyImported, ImportedContents
     from graspsense.store.store import Store
 
-    columns = {"time": time, "gap": gap, "effort": effort, "velocity": velocity}
-    given = {what: [one] for what, one in columns.items() if one is not None}
-    if forces:
-        given["force"] = list(forces)
-    labels = {} if label is None else labels_of(label)
-    kept = []
-    with Store.open(save) as store:
-        for source in sources:
-            csv = source.lower().endswith((".csv", ".tsv", ".txt")) and ":" not in source
-            if given and not csv:
-                raise click.UsageError(f"--{next(iter(given))} is for a CSV; {source} is none")
-            recording = f"csv:{named(source, given)}" if csv else source
-            flags = (
-                Flag("--gripper", "gripper.type", "replay"),
-                Flag("SOURCE", "gripper.recording", recording),
-            )
+    kept: list[dict[str, Any]] = []
+    refused: list[str] = []
+    outcomes: dict[str, int] = {}
+    few = len(recordings) <= 3
+    with Store.open(save) as store, ProgressLine() as progress:
+        contents = ImportedContents(store)
+        for done, one in enumerate(recordings):
             try:
-                settings = resolve(pipeline, options=options, flags=flags)
-            except ImplausibleSettings as error:  # whose advice, --force, names a column here
-                raise ConfigError(str(error)) from None
-            check(settings)
-            trial, number = import_recording(store, settings, installed(), labels)
+                trial, number = import_recording(
+                    store, chosen.settings(one), installed(), one.labelled, contents
+                )
+            except AlreadyImported as error:
+                refused.append(str(error))
+                continue
+            outcomes[trial.outcome.words] = outcomes.get(trial.outcome.words, 0) + 1
+            source = one.labelled.source
             kept.append({"source": source, "trial": number, "outcome": trial.outcome.words})
-            echo(f"{source}: trial {number}, {trial.outcome.words}", indent=2, err=as_json)
-            for note in trial.device.notes:
-                echo(f"  {note}", Style.CAUTION, err=as_json)
+            if few:
+                echo(f"{source}: trial {number}, {trial.outcome.words}", indent=2, err=as_json)
+                for note in trial.device.notes:
+                    echo(f"  {note}", Style.CAUTION, err=as_json)
+            progress("grasps imported", done + 1, len(recordings))
+    if not kept:
+        raise ConfigError(refused[0])
+    if not few:
+        words = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
+        echo(f"{len(kept)} trials imported into {save}: {words}", err=as_json)
+        for note in recordings[0].labelled.recording.notes[1:]:
+            echo(f"  {note}", err=as_json)
+    echo(f"  {chosen.words}", err=as_json)
+    _echo_notices(_summary(recordings), err=as_json)
+    if refused:
+        echo(f"  {len(refused)} recordings left out: {refused[0]}", Style.CAUTION, err=as_json)
     if as_json:
-        echo_json({"store": save, "trials": kept})
+        echo_json({"store": save, "trials": kept, "refused": refused, "thresholds": chosen.words})
+
+
+def _show(recordings: Sequence[ImportedRecording], chosen: _Chosen, picture: Path, as_json: bool) -> None:
+    """Print what was understood of the recordings, and draw one of them."""
+    from attrs import asdict
+
+    from graspsense.cli.run import draw_grasp
+    from graspsense.core.errors import PluginUnavailable
+    from graspsense.core.pipeline import grasp_with
+    from graspsense.core.plugins import installed
+    from graspsense.sources.dataset_recordings import handed_over
+
+    summary = _summary(recordings)
+    if as_json:
+        echo_json({**asdict(summary), "thresholds": chosen.words})
+    else:
+        _echo_summary(summary)
+        echo_entry("thresholds", chosen.words)
+        _echo_notices(summary, err=False)
+    middle = recordings[len(recordings) // 2]
+    with handed_over(middle.name, middle.labelled.recording):
+        trial = grasp_with(chosen.settings(middle), installed(), labels={"label": middle.labelled.label})
+    try:
+        draw_grasp(trial, picture)
+    except PluginUnavailable as error:
+        echo(f"no picture: {error}", Style.CAUTION, err=True)
+
+
+def _summary(recordings: Sequence[ImportedRecording]) -> ImportSummary:
+    from graspsense.sources.import_summary import summary_of
+
+    return summary_of([one.labelled for one in recordings])
+
+
+def _echo_summary(summary: ImportSummary) -> None:
+    from graspsense.core.units import display_unit
+
+    gap, factor = display_unit(summary.units.get("gap", "m"))
+    force = summary.units.get("force_left", "N")
+    time = "Hz" if summary.units.get("t", "s") == "s" else f"per {summary.units['t']}"
+    header = (
+        "Label", "Grasps", "Objects", "Samples", f"Rate, {time}", f"Gap, {gap}", f"Left, {force}", f"Right, {force}",
+    )  # fmt: skip
+    rows = [
+        (
+            one.label or "none",
+            str(one.grasps),
+            "unknown" if one.instances is None else str(one.instances),
+            _span(one.samples),
+            _span(one.rate_hz),
+            _span(tuple(factor * value for value in one.gap)),
+            _span(one.left),
+            _span(one.right),
+        )
+        for one in summary.labels
+    ]
+    echo_table(header, rows)
+    echo()
+    echo_entry("grasps", str(summary.grasps))
+    for note in summary.notes:
+        echo_entry("", note)
+    recorded = "unknown" if summary.recorded is None else f"{summary.recorded[0]} to {summary.recorded[1]}"
+    echo_entry("recorded", recorded)
+    if summary.channels:
+        echo_entry("channels", ", ".join(summary.channels))
+    if summary.values:
+        echo_entry("values", ", ".join(summary.values))
+
+
+def _span(values: Sequence[float]) -> str:
+    low, high = (f"{value:.4g}" for value in values)
+    return low if low == high else f"{low} to {high}"
+
+
+def _echo_notices(summary: ImportSummary, *, err: bool) -> None:
+    for notice, count in summary.notices:
+        echo(f"  {count} of {summary.grasps} grasps: {notice}", Style.CAUTION, indent=2, err=err)

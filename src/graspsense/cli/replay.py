@@ -40,7 +40,7 @@ def replay(
     """Compute features and a prediction from a recording, as during the grasp; nothing moves.
 
     FILE.mcap is a recording of graspsense, DIR#NUMBER a trial of a store, and KIND:NAME a file of another reader, for
-    example icub:FOLDER/full_vitamin_water_1.txt.
+    example icub:FOLDER/full_vitamin_water_1.txt, or manifest:FILE.toml#3 for the third grasp of a manifest.
     """
     from graspsense.cli.run import draw_grasp, print_trial
     from graspsense.core.pipeline import grasp_with
@@ -65,18 +65,19 @@ def replay(
 
 def _settings(recording: str, pipeline: str | None, options: tuple[str, ...], force: bool) -> Settings:
     from graspsense.core.config import Flag, resolve
-    from graspsense.sources.replay import KINDS, kind_and_name
+    from graspsense.sources.replay import kind_and_name, known_kinds
     from graspsense.store.trial_ref import recorded_settings
 
     kind, name = kind_and_name(recording)
-    if kind not in KINDS and "#" in recording:
+    kinds = known_kinds()
+    if kind not in kinds and "#" in recording:
         kind, name = "store", recording
     own: Any = None
     if pipeline is None and kind in ("store", "mcap"):
         own = recorded_settings(kind, name)
     flags = (
         Flag("--gripper", "gripper.type", "replay"),
-        Flag("RECORDING", "gripper.recording", f"{kind}:{name}" if kind in KINDS else recording),
+        Flag("RECORDING", "gripper.recording", f"{kind}:{name}" if kind in kinds else recording),
     )
     # The settings of the recording have been accepted when it was made.
     return resolve(

@@ -324,18 +324,31 @@ class ModelEntry:
     """What the model was trained on, in one line."""
 
 
-@frozen
+@frozen(kw_only=True)
 class DatasetEntry:
-    """A reader of recorded data, used as `name:FOLDER`; `target` is the function that reads them."""
+    """A reader of recorded data, used as `name:FOLDER`.
+
+    It names a function `recordings(folder)` that yields a `LabelledRecording` for each grasp, and graspsense imports,
+    replays and evaluates them. A data set that has features of its own names a function `target` instead, or beside it:
+    `evaluate` then uses that. Raises ValueError if neither is given.
+    """
 
     name: str = field(validator=_IS_NAME)
     """The name before the colon in `name:FOLDER`."""
-    target: str = field(validator=_IS_TARGET)
-    """The import string of the function that reads the data, as in `"lab_data.reader:read"`."""
     summary: str = field(validator=instance_of(str))
     """What the data set is, in one line."""
+    recordings: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
+    """The import string of the function `recordings(folder)`, as in `"lab_data.reader:recordings"`."""
+    target: str = field(default="", validator=_IS_TARGET_OR_EMPTY)
+    """The import string of a function `read(folder, features, *, unreliable)` that returns `Labelled`."""
     needs: str = ""
-    """What to install or do if the target cannot be imported."""
+    """What to install or do if the functions cannot be imported."""
+
+    def __attrs_post_init__(self) -> None:
+        if not self.recordings and not self.target:
+            raise ValueError(
+                f"data set {self.name!r} names no function: give 'recordings', as in \"lab_data.reader:recordings\""
+            )
 
 
 @frozen

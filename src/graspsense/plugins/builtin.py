@@ -86,7 +86,13 @@ def graspsense_datasets() -> Iterable[DatasetEntry]:
     yield DatasetEntry(
         name="icub",
         target="graspsense.sources.icub_dataset:read_dataset",
+        recordings="graspsense.sources.icub_dataset:read_recordings",
         summary="iCub Grasp Dataset (Soh, Su and Demiris 2012), as icub:FOLDER",
+    )
+    yield DatasetEntry(
+        name="manifest",
+        recordings="graspsense.sources.manifest.reader:read_recordings",
+        summary="files of other programs that a manifest describes, as manifest:FILE.toml",
     )
     yield DatasetEntry(
         name="store",

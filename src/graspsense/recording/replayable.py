@@ -39,7 +39,7 @@ _FRAME: Final = struct.Struct(f"<{len(Frame._fields)}d")
 
 
 def content_sha256(recording: Recording) -> str:
-    """Return a hash of the frames and pad images: equal for the same grasp under another file name or label."""
+    """Return a hash of the frames, images and channels: equal for the same grasp under another file name or label."""
     content = hashlib.sha256()
     counter = 0
     for reading in recording.readings:
@@ -48,4 +48,6 @@ def content_sha256(recording: Recording) -> str:
         if pads.counter != counter:
             counter = pads.counter
             content.update(struct.pack(f"<{2 * len(pads.left)}d", *pads.left, *pads.right))
+        if reading.signals:
+            content.update(repr(tuple(reading.signals)).encode())
     return content.hexdigest()

@@ -49,6 +49,8 @@ class GraspColumns:
     arrays: Mapping[str, Numbers] = field(factory=dict)
     units: Mapping[str, str] = field(factory=dict)
     notes: tuple[str, ...] = ()
+    lines: NDArray[np.int64] | None = None
+    """The line of each sample in a text file."""
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -59,6 +61,10 @@ class GraspColumns:
         """The mean force of both pads."""
         mean: Numbers = (self.left_n + self.right_n) / 2.0
         return mean
+
+    def place(self, k: int) -> str:
+        """Return where the sample with this index is, in words."""
+        return f"sample {k + 1}" if self.lines is None else f"line {self.lines[k]}"
 
     def rows(self, which: Any, part: str = "") -> GraspColumns:
         """Return these samples (a slice, numbers, or a mask); `part` says in words which they are."""
@@ -73,6 +79,7 @@ class GraspColumns:
             velocity_m_s=None if self.velocity_m_s is None else self.velocity_m_s[which],
             scalars={name: values[which] for name, values in self.scalars.items()},
             arrays={name: values[which] for name, values in self.arrays.items()},
+            lines=None if self.lines is None else self.lines[which],
         )
 
 
@@ -120,7 +127,7 @@ def check_increasing(columns: GraspColumns) -> None:
         k = int(wrong[0])
         before, after = columns.t_s[k].item(), columns.t_s[k + 1].item()
         raise DataDamaged(
-            f"{columns.source}: the time goes from {before!r} to {after!r} at sample {k + 2}; it must increase. "
+            f"{columns.source}, {columns.place(k + 1)}: the time goes from {before!r} to {after!r}; it must increase. "
             'If rows are repeated, write duplicates = "drop" in the manifest; if they come from several grasps, split '
             "the file"
         )
@@ -134,7 +141,7 @@ def _check_complete(columns: GraspColumns) -> None:
             raise DataDamaged(f"{columns.source}: the {what} has no number")
         if len(missing):
             raise DataDamaged(
-                f"{columns.source}: the {what} is missing or infinite at sample {missing[0] + 1}"
+                f"{columns.source}, {columns.place(int(missing[0]))}: the {what} is missing or infinite"
             )
 
 

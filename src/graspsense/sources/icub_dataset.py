@@ -10,6 +10,7 @@ squeezed yet. All of this was decided before any recognition rate was computed.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,6 +23,7 @@ from graspsense.core.roles import FeatureSet
 from graspsense.core.signals import APPROACH
 from graspsense.core.trace import SI_UNITS, Trace, trace_of
 from graspsense.recording.controls import controls
+from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.sources.icub import (
     DATA_FOLDER,
     FINGER_FLEXION,
@@ -33,6 +35,7 @@ from graspsense.sources.icub import (
     UNITS,
     IcubGrasp,
     read_grasp,
+    read_recording,
     relative_readings,
 )
 
@@ -94,6 +97,18 @@ def read_dataset(folder: str, features: FeatureSet[Any], *, unreliable: bool = F
         notes=tuple(notes),
         provenance={"simulated": False, "frames_not_seconds": True},
     )
+
+
+def read_recordings(folder: str) -> Iterator[LabelledRecording]:
+    """Yield the grasps in this folder, without those of the class that the author calls unreliable.
+
+    Raises as `read_dataset`.
+    """
+    for path, label, number in _grasps(folder):
+        if label != UNRELIABLE:
+            yield LabelledRecording(
+                recording=read_recording(str(path)), source=path.name, label=label, order=float(number)
+            )
 
 
 def _grasps(folder: str) -> list[tuple[Path, str, int]]:

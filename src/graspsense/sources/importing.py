@@ -1,46 +1,74 @@
-"""Importing a recording of another program: as a complete recording of our own, and as a trial of a store."""
+"""Importing recordings of other programs: as complete recordings of our own, and as trials of a store."""
 
 from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from attrs import evolve
+
+from graspsense.core.labelled import class_of
 from graspsense.core.pipeline import grasp_with
 from graspsense.core.signals import APPROACH, Reading
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_numbers, pads_topic, signal_topics
+from graspsense.recording.replayable import content_sha256
 from graspsense.recording.trial_record import TrialRecord
 from graspsense.recording.writer import RecordingWriter
-from graspsense.sources.replay import KINDS, kind_and_name
+from graspsense.sources.dataset_recordings import handed_over
+from graspsense.store.imported_contents import CONTENT, ImportedContents
 
 if TYPE_CHECKING:
     from graspsense.core.config import Settings
     from graspsense.core.plugins import Plugins
     from graspsense.core.trial import Trial
+    from graspsense.recording.labelled_recording import LabelledRecording
     from graspsense.recording.replayable import Recording
     from graspsense.store.store import Store
 
 
+def labels_of_recording(one: LabelledRecording) -> dict[str, str]:
+    """Return what a data set says about a grasp as the labels of a trial."""
+    labels = {"label": one.label} if one.label else {}
+    if one.label and one.instance:
+        labels["instance"] = f"{class_of(one.label)}#{one.instance}"
+    if one.recorded_at:
+        labels["recorded_at"] = one.recorded_at
+    if one.order is not None:
+        labels["order"] = f"{one.order:.17g}"
+    return labels | {name: repr(value) for name, value in one.values.items()}
+
+
 def import_recording(
-    store: Store, settings: Settings, plugins: Plugins, labels: Mapping[str, str]
+    store: Store,
+    settings: Settings,
+    plugins: Plugins,
+    labelled: LabelledRecording,
+    contents: ImportedContents,
 ) -> tuple[Trial, int]:
     """Run a pipeline whose gripper replays a recording, store trial and recording, and return trial and number.
 
-    The whole recording is stored, even if the controller ended earlier. Raises ConfigError, DataDamaged, SaveFailed.
+    `settings` name the recording, as `gripper.recording`. The whole recording is stored, even if the controller ended
+    earlier. Raises ConfigError, also if the store has its content already, DataDamaged, SaveFailed.
     """
+    sha256 = content_sha256(labelled.recording)
+    contents.refuse(sha256, labelled.source)
+    labels = labels_of_recording(labelled)
     record = TrialRecord.begin(settings, labels, "import")
-    trial = grasp_with(settings, plugins, labels=labels)
+    about = {CONTENT: sha256, "source": labelled.source}
+    record = evolve(record, provenance={**record.provenance, **about})
+    with handed_over(settings.values["gripper"]["recording"], labelled.recording):
+        trial = grasp_with(settings, plugins, labels=labels)
     record = record.with_device(trial.device).with_result(trial)
-    kind, name = kind_and_name(settings.values["gripper"]["recording"])
     path = store.new_recording(record.made_at)
     try:
         file = RecordingWriter(path)
         try:
             file.metadata(START, record.section(START))
             file.metadata(DEVICE, record.section(DEVICE))
-            _write_readings(file, KINDS[kind](name), trial.trace.phase.tolist())
+            _write_readings(file, labelled.recording, trial.trace.phase.tolist())
             file.metadata(RESULT, record.section(RESULT))
             recording = file.finish()
         except BaseException:
@@ -48,7 +76,9 @@ def import_recording(
             raise
     except OSError as error:
         raise SaveFailed(f"the recording {path} could not be written: {error.strerror}") from error
-    return trial, store.add(record, recording)
+    number = store.add(record, recording)
+    contents.add(sha256, number)
+    return trial, number
 
 
 def _write_readings(file: RecordingWriter, recording: Recording, phases: Sequence[int]) -> None:

@@ -17,6 +17,11 @@ from graspsense.core.roles import DeviceInfo, SensorBackend
 from graspsense.core.setting import NAMES_INPUT, setting
 from graspsense.core.signals import CHANNELS, EFFORT, Command, Pads, Reading
 from graspsense.recording.replayable import Recording
+from graspsense.sources.dataset_recordings import (
+    datasets_with_recordings,
+    is_recording_number,
+    numbered_recording,
+)
 from graspsense.sources.icub import read_recording
 
 
@@ -51,7 +56,22 @@ KINDS: Final[Mapping[str, Callable[[str], Recording]]] = {
     "rosbag": _bag,
     "store": _stored,
 }
-"""What can stand before the colon of a recording's name, and the reader of that kind."""
+"""What can stand before the colon of the name of a recording, and the reader of that kind.
+
+The data sets that have recordings can stand there as well, with the number of a recording: `manifest:FILE.toml#3`.
+"""
+
+
+def known_kinds() -> tuple[str, ...]:
+    """Return all that can stand before the colon of the name of a recording."""
+    return tuple(dict.fromkeys((*KINDS, *datasets_with_recordings())))
+
+
+def read_named(kind: str, name: str) -> Recording:
+    """Return the recording of this kind and name. Raises ConfigError, DataDamaged."""
+    if kind in KINDS and not is_recording_number(kind, name):
+        return KINDS[kind](name)
+    return numbered_recording(kind, name)
 
 
 def kind_and_name(recording: str) -> tuple[str, str]:
@@ -64,14 +84,15 @@ def kind_and_name(recording: str) -> tuple[str, str]:
 
 def _known_kind(_config: object, _attribute: Attribute[str], value: str) -> None:
     kind, name = kind_and_name(value)
-    known = ", ".join(f"{k}:" for k in KINDS)
+    kinds = KINDS if kind in KINDS else known_kinds()
+    known = ", ".join(f"{k}:" for k in kinds)
     if not kind:
         raise ValueError(
             f"{value!r} does not say what kind of recording it is: write {known} before the file; a trial of "
             "a store is DIR#NUMBER"
         )
-    if kind not in KINDS:
-        raise ValueError(f"unknown kind of recording {kind!r}. Known: {known}.{suggestion(kind, KINDS)}")
+    if kind not in kinds:
+        raise ValueError(f"unknown kind of recording {kind!r}. Known: {known}.{suggestion(kind, kinds)}")
     if not name:
         raise ValueError(f"{value!r} names no file: write it after the colon")
 
@@ -84,7 +105,7 @@ class ReplayConfig:
         validator=and_(instance_of(str), _known_kind),
         effect=NAMES_INPUT,
         meaning="The recording, KIND:FILE, as in icub:FOLDER/full_vitamin_water_1.txt. store:DIR#NUMBER is a trial of "
-        "a store. A FILE.mcap needs no kind.",
+        "a store, manifest:FILE.toml#NUMBER a grasp of a manifest. A FILE.mcap needs no kind.",
     )
 
 
@@ -174,7 +195,7 @@ class ReplayBackend(SensorBackend[ReplayConfig]):
         """Return the recording in the settings, read once."""
         if self._kept is None:
             kind, name = kind_and_name(self.config.recording)
-            self._kept = KINDS[kind](name)
+            self._kept = read_named(kind, name)
         return self._kept
 
     def _opened(self) -> Recording:

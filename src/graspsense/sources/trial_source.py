@@ -169,8 +169,12 @@ def _data_set(source: TrialSource, features: FeatureSet[Any]) -> Labelled:
     name, _, folder = source.source.partition(":")
     if not folder:
         raise ConfigError(f"{source.source!r} names no folder: write it after the colon")
-    reader = installed().dataset(name).load()
-    found = reader(folder, features, unreliable=source.unreliable)
+    dataset = installed().dataset(name)
+    if not dataset.entry.target:
+        from graspsense.sources.labelled_recordings import labelled_recordings
+
+        return labelled_recordings(name, folder, features)
+    found = dataset.load()(folder, features, unreliable=source.unreliable)
     if not isinstance(found, Labelled):
         raise PluginUnavailable(
             f"data set {name!r} cannot be used here: its reader gave {type(found).__name__}, not Labelled"

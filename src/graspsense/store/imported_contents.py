@@ -14,6 +14,10 @@ CONTENT: Final = "content_sha256"
 """Key of the provenance of an imported trial: the hash of its frames, by `content_sha256`."""
 
 
+class AlreadyImported(ConfigError):
+    """The store has this grasp already."""
+
+
 class ImportedContents:
     """The contents of the imported trials of a store that are not set aside.
 
@@ -37,10 +41,10 @@ class ImportedContents:
             self._trials.setdefault(sha256, number)
 
     def refuse(self, sha256: str, source: str) -> None:
-        """Raise ConfigError if the store has this content already; `source` names what is imported."""
+        """Raise AlreadyImported if the store has this content already; `source` names what is imported."""
         number = self._trials.get(sha256)
         if number is not None:
-            raise ConfigError(
+            raise AlreadyImported(
                 f"{source} has the same content as trial {number} of the store in {self._folder}. A grasp that is "
                 "stored twice is in training and test data at once, which makes every rate too high. To import it "
                 f"again with other options, first set that trial aside: graspsense trials aside {self._folder}#{number}"

@@ -101,6 +101,11 @@ def everything_declared_loads(package: Package) -> None:
     for resource in package.resources:
         if isinstance(resource.entry, PipelineEntry | ModelEntry):
             resource.file()
+        elif isinstance(resource.entry, DatasetEntry):
+            if resource.entry.recordings:
+                resource.recordings()
+            if resource.entry.target:
+                resource.load()
         else:
             resource.load()
 
@@ -233,7 +238,10 @@ def _modules_of(package: Package) -> Iterator[str]:
         targets = (component.entry.target, component.entry.config)
         yield from (target.partition(":")[0] for target in targets if target)
     for resource in package.resources:
-        if isinstance(resource.entry, DatasetEntry | CommandEntry):
+        if isinstance(resource.entry, DatasetEntry):
+            targets = (resource.entry.recordings, resource.entry.target)
+            yield from (target.partition(":")[0] for target in targets if target)
+        elif isinstance(resource.entry, CommandEntry):
             yield resource.entry.target.partition(":")[0]
 
 

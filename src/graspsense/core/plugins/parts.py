@@ -232,6 +232,15 @@ class Resource(Declared[EntryT]):
         assert not isinstance(self.entry, PipelineEntry | ModelEntry), "pipelines and models are files"
         return self._import(self.entry.target)
 
+    def recordings(self) -> Any:
+        """Import and return the function of a data set that yields its recordings. Raises PluginUnavailable."""
+        assert isinstance(self.entry, DatasetEntry), f"a {self.kind} has no recordings"
+        if not self.entry.recordings:
+            raise self._unavailable(
+                "its reader gives features, and no recordings that can be replayed or imported"
+            )
+        return self._import(self.entry.recordings)
+
     def file(self) -> Traversable:
         """Return the file of a pipeline or model. Raises PluginUnavailable if its package does not contain it."""
         assert isinstance(self.entry, PipelineEntry | ModelEntry), f"a {self.kind} is code"

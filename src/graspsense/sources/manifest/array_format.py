@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from graspsense.core.errors import ConfigError, DataDamaged, named
-from graspsense.sources.manifest.table import Numbers, Table
+from graspsense.sources.manifest.table import ColumnTable, Numbers
 
 
-def read_npy(path: Path) -> list[Table]:
+def read_npy(path: Path) -> list[ColumnTable]:
     """Return the table in an NPY file: rows are times, columns are c1, c2 and so on.
 
     An array of three dimensions has one grasp for each index of the first. Raises ConfigError, DataDamaged.
@@ -22,20 +22,22 @@ def read_npy(path: Path) -> list[Table]:
     array = _loaded(path)
     if array.dtype.names:
         return [
-            Table(source=path.name, numbers={name: _float(path, array[name]) for name in array.dtype.names})
+            ColumnTable(
+                source=path.name, numbers={name: _float(path, array[name]) for name in array.dtype.names}
+            )
         ]
     values = _float(path, array)
     if values.ndim == 3:
         return [
-            Table(source=f"{path.name}, index {i}", numbers=_columns(one), fields={"part": str(i)})
+            ColumnTable(source=f"{path.name}, index {i}", numbers=_columns(one), fields={"part": str(i)})
             for i, one in enumerate(values)
         ]
     if values.ndim not in (1, 2):
         raise DataDamaged(f"{path}: an array of {values.ndim} dimensions is not a table")
-    return [Table(source=path.name, numbers=_columns(values.reshape(len(values), -1)))]
+    return [ColumnTable(source=path.name, numbers=_columns(values.reshape(len(values), -1)))]
 
 
-def read_npz(path: Path) -> list[Table]:
+def read_npz(path: Path) -> list[ColumnTable]:
     """Return the table in an NPZ file: each array is a column, or several. Raises ConfigError, DataDamaged."""
     try:
         with np.load(path, allow_pickle=False) as archive:
@@ -45,7 +47,7 @@ def read_npz(path: Path) -> list[Table]:
     return [_of_arrays(path, arrays)]
 
 
-def read_mat(path: Path) -> list[Table]:
+def read_mat(path: Path) -> list[ColumnTable]:
     """Return the table in a MAT file of version 4 to 7: each numeric variable is a column, or several.
 
     Raises ConfigError, DataDamaged.
@@ -83,7 +85,7 @@ def _unreadable(path: Path, error: Exception, kind: str) -> Exception:
     return DataDamaged(f"{path} cannot be read as a {kind} file: {named(error)}")
 
 
-def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> Table:
+def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> ColumnTable:
     """Return the table of these arrays. The length that most of them share is the number of rows."""
     numeric = {
         name: array
@@ -110,7 +112,7 @@ def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> Table:
         for name, array in arrays.items()
         if isinstance(array, np.ndarray) and array.size == 1 and array.dtype.kind in "fiubU"
     }
-    return Table(source=path.name, numbers=columns, fields=scalars)
+    return ColumnTable(source=path.name, numbers=columns, fields=scalars)
 
 
 def _columns(values: Numbers) -> dict[str, Numbers]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
@@ -12,7 +11,7 @@ import numpy as np
 from graspsense.core.errors import ConfigError
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.expression import Expression, ExpressionError
-from graspsense.sources.manifest.table import Numbers, Table
+from graspsense.sources.manifest.table import ColumnTable, Numbers
 
 TO_SI: Final[Mapping[str, Mapping[str, float]]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
@@ -27,7 +26,7 @@ TO_SI: Final[Mapping[str, Mapping[str, float]]] = {
 class AvailableColumns(dict[str, Any]):
     """The columns of a table that expressions can use: its numbers, its fields that are numbers, and channels."""
 
-    def __init__(self, manifest: ReadManifest, table: Table) -> None:
+    def __init__(self, manifest: ReadManifest, table: ColumnTable) -> None:
         super().__init__(table.numbers)
         self.manifest, self.table = manifest, table
         for name, text in table.fields.items():
@@ -55,8 +54,10 @@ class AvailableColumns(dict[str, Any]):
         try:
             return compute()
         except ExpressionError as error:
-            texts = [name for name in self.table.texts if re.search(rf"\b{re.escape(name)}\b", str(error))]
-            aside = f"\n    columns of text, which are not numbers: {', '.join(texts)}" if texts else ""
+            texts = [name for name in self.table.texts if repr(name) in str(error)]
+            lines = self.table.not_numbers
+            words = [f"{name} ({lines[name]})" if name in lines else name for name in texts]
+            aside = f"\n    columns of text, which are not numbers: {', '.join(words)}" if texts else ""
             raise ConfigError(
                 f"{self.manifest.place}: {key}, for {self.table.source}: {error}{aside}"
             ) from None

@@ -55,7 +55,7 @@ _OPERATORS: Final[Mapping[type[ast.operator], Callable[[Any, Any], Any]]] = {
     ast.Mult: np.multiply,
     ast.Div: np.divide,
 }
-_UNIT: Final = re.compile(r"(?P<text>.*\S)\s*\[(?P<unit>[^\[\]']*[^\[\]'\d\s][^\[\]']*)\]\s*", re.DOTALL)
+_UNIT: Final = re.compile(r"(?P<text>.*\S)\s+\[(?P<unit>[^\[\]']*[^\[\]'\d\s][^\[\]']*)\]\s*", re.DOTALL)
 
 
 class ExpressionError(ConfigError):
@@ -97,7 +97,7 @@ class Expression:
 
     def _value(self, node: ast.expr, columns: Mapping[str, Values]) -> Values:
         if isinstance(node, ast.Constant) and not isinstance(node.value, str):
-            return np.float64(node.value)
+            return np.float64(node.value)  # type: ignore[arg-type] # checked by `parse`
         if isinstance(node, ast.Name | ast.Constant):
             found = [columns[name] for name in self._matching(node, tuple(columns))]
             return found[0] if len(found) == 1 else np.column_stack(found)

@@ -13,14 +13,14 @@ from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.sources.manifest.available import AvailableColumns, number_in
 from graspsense.sources.manifest.description import ReadManifest
 from graspsense.sources.manifest.files import NamedFile
-from graspsense.sources.manifest.table import Table
+from graspsense.sources.manifest.table import ColumnTable
 
 _FIELD: Final = re.compile(r"\{(\w+)\}")
 _NOT_IN_LABELS: Final = re.compile(r"[\s#,]+")
 _STAMP: Final = re.compile(r"(\d{4})-?(\d\d)-?(\d\d)[T _-]?(\d\d):?(\d\d):?(\d\d)(?:\.\d+)?")
 
 
-def _filled(manifest: ReadManifest, key: str, template: str, table: Table) -> str:
+def _filled(manifest: ReadManifest, key: str, template: str, table: ColumnTable) -> str:
     """Return a template filled from the facts and columns of a table. Raises ConfigError, DataDamaged."""
 
     def value(match: re.Match[str]) -> str:
@@ -35,13 +35,13 @@ def _filled(manifest: ReadManifest, key: str, template: str, table: Table) -> st
     return _FIELD.sub(value, template)
 
 
-def _given(manifest: ReadManifest, key: str, table: Table) -> str:
+def _given(manifest: ReadManifest, key: str, table: ColumnTable) -> str:
     """Return what the manifest says for this key, or the field of that name."""
     template = getattr(manifest.keys, key)
     return _filled(manifest, key, template, table) if template else table.fields.get(key, "")
 
 
-def label_of(manifest: ReadManifest, table: Table) -> str:
+def label_of(manifest: ReadManifest, table: ColumnTable) -> str:
     """Return the label of a grasp, with `_` for spaces. Raises ConfigError, DataDamaged."""
     text = _NOT_IN_LABELS.sub("_", _given(manifest, "label", table).strip())
     if not text:
@@ -49,12 +49,12 @@ def label_of(manifest: ReadManifest, table: Table) -> str:
     return text
 
 
-def instance_of(manifest: ReadManifest, table: Table) -> str:
+def instance_of(manifest: ReadManifest, table: ColumnTable) -> str:
     """Return what identifies the individual object, empty if that is not known. Raises ConfigError, DataDamaged."""
     return _NOT_IN_LABELS.sub("_", _given(manifest, "instance", table).strip()).replace(":", "_")
 
 
-def order_of(manifest: ReadManifest, table: Table) -> float | None:
+def order_of(manifest: ReadManifest, table: ColumnTable) -> float | None:
     """Return the place of a grasp in the order of recording. Raises ConfigError, DataDamaged."""
     text = _given(manifest, "order", table)
     number = number_in(text)
@@ -63,7 +63,7 @@ def order_of(manifest: ReadManifest, table: Table) -> float | None:
     return number
 
 
-def recorded_at_of(manifest: ReadManifest, table: Table) -> str:
+def recorded_at_of(manifest: ReadManifest, table: ColumnTable) -> str:
     """Return the time of the recording in ISO 8601, from a time stamp or a number of seconds since 1970."""
     text = _given(manifest, "recorded", table)
     if not text:
@@ -85,7 +85,7 @@ def recorded_at_of(manifest: ReadManifest, table: Table) -> str:
         ) from None
 
 
-def values_of(manifest: ReadManifest, file: NamedFile, table: Table) -> dict[str, float]:
+def values_of(manifest: ReadManifest, file: NamedFile, table: ColumnTable) -> dict[str, float]:
     """Return the properties of a grasp, under their names with units. Raises ConfigError, DataDamaged."""
     found = AvailableColumns(manifest, table)
     values = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -51,6 +51,8 @@ def _matching(manifest: ReadManifest) -> Iterator[NamedFile]:
     given = manifest.keys.files
     patterns = [_pattern(manifest, one) for one in ((given,) if isinstance(given, str) else given)]
     for name, path in _tree(manifest.base):
+        if path.name == manifest.place.name and path.resolve() == manifest.place.resolve():
+            continue
         match = next(filter(None, (pattern.fullmatch(name) for pattern in patterns)), None)
         if match is not None:
             yield NamedFile(path=path, fields=match.groupdict())
@@ -93,7 +95,7 @@ def _tree(base: Path) -> Iterator[tuple[str, Path]]:
     return iter(sorted(shown, key=lambda one: natural_key(one[0])))
 
 
-def natural_key(name: str) -> Sequence[tuple[int, int, str]]:
+def natural_key(name: str) -> list[tuple[int, int, str]]:
     """Return the key by which names are sorted so that `data_2` stands before `data_10`."""
     return [(0, int(one), "") if one.isdecimal() else (1, 0, one) for one in re.split(r"(\d+)", name)]
 

@@ -25,6 +25,8 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
     if abs(low) > abs(high) and low < 0.0:
         yield "the force is negative where it is largest: is it a pull? Turn its sign: -FORCE"
     moved, span = float(gap[peak] - gap[0]), float(np.ptp(gap))
+    if span == 0.0 and not columns.units.get("gap"):
+        yield "the gap does not change during the recording: is it another column?"
     if span > 0.0 and moved > 0.2 * span:
         yield (
             "the gap rises while the force rises: is it a position that grows on closing? Write the gap as a "

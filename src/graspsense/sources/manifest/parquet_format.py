@@ -9,10 +9,10 @@ import numpy as np
 
 from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable, named
 from graspsense.recording.parquet import PARQUET_HINT
-from graspsense.sources.manifest.table import Numbers, Table
+from graspsense.sources.manifest.table import ColumnTable, Numbers
 
 
-def read_parquet(path: Path) -> list[Table]:
+def read_parquet(path: Path) -> list[ColumnTable]:
     """Return the table in a Parquet file. Raises PluginUnavailable without pyarrow, ConfigError, DataDamaged."""
     try:
         import pyarrow.parquet
@@ -36,4 +36,4 @@ def read_parquet(path: Path) -> list[Table]:
                 numbers[name] = numbers[name][:, 0]
         except (TypeError, ValueError):
             texts[name] = ["" if one is None else str(one) for one in values]
-    return [Table(source=path.name, numbers=numbers, texts=texts)]
+    return [ColumnTable(source=path.name, numbers=numbers, texts=texts)]

@@ -18,7 +18,7 @@ from graspsense.sources.manifest.files import NamedFile, files_of
 from graspsense.sources.manifest.notices import notices_of
 from graspsense.sources.manifest.samples import samples
 from graspsense.sources.manifest.steps import cut_at, resampled, squeezes
-from graspsense.sources.manifest.table import Table
+from graspsense.sources.manifest.table import ColumnTable
 
 
 def read_recordings(place: str) -> Iterator[LabelledRecording]:
@@ -29,7 +29,7 @@ def read_recordings(place: str) -> Iterator[LabelledRecording]:
             yield from grasps_in(manifest, file, table)
 
 
-def tables_of(manifest: ReadManifest, file: NamedFile) -> list[Table]:
+def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
     """Return the tables of a file, each with the facts of its path. Raises ConfigError, DataDamaged."""
     read = _format(manifest, file.path)
     tables = [table.with_fields(file.fields) for table in read(file.path)]
@@ -46,7 +46,7 @@ def tables_of(manifest: ReadManifest, file: NamedFile) -> list[Table]:
     return tables
 
 
-def grasps_in(manifest: ReadManifest, file: NamedFile, table: Table) -> Iterator[LabelledRecording]:
+def grasps_in(manifest: ReadManifest, file: NamedFile, table: ColumnTable) -> Iterator[LabelledRecording]:
     """Yield the grasps of a table: several only where squeezes are to be found. Raises ConfigError, DataDamaged."""
     keys = manifest.keys
     columns = samples(manifest, table)
@@ -67,7 +67,7 @@ def grasps_in(manifest: ReadManifest, file: NamedFile, table: Table) -> Iterator
         )
 
 
-def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[Table]]:
+def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[ColumnTable]]:
     """Return the function that reads a file of this suffix. Raises ConfigError."""
     suffix = path.suffix.lower()
     if suffix in (".csv", ".tsv", ".txt", ".dat", ".data", ""):
@@ -94,7 +94,7 @@ def _format(manifest: ReadManifest, path: Path) -> Callable[[Path], list[Table]]
     )
 
 
-def _bag(manifest: ReadManifest) -> Callable[[Path], list[Table]]:
+def _bag(manifest: ReadManifest) -> Callable[[Path], list[ColumnTable]]:
     from graspsense.sources.manifest.ros_format import read_bag
 
     texts = [one.text for parts in manifest.expressions.values() for one in parts]
@@ -103,7 +103,7 @@ def _bag(manifest: ReadManifest) -> Callable[[Path], list[Table]]:
     return lambda path: read_bag(path, topics)
 
 
-def _by_column(table: Table, column: str) -> list[Table]:
+def _by_column(table: ColumnTable, column: str) -> list[ColumnTable]:
     """Return a table for each value of a column, in the order in which the values occur. Raises ConfigError."""
     values: Sequence[Any]
     if column in table.texts:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable, named
-from graspsense.sources.manifest.table import Numbers, Table
+from graspsense.sources.manifest.table import ColumnTable, Numbers
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -23,7 +23,7 @@ MOST_COMPONENTS: Final = 4096
 STAMP: Final = ("sec", "nanosec")
 
 
-def read_bag(path: Path, topics: Collection[str] = ()) -> list[Table]:
+def read_bag(path: Path, topics: Collection[str] = ()) -> list[ColumnTable]:
     """Return the numbers in a ROS 1 bag, a folder of a ROS 2 bag, or an MCAP file.
 
     `topics` are those to read; with none, all. Raises PluginUnavailable without rosbags, ConfigError, DataDamaged.
@@ -52,7 +52,7 @@ def read_bag(path: Path, topics: Collection[str] = ()) -> list[Table]:
             values = np.array(rows, dtype=np.float64).reshape(len(rows), -1)[np.maximum(last, 0)]
             values[last < 0] = np.nan
             numbers[name] = values[:, 0] if values.shape[1] == 1 else values
-    return [Table(source=path.name, numbers=numbers, t_s=times.astype(np.float64) * 1e-9)]
+    return [ColumnTable(source=path.name, numbers=numbers, t_s=times.astype(np.float64) * 1e-9)]
 
 
 def _messages(path: Path, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from graspsense.core.errors import ConfigError, DataDamaged
@@ -9,10 +11,12 @@ from graspsense.sources.grasp_columns import GraspColumns
 from graspsense.sources.manifest.available import AvailableColumns
 from graspsense.sources.manifest.description import ReadManifest, samples_of
 from graspsense.sources.manifest.steps import without_duplicates
-from graspsense.sources.manifest.table import Numbers, Table
+from graspsense.sources.manifest.table import ColumnTable, Numbers
+
+EARLIEST_STAMP_S: Final = 1e6
 
 
-def samples(manifest: ReadManifest, table: Table) -> GraspColumns:
+def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     """Return the samples of a table as the manifest describes them. Raises ConfigError, DataDamaged."""
     keys, found = manifest.keys, AvailableColumns(manifest, table)
     if not len(table):
@@ -63,6 +67,7 @@ def samples(manifest: ReadManifest, table: Table) -> GraspColumns:
             "t": "" if _has_time(manifest, table, found) else "sample",
         },
         notes=tuple(notes),
+        lines=table.lines,
     )
     return without_duplicates(columns) if keys.duplicates == "drop" else columns
 
@@ -76,21 +81,21 @@ def _folds(manifest: ReadManifest) -> list[str]:
     return [f"the left pad is {texts[0]}, the right pad is {texts[1]}"]
 
 
-def _has_time(manifest: ReadManifest, table: Table, found: AvailableColumns) -> bool:
+def _has_time(manifest: ReadManifest, table: ColumnTable, found: AvailableColumns) -> bool:
     return bool(
         manifest.keys.rate_hz or table.t_s is not None or any(map(found.has, manifest.expressions["time"]))
     )
 
 
-def _times(manifest: ReadManifest, table: Table, found: AvailableColumns) -> Numbers:
+def _times(manifest: ReadManifest, table: ColumnTable, found: AvailableColumns) -> Numbers:
     """Return the time of each row (s), from 0 on. Raises ConfigError."""
     parts = manifest.expressions["time"]
     missing = not any(map(found.has, parts))
     given = None if missing and manifest.keys.rate_hz else found.value("time", parts, "time")
     if given is not None:
-        return given[0] - given[0][0]
+        return _from_start(given[0])
     if table.t_s is not None:
-        return table.t_s - table.t_s[0]
+        return _from_start(table.t_s)
     if manifest.keys.rate_hz:
         return np.arange(len(table)) / manifest.keys.rate_hz
     if len(table) == 1:
@@ -102,8 +107,13 @@ def _times(manifest: ReadManifest, table: Table, found: AvailableColumns) -> Num
     )
 
 
+def _from_start(t_s: Numbers) -> Numbers:
+    """Return times (s), counted from the first one where they are stamps of a clock such as seconds since 1970."""
+    return t_s - t_s[0] if abs(float(t_s[0])) > EARLIEST_STAMP_S else t_s
+
+
 def _channels(
-    manifest: ReadManifest, table: Table, found: AvailableColumns
+    manifest: ReadManifest, table: ColumnTable, found: AvailableColumns
 ) -> tuple[dict[str, Numbers], dict[str, Numbers], dict[str, str]]:
     """Return the further channels with one number a sample, the arrays, and the units of both. Raises ConfigError."""
     scalars: dict[str, Numbers] = {}

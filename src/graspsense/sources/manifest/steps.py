@@ -104,11 +104,13 @@ def resampled(columns: GraspColumns, rate_hz: float) -> GraspColumns:
 
     def along(values: NDArray[np.float64]) -> NDArray[np.float64]:
         if values.ndim == 1:
-            return np.interp(times, t, values)
+            column: NDArray[np.float64] = np.interp(times, t, values)
+            return column
         return np.column_stack([np.interp(times, t, column) for column in values.T])
 
     return evolve(
         columns,
+        lines=None,
         t_s=times,
         gap_m=along(columns.gap_m),
         left_n=along(columns.left_n),

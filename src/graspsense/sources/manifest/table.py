@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from graspsense.core.errors import DataDamaged
@@ -15,7 +15,7 @@ Numbers = NDArray[np.float64]
 
 
 @frozen(kw_only=True, eq=False)
-class Table:
+class ColumnTable:
     """The columns of a file or of a part of it.
 
     `numbers` holds the columns of numbers: shape (n,), or (n, k) for one with k components; a missing value is NaN.
@@ -29,6 +29,10 @@ class Table:
     texts: Mapping[str, Sequence[str]] = field(factory=dict)
     fields: Mapping[str, str] = field(factory=dict)
     t_s: Numbers | None = None
+    lines: NDArray[np.int64] | None = None
+    """The line of each row in a text file."""
+    not_numbers: Mapping[str, str] = field(factory=dict)
+    """For a column of text that begins with a number: its first line with another text, in words."""
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -57,26 +61,21 @@ class Table:
             )
         return values.pop()
 
-    def rows(self, which: Any, part: str = "") -> Table:
+    def rows(self, which: Any, part: str = "") -> ColumnTable:
         """Return these rows (a slice, numbers, or a mask); `part` says in words which they are."""
         index = np.arange(len(self))[which].tolist()
-        return Table(
+        return evolve(
+            self,
             source=f"{self.source}, {part}" if part else self.source,
             numbers={name: values[which] for name, values in self.numbers.items()},
             texts={name: [values[i] for i in index] for name, values in self.texts.items()},
-            fields=self.fields,
             t_s=None if self.t_s is None else self.t_s[which],
+            lines=None if self.lines is None else self.lines[which],
         )
 
-    def with_fields(self, fields: Mapping[str, str]) -> Table:
+    def with_fields(self, fields: Mapping[str, str]) -> ColumnTable:
         """Return the table with these facts beside its own."""
-        return Table(
-            source=self.source,
-            numbers=self.numbers,
-            texts=self.texts,
-            fields={**fields, **self.fields},
-            t_s=self.t_s,
-        )
+        return evolve(self, fields={**fields, **self.fields})
 
 
 def _shown(value: float) -> str:

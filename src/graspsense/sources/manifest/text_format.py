@@ -18,7 +18,7 @@ from attrs import define, field
 
 from graspsense.core.errors import DataDamaged
 from graspsense.sources.csv_columns import is_missing, text_of
-from graspsense.sources.manifest.table import Numbers, Table
+from graspsense.sources.manifest.table import ColumnTable, Numbers
 
 COMMENTS: Final = ("#", "%")
 _DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
@@ -35,7 +35,7 @@ class _Part:
     lines: list[tuple[int, str]] = field(factory=list)
 
 
-def read_text(path: Path, start: str = "") -> list[Table]:
+def read_text(path: Path, start: str = "") -> list[ColumnTable]:
     """Return the tables in a text file: one, or with `start` one for each line that this regular expression matches.
 
     The named groups of `start` become fields of the table that begins there; lines before the first match are left out.
@@ -64,7 +64,7 @@ def _parts(text: str, start: str) -> Iterator[_Part]:
         yield part
 
 
-def _table(path: Path, part: _Part, where: str) -> Table:
+def _table(path: Path, part: _Part, where: str) -> ColumnTable:
     separator = _separator([line for _, line in part.lines[:20]])
     rows = [_cells(path, number, line, separator) for number, line in part.lines]
     numbers = [number for number, _ in part.lines]
@@ -83,17 +83,23 @@ def _table(path: Path, part: _Part, where: str) -> Table:
     commas = separator != "," and any(_DECIMAL_COMMA.fullmatch(cell) for row in rows[:50] for cell in row)
     found: dict[str, Numbers] = {}
     texts: dict[str, Sequence[str]] = {}
+    not_numbers: dict[str, str] = {}
     for name, cells in zip(names, zip(*rows, strict=True), strict=True):
         values = _numbers([cell.replace(",", ".") for cell in cells] if commas else cells)
         if values is None:
             texts[name] = cells
+            if _is_number(cells[0]):
+                k = next(k for k, cell in enumerate(cells) if not (_is_number(cell) or is_missing(cell)))
+                not_numbers[name] = f"line {numbers[k]} has {cells[k][:40]!r}"
         else:
             found[name] = values
-    return Table(
+    return ColumnTable(
         source=f"{path.name}, {where}" if where else path.name,
         numbers=found,
         texts=texts,
         fields=part.fields,
+        lines=np.array(numbers, dtype=np.int64),
+        not_numbers=not_numbers,
     )
 
 

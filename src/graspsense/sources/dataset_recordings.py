@@ -1,0 +1,75 @@
+"""The recordings of a data set: `NAME:PLACE` names all of them, `NAME:PLACE#NUMBER` the one with this number."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from itertools import islice
+from typing import Final
+
+from graspsense.core.errors import ComponentFailed, ConfigError, GraspsenseError, PluginUnavailable, named
+from graspsense.core.plugins import installed
+from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.recording.replayable import Recording
+
+_NUMBERED: Final = re.compile(r"(?P<place>.+)#(?P<number>[1-9]\d{0,8})", re.DOTALL)
+
+_handed: dict[str, Recording] = {}
+
+
+def datasets_with_recordings() -> tuple[str, ...]:
+    """Return the names of the installed data sets that have recordings."""
+    return tuple(one.name for one in installed().datasets() if one.entry.recordings)
+
+
+def is_recording_number(kind: str, name: str) -> bool:
+    """Return whether this names a recording of a data set by its number."""
+    return _NUMBERED.fullmatch(name) is not None and kind in datasets_with_recordings()
+
+
+def recordings_of(kind: str, place: str) -> Iterator[LabelledRecording]:
+    """Yield every recording of a data set. Raises UnknownName, PluginUnavailable, ConfigError, DataDamaged."""
+    dataset = installed().dataset(kind)
+    read = dataset.recordings()
+    try:
+        for one in read(place):
+            if not isinstance(one, LabelledRecording):
+                raise PluginUnavailable(
+                    f"data set {dataset.qualified} cannot be used here: its reader gave {type(one).__name__}, not "
+                    "LabelledRecording"
+                )
+            yield one
+    except GraspsenseError:
+        raise
+    except Exception as error:
+        raise ComponentFailed(f"the reader of data set {dataset.qualified} failed: {named(error)}") from error
+
+
+def numbered_recording(kind: str, name: str) -> Recording:
+    """Return the recording that `PLACE#NUMBER` names. Raises ConfigError if there is none, and as `recordings_of`."""
+    if f"{kind}:{name}" in _handed:
+        return _handed[f"{kind}:{name}"]
+    match = _NUMBERED.fullmatch(name)
+    if match is None:
+        raise ConfigError(
+            f"{kind}:{name} names all recordings of a data set: write the number of one behind it, as in "
+            f"{kind}:{name}#1"
+        )
+    number = int(match["number"])
+    found = next(islice(recordings_of(kind, match["place"]), number - 1, None), None)
+    if found is None:
+        raise ConfigError(f"{kind}:{match['place']} has fewer than {number} recordings")
+    return found.recording
+
+
+class handed_over:  # noqa: N801 - used as a context manager, like those of contextlib
+    """While a recording is imported, `numbered_recording` returns it under its name without reading its file again."""
+
+    def __init__(self, name: str, recording: Recording) -> None:
+        self.name, self.recording = name, recording
+
+    def __enter__(self) -> None:
+        _handed[self.name] = self.recording
+
+    def __exit__(self, *_: object) -> None:
+        del _handed[self.name]

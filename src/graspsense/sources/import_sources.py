@@ -1,0 +1,78 @@
+"""The recordings that the sources of `graspsense import` name: a CSV, a manifest, a data set, or a single recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from attrs import evolve, frozen
+
+from graspsense.core.errors import ConfigError
+from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.sources.dataset_recordings import datasets_with_recordings, recordings_of
+from graspsense.sources.grasp_csv import named
+from graspsense.sources.replay import KINDS, kind_and_name, read_named
+from graspsense.store.labels import labels_of
+
+CSV_SUFFIXES = (".csv", ".tsv", ".txt")
+
+
+@frozen(kw_only=True, eq=False)
+class ImportedRecording:
+    """A recording to import: what the user typed, its name for `gripper.recording`, and what is known of it."""
+
+    source: str
+    name: str
+    labelled: LabelledRecording
+
+
+def is_csv(source: str) -> bool:
+    """Return whether a source is a CSV file whose columns options name."""
+    return source.lower().endswith(CSV_SUFFIXES) and ":" not in source
+
+
+def recordings_to_import(
+    source: str, columns: Mapping[str, Sequence[str]], label: str | None
+) -> Iterator[ImportedRecording]:
+    """Yield every recording that a source names; `columns` are those of a CSV, `label` is that of all recordings.
+
+    Raises ConfigError, DataDamaged.
+    """
+    dataset = _dataset(source)
+    if dataset is not None:
+        kind, place = dataset
+        for number, labelled in enumerate(recordings_of(kind, place), 1):
+            yield ImportedRecording(
+                source=source, name=f"{kind}:{place}#{number}", labelled=_relabelled(labelled, label)
+            )
+        return
+    name = f"csv:{named(source, columns)}" if is_csv(source) else source
+    kind, file = kind_and_name(name)
+    if kind not in KINDS:
+        known = ", ".join(f"{one}:" for one in dict.fromkeys((*KINDS, *datasets_with_recordings())))
+        raise ConfigError(
+            f"{source!r} is not a source of recordings: name a FILE.csv, a manifest FILE.toml, or write one of {known} "
+            "before a file"
+        )
+    labelled = LabelledRecording(recording=read_named(kind, file), source=source)
+    yield ImportedRecording(source=source, name=name, labelled=_relabelled(labelled, label))
+
+
+def _dataset(source: str) -> tuple[str, str] | None:
+    """Return the data set and the place of all its recordings that a source names, None if it names one recording."""
+    if source.lower().endswith(".toml") and ":" not in source:
+        return "manifest", source
+    kind, _, place = source.partition(":")
+    if not place or kind not in datasets_with_recordings():
+        return None
+    return (kind, place) if kind not in KINDS or Path(place).expanduser().is_dir() else None
+
+
+def _relabelled(labelled: LabelledRecording, label: str | None) -> LabelledRecording:
+    """Return the recording with the label that a user gave for all. Raises ConfigError if either is not a label."""
+    if label is None:
+        if labelled.label:
+            labels_of(labelled.label)
+        return labelled
+    given = labels_of(label)
+    return evolve(labelled, label=given["label"], instance=given.get("instance", "").partition("#")[2])

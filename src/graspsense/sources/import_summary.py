@@ -1,0 +1,94 @@
+"""What an import understood of its recordings: labels, instances, samples, rates, ranges and what looks wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.core.channels import further
+from graspsense.recording.labelled_recording import LabelledRecording
+
+
+@frozen(kw_only=True)
+class LabelSummary:
+    """The recordings of one label: how many they are, of how many objects, and the ranges of their values.
+
+    The gap is in m and the forces are in N unless the recordings have other units.
+    """
+
+    label: str
+    grasps: int
+    instances: int | None
+    samples: tuple[int, int]
+    rate_hz: tuple[float, float]
+    gap: tuple[float, float]
+    left: tuple[float, float]
+    right: tuple[float, float]
+
+
+@frozen(kw_only=True)
+class ImportSummary:
+    """All recordings of an import."""
+
+    grasps: int
+    labels: tuple[LabelSummary, ...]
+    units: dict[str, str]
+    channels: tuple[str, ...]
+    values: tuple[str, ...]
+    recorded: tuple[str, str] | None
+    """The first and the last time of recording; None unless every recording has one."""
+    notes: tuple[str, ...]
+    """How the first recording came about."""
+    notices: tuple[tuple[str, int], ...]
+    """What looks wrong, and in how many recordings."""
+
+
+def summary_of(recordings: Sequence[LabelledRecording]) -> ImportSummary:
+    """Return the summary of at least one recording."""
+    by_label: dict[str, list[LabelledRecording]] = {}
+    notices: dict[str, int] = {}
+    for one in recordings:
+        by_label.setdefault(one.label, []).append(one)
+        for notice in one.notices:
+            notices[notice] = notices.get(notice, 0) + 1
+    first = recordings[0].recording
+    times = sorted(one.recorded_at for one in recordings)
+    return ImportSummary(
+        grasps=len(recordings),
+        labels=tuple(_label(label, some) for label, some in sorted(by_label.items())),
+        units=dict(first.units),
+        channels=tuple(f"{one.name} [{one.unit}]" for one in further(first.channels)),
+        values=tuple(dict.fromkeys(name for one in recordings for name in one.values)),
+        recorded=(times[0], times[-1]) if times[0] else None,
+        notes=first.notes,
+        notices=tuple(sorted(notices.items(), key=lambda one: -one[1])),
+    )
+
+
+def _label(label: str, recordings: Sequence[LabelledRecording]) -> LabelSummary:
+    instances = {one.instance for one in recordings}
+    frames = np.array(
+        [
+            (frame.gap_m, frame.force_left_n, frame.force_right_n)
+            for one in recordings
+            for frame, *_ in one.recording.readings
+        ]
+    )
+    return LabelSummary(
+        label=label,
+        grasps=len(recordings),
+        instances=None if "" in instances else len(instances),
+        samples=_range([len(one.recording.readings) for one in recordings]),
+        rate_hz=_range([one.recording.rate_hz for one in recordings]),
+        gap=_range(frames[:, 0]),
+        left=_range(frames[:, 1]),
+        right=_range(frames[:, 2]),
+    )
+
+
+def _range(values: Any) -> tuple[Any, Any]:
+    array = np.asarray(values)
+    return np.nanmin(array).item(), np.nanmax(array).item()

@@ -1,0 +1,102 @@
+"""The recordings of a data set as labelled trials, without a store: `evaluate NAME:FOLDER`.
+
+Features are extracted from the recorded trace. All of it is in the phase `approach`, because no controller of
+graspsense was involved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from graspsense.core.errors import ConfigError
+from graspsense.core.features import Features, table_of
+from graspsense.core.labelled import Labelled, class_of
+from graspsense.core.roles import FeatureSet
+from graspsense.core.signals import APPROACH
+from graspsense.core.trace import SI_UNITS, Trace, trace_of
+from graspsense.recording.before_contact import before_contact
+from graspsense.recording.controls import controls
+from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.recording.replayable import Recording
+from graspsense.sources.dataset_recordings import recordings_of
+
+
+def labelled_recordings(kind: str, place: str, features: FeatureSet[Any]) -> Labelled:
+    """Return the labelled recordings of a data set. Raises ConfigError if there are none, DataDamaged."""
+    facts: list[LabelledRecording] = []
+    rows: list[Features] = []
+    before: list[Features] = []
+    unlabelled = 0
+    for one in recordings_of(kind, place):
+        if not one.label:
+            unlabelled += 1
+            continue
+        trace = trace_of_recording(one.recording)
+        rows.append(features.extract(trace))
+        before.append(before_contact(trace))
+        facts.append(one)
+    if not facts:
+        raise ConfigError(f"{kind}:{place} has no recording with a label")
+    table = table_of(rows)
+    notes = [f"{unlabelled} recordings without a label are left out"] if unlabelled else []
+    notes += _counted(one.notices for one in facts)
+    units = {unit for one in facts for unit in one.recording.units.values()}
+    if units:
+        notes.append(f"units that are not SI units: {', '.join(sorted(units))}")
+    order = _order(facts)
+    return Labelled(
+        source=f"{kind}:{place}",
+        table=table,
+        labels=tuple(one.label for one in facts),
+        instances=tuple(f"{class_of(one.label)}#{one.instance}" for one in facts)
+        if all(one.instance for one in facts)
+        else None,
+        no_instances="the data set does not say which trials are of the same object",
+        order=order,
+        no_order="" if order is not None else "the data set does not say when each trial was recorded",
+        **controls(table, table_of(before)),
+        notes=tuple(notes),
+        provenance={"simulated": False},
+    )
+
+
+def trace_of_recording(recording: Recording) -> Trace:
+    """Return the trace of a recording, all in the phase `approach`."""
+    readings, images = recording.readings, []
+    counter = 0
+    for reading in readings:
+        if reading.pads.counter != counter:
+            counter = reading.pads.counter
+            images.append(reading.pads)
+    n = len(readings)
+    return trace_of(
+        [reading.frame for reading in readings],
+        [APPROACH] * n,
+        [0.0] * n,
+        images,
+        {**SI_UNITS, **recording.units},
+        [reading.signals for reading in readings] if recording.channels else (),
+    )
+
+
+def _order(facts: Sequence[LabelledRecording]) -> tuple[int, ...] | None:
+    """Return the rank of each trial by its time of recording, or else by its number; None if neither is known."""
+    keys: list[Any]
+    if all(one.recorded_at for one in facts):
+        keys = [one.recorded_at for one in facts]
+    elif all(one.order is not None for one in facts):
+        keys = [one.order for one in facts]
+    else:
+        return None
+    ranks = {key: rank for rank, key in enumerate(sorted(set(keys)))}
+    return tuple(ranks[key] for key in keys)
+
+
+def _counted(notices: Any) -> list[str]:
+    """Return each notice once, with the number of recordings that it is about."""
+    counts: dict[str, int] = {}
+    for of_one in notices:
+        for notice in of_one:
+            counts[notice] = counts.get(notice, 0) + 1
+    return [f"{count} recordings: {notice}" for notice, count in counts.items()]

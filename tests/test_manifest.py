@@ -1,0 +1,536 @@
+"""Manifests: small files in the layout of public data sets and of every format, each imported by at most ten lines."""
+
+from __future__ import annotations
+
+import json
+import re
+from textwrap import dedent
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from graspsense.cli.main import main
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.recording.reader import read_recorded
+from graspsense.sources.manifest.reader import read_recordings
+from graspsense.store.store import Store
+
+RATE_HZ = 100.0
+T_S = np.arange(300) / RATE_HZ
+
+
+def squeezing(width_m=0.05, stiffness_n_m=2000.0, offset_n=0.0):
+    """Return gap (m) and force (N) of fingers that close from 60 mm at 10 mm/s and stop after 2 s."""
+    gap = np.maximum(0.06 - 0.01 * T_S, 0.04)
+    return gap, stiffness_n_m * np.maximum(width_m - gap, 0.0) + offset_n
+
+
+def manifest(folder, text):
+    """Write a manifest of at most ten lines; return its path."""
+    lines = dedent(text).strip().splitlines()
+    assert len(lines) <= 10
+    path = folder / "manifest.toml"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def recordings(folder, text):
+    return list(read_recordings(str(manifest(folder, text))))
+
+
+def column(one, name):
+    return np.array([getattr(reading.frame, name) for reading in one.recording.readings])
+
+
+def pandas_csv(path, columns):
+    """Write columns as `DataFrame.to_csv` does: with an index column that has no name."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = zip(*columns.values(), strict=True)
+    lines = [f",{','.join(columns)}", *(f"{k},{','.join(map(str, row))}" for k, row in enumerate(rows))]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main([str(one) for one in arguments])
+    out, err = capsys.readouterr()
+    return ended.value.code, out, err
+
+
+# The layouts of the public sets of docs/other_data.md.
+
+FRUIT = """
+    files = ["{label}/{part}Set/{instance}/ForceData_*.csv", "{label}/trainingSet/data_{instance:d}.npy"]
+    time = "Time"
+    rate_hz = 100
+    gap = ["60 - Pos [mm]", "60 - c1/95.4929 [mm]"]
+    force = ["Force", "c2"]
+    cut = "rupture"
+    duplicates = "drop"
+    values = { break_force = "break_force.npy" }
+"""
+
+
+def test_fruit_squeezed_until_it_breaks(tmp_path):
+    gap, force = squeezing()
+    force[180:] *= 0.2
+    position = 60.0 - gap * 1e3
+    folder = tmp_path / "kiwi/trainingSet/20241124_151319"
+    time = np.repeat(T_S[::2], 2) + 1732432394.9
+    time[1:][np.diff(time) == 0.0] += np.where(np.arange(150) < 140, 0.01, 0.0)
+    pandas_csv(folder / "ForceData_20241124_151319.csv", {"Time": time, "Force": force, "Pos": position})
+    np.save(folder / "break_force.npy", np.float64(2.62))
+    (tmp_path / "banana/trainingSet").mkdir(parents=True)
+    np.save(tmp_path / "banana/trainingSet/data_7.npy", np.column_stack([position * 95.4929, force]))
+
+    banana, kiwi = recordings(tmp_path, FRUIT)
+
+    assert (banana.label, banana.instance, kiwi.label, kiwi.instance) == (
+        "banana",
+        "7",
+        "kiwi",
+        "20241124_151319",
+    )
+    assert (kiwi.values, banana.values) == ({"break_force": 2.62}, {})
+    for one in (banana, kiwi):
+        assert column(one, "gap_m") == pytest.approx(gap[:180], abs=1e-12)
+        assert len(one.recording.readings) == 180  # up to the largest force before the rupture
+    assert any(
+        "10 samples with the time of the one before were dropped" in note for note in kiwi.recording.notes
+    )
+    assert banana.recording.rate_hz == pytest.approx(100.0)
+
+
+JACO = r"""
+    files = "data.csv"
+    start = 'seq,(?P<order>\d+),stamp start,(?P<began>[^,]+),stamp end,(?P<ended>[^,]+).*label,(?P<object>\d+)'
+    time = "(timestep - 1)*(ended - began)/299 [ns]"
+    channels = { finger1 = "'eucl force 1' [N]", finger2 = "'eucl force 2' [N]", finger3 = "norm('opto3_?') [N]" }
+    left = "max(finger1, finger2)"
+    right = "finger3"
+    gap = "100 - mean('finger?_pos') [mm]"
+    label = "object{object}"
+    recorded = "{began}"
+"""
+
+
+def jaco(path):
+    gap, force = squeezing()
+    lines = ["Philip,Number of samples,2"]
+    for order, (label, grows) in enumerate([(17, 1.0), (3, 0.5)]):
+        began = 1592233887442126035 + order * 60_000_000_000
+        lines.append(
+            f"header,seq,{order},stamp start,{began},stamp end,{began + 2_990_000_000},class label,{label}"
+        )
+        lines.append(
+            "timestep,eucl force 1,eucl force 2,opto3_x,opto3_y,opto3_z,finger1_pos,finger2_pos,finger3_pos"
+        )
+        for k in range(len(T_S)):
+            f = force[k] * grows
+            position = 100.0 - gap[k] * 1e3
+            lines.append(
+                f"{k + 1},{f},{0.5 * f},{0.6 * f},{0.8 * f},0,{position - 3},{position},{position + 3}"
+            )
+    path.write_text("\n".join(lines) + "\n")
+    return gap, force
+
+
+def test_three_fingers_in_blocks_of_one_file_are_folded_and_kept(tmp_path):
+    gap, force = jaco(tmp_path / "data.csv")
+
+    first, second = recordings(tmp_path, JACO)
+
+    assert (first.label, second.label, first.order) == ("object17", "object3", 0.0)
+    assert first.recorded_at == "2020-06-15T15:11:27.442126+00:00"
+    assert column(first, "t_s") == pytest.approx(T_S, abs=1e-6)
+    assert column(first, "gap_m") == pytest.approx(gap)
+    assert column(second, "force_left_n") == pytest.approx(0.5 * force)
+    assert column(second, "force_right_n") == pytest.approx(0.5 * force)
+    channels = [(one.name, one.unit) for one in first.recording.channels]
+    assert channels == [("finger1", "N"), ("finger2", "N"), ("finger3", "N")]
+    assert first.recording.readings[-1].signals.finger2 == pytest.approx(0.5 * force[-1])
+    assert "the left pad is max(finger1, finger2), the right pad is finger3" in first.recording.notes
+
+
+BIOTAC = """
+    files = "data/{material}_{object:d}_{order:d}_HOLD.mat"
+    label = "{material}"
+    instance = "{object}"
+    rate_hz = 100
+    gap = "JPos"
+    effort = "-JEff"
+    left = "F0pdc [counts]"
+    right = "F1pdc [counts]"
+    channels = { electrodes = "F0Electrodes [counts]" }
+"""
+
+
+def test_matrices_of_a_mat_file_become_columns_and_arrays(tmp_path):
+    gap, force = squeezing(offset_n=1000.0)
+    (tmp_path / "data").mkdir()
+    variables = {
+        "JPos": gap[None], "JEff": -force[None], "F0pdc": force[None].astype(np.uint16), "F1pdc": force[None],
+        "F0Electrodes": np.arange(19 * 300).reshape(19, 300),
+    }  # fmt: skip
+    for trial in (2, 10):
+        savemat(tmp_path / f"data/black_foam_110_{trial}_HOLD.mat", variables)
+
+    second, tenth = recordings(tmp_path, BIOTAC)
+
+    assert (second.order, tenth.order) == (2.0, 10.0)  # not in the order of the texts
+    assert (second.label, second.instance) == ("black_foam", "110")
+    assert second.recording.units == {"force_left": "counts", "force_right": "counts"}
+    assert column(second, "effort_n") == pytest.approx(force)
+    (array,) = second.recording.channels
+    assert (array.name, array.unit, array.cells) == ("electrodes", "counts", 19)
+    assert second.recording.readings[5].signals.electrodes.cells == tuple(5.0 + 300.0 * k for k in range(19))
+
+
+STABILITY = """
+    files = "palm_{palm}.csv"
+    split = "rows"
+    label = "slipped{slipped}"
+    instance = "{object}"
+    left = "mean('ff_biotac_*', 'mf_biotac_*') [counts]"
+    right = "mean('th_biotac_*') [counts]"
+    channels = { first_finger = "'ff_biotac_*' [counts]", thumb = "'th_biotac_*' [counts]" }
+"""
+
+
+def test_each_row_of_a_table_is_a_reading_with_its_arrays(tmp_path):
+    fingers = ("ff", "mf", "th")
+    names = ["object", "slipped", *(f"{one}_biotac_{k}" for one in fingers for k in range(1, 25))]
+    rows = [["pringles", 0, *range(72)], ["toy car", 1, *range(100, 172)]]
+    (tmp_path / "palm_down.csv").write_text(
+        "\n".join(",".join(map(str, row)) for row in [names, *rows]) + "\n"
+    )
+
+    stable, slipped = recordings(tmp_path, STABILITY)
+
+    assert (stable.label, slipped.label, slipped.instance) == ("slipped0", "slipped1", "toy_car")
+    (reading,) = slipped.recording.readings
+    assert (reading.frame.force_left_n, reading.frame.force_right_n) == (123.5, 159.5)
+    assert reading.signals.thumb.cells == tuple(range(148, 172))
+    assert slipped.recording.units["t"] == "sample"
+
+
+TAPS = """
+    files = "taps.npz"
+    split = "tap"
+    label = "{material}"
+    rate_hz = 100
+    gap = "spread [mm]"
+    force = "sum(taxels)*0.1"
+    channels = { fingertip = "taxels [counts]" }
+    zero = "20 samples"
+    list = ""
+    order = "{tap}"
+"""
+
+
+def test_taps_in_one_array_are_split_by_a_column(tmp_path):
+    gap, force = squeezing()
+    np.savez(
+        tmp_path / "taps.npz",
+        tap=np.repeat([1, 2], 300),
+        material=np.array("felt"),
+        spread=np.tile(gap, 2) * 1e3,
+        taxels=np.tile(np.outer(10.0 * force, np.full(24, 1 / 24)) + 7.0, (2, 1)),
+    )
+
+    first, second = recordings(tmp_path, TAPS)
+
+    assert (first.label, first.order, second.order) == ("felt", 1.0, 2.0)
+    assert column(second, "force_left_n") == pytest.approx(force, abs=1e-9)
+    assert second.recording.readings[0].signals.fingertip.cells == pytest.approx((0.0,) * 24)
+
+
+# Formats.
+
+PLAIN = """
+    files = "{label}.*"
+    time = "t"
+    gap = "gap [mm]"
+    force = "F"
+"""
+
+
+def texts(separator, decimal=".", comment=""):
+    gap, force = squeezing()
+    lines = [comment] if comment else []
+    lines.append(separator.join(("t", "gap", "F")))
+    for row in zip(T_S, gap * 1e3, force, strict=True):
+        lines.append(separator.join(f"{value:.6f}".replace(".", decimal) for value in row))
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("jar.csv", texts(",")),
+        ("jar.csv", texts(";", ",", "# written by a logger")),
+        ("jar.tsv", texts("\t", ",")),
+        ("jar.txt", texts("  ")),
+        ("jar.dat", texts(" ", ",", "% MATLAB")),
+        ("jar.csv", "\ufeff" + texts(",").replace("\n", "\r\n")),
+    ],
+)
+def test_text_files_as_programs_write_them(name, text, tmp_path):
+    (tmp_path / name).write_text(text, newline="")
+    (one,) = recordings(tmp_path, PLAIN)
+    gap, force = squeezing()
+    assert column(one, "t_s") == pytest.approx(T_S)
+    assert column(one, "gap_m") == pytest.approx(gap, abs=1e-9)
+    assert column(one, "force_right_n") == pytest.approx(force, abs=1e-6)
+
+
+def test_columns_without_names_have_numbers(tmp_path):
+    (tmp_path / "jar.txt").write_text("\n".join(texts(" ").splitlines()[1:]))
+    (one,) = recordings(
+        tmp_path, PLAIN.replace('"t"', '"c1"').replace("gap [mm]", "c2 [mm]").replace('"F"', '"c3"')
+    )
+    assert column(one, "gap_m") == pytest.approx(squeezing()[0], abs=1e-9)
+
+
+def test_npy_of_three_dimensions_has_a_grasp_for_each_index(tmp_path):
+    gap, force = squeezing()
+    np.save(tmp_path / "jar.npy", np.stack([np.column_stack([T_S, gap, k * force]) for k in (1, 2)]))
+    first, second = recordings(
+        tmp_path, 'files = "{label}.npy"\ntime = "c1"\ngap = "c2"\nforce = "c3"\norder = "{part}"'
+    )
+    assert (first.order, second.order) == (0.0, 1.0)
+    assert column(second, "force_left_n") == pytest.approx(2 * force)
+
+
+def test_pickled_objects_are_never_loaded(tmp_path):
+    np.save(tmp_path / "jar.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    with pytest.raises(
+        DataDamaged, match="Python objects in it are not loaded, because that can run any code"
+    ):
+        recordings(tmp_path, 'files = "{label}.npy"\nrate_hz = 100\ngap = "c1"\nforce = "c2"')
+
+
+def test_parquet(tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
+    import pyarrow
+
+    gap, force = squeezing()
+    parquet.write_table(pyarrow.table({"t": T_S, "gap": gap * 1e3, "F": force}), tmp_path / "jar.parquet")
+    (one,) = recordings(tmp_path, PLAIN)
+    assert column(one, "gap_m") == pytest.approx(gap, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["bag", "mcap"])
+def test_ros_bags_with_topics_of_different_rates(kind, tmp_path):
+    pytest.importorskip("rosbags", reason="needs the extra ros")
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import StoragePlugin
+    from rosbags.rosbag2 import Writer as Writer2
+    from rosbags.typesys import Stores, get_typestore
+
+    gap, force = squeezing()
+    ros1 = kind == "bag"
+    store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    place = tmp_path / "jar.bag" if ros1 else tmp_path / "written"
+    writer = Writer1(place) if ros1 else Writer2(place, version=9, storage_plugin=StoragePlugin.MCAP)
+    number, several = store.types["std_msgs/msg/Float64"], store.types["std_msgs/msg/Float64MultiArray"]
+    layout = store.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
+    encode = store.serialize_ros1 if ros1 else store.serialize_cdr
+    with writer:
+        width = writer.add_connection("/hand/width", "std_msgs/msg/Float64", typestore=store)
+        forces = writer.add_connection("/hand/forces", "std_msgs/msg/Float64MultiArray", typestore=store)
+        for k, t_s in enumerate(T_S):
+            at = 10**18 + round(t_s * 1e9)
+            writer.write(width, at, encode(number(gap[k]), "std_msgs/msg/Float64"))
+            if k % 2 == 0:
+                message = several(layout, np.array([force[k], 2 * force[k]]))
+                writer.write(forces, at, encode(message, "std_msgs/msg/Float64MultiArray"))
+    if not ros1:
+        (next(place.glob("*.mcap"))).rename(tmp_path / "jar.mcap")
+        (place / "metadata.yaml").unlink()
+
+    (one,) = recordings(
+        tmp_path,
+        """
+        files = "{label}.*"
+        gap = "'/hand/width.data'"
+        left = "'/hand/forces.data'[0]"
+        right = "'/hand/forces.data'[1]"
+        """,
+    )
+
+    assert column(one, "t_s") == pytest.approx(T_S, abs=1e-6)
+    assert column(one, "gap_m") == pytest.approx(gap)
+    assert column(one, "force_right_n") == pytest.approx(2 * np.repeat(force[::2], 2))  # the last value holds
+
+
+# Steps.
+
+
+def plain(folder, extra, *, force=None, gap=None, time=None):
+    own_gap, own_force = squeezing()
+    gap, force = own_gap if gap is None else gap, own_force if force is None else force
+    pandas_csv(folder / "jar.csv", {"t": T_S if time is None else time, "gap": gap * 1e3, "F": force})
+    return recordings(folder, PLAIN + extra)
+
+
+def test_zero_is_taken_from_the_first_samples_or_seconds(tmp_path):
+    _, force = squeezing()
+    for zero in ("20 samples", "0.2 s", "200 ms"):
+        (one,) = plain(tmp_path, f'zero = "{zero}"', force=force + 5.0)
+        assert column(one, "force_left_n") == pytest.approx(force, abs=1e-9)
+
+
+def test_squeezes_are_found_from_the_force(tmp_path):
+    gap, force = squeezing()
+    there_and_back = np.concatenate([force, force[::-1]] * 3)
+    gaps = np.concatenate([gap, gap[::-1]] * 3)
+    found = plain(tmp_path, 'split = "force"', force=there_and_back, gap=gaps, time=np.arange(1800) / RATE_HZ)
+    assert len(found) == 3
+    assert all(column(one, "force_left_n").max() == pytest.approx(20.0) for one in found)
+    assert [one.source for one in found] == [f"jar.csv, squeeze {k}" for k in (1, 2, 3)]
+
+
+def test_a_grasp_is_cut_at_its_release(tmp_path):
+    _, force = squeezing()
+    force[250:] = 0.0
+    (one,) = plain(tmp_path, 'cut = "release"', force=force)
+    assert len(one.recording.readings) == 250
+
+
+def test_it_is_resampled(tmp_path):
+    (one,) = plain(tmp_path, "resample_hz = 50")
+    assert one.recording.rate_hz == pytest.approx(50.0)
+    assert column(one, "gap_m") == pytest.approx(squeezing()[0][::2], abs=1e-9)
+
+
+def test_a_list_names_files_and_rows_with_their_facts(tmp_path):
+    gap, force = squeezing()
+    pandas_csv(tmp_path / "all.csv", {"gap": np.tile(gap, 2), "F": np.tile(force, 2)})
+    (tmp_path / "list.csv").write_text(
+        "file,label,instance,recorded,order,first_row,last_row\n"
+        "all.csv,jar:full,3,2024-11-24T15:13:19,1,1,300\nall.csv,jar:open,4,1732461199,2,301,600\n"
+    )
+    first, second = recordings(tmp_path, 'list = "list.csv"\nrate_hz = 100\ngap = "gap"\nforce = "F"')
+    assert (first.label, first.instance, second.label, second.order) == ("jar:full", "3", "jar:open", 2.0)
+    assert first.recorded_at == second.recorded_at == "2024-11-24T15:13:19+00:00"
+    assert first.source == "all.csv, rows 1 to 300"
+    assert column(second, "gap_m") == pytest.approx(gap)
+
+
+# What looks wrong.
+
+
+@pytest.mark.parametrize(
+    ("columns", "says"),
+    [
+        ({"gap": 0.1 - squeezing()[0]}, 'the gap rises while the force rises: .*gap = "0.1 - POSITION"'),
+        ({"force": np.round(20 * squeezing()[1])}, r'whole numbers, as counts .*force = "COLUMN \[counts\]"'),
+        ({"force": squeezing()[1] + 30.0}, 'the force does not begin at zero: .*zero = "10 samples"'),
+        ({"force": -squeezing()[1]}, "the force is negative where it is largest: .*-FORCE"),
+        ({"force": 10.0 + 2.0 * np.cos(T_S)}, "the recording begins in contact: there is no approach"),
+        ({"gap": np.full(300, 0.05)}, "the gap does not change"),
+    ],
+)  # fmt: skip
+def test_what_looks_wrong_is_noticed_with_its_remedy(columns, says, tmp_path):
+    (one,) = plain(tmp_path, "", **columns)
+    assert [notice for notice in one.notices if re.search(says, notice)], one.notices
+    (fine,) = plain(tmp_path, "")
+    assert fine.notices == ()
+
+
+def test_a_gap_in_millimetres_and_counts_called_newtons_are_refused(tmp_path):
+    pandas_csv(tmp_path / "jar.csv", {"t": T_S, "gap": squeezing()[0] * 1e3, "F": squeezing()[1]})
+    with pytest.raises(DataDamaged, match=r"the gap reaches 60 m, which no gripper has.*\[mm\]"):
+        recordings(tmp_path, PLAIN.replace("gap [mm]", "gap"))
+    pandas_csv(tmp_path / "jar.csv", {"t": T_S, "gap": squeezing()[0] * 1e3, "F": squeezing()[1] + 3000})
+    with pytest.raises(DataDamaged, match=r"the force reaches 3020 N.*\[counts\]"):
+        recordings(tmp_path, PLAIN)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('files = "{label}.csv"\ngap = "g"', r"manifest.toml: a grasp needs its force"),
+        ('files = "x.csv"\ngap = "gap"\nforce = "F"', r'manifest.toml: no label: write label = "\{field\}"'),
+        (
+            PLAIN.replace('"F"', '"Force"'),
+            r"force, for jar.csv: no column 'Force'\. Columns: index, t, gap, F",
+        ),
+        (PLAIN.replace('"t"', '"t +"'), r"manifest.toml:\d: time: this is not an expression"),
+        (
+            PLAIN + 'cutt = "release"',
+            r"manifest.toml:\d: cutt: a manifest has no key 'cutt'\. Did you mean 'cut'",
+        ),
+        (
+            PLAIN + 'zero = "ten"',
+            r"manifest.toml:\d: zero: 'ten' is neither a number of samples nor of seconds",
+        ),
+        (
+            PLAIN.replace("{label}", "{label}s"),
+            r"no file in .* matches '\{label\}s\.\*'\. It contains.*jar\.csv",
+        ),
+        (
+            PLAIN + 'label = "{name}"',
+            r"label: jar.csv has no field or column 'name'\. It has: label, index, t, gap, F",
+        ),
+        (PLAIN + 'recorded = "{label}"', r"recorded: 'jar' of jar.csv is not a time"),
+        (PLAIN + 'split = "trial"', r"split: jar.csv has no column 'trial'"),
+        (PLAIN + 'values = { hardness = "F" }', r"values.hardness changes during jar.csv: take peak"),
+        (PLAIN.replace('time = "t"', ""), r"jar.csv has no time: write time = .* or rate_hz = 100"),
+        (PLAIN + 'start = "("', r"manifest.toml:\d: start: '\(' is not a regular expression"),
+        (PLAIN + 'folder = "elsewhere"', "there is no folder .*elsewhere"),
+    ],
+)
+def test_a_mistake_in_a_manifest_is_told_with_what_is_allowed(text, says, tmp_path):
+    gap, force = squeezing()
+    pandas_csv(tmp_path / "jar.csv", {"t": T_S, "gap": gap * 1e3, "F": force})
+    with pytest.raises(ConfigError, match=says):
+        recordings(tmp_path, text)
+
+
+# The commands.
+
+
+def test_a_whole_set_is_imported_evaluated_and_replayed(tmp_path, capsys):
+    _, force = jaco(tmp_path / "data.csv")
+    described, store = manifest(tmp_path, JACO), tmp_path / "store"
+
+    code, out, err = run(capsys, "import", described, "--save", store, "-o", "classifier.type=none", "--json")
+
+    assert code == 0, err
+    assert [one["trial"] for one in json.loads(out)["trials"]] == [1, 2]
+    with Store.read(store) as opened:
+        labels = [dict(opened.trial(number).record.labels) for number in (1, 2)]
+        recording = read_recorded(opened.trial(1).recording)
+        assert opened.trial(1).record.provenance["source"] == "data.csv, line 3"
+    assert labels[0] == {"label": "object17", "recorded_at": "2020-06-15T15:11:27.442126+00:00", "order": "0"}
+    assert recording.readings()[-1].signals.finger2 == pytest.approx(0.5 * force[-1])
+    assert [one.name for one in recording.channels] == ["finger1", "finger2", "finger3"]
+    features = json.loads(run(capsys, "replay", f"{store}#1", "--json")[1])["features"]
+    same = json.loads(run(capsys, "replay", f"manifest:{described}#1", "--pipeline", "default",
+        "-o", "classifier.type=none", "--json")[1])["features"]  # fmt: skip
+    assert features["p_first"] == pytest.approx(same["p_first"], abs=2e-3)
+    code, _, err = run(capsys, "import", described, "--save", store, "-o", "classifier.type=none")
+    assert (code, "same content as trial 1" in err) == (2, True)
+    code, _, err = run(capsys, "replay", f"manifest:{described}#3")
+    assert (code, "fewer than 3 recordings" in err) == (2, True)
+
+
+def test_check_says_what_it_understood_and_draws_a_grasp_without_storing(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("matplotlib", reason="needs the extra plot")
+    jaco(tmp_path / "data.csv")
+    monkeypatch.chdir(tmp_path)
+    described = manifest(tmp_path, JACO)
+
+    code, out, err = run(capsys, "import", described, "--check", "-o", "classifier.type=none")
+
+    assert code == 0, err
+    assert "object17  1       unknown  300      100       40 to 60  0 to 20  0 to 20" in out
+    assert "channels    finger1 [N], finger2 [N], finger3 [N]" in out
+    assert "recorded    2020-06-15T15:11:27.442126+00:00 to 2020-06-15T15:12:27.442126+00:00" in out
+    assert (tmp_path / "import-check.png").read_bytes().startswith(b"\x89PNG")
+    assert not (tmp_path / "store").exists()
+    code, _, err = run(capsys, "import", described)
+    assert (code, "--save DIR. Or look at the recordings first: --check" in err) == (2, True)
