@@ -23,6 +23,7 @@ from graspsense import plugin_api
 from graspsense.core import contact, entries, hookspecs, roles, signals, strict, tick
 from graspsense.core.entries import DECLARED, TABLE_OF_ROLE
 from graspsense.core.features import Features, FeatureTable, Prediction
+from graspsense.core.reasons import Contribution, FeatureValue, Reason
 from graspsense.core.trace import ImageTrace, SampleTrace, Trace
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
 from graspsense.scaffold.make import KINDS, plugin_module, words_of
@@ -77,7 +78,20 @@ FURTHER = {
 FLOWING: tuple[Any, ...] = (
     *(signals.Reading, signals.Frame, signals.Pads, signals.Image, signals.Samples, signals.Command),
     *(entries.Channel, entries.TactileArray, entries.FastChannel, roles.DeviceInfo),
-    *(Trace, ImageTrace, SampleTrace, Features, FeatureTable, Prediction, RunInfo, GraspEvent, Trial),
+    *(
+        Trace,
+        ImageTrace,
+        SampleTrace,
+        Features,
+        FeatureTable,
+        Prediction,
+        Reason,
+        FeatureValue,
+        Contribution,
+        RunInfo,
+        GraspEvent,
+        Trial,
+    ),
 )
 HEAD = "<!-- Written by docs/role_pages.py from the code: change that. -->\n"
 

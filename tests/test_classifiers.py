@@ -14,7 +14,7 @@ from graspsense.core.errors import ConfigError
 from graspsense.core.features import Features, FeatureTable
 from graspsense.plugin_api import create
 
-ALL = ["c45", "svm", "mlp", "forest", "knn", "tree"]
+ALL = ["c45", "svm", "mlp", "forest", "boosted", "knn", "tree"]
 NAMES, UNITS = ("p_first", "f_steady", "noise"), ("m", "N", "")
 
 
@@ -74,7 +74,9 @@ class TestEvery:
         )
         said = classifier.explain(row)
         assert said.label == "can:full"
-        assert any("f_steady is missing" in one and "never came to rest" in one for one in said.because)
+        assert any(
+            "f_steady is missing" in one.words and "never came to rest" in one.words for one in said.because
+        )
 
     def test_a_feature_that_no_trial_had_and_one_that_is_constant(self, name):
         table, labels = trials()
@@ -142,15 +144,17 @@ def test_trees_tell_their_path_in_the_features_own_units():
     row = Features(names=NAMES, values=(0.0661, 8.0, 0.0), units=UNITS)
     for name in ("c45", "tree"):
         because = fitted(name, table, labels).explain(row).because
-        assert any(one.startswith("p_first = 66.1 mm > ") and one.endswith(" mm") for one in because)
-        assert "training trials" in because[-1]
+        assert any(
+            one.words.startswith("p_first = 66.1 mm > ") and one.words.endswith(" mm") for one in because
+        )
+        assert "training trials" in because[-1].words
 
 
 def test_neighbours_tell_their_votes():
     row = Features(names=NAMES, values=(0.0661, 8.0, 0.0), units=UNITS)
     because = fitted("knn", *trials(), neighbours=7).explain(row).because
 
-    assert because[-1].startswith("7 of the 7 nearest training trials are can:full; the nearest is ")
+    assert because[-1].words.startswith("7 of the 7 nearest training trials are can:full; the nearest is ")
 
 
 def test_more_neighbours_than_trials():

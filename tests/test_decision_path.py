@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense.core.decision_path import FeatureRange, SplitTest, feature_ranges, path_in_words
+from graspsense.core.decision_path import FeatureRange, SplitTest, feature_ranges, path_reasons
 from graspsense.core.features import Features, FeatureTable, Prediction
 from graspsense.core.units import in_words_apart
 from graspsense.plugin_api import create
@@ -28,7 +28,7 @@ def test_the_ranges_accept_exactly_what_all_the_tests_accept(tests, value, other
     for name in "abc":
         accepted = all((other > test.threshold) == test.above for test in path if test.feature == name)
         assert (name not in ranges or ranges[name].contains(other)) == accepted
-    assert len(path_in_words(path)) == len({name for name, _ in tests})
+    assert len(path_reasons(path)) == len({name for name, _ in tests})
 
 
 @given(values=st.lists(NUMBERS, min_size=1, max_size=4))
@@ -44,10 +44,11 @@ def test_the_tightest_bound_is_told_with_the_unit_for_people():
     def test(threshold: float, above: bool) -> SplitTest:
         return SplitTest(feature="p_first", unit="m", value=0.0579, threshold=threshold, above=above)
 
-    assert path_in_words([test(0.0569, True), test(0.057, True)]) == ("p_first = 57.9 mm > 57 mm",)
-    assert path_in_words([test(0.0569, True), test(0.0599, False)]) == (
-        "56.9 mm < p_first = 57.9 mm <= 59.9 mm",
-    )
+    (above,) = path_reasons([test(0.0569, True), test(0.057, True)])
+    assert above.words == "p_first = 57.9 mm > 57 mm"
+    assert (above.features[0].value, above.above, above.up_to) == (0.0579, 0.057, None)
+    (between,) = path_reasons([test(0.0569, True), test(0.0599, False)])
+    assert between.words == "56.9 mm < p_first = 57.9 mm <= 59.9 mm"
     assert FeatureRange(feature="f", unit="1", value=0.5, high=0.50001).words == "f = 0.5 <= 0.50001"
 
 
@@ -61,7 +62,7 @@ def test_trials_within_the_told_ranges_have_the_same_prediction(name):
     several = 0
     for a, b in rng.uniform(0.0, 0.1, (50, 2)).tolist():
         said = classifier.explain(Features(names=("a", "b"), values=(a, b), units=("m", "m")))
-        tests = [one for one in said.because if " = " in one]
+        tests = [one.words for one in said.because if " = " in one.words]
         assert len(tests) == len({re.search(r"(\w) = ", one)[1] for one in tests})
         several += any("<" in one.split(" = ")[0] for one in tests)
         # Within the printed bounds, which are rounded, the label does not change.

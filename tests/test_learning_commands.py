@@ -93,7 +93,7 @@ def test_train_then_predict(run, csv, tmp_path):
     assert [one["label"] for one in found["predictions"]][:3] == ["can:full", "jar:empty", "unknown"]
     assert found["unknown"] == 1
     assert found["rate"] is None
-    assert any("f_steady is missing" in one for one in found["predictions"][3]["because"])
+    assert any("f_steady is missing" in one["words"] for one in found["predictions"][3]["because"])
 
     code, out, _ = run("predict", model, csv, "--label", "what")
     assert code == 0

@@ -85,8 +85,10 @@ def test_a_thing_unlike_anything_is_unknown_and_says_why():
     said = model().predict(Features(names=NAMES, values=(0.03, 8.0, 0.0), units=UNITS))
 
     assert said.label == UNKNOWN
-    assert said.because[0].startswith("p_first = 30 mm is unlike everything trained on: the nearest, bottle:")
-    assert said.because[1].startswith("of the known labels, the nearest is bottle:")
+    assert said.because[0].words.startswith(
+        "p_first = 30 mm is unlike everything trained on: the nearest, bottle:"
+    )
+    assert said.because[1].words.startswith("of the known labels, the nearest is bottle:")
 
 
 def test_nothing_felt_is_unknown_with_the_reason():
@@ -94,7 +96,7 @@ def test_nothing_felt_is_unknown_with_the_reason():
         names=NAMES, values=(math.nan,) * 3, units=UNITS, reasons=dict.fromkeys(NAMES, "no contact")
     )
 
-    assert model().predict(nothing).because == ("no feature is defined: no contact",)
+    assert [one.words for one in model().predict(nothing).because] == ["no feature is defined: no contact"]
 
 
 @pytest.mark.parametrize(
@@ -111,7 +113,7 @@ def test_other_features_or_units_cannot_be_judged(features, why):
     said = model().predict(features)
 
     assert (said.label, said.probabilities) == (UNKNOWN, {})
-    assert why in said.because[0]
+    assert why in said.because[0].words
 
 
 def test_further_features_and_another_order_do_no_harm():

@@ -8,6 +8,7 @@ import pytest
 
 from graspsense.core.features import Features, FeatureTable
 from graspsense.core.novelty import REACH, novelty_from, novelty_of
+from graspsense.core.reasons import FeatureValue
 
 NAMES, UNITS = ("p_first", "delta_t"), ("m", "s")
 
@@ -44,9 +45,12 @@ def test_the_edge_of_the_known_is_three_spreads_outside_a_class(share):
 
 
 def test_the_reason_names_the_feature_the_value_and_the_nearest_class_in_units():
-    assert SPAN.unlike(features(0.030, 0.3)) == (
+    reason = SPAN.unlike(features(0.030, 0.3))
+
+    assert reason.words == (
         "p_first = 30 mm is unlike everything trained on: the nearest, bottle, has 57 mm to 59 mm"
     )
+    assert reason.features == (FeatureValue("p_first", 0.030, "m"),)
 
 
 def test_like_one_class_in_one_feature_and_another_in_the_other_is_unknown():
@@ -60,7 +64,7 @@ def test_like_one_class_in_one_feature_and_another_in_the_other_is_unknown():
 def test_a_missing_feature_is_not_judged_and_no_feature_at_all_is_unknown():
     assert SPAN.unlike(features(0.058, math.nan)) is None
     assert SPAN.unlike(features(0.030, math.nan)) is not None
-    assert SPAN.unlike(features(math.nan, math.nan)) == "no feature is defined: the recording ended"
+    assert SPAN.unlike(features(math.nan, math.nan)).words == "no feature is defined: the recording ended"
     assert SPAN.unlike_rows(table([[math.nan, math.nan]])).tolist() == [True]
 
 

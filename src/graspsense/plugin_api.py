@@ -124,8 +124,9 @@ _TABLE: Final[Table] = {
         "units": ("in_words",),
     },
     "Classifiers": {
-        "decision_path": ("SplitTest", "leaf_in_words", "path_in_words"),
+        "decision_path": ("SplitTest", "leaf_reason", "path_reasons"),
         "features": ("UNKNOWN", "FeatureTable", "Prediction", "table_of"),
+        "reasons": ("Contribution", "FeatureValue", "Reason", "contribution_reasons", "missing_feature"),
         "roles": ("Classifier", "ClassifierConfig"),
         "tree": ("TreeNode",),
     },

@@ -121,12 +121,17 @@ from graspsense.core.units import in_words as in_words
 
 # Classifiers
 from graspsense.core.decision_path import SplitTest as SplitTest
-from graspsense.core.decision_path import leaf_in_words as leaf_in_words
-from graspsense.core.decision_path import path_in_words as path_in_words
+from graspsense.core.decision_path import leaf_reason as leaf_reason
+from graspsense.core.decision_path import path_reasons as path_reasons
 from graspsense.core.features import UNKNOWN as UNKNOWN
 from graspsense.core.features import FeatureTable as FeatureTable
 from graspsense.core.features import Prediction as Prediction
 from graspsense.core.features import table_of as table_of
+from graspsense.core.reasons import Contribution as Contribution
+from graspsense.core.reasons import FeatureValue as FeatureValue
+from graspsense.core.reasons import Reason as Reason
+from graspsense.core.reasons import contribution_reasons as contribution_reasons
+from graspsense.core.reasons import missing_feature as missing_feature
 from graspsense.core.roles import Classifier as Classifier
 from graspsense.core.roles import ClassifierConfig as ClassifierConfig
 from graspsense.core.tree import TreeNode as TreeNode

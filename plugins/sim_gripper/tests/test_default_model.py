@@ -32,7 +32,9 @@ def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
     assert said.prediction_set[0] == name
     assert said.coverage == 0.9
     assert said.probabilities[name] == max(said.probabilities.values())
-    assert any(step.startswith(("p_first ", "p_steady ", "f_steady ", "delta_t ")) for step in said.because)
+    assert any(
+        step.words.startswith(("p_first ", "p_steady ", "f_steady ", "delta_t ")) for step in said.because
+    )
     assert "simulated grasps at 20 N, 10 mm/s" in said.model
     assert said.warnings == (
         "trained on simulated grasps: valid for the simulator, untested on real objects",
@@ -45,14 +47,14 @@ def test_what_it_never_saw_is_unknown(pipeline, name, seed):
     said = pipeline.grasp(object=name, seed=seed).prediction
 
     assert said.label == "unknown"
-    assert "is unlike everything trained on" in said.because[0]
+    assert "is unlike everything trained on" in said.because[0].words
 
 
 def test_nothing_there_is_unknown(pipeline):
     said = pipeline.grasp(object="none").prediction
 
     assert said.label == "unknown"
-    assert said.because == ("no feature is defined: no pad felt 0.625 N",)
+    assert [one.words for one in said.because] == ["no feature is defined: no pad felt 0.625 N"]
 
 
 def test_its_sets_are_calibrated_for_each_label():

@@ -118,7 +118,8 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
         certainty = percent(one.certainty) if one.certainty is not None else ""
         of_set = () if coverage is None else (" or ".join(one.prediction_set),)
         label = (labels[i], "yes" if one.label == labels[i] else "no") if labels else ()
-        rows.append((str(i + 1), one.label, certainty, *of_set, *label, "; ".join(one.because)))
+        because = "; ".join(reason.words for reason in one.because)
+        rows.append((str(i + 1), one.label, certainty, *of_set, *label, because))
     echo_table(header, rows, {"PREDICTION": prediction_style, "CORRECT": correct_style})
 
 
@@ -152,12 +153,5 @@ def _known(prediction: Prediction) -> bool:
 
 
 def _as_json(prediction: Prediction, truth: str | None) -> dict[str, Any]:
-    found = {
-        "label": prediction.label,
-        "probabilities": dict(prediction.probabilities),
-        "support": None if prediction.support is None else list(prediction.support),
-        "prediction_set": list(prediction.prediction_set),
-        "coverage": prediction.coverage,
-        "because": list(prediction.because),
-    }
+    found = prediction.as_json()
     return found if truth is None else {**found, "truth": truth}

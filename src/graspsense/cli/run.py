@@ -224,8 +224,8 @@ def _print_prediction(prediction: Prediction) -> None:
     echo_entry("prediction", f"{prediction.label}{certainty}", prediction_style(prediction.label))
     if prediction.set_in_words:
         echo_entry("set", prediction.set_in_words)
-    for step in prediction.because:
-        echo_entry("", step)
+    for reason in prediction.because:
+        echo_entry("", reason.words)
     echo_entry("model", prediction.model)
     for warning in prediction.warnings:
         echo_entry("warning", warning, Style.CAUTION)

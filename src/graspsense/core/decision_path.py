@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from attrs import evolve, frozen
 
+from graspsense.core.reasons import FeatureValue, Reason, missing_feature
 from graspsense.core.units import in_words, in_words_apart
 
 
@@ -72,17 +73,30 @@ def feature_ranges(tests: Sequence[SplitTest]) -> tuple[FeatureRange, ...]:
     return tuple(ranges.values())
 
 
-def path_in_words(tests: Sequence[SplitTest]) -> tuple[str, ...]:
+def path_reasons(tests: Sequence[SplitTest]) -> tuple[Reason, ...]:
     """Return the reasons of a decision tree: the tightest bounds of each feature, and what was missing."""
     missing = [
-        f"{test.feature} is missing: taken as {'>' if test.above else '<='} {in_words(test.threshold, test.unit)}, "
-        f"like {100 * test.share:.0f} % of the training trials that came here"
+        missing_feature(
+            test.feature,
+            test.unit,
+            f": taken as {'>' if test.above else '<='} {in_words(test.threshold, test.unit)}, "
+            f"like {100 * test.share:.0f} % of the training trials that came here",
+        )
         for test in tests
         if math.isnan(test.value)
     ]
-    return (*(one.words for one in feature_ranges(tests)), *missing)
+    return (*(_of_range(one) for one in feature_ranges(tests)), *missing)
 
 
-def leaf_in_words(with_label: float, trials: float, label: str) -> str:
+def leaf_reason(with_label: float, trials: float, label: str) -> Reason:
     """Return what the training trials at a leaf were."""
-    return f"{with_label:.4g} of the {trials:.4g} training trials in this leaf were {label}"
+    return Reason(words=f"{with_label:.4g} of the {trials:.4g} training trials in this leaf were {label}")
+
+
+def _of_range(one: FeatureRange) -> Reason:
+    return Reason(
+        words=one.words,
+        features=(FeatureValue(one.feature, one.value, one.unit),),
+        above=one.low if math.isfinite(one.low) else None,
+        up_to=one.high if math.isfinite(one.high) else None,
+    )

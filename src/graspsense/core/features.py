@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from attrs import field, frozen
+
+from graspsense.core.reasons import Reason
 
 if TYPE_CHECKING:
     import numpy as np
@@ -121,22 +123,26 @@ def _texts(items: Iterable[str]) -> tuple[str, ...]:
     return tuple(items)
 
 
+def _reasons(items: Iterable[Reason | str]) -> tuple[Reason, ...]:
+    return tuple(one if isinstance(one, Reason) else Reason(words=one) for one in items)
+
+
 @frozen(kw_only=True)
 class Prediction:
     """The prediction of a classifier for one trial.
 
     `label` is a class, or `unknown` for a trial far outside the training data. `probabilities` sum to 1; they are empty
-    if the model could not be applied. `because` is the reason in words and units, with one step in each item. `model`
-    describes in one line what the model was trained on. `support` is None, or two
-    numbers of training trials from which the probability of the label was computed: those with the label, and all of
-    those in the leaf of the tree, or among the nearest. `prediction_set` has the labels that cannot be ruled out, the
-    most probable first: it contains the true label of a new object with the probability `coverage`. It is empty, and
-    `coverage` None, if the model is not calibrated or the trial is unknown.
+    if the model could not be applied. `because` has the reasons (`Reason`) in words and units; a text that is given
+    becomes a reason without values. `model` describes in one line what the model was trained on. `support` is None, or
+    two numbers of training trials from which the probability of the label was computed: those with the label, and all
+    of those in the leaf of the tree, or among the nearest. `prediction_set` has the labels that cannot be ruled out,
+    the most probable first: it contains the true label of a new object with the probability `coverage`. It is empty,
+    and `coverage` None, if the model is not calibrated or the trial is unknown.
     """
 
     label: str
     probabilities: Mapping[str, float]
-    because: tuple[str, ...] = field(converter=_texts)
+    because: tuple[Reason, ...] = field(converter=_reasons)
     warnings: tuple[str, ...] = field(default=(), converter=_texts)
     model: str = ""
     support: tuple[float, float] | None = None
@@ -172,6 +178,17 @@ class Prediction:
         with_label, trials = self.support
         about = percent(self.certainty).removeprefix("over ")
         return f"about {about}: {with_label:.4g} of {trials:.4g} training trials"
+
+    def as_json(self) -> dict[str, Any]:
+        """Return label, probabilities, set and reasons as `--json` prints them."""
+        return {
+            "label": self.label,
+            "probabilities": dict(self.probabilities),
+            "support": None if self.support is None else list(self.support),
+            "prediction_set": list(self.prediction_set),
+            "coverage": self.coverage,
+            "because": [one.as_json() for one in self.because],
+        }
 
     def __repr__(self) -> str:
         certainty = f", {self.certainty_in_words}" if self.certainty_in_words else ""

@@ -27,6 +27,7 @@ from graspsense.core.features import UNKNOWN, Features, FeatureTable, Prediction
 from graspsense.core.firstparty import MODELS
 from graspsense.core.json_values import json_ready, settings_from_json
 from graspsense.core.novelty import Novelty, novelty_from, novelty_of
+from graspsense.core.reasons import Reason
 from graspsense.core.setting import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ class Model:
         """
         warnings = tuple(self._warnings(settings, device))
         probabilities: Mapping[str, float] = {}
-        because: tuple[str, ...]
+        because: tuple[Reason | str, ...]
         misfit = self.misfit(features)
         if misfit:
             because = (misfit,)

@@ -69,7 +69,7 @@ def prediction_html(prediction: Prediction) -> str:
         parts.append(sentence(f"set: {prediction.set_in_words}"))
     if likely:
         parts.append(table(("class", "probability"), [(label, percent(share)) for label, share in likely]))
-    parts += [sentence(step) for step in prediction.because]
+    parts += [sentence(reason.words) for reason in prediction.because]
     parts += [sentence(f"warning: {warning}") for warning in prediction.warnings]
     if prediction.model:
         parts.append(sentence(f"model: {prediction.model}"))

@@ -15,6 +15,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.features import Features, FeatureTable
+from graspsense.core.reasons import FeatureValue, Reason
 from graspsense.core.units import in_words
 
 if TYPE_CHECKING:
@@ -44,27 +45,29 @@ class Novelty:
     featureless: bool
     """Whether a training trial had no feature at all, so that such a trial is not new."""
 
-    def unlike(self, features: Features) -> str | None:
+    def unlike(self, features: Features) -> Reason | None:
         """Return why this trial is unlike every class, or None if it is like one of them."""
         values = np.array([features[name] for name in self.names])
         if np.isnan(values).all():
             if self.featureless:
                 return None
             reasons = "; ".join(sorted(set(features.reasons.values())))
-            return f"no feature is defined: {reasons}" if reasons else "no feature is defined"
+            return Reason(words=f"no feature is defined: {reasons}" if reasons else "no feature is defined")
         outside = self._outside(values)
         worst = _worst(outside)
         k = int(np.argmin(worst))
         if worst[k] <= REACH:
             return None
         if math.isinf(worst[k]):
-            return "it has none of the features that the training trials had"
+            return Reason(words="it has none of the features that the training trials had")
         f = int(np.nanargmax(outside[k]))
         unit = self.units[f]
         low, high = (in_words(float(end[k, f]), unit) for end in (self.lowest, self.highest))
-        return (
-            f"{self.names[f]} = {in_words(float(values[f]), unit)} is unlike everything trained on: "
-            f"the nearest, {self.classes[k]}, has {low} to {high}"
+        feature = FeatureValue(self.names[f], float(values[f]), unit)
+        return Reason(
+            words=f"{feature.words} is unlike everything trained on: "
+            f"the nearest, {self.classes[k]}, has {low} to {high}",
+            features=(feature,),
         )
 
     def unlike_rows(self, table: FeatureTable) -> NDArray[np.bool_]:

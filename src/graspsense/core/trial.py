@@ -90,12 +90,7 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
         "prediction": None
         if prediction is None
         else {
-            "label": prediction.label,
-            "probabilities": dict(prediction.probabilities),
-            "support": None if prediction.support is None else list(prediction.support),
-            "prediction_set": list(prediction.prediction_set),
-            "coverage": prediction.coverage,
-            "because": list(prediction.because),
+            **prediction.as_json(),
             "warnings": list(prediction.warnings),
             "model": prediction.model,
         },

@@ -70,6 +70,7 @@ def graspsense_classifiers() -> Iterable[ClassifierEntry]:
         ("svm", "Svm", "support vector machine with a radial kernel (scikit-learn)"),
         ("mlp", "Mlp", "neural network with one hidden layer (scikit-learn)"),
         ("forest", "Forest", "random forest (scikit-learn)"),
+        ("boosted", "Boosted", "gradient-boosted trees (scikit-learn)"),
         ("knn", "Knn", "nearest neighbours (scikit-learn)"),
         ("tree", "Cart", "binary decision tree, CART (scikit-learn)"),
     ):

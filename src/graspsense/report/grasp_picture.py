@@ -71,7 +71,7 @@ def _words(trial: Trial) -> list[str]:
         return [*lines, "Prediction: none, the pipeline has no classifier"]
     certainty = f" ({prediction.certainty_in_words})" if prediction.certainty_in_words else ""
     lines += ["Prediction", f"   {prediction.label}{certainty}", "", "because"]
-    lines += [f"   {step}" for step in prediction.because]
+    lines += [f"   {reason.words}" for reason in prediction.because]
     if trial.report.get("simulated"):
         lines += ["", "simulated gripper and object"]
     return lines

@@ -232,8 +232,8 @@ def explains_its_predictions(subject: Subject) -> None:
                 f"{shares.get(label)}: write float(...)",
             )
         demand(
-            len(said.because) > 0 and all(type(one) is str and one for one in said.because),
-            f"explain gives the reasons {said.because!r}: give the reason in words and units, one step in each item",
+            len(said.because) > 0 and all(one.words for one in said.because),
+            f"explain gives the reasons {said.because!r}: give each reason in words and units",
         )
 
 

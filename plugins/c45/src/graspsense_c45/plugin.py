@@ -19,8 +19,9 @@ from graspsense.plugin_api import (
     TreeNode,
     hookimpl,
     in_words,
-    leaf_in_words,
-    path_in_words,
+    leaf_reason,
+    missing_feature,
+    path_reasons,
     setting,
 )
 
@@ -137,7 +138,7 @@ class C45(Classifier[C45Config]):
         path = explain(tree, row)
         shares = distributions(tree, [row], "numpy")[0].tolist()
         missing = [
-            f"{one.name} is missing: {features.reasons.get(one.name, 'no reason given')}"
+            missing_feature(one.name, one.unit, f": {features.reasons.get(one.name, 'no reason given')}")
             for one, value in zip(tree.schema.attributes, row, strict=True)
             if math.isnan(value)
         ]
@@ -152,13 +153,13 @@ class C45(Classifier[C45Config]):
             )
             for test in path.numeric_tests
         ]
-        leaf = leaf_in_words(path.with_label, path.support, str(path.label))
+        leaf = leaf_reason(path.with_label, path.support, str(path.label))
         # Where a tested feature is missing, the probability is a mean over leaves and not the share in this one.
         one_leaf = not any(math.isnan(test.value) for test in tests)
         return Prediction(
             label=str(path.label),
             probabilities=dict(zip(self.classes(), shares, strict=True)),
-            because=(*missing, *path_in_words(tests), leaf),
+            because=(*missing, *path_reasons(tests), leaf),
             support=(path.with_label, path.support) if one_leaf and path.support > 0 else None,
         )
 

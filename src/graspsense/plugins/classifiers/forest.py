@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from attrs import frozen
 
-from graspsense.plugin_api import setting
+from graspsense.plugin_api import FeatureValue, Reason, contribution_reasons, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier, most_likely
+from graspsense.plugins.classifiers.tree_contributions import path_contributions
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,7 +35,31 @@ class Forest(ScikitClassifier[ForestConfig]):
             n_estimators=self.config.trees, min_samples_leaf=self.config.min_leaf, random_state=seed
         )
 
-    def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
-        """Return the votes of the trees."""
-        what = f"mean of {self.config.trees} trees"
-        return (most_likely(self.shares(fitted, row)[0].tolist(), self.classes(), what),)
+    def reasons(
+        self,
+        fitted: FittedEstimator,
+        row: NDArray[np.float64],
+        given: Sequence[FeatureValue],
+        shares: Mapping[str, float],
+    ) -> Sequence[Reason]:
+        """Return the contributions of the features to the probability, and the mean of the trees."""
+        import numpy as np
+
+        label = next(iter(shares))
+        column = self.classes().index(label)
+        trees = fitted.estimator.estimators_
+        means = []
+        for one in trees:
+            values = one.tree_.value[:, 0, :]
+            means.append(values[:, column] / values.sum(axis=1))
+        start, parts = path_contributions([one.tree_ for one in trees], means, row)
+        weights = np.array([start, *parts]) / len(trees)
+        return (
+            *contribution_reasons(
+                [((feature,), value) for feature, value in zip(given, weights[1:].tolist(), strict=True)],
+                float(weights[0]),
+                scale="probability",
+                label=label,
+            ),
+            most_likely(shares, f"mean of {len(trees)} trees"),
+        )

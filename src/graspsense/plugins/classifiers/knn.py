@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from attrs import frozen
 
-from graspsense.plugin_api import ClassifierConfig, setting
+from graspsense.plugin_api import ClassifierConfig, FeatureValue, Reason, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier
 
 if TYPE_CHECKING:
@@ -35,14 +35,22 @@ class Knn(ScikitClassifier[KnnConfig]):
 
         return KNeighborsClassifier(n_neighbors=min(self.config.neighbours, trials))
 
-    def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
+    def reasons(
+        self,
+        fitted: FittedEstimator,
+        row: NDArray[np.float64],
+        given: Sequence[FeatureValue],
+        shares: Mapping[str, float],
+    ) -> Sequence[Reason]:
         """Return the votes, and the distance of the nearest trial."""
         distances, rows = fitted.estimator.kneighbors(row)
         votes = [fitted.labels[i] for i in rows[0].tolist()]
-        return (
+        label = next(iter(shares))
+        words = (
             f"{votes.count(label)} of the {len(votes)} nearest training trials are {label}; the nearest is "
-            f"{distances[0, 0]:.2g} standard deviations away",
+            f"{distances[0, 0]:.2g} standard deviations away"
         )
+        return (Reason(words=words),)
 
     def support(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float]:
         """Return the votes for the label, and all votes."""

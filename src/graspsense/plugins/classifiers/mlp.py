@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from attrs import frozen
 
-from graspsense.plugin_api import setting
+from graspsense.plugin_api import FeatureValue, Reason, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier, most_likely
 
 if TYPE_CHECKING:
@@ -43,6 +43,12 @@ class Mlp(ScikitClassifier[MlpConfig]):
             random_state=seed,
         )
 
-    def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
+    def reasons(
+        self,
+        fitted: FittedEstimator,
+        row: NDArray[np.float64],
+        given: Sequence[FeatureValue],
+        shares: Mapping[str, float],
+    ) -> Sequence[Reason]:
         """Return the most probable labels."""
-        return (most_likely(self.shares(fitted, row)[0].tolist(), self.classes(), "outputs of the network"),)
+        return (most_likely(shares, "outputs of the network"),)

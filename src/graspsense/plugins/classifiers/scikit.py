@@ -20,8 +20,11 @@ from graspsense.plugin_api import (
     ClassifierConfig,
     Features,
     FeatureTable,
+    FeatureValue,
     Prediction,
+    Reason,
     in_words,
+    missing_feature,
     setting,
 )
 
@@ -73,8 +76,18 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         """Return the unfitted estimator for this number of training trials."""
 
     @abstractmethod
-    def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
-        """Return the reasons for this label of one preprocessed trial, of shape (1, features)."""
+    def reasons(
+        self,
+        fitted: FittedEstimator,
+        row: NDArray[np.float64],
+        given: Sequence[FeatureValue],
+        shares: Mapping[str, float],
+    ) -> Sequence[Reason]:
+        """Return the reasons for the most probable label of one trial.
+
+        `row` is the preprocessed trial, of shape (1, features), `given` its features before that; `shares` are its
+        probabilities, the most probable label first.
+        """
 
     def support(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float] | None:
         """Return the training trials that the largest probability was counted from: with the label, and in all.
@@ -138,20 +151,27 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         fitted = self._model()
         values = [features[name] for name in fitted.table.names]
         row = fitted.ready(np.array([values]))
-        shares = self.shares(fitted, row)[0].tolist()
-        label = self.classes()[int(np.argmax(shares))]
+        found = self.shares(fitted, row)[0].tolist()
+        shares = dict(zip(self.classes(), found, strict=True))
+        ranked = dict(sorted(shares.items(), key=lambda one: -one[1]))
+        given = [
+            FeatureValue(name, None if math.isnan(value) else value, unit)
+            for name, unit, value in zip(fitted.table.names, fitted.table.units, values, strict=True)
+        ]
         filled = [
-            f"{name} is missing ({features.reasons.get(name, 'no reason given')}): the median in training, "
-            f"{in_words(float(fill), unit)}, stands for it"
-            for name, unit, value, fill in zip(
-                fitted.table.names, fitted.table.units, values, fitted.fill, strict=True
+            missing_feature(
+                one.name,
+                one.unit,
+                f" ({features.reasons.get(one.name, 'no reason given')}): the median in training, "
+                f"{in_words(float(fill), one.unit)}, stands for it",
             )
-            if math.isnan(value)
+            for one, fill in zip(given, fitted.fill, strict=True)
+            if one.value is None
         ]
         return Prediction(
-            label=label,
-            probabilities=dict(zip(self.classes(), shares, strict=True)),
-            because=(*filled, *self.reasons(fitted, row, label)),
+            label=self.classes()[int(np.argmax(found))],
+            probabilities=shares,
+            because=(*filled, *self.reasons(fitted, row, given, ranked)),
             warnings=self._version_warnings(),
             support=self.support(fitted, row),
         )
@@ -233,7 +253,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         )
 
 
-def most_likely(shares: Sequence[float], classes: Sequence[str], what: str) -> str:
-    """Return the three largest shares in words."""
-    best = sorted(zip(shares, classes, strict=True), key=lambda one: -one[0])[:3]
-    return f"{what}: " + ", ".join(f"{label} {share:.0%}" for share, label in best)
+def most_likely(shares: Mapping[str, float], what: str) -> Reason:
+    """Return the three largest shares in words; `shares` has the largest first."""
+    best = list(shares.items())[:3]
+    return Reason(words=f"{what}: " + ", ".join(f"{label} {share:.0%}" for label, share in best))

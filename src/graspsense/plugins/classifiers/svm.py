@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import frozen
 
-from graspsense.plugin_api import setting
+from graspsense.plugin_api import FeatureValue, Reason, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier, most_likely
 
 if TYPE_CHECKING:
@@ -48,7 +48,12 @@ class Svm(ScikitClassifier[SvmConfig]):
         powers = np.exp(values - values.max(axis=1, keepdims=True))
         return np.asarray(powers / powers.sum(axis=1, keepdims=True))
 
-    def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
+    def reasons(
+        self,
+        fitted: FittedEstimator,
+        row: NDArray[np.float64],
+        given: Sequence[FeatureValue],
+        shares: Mapping[str, float],
+    ) -> Sequence[Reason]:
         """Return the nearest labels."""
-        shares = self.shares(fitted, row)[0].tolist()
-        return (most_likely(shares, self.classes(), "softmax of the decision values (not calibrated)"),)
+        return (most_likely(shares, "softmax of the decision values (not calibrated)"),)

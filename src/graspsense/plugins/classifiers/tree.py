@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 from attrs import frozen
 
-from graspsense.plugin_api import SplitTest, leaf_in_words, path_in_words, setting
+from graspsense.plugin_api import FeatureValue, Reason, SplitTest, leaf_reason, path_reasons, setting
 from graspsense.plugins.classifiers.scikit import FittedEstimator, KeptConfig, ScikitClassifier
 
 if TYPE_CHECKING:
@@ -37,7 +37,13 @@ class Cart(ScikitClassifier[CartConfig]):
             criterion=self.config.criterion, min_samples_leaf=self.config.min_leaf, random_state=seed
         )
 
-    def reasons(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> Sequence[str]:
+    def reasons(
+        self,
+        fitted: FittedEstimator,
+        row: NDArray[np.float64],
+        given: Sequence[FeatureValue],
+        shares: Mapping[str, float],
+    ) -> Sequence[Reason]:
         """Return the path through the tree, with thresholds in the units of the features."""
         inner = fitted.estimator.tree_
         nodes = fitted.estimator.decision_path(row).indices.tolist()
@@ -53,7 +59,7 @@ class Cart(ScikitClassifier[CartConfig]):
                     above=bool(row[0, k] > inner.threshold[node]),
                 )
             )
-        return (*path_in_words(tests), leaf_in_words(*self.support(fitted, row), label))
+        return (*path_reasons(tests), leaf_reason(*self.support(fitted, row), next(iter(shares))))
 
     def support(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float]:
         """Return how many training trials in the leaf have its most frequent label, and how many there are."""

@@ -1,0 +1,94 @@
+"""Gradient-boosted trees."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from attrs import frozen
+
+from graspsense.plugin_api import ClassifierConfig, FeatureValue, Reason, contribution_reasons, setting
+from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier, most_likely
+from graspsense.plugins.classifiers.tree_contributions import means_from_leaves, path_contributions
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@frozen(kw_only=True)
+class BoostedConfig(ClassifierConfig):
+    """Settings of the boosting."""
+
+    stages: int = setting(default=100, minimum=1, plausible=(1, 10_000), meaning="Trees of each label.")
+    learning_rate: float = setting(
+        default=0.1, above=0.0, plausible=(0.001, 1.0), meaning="Factor of each tree's output."
+    )
+    depth: int = setting(
+        default=3, minimum=1, plausible=(1, 30), meaning="Largest number of tests on a path."
+    )
+    min_leaf: int = setting(default=1, minimum=1, meaning="Smallest number of training trials at a leaf.")
+    sample: float = setting(
+        default=1.0, above=0.0, maximum=1.0, meaning="Share of the training trials, drawn anew for each tree."
+    )
+
+
+class Boosted(ScikitClassifier[BoostedConfig]):
+    """Trees of which each corrects the sum of those before it, in the log-odds of the labels."""
+
+    def estimator(self, seed: int, trials: int) -> Any:
+        """Return the boosting. Its trees are public, unlike those of the histogram-based one of scikit-learn."""
+        from sklearn.ensemble import GradientBoostingClassifier
+
+        return GradientBoostingClassifier(
+            n_estimators=self.config.stages,
+            learning_rate=self.config.learning_rate,
+            max_depth=self.config.depth,
+            min_samples_leaf=self.config.min_leaf,
+            subsample=self.config.sample,
+            random_state=seed,
+        )
+
+    def reasons(
+        self,
+        fitted: FittedEstimator,
+        row: NDArray[np.float64],
+        given: Sequence[FeatureValue],
+        shares: Mapping[str, float],
+    ) -> Sequence[Reason]:
+        """Return the contributions of the features to the odds of the label against the next most probable one."""
+        label, against = list(shares)[:2]
+        total, parts = 0.0, [0.0] * len(given)
+        for sign, name in ((1.0, label), (-1.0, against)):
+            for k, value in enumerate(self._contributions(fitted, row, name)):
+                parts[k] += sign * value
+            total += sign * self._raw(fitted, row, name)
+        return (
+            *contribution_reasons(
+                [((feature,), value) for feature, value in zip(given, parts, strict=True)],
+                total - sum(parts),
+                scale="log-odds",
+                label=label,
+                against=against,
+            ),
+            most_likely(shares, f"sum of {len(fitted.estimator.estimators_)} trees of each label"),
+        )
+
+    def _contributions(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> list[float]:
+        """Return the contribution of each feature to the output for a label."""
+        column = self.classes().index(label)
+        if len(self.classes()) == 2:  # one output, the log-odds of the second label
+            if column == 0:
+                return [0.0] * row.shape[1]
+            column = 0
+        trees = [stage[column].tree_ for stage in fitted.estimator.estimators_]
+        _, parts = path_contributions(trees, [means_from_leaves(one) for one in trees], row)
+        return [fitted.estimator.learning_rate * value for value in parts]
+
+    def _raw(self, fitted: FittedEstimator, row: NDArray[np.float64], label: str) -> float:
+        """Return the output for a label, before the softmax."""
+        outputs = fitted.estimator.decision_function(row)
+        column = self.classes().index(label)
+        if len(self.classes()) == 2:
+            return float(outputs[0]) if column == 1 else 0.0
+        return float(outputs[0, column])
