@@ -95,10 +95,19 @@ def write_recording(path, ticks=120, record=None, finish=True, **texts):
 
 
 def keep(
-    store, label="can:full_open", instance=None, outcome="steady", values=(0.066, 5.5), ticks=120, **more
+    store,
+    label="can:full_open",
+    instance=None,
+    outcome="steady",
+    values=(0.066, 5.5),
+    ticks=120,
+    labels=None,
+    complete=True,
+    **more,
 ):
-    """Add a small trial to the store and return its number."""
+    """Add a small trial to the store and return its number; `labels` are further ones."""
     record = ended(outcome, values, label=label, instance=instance, **more)
+    record = evolve(record, labels={**record.labels, **(labels or {})})
     path = store.new_recording(record.made_at)
     write_recording(path, ticks, record)
-    return store.add(record, RecordingInfo.of(path, ticks, 3))
+    return store.add(record, RecordingInfo.of(path, ticks, 3), complete=complete)

@@ -7,14 +7,21 @@ import tomllib
 
 import numpy as np
 import pytest
-from kept import frame, keep, pads
+from attrs import evolve
+from kept import ended, frame, keep, pads, write_recording
 from scipy.io import arff
 
 from graspsense.cli.main import main
+from graspsense.core.config import select_component
 from graspsense.core.errors import ConfigError, PluginUnavailable
+from graspsense.evaluation.evaluate import evaluate
+from graspsense.evaluation.json_codec import to_json
+from graspsense.recording.recording_info import RecordingInfo
+from graspsense.recording.trial_record import FeatureValues
 from graspsense.sources.features_csv import read_labelled
 from graspsense.store.changes import set_aside
 from graspsense.store.dataset import labelled_store
+from graspsense.store.export_table import ABOUT_BEFORE
 from graspsense.store.store import Store
 
 
@@ -181,3 +188,52 @@ def test_a_store_without_labels_says_how_to_get_some(tmp_path):
         keep(store, None)
     with pytest.raises(ConfigError, match="graspsense collect"):
         labelled_store(str(tmp_path / "t"))
+
+
+def a_store_of_everything(folder):
+    """Trials of both origins, with times, numbers to predict, one incomplete, one aborted, one with other features."""
+    other = {"features": (("p_other", "m"),), "values": (0.05,)}
+    with Store.open(folder) as store:
+        first = ended(label="can:full")
+        alone = evolve(first, result=evolve(first.result, features=FeatureValues(**other)))
+        path = store.new_recording(first.made_at)
+        write_recording(path, 5, alone)
+        store.add(alone, RecordingInfo.of(path, 5, 1))
+        for k in range(24):
+            label, origin = ("can:full", "can:empty")[k % 2], ("import", "collect")[k % 3 == 0]
+            keep(store, label, f"can#{k // 2}", values=(0.05 + 0.001 * k, (k * 7) % 5 + k % 2), origin=origin, ticks=9,
+                 labels={"recorded_at": f"2020-01-{1 + (k * 5) % 24:02d}", "fill [ml]": str(100 + k)})  # fmt: skip
+        keep(store, "can:full", "can#1", outcome="aborted", ticks=9)
+        keep(store, "can:full", "can#1", ticks=9, complete=False)
+
+
+def test_evaluate_gives_the_same_figures_for_a_store_and_its_export(export, tmp_path):
+    folder = tmp_path / "trials"
+    a_store_of_everything(folder)
+    assert export(folder, tmp_path / "t.csv")[0] == 0
+    component = select_component("classifier", "c45")
+    stored, found = (
+        to_json(evaluate(component, trials, classifier="c45", folds=3, learning_curve=False))
+        for trials in (labelled_store(str(folder)), read_labelled(tmp_path / "t.csv", "label"))
+    )
+    for own in ("source", "notes"):
+        stored.pop(own), found.pop(own)
+    assert stored["headline"]["n"] == 24
+    assert {"before_contact", "first_line", "recording_order"} <= stored["controls"].keys()
+    assert all(stored["controls"][name]["rate"] for name in ("first_line", "recording_order", "width_only"))
+    assert found == stored
+
+
+def test_an_export_of_an_earlier_version_still_opens(folder, export, tmp_path):
+    export(folder, tmp_path / "t.csv")
+    with (tmp_path / "t.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    names = [*ABOUT_BEFORE, "p_first [m]", "f_steady [N]"]
+    with (tmp_path / "old.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, names, extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(rows)
+    found = read_labelled(tmp_path / "old.csv", "label")
+    assert found.table.names == ("p_first", "f_steady")
+    assert (found.labels, found.order) == (("can:full_open", "can:it's open"), (0, 1))
+    assert found.before_contact is None

@@ -50,7 +50,7 @@ def values_of_labels(name: str, labels: Sequence[str], where: str) -> tuple[str,
         value = math.nan
         for heading, cell in json.loads(text).items():
             called, unit = name_and_unit(heading)
-            number = _number(cell)
+            number = number_of(cell)
             if number is not None and heading not in ("label", "instance", "order"):
                 known.add(called)
             if called != name:
@@ -75,7 +75,8 @@ def values_of_labels(name: str, labels: Sequence[str], where: str) -> tuple[str,
     return next(iter(units)), values
 
 
-def _number(cell: object) -> float | None:
+def number_of(cell: object) -> float | None:
+    """Return the finite number that a text is, or None."""
     try:
         number = float(str(cell))
     except ValueError:

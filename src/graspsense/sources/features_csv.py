@@ -17,20 +17,21 @@ import numpy as np
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import UNKNOWN, FeatureTable
 from graspsense.core.labelled import Labelled
-from graspsense.recording.controls import controls
+from graspsense.core.target_value import TargetValue
+from graspsense.recording.controls import Controls, controls
 from graspsense.sources.csv_columns import CsvColumns, is_missing
-from graspsense.store.export_table import ABOUT
-from graspsense.store.store import NOT_ENDED
+from graspsense.sources.exported_table import ExportedTable, exported
 
 
 def read_labelled(
     path: Path,
-    label: str,
+    label: str | None,
     *,
     instance: str | None = None,
     order: str | None = None,
     features: Sequence[str] = (),
     before: Sequence[str] = (),
+    value: str | None = None,
 ) -> Labelled:
     """Return the trials of a CSV file; the column `label` says what was grasped.
 
@@ -38,40 +39,81 @@ def read_labelled(
     order of recording (default: the order of the lines). Both are known in a table that `graspsense export` wrote.
     `features` are the columns to learn from, by default all columns of numbers that have no other meaning. `before`
     are the columns that are known before contact; the control from before contact uses them, and they are features too
-    unless `features` leaves them out.
+    unless `features` leaves them out. With `value`, this column of numbers is the target; lines without it are left
+    out, and the column of the label is not needed.
 
     Raises ConfigError if a column does not exist or cannot be a label, DataDamaged if the file is not a valid table.
     """
     columns = CsvColumns(path)
     notes: list[str] = []
-    simulated = False
-    if _is_export(columns):
-        _keep_complete_trials(columns, label, notes)
-        order = order or "trial"
+    export = exported(columns)
+    if export is not None:
+        label = label or "label"
+        export.keep_complete_trials(label if value is None else None, notes)
         if instance is None and not any(map(is_missing, columns.cells["instance"])):
             instance = "instance"
-        features = features or columns.names[len(ABOUT) :]
-        simulated = "1" in columns.cells["simulated"]
-    labels = _labels(columns, label)
+        features = features or export.features
+    target = None if value is None else _target(columns, value, export, notes)
+    labels = _labels(columns, label) if target is None else _texts(columns, label)
     instances = None if instance is None else tuple(columns.complete_column(instance, "the instance"))
-    table = _feature_table(columns, features, {name for name in (label, instance, order) if name}, notes)
+    reserved = {name for name in (label, instance, order, value) if name}
+    table = _feature_table(columns, features, reserved, notes)
     _note_similar_labels(labels, notes)
+    ranks, no_order = _order(columns, order, export, notes)
     return Labelled(
         source=str(path),
         table=table,
         labels=tuple(labels),
         instances=instances,
         no_instances="no column names the instance (--instance COLUMN)",
-        order=_ranks(columns, order, notes),
-        **controls(
-            table,
-            columns.table(list(before)) if before else None,
-            before_what=f"only {', '.join(before)}",
-            no_before="no columns are named as known before contact (--before COLUMNS)",
-        ),
+        order=ranks,
+        no_order=no_order,
+        **_controls(table, columns, before, export),
+        value=target,
         notes=tuple(notes),
-        provenance={"simulated": simulated},
+        provenance={"simulated": export is not None and "1" in columns.cells["simulated"]},
     )
+
+
+def _controls(
+    table: FeatureTable, columns: CsvColumns, before: Sequence[str], export: ExportedTable | None
+) -> Controls:
+    """Return the controls: of an exported store the same as those of the store, unless `before` names columns."""
+    if export is not None and not before and (found := export.before_contact()) is not None:
+        return controls(table, found, first_line=export.first_line())
+    return controls(
+        table,
+        columns.table(list(before)) if before else None,
+        before_what=f"only {', '.join(before)}",
+        no_before="no columns are named as known before contact (--before COLUMNS)",
+    )
+
+
+def _target(columns: CsvColumns, value: str, export: ExportedTable | None, notes: list[str]) -> TargetValue:
+    """Keep the lines that have the number to predict, and return the numbers. Raises ConfigError, DataDamaged."""
+    name = value if export is None else export.value_column(value)
+    columns.column(name, "the number to predict")
+    having = [i for i, number in enumerate(columns.numbers(name)) if not math.isnan(number)]
+    if not having:
+        raise DataDamaged(f"{columns.path}: no line has a {value}")
+    if len(having) < len(columns):
+        notes.append(f"{len(columns) - len(having)} trials left out: they have no {value}")
+        columns.keep(having)
+    return TargetValue(name=value, unit=columns.units[name], values=tuple(columns.numbers(name)))
+
+
+def _texts(columns: CsvColumns, label: str | None) -> list[str]:
+    """Return the labels of trials whose target is a number: they may lack one."""
+    return [""] * len(columns) if label is None else list(columns.column(label, "the label"))
+
+
+def _order(
+    columns: CsvColumns, order: str | None, export: ExportedTable | None, notes: list[str]
+) -> tuple[tuple[int, ...] | None, str]:
+    """Return the position of each trial in the order of recording, or None with the reason. Raises DataDamaged."""
+    if order is None and export is not None:
+        return export.order()
+    return _ranks(columns, order, notes), ""
 
 
 def read_table(path: Path, names: Sequence[str]) -> FeatureTable:
@@ -100,26 +142,9 @@ def write_labelled(path: Path, labelled: Labelled) -> None:
     os.replace(part, path)
 
 
-def _is_export(columns: CsvColumns) -> bool:
-    """Return whether `graspsense export` wrote this table."""
-    return tuple(columns.names[: len(ABOUT)]) == ABOUT
-
-
-def _keep_complete_trials(columns: CsvColumns, label: str, notes: list[str]) -> None:
-    """Keep the trials that a store gives: those with a label that ended by themselves. Raises DataDamaged."""
-    labels, outcomes = columns.column(label, "the label"), columns.cells["outcome"]
-    named = [i for i, cell in enumerate(labels) if not is_missing(cell)]
-    ended = [i for i in named if outcomes[i] not in NOT_ENDED]
-    if len(named) < len(columns):
-        notes.append(f"{len(columns) - len(named)} trials left out: they have no label")
-    if len(ended) < len(named):
-        notes.append(f"{len(named) - len(ended)} trials left out: they did not end by themselves")
-    if not ended:
-        raise DataDamaged(f"{columns.path} has no labelled trial that ended by itself")
-    columns.keep(ended)
-
-
-def _labels(columns: CsvColumns, label: str) -> list[str]:
+def _labels(columns: CsvColumns, label: str | None) -> list[str]:
+    if label is None:
+        raise ConfigError(f"which column of {columns.path} holds the label? Name it: --label COLUMN")
     labels = columns.complete_column(label, "the label")
     if len(set(labels)) > max(2, len(labels) // 2):
         raise ConfigError(

@@ -151,7 +151,7 @@ def groups_of(source: TrialSource) -> tuple[Group, ...]:
 def _csv(source: TrialSource) -> Labelled:
     from graspsense.sources.features_csv import read_labelled
 
-    if not source.label:
+    if not source.label and source.value is None:
         raise ConfigError(f"which column of {source.source} holds the label? Name it: --label COLUMN")
     return read_labelled(
         Path(source.source),
@@ -160,6 +160,7 @@ def _csv(source: TrialSource) -> Labelled:
         order=source.order,
         features=source.columns,
         before=source.before,
+        value=source.value,
     )
 
 

@@ -6,23 +6,40 @@ import csv
 import io
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from attrs import frozen
 
 from graspsense.core.errors import ConfigError
+from graspsense.core.features import FeatureTable
+from graspsense.core.target_value import name_and_unit, number_of
 from graspsense.recording.atomic_file import write_new
 from graspsense.recording.parquet import parquet
 from graspsense.store.dataset import feature_table
+from graspsense.store.first_line import first_lines
 from graspsense.store.store import Store
-
-if TYPE_CHECKING:
-    from graspsense.core.features import FeatureTable
+from graspsense.store.time_recorded import ORDER, RECORDED_AT
 
 ABOUT: Final = (
+    "trial",
+    "made_at",
+    "recorded_at",
+    "order",
+    "label",
+    "instance",
+    "outcome",
+    "complete",
+    "origin",
+    "device",
+    "simulated",
+    "recording",
+    "feature_set",
+)
+"""Columns that describe a trial. `recorded_at` and `order` are those of an import that names them."""
+ABOUT_BEFORE: Final = (
     "trial",
     "made_at",
     "label",
@@ -33,6 +50,20 @@ ABOUT: Final = (
     "simulated",
     "recording",
 )
+"""The columns that describe a trial in the tables of earlier versions."""
+BEFORE, FIRST, VALUE = "before_contact.", "first_line.", "value."
+"""What the name of a column of a CSV file begins with that holds a number of a control, or one to predict."""
+
+
+_SELECTED: Final = (
+    "trial",
+    "made_at",
+    "labels",
+    *ABOUT[ABOUT.index("label") :],
+    "values",
+    "before_set",
+    "before_contact",
+)
 
 
 @frozen(kw_only=True, eq=False)
@@ -41,6 +72,8 @@ class TrialTable:
 
     about: Mapping[str, list[Any]]
     features: FeatureTable
+    further: FeatureTable
+    """The numbers of the controls and those to predict, whose names begin with `BEFORE`, `FIRST` or `VALUE`."""
     set_aside: int = 0
     """Number of trials of the store that are not in the table, because they are set aside."""
 
@@ -49,31 +82,76 @@ def trial_table(folder: str | Path) -> TrialTable:
     """Return all trials of a store that are not set aside. Raises ConfigError if there is none, DataDamaged."""
     with Store.read(folder) as store:
         rows = store.query(
-            """SELECT id, made_at, label, instance, outcome, origin, device, simulated, recording, feature_set, "values"
-            FROM trial WHERE set_aside IS NULL ORDER BY id"""
+            """SELECT id, made_at, detail.labels, label, instance, outcome, complete, origin, trial.device, simulated,
+            recording, feature_set, "values", before_set, before_contact FROM trial
+            JOIN detail ON detail.trial = trial.id WHERE set_aside IS NULL ORDER BY id"""
         )
         sets = dict(store.query("SELECT id, features FROM feature_set"))
+        columns = dict(zip(_SELECTED, zip(*rows, strict=True), strict=True)) if rows else {}
+        first_line = first_lines(store, columns["recording"], columns["origin"]) if rows else None
         ((set_aside,),) = store.query("SELECT count(*) FROM trial WHERE set_aside IS NOT NULL")
     if not rows:
         aside = f" that is not set aside ({set_aside} are)" if set_aside else ""
         raise ConfigError(f"the store in {folder} has no trial to export{aside}")
-    columns = list(zip(*rows, strict=True))
-    names: dict[tuple[str, str], None] = {}
-    for number in dict.fromkeys(columns[-2]):
-        names.update(dict.fromkeys((str(name), str(unit)) for name, unit in json.loads(sets[number])))
-    table = feature_table(str(folder), list(names), [sets[number] for number in columns[-2]], columns[-1])
+    labels = [json.loads(text) for text in columns["labels"]]
+    columns |= {name: tuple(one.get(name) for one in labels) for name in (RECORDED_AT, ORDER)}
+    before = _unpacked(folder, sets, columns["before_set"], columns["before_contact"])
+    parts = [(BEFORE, before), (FIRST, first_line), (VALUE, _numbers_to_predict(labels))]
     return TrialTable(
-        about={name: list(column) for name, column in zip(ABOUT, columns[: len(ABOUT)], strict=True)},
-        features=table,
+        about={name: list(columns[name]) for name in ABOUT},
+        features=_unpacked(folder, sets, columns["feature_set"], columns["values"]),
+        further=_side_by_side([(prefix, part) for prefix, part in parts if part is not None]),
         set_aside=set_aside,
     )
 
 
+def _unpacked(
+    folder: str | Path, sets: Mapping[int, str], numbers: Sequence[int], values: Sequence[bytes]
+) -> FeatureTable:
+    """Return packed values of several feature sets as a table of all their features."""
+    names: dict[tuple[str, str], None] = {}
+    for number in dict.fromkeys(numbers):
+        names.update(dict.fromkeys((str(name), str(unit)) for name, unit in json.loads(sets[number])))
+    return feature_table(str(folder), list(names), [sets[number] for number in numbers], values)
+
+
+def _numbers_to_predict(labels: Sequence[Mapping[str, str]]) -> FeatureTable:
+    """Return the numbers among the labels of the trials, NaN where a trial does not have one."""
+    headings = {
+        heading: name_and_unit(heading)
+        for one in labels
+        for heading, cell in one.items()
+        if heading not in ("label", "instance", RECORDED_AT, ORDER) and number_of(cell) is not None
+    }
+    values = np.full((len(labels), len(headings)), np.nan)
+    for row, one in enumerate(labels):
+        for k, heading in enumerate(headings):
+            number = number_of(one.get(heading, ""))
+            values[row, k] = np.nan if number is None else number
+    return FeatureTable(
+        names=tuple(name for name, _ in headings.values()),
+        units=tuple(unit for _, unit in headings.values()),
+        values=values,
+    )
+
+
+def _side_by_side(parts: Sequence[tuple[str, FeatureTable]]) -> FeatureTable:
+    """Return tables of the same trials as one, with a prefix before the names of each."""
+    return FeatureTable(
+        names=tuple(f"{prefix}{name}" for prefix, part in parts for name in part.names),
+        units=tuple(unit for _, part in parts for unit in part.units),
+        values=np.hstack([part.values for _, part in parts]),
+    )
+
+
 def write_csv(path: Path, table: TrialTable) -> None:
-    """Write one line per trial; headings give units, as in `p_first [m]`, and a missing value is an empty cell."""
+    """Write one line per trial; headings give units, as in `p_first [m]`, and a missing value is an empty cell.
+
+    The numbers of the controls follow the features, so that `evaluate` of the file is that of the store.
+    """
     out = io.StringIO(newline="")
     writer = csv.writer(out, lineterminator="\n")
-    features = table.features
+    features = _side_by_side([("", table.features), ("", table.further)])
     headings = [f"{name} [{unit}]" for name, unit in zip(features.names, features.units, strict=True)]
     writer.writerow([*table.about, *headings])
     for about, values in zip(zip(*table.about.values(), strict=True), features.values.tolist(), strict=True):

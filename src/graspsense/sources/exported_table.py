@@ -1,0 +1,107 @@
+"""A CSV file that `graspsense export` wrote: the same trials, features and controls as the store that it is from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from attrs import evolve
+
+from graspsense.core.errors import DataDamaged
+from graspsense.sources.csv_columns import CsvColumns, is_missing
+from graspsense.store.export_table import ABOUT, ABOUT_BEFORE, BEFORE, FIRST, VALUE
+from graspsense.store.store import NOT_ENDED
+from graspsense.store.time_recorded import order_recorded
+
+if TYPE_CHECKING:
+    from graspsense.core.features import FeatureTable
+
+
+class ExportedTable:
+    """The columns of an exported store; `about` are those that describe a trial, `features` those to learn from."""
+
+    def __init__(self, columns: CsvColumns, about: Sequence[str]) -> None:
+        self.columns = columns
+        self.about = tuple(about)
+        further = columns.names[len(about) :]
+        self.features = [name for name in further if not name.startswith((BEFORE, FIRST, VALUE))]
+
+    def keep_complete_trials(self, label: str | None, notes: list[str]) -> None:
+        """Keep the trials that a store gives: complete ones that ended by themselves, with a label if one is named.
+
+        Of trials with several sets of features, those with that of the newest trial are kept. Raises DataDamaged if
+        none is left.
+        """
+        columns = self.columns
+        rows = list(range(len(columns)))
+        if label is not None:
+            cells = columns.column(label, "the label")
+            rows = _kept(rows, [not is_missing(cell) for cell in cells], "they have no label", notes)
+        ended = [outcome not in NOT_ENDED for outcome in columns.cells["outcome"]]
+        rows = _kept(rows, ended, "they did not end by themselves", notes)
+        if "complete" in self.about:
+            whole = [cell != "0" for cell in columns.cells["complete"]]
+            rows = _kept(rows, whole, "they are incomplete", notes)
+        if not rows:
+            raise DataDamaged(f"{columns.path} has no labelled trial that ended by itself")
+        if "feature_set" in self.about:
+            sets = columns.cells["feature_set"]
+            newest = [one == sets[rows[-1]] for one in sets]
+            several = len({sets[i] for i in rows}) > 1
+            rows = _kept(rows, newest, "their features differ from those of the newest trial", notes)
+            columns.keep(rows)
+            if several:
+                self.features = [name for name in self.features if not columns.is_blank(name)]
+        else:
+            columns.keep(rows)
+
+    def order(self) -> tuple[tuple[int, ...] | None, str]:
+        """Return the position of each trial in the order of recording, or None with the reason."""
+        cells = self.columns.cells
+        if "recorded_at" not in self.about:
+            labels = ["{}"] * len(self.columns)
+        else:
+            keys = ("recorded_at", "order")
+            labels = [
+                json.dumps({key: cells[key][i] for key in keys if not is_missing(cells[key][i])})
+                for i in range(len(self.columns))
+            ]
+        return order_recorded(cells["made_at"], cells["origin"], labels)
+
+    def before_contact(self) -> FeatureTable | None:
+        """Return the features from before contact, None in a table of an earlier version."""
+        return self._with_prefix(BEFORE)
+
+    def first_line(self) -> FeatureTable | None:
+        """Return the numbers of the first frame of imported trials, None if there are none."""
+        table = self._with_prefix(FIRST)
+        return None if table is None or np.isnan(table.values).all() else table
+
+    def value_column(self, name: str) -> str:
+        """Return the column of a number to predict."""
+        return name if name in self.columns.cells else f"{VALUE}{name}"
+
+    def _with_prefix(self, prefix: str) -> FeatureTable | None:
+        names = [name for name in self.columns.names if name.startswith(prefix)]
+        if not names:
+            return None
+        table = self.columns.table(names)
+        return evolve(table, names=tuple(name.removeprefix(prefix) for name in names))
+
+
+def exported(columns: CsvColumns) -> ExportedTable | None:
+    """Return the table that `graspsense export` wrote, None if these columns are not one."""
+    for about in (ABOUT, ABOUT_BEFORE):
+        if tuple(columns.names[: len(about)]) == about:
+            return ExportedTable(columns, about)
+    return None
+
+
+def _kept(rows: list[int], wanted: Sequence[bool], why: str, notes: list[str]) -> list[int]:
+    """Return the rows that are wanted, with a note on the others."""
+    kept = [i for i in rows if wanted[i]]
+    if len(kept) < len(rows):
+        notes.append(f"{len(rows) - len(kept)} trials left out: {why}")
+    return kept
