@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 from attrs import evolve
+from sklearn.exceptions import ConvergenceWarning
 
 from graspsense.core.config import SelectedComponent
 from graspsense.core.errors import ConfigError
@@ -362,3 +364,39 @@ def test_an_evaluation_is_read_back_from_its_json():
     labels = [f"can:{'full' if k % 2 else 'empty'}" for k in range(40)]
     made = judged(labelled(labels, rng.normal(size=40), rng.normal(size=40)))
     assert from_json(json.loads(json.dumps(to_json(made))), Evaluation) == made
+
+
+class Unconverged(SelectedComponent):
+    """A classifier whose every fit warns, as one of scikit-learn does that reaches its limit of iterations."""
+
+    def create(self):
+        classifier = super().create()
+        fit = classifier.fit
+
+        def warning_fit(*arguments):
+            text = "lbfgs failed to converge after 500 iteration(s) (status=1):\nIncrease the number of iterations."
+            warnings.warn(text, ConvergenceWarning, stacklevel=2)
+            fit(*arguments)
+
+        classifier.fit = warning_fit
+        return classifier
+
+
+def test_warnings_of_scikit_learn_are_one_line_each_with_a_count(recwarn):
+    labels, width, force = four_states(10)
+    learner_of_test = learner("knn")
+    warning = Unconverged(learner_of_test.component, learner_of_test.config)
+    found = evaluate(
+        warning,
+        labelled(labels, width, force),
+        classifier="knn",
+        folds=4,
+        permutations=1,
+        learning_curve=False,
+    )
+    # Four folds of the headline and four of the shuffled labels.
+    assert (
+        "ConvergenceWarning, 8 times: lbfgs failed to converge after 500 iteration(s) (status=1)"
+        in found.notes
+    )
+    assert not [one for one in recwarn if "onverge" in str(one.message)]

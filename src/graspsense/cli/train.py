@@ -68,6 +68,7 @@ def train(
     from graspsense.core.model import train as trained
     from graspsense.core.model import write_model
     from graspsense.evaluation.doubt import calibrated_sets
+    from graspsense.evaluation.gathered_warnings import gathered_warnings
 
     path = Path(out)
     if path.suffix != ".json":
@@ -78,22 +79,24 @@ def train(
     with ProgressLine() as progress:
         labelled = trials_of(source, progress, given)
     labelled = _with_target(labelled, target)
-    model = trained(
-        learner.component,
-        learner.config,
-        labelled,
-        name=path.stem,
-        seed=given["seed"],
-        target=target,
-        provenance={"command": command_line(("keep", "overwrite", "as_json"))},
-    )
-    model = evolve(model, sets=calibrated_sets(learner, labelled, given["seed"]))
+    notes = list(labelled.notes)
+    with gathered_warnings(notes):
+        model = trained(
+            learner.component,
+            learner.config,
+            labelled,
+            name=path.stem,
+            seed=given["seed"],
+            target=target,
+            provenance={"command": command_line(("keep", "overwrite", "as_json"))},
+        )
+        model = evolve(model, sets=calibrated_sets(learner, labelled, given["seed"]))
     write_model(path, model)
     if keep:
         from graspsense.sources.features_csv import write_labelled
 
         write_labelled(Path(keep), labelled)
-    for note in labelled.notes:
+    for note in notes:
         talk(f"note: {note}")
     if as_json:
         echo_json({"model": out, **_as_values(model), "trials": len(labelled)})

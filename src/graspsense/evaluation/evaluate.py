@@ -18,6 +18,7 @@ from graspsense.evaluation.confusion import confusion
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.doubt import reliability, set_coverage
 from graspsense.evaluation.folds import commonest, in_order, instance_held_out, stratified
+from graspsense.evaluation.gathered_warnings import gathered_warnings
 from graspsense.evaluation.intervals import (
     MIN_INSTANCES,
     Difference,
@@ -68,9 +69,10 @@ def evaluate(
     notes = list(labelled.notes)
     trials = _trials_for(labelled, target, notes)
     evaluator = _Evaluator(learner, trials, target, folds, seed, progress, notes)
-    headline, protocols = evaluator.measure_protocols()
-    measured = evaluator.measure_controls(headline, protocols, permutations) if controls else {}
-    curve = evaluator.learning_curve(headline) if learning_curve else ()
+    with gathered_warnings(notes):
+        headline, protocols = evaluator.measure_protocols()
+        measured = evaluator.measure_controls(headline, protocols, permutations) if controls else {}
+        curve = evaluator.learning_curve(headline) if learning_curve else ()
     labels, table = trials.labels, trials.table
     return Evaluation(
         source=labelled.source,

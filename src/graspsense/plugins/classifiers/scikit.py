@@ -107,7 +107,6 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         import warnings
 
         import numpy as np
-        from sklearn.exceptions import ConvergenceWarning
         from threadpoolctl import threadpool_limits
 
         if len(set(labels)) < 2:
@@ -129,9 +128,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             scale=np.where(constant, 1.0, scale),
         )
         # One thread: on small tables more threads cost time, and the order of sums would depend on the machine.
-        with warnings.catch_warnings(), threadpool_limits(1):
-            # A network that has not converged is accepted; its recognition rate shows how good it is.
-            warnings.simplefilter("ignore", ConvergenceWarning)
+        with threadpool_limits(1):
             fitted.estimator.fit(fitted.ready(table.values), np.array(labels))
         self._fitted = fitted
 
@@ -202,7 +199,10 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
 
     def from_json(self, model: Mapping[str, Any]) -> None:
         """Restore the model. Raises KeyError, TypeError or ValueError."""
+        import warnings
+
         import numpy as np
+        from sklearn.exceptions import ConvergenceWarning
 
         names, units = zip(*((str(name), str(unit)) for name, unit in model["features"]), strict=True)
         self._made_with = str(model["made_with"])
@@ -213,7 +213,10 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         values = np.array(model["trials"], dtype=np.float64)
         if values.shape != (len(labels), len(names)) or np.isinf(values).any():
             raise ValueError("its training trials do not fit its labels and features")
-        self.fit(FeatureTable(names=names, units=units, values=values), labels, int(model["seed"]))
+        with warnings.catch_warnings():
+            # The training told of a network that has not converged.
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            self.fit(FeatureTable(names=names, units=units, values=values), labels, int(model["seed"]))
 
     def _from_skops(
         self, model: Mapping[str, Any], names: tuple[str, ...], units: tuple[str, ...]
