@@ -33,6 +33,7 @@ MANY_PARAMETERS = {
     "graspsense/cli/report.py:report": OPTIONS,
     "graspsense/cli/run.py:run": OPTIONS,
     "graspsense/cli/tradeoff.py:simulation": OPTIONS,
+    "graspsense/cli/train.py:train": OPTIONS,
     "graspsense/core/setting.py:setting": "public; every part of a declaration is optional and by keyword only",
     "graspsense/core/transmission.py:screw_linkage": "the ten published constants of a linkage, by keyword only",
     "graspsense/evaluation/crossval.py:cross_validate": "public; three optional ones are by keyword only",

@@ -9,6 +9,7 @@ from graspsense.cli.terminal import talk, terminal_width
 
 if TYPE_CHECKING:
     from graspsense.core.signals import Command, Reading
+    from graspsense.core.trial import GraspEvent
 
 BAR: Final = 24
 """Characters of the bar of the widest gap, where the terminal has room for it."""
@@ -53,6 +54,11 @@ class LiveRows:
             f"{frame.t_s:7.3f}  {_phase_name(phase):<10}{frame.gap_m * 1e3:6.1f} mm  {bar:<{self._bar}}"
             f"{_newtons(frame.force_left_n)} {_newtons(frame.force_right_n)}"
         )
+
+    def event(self, event: GraspEvent) -> None:
+        """Print a prediction that was made while the grasp goes on."""
+        if event.source == "model":
+            talk(f"{event.t_s:7.3f}  {_phase_name(event.phase):<10}{event.what}")
 
 
 def _newtons(force_n: float) -> str:

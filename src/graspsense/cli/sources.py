@@ -100,6 +100,15 @@ def classifier_option(command: CommandT) -> CommandT:
     )(command)
 
 
+def checkpoints_option(command: CommandT) -> CommandT:
+    """Add --checkpoints; `checkpoints_of` reads its text."""
+    return click.option(
+        "--checkpoints",
+        metavar="SECONDS",
+        help="Also predict so many seconds after the contact, comma-separated, as in 0.1,0.2,0.4.",
+    )(command)
+
+
 def is_csv(source: str) -> bool:
     """Whether this source is a file of features."""
     from graspsense.sources.trial_source import kind_of
@@ -107,9 +116,12 @@ def is_csv(source: str) -> bool:
     return kind_of(source) == "CSV"
 
 
-def trials_of(source: str, progress: ProgressLine, given: Mapping[str, Any]) -> Labelled:
+def trials_of(
+    source: str, progress: ProgressLine, given: Mapping[str, Any], checkpoints_s: Sequence[float] = ()
+) -> Labelled:
     """Return the trials of a source, or of one class of it; `given` holds the options of `source_options`.
 
+    With `checkpoints_s` (s after the contact), they have the features of `CheckpointFeatures`.
     Raises ConfigError, DataDamaged.
     """
     from graspsense.cli.terminal import talk
@@ -131,6 +143,7 @@ def trials_of(source: str, progress: ProgressLine, given: Mapping[str, Any]) -> 
         "objects": _names(given["objects"]),
         "instances": given["instances"],
         "trials": given["trials"],
+        "checkpoints_s": tuple(checkpoints_s),
     }
     try:
         described = structured(values, TrialSource, source)

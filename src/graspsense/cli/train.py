@@ -10,6 +10,7 @@ import click
 from graspsense.cli.output import echo_json, file_to_write, refuse_existing
 from graspsense.cli.sources import (
     SOURCES,
+    checkpoints_option,
     classifier_option,
     command_line,
     learner_of,
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="What the model predicts; state needs --only CLASS.",
 )
+@checkpoints_option
 @classifier_option
 @source_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -57,6 +59,7 @@ def train(
     overwrite: bool,
     target: str,
     classifier: str | None,
+    checkpoints: str | None,
     as_json: bool,
     **given: Any,
 ) -> None:
@@ -64,9 +67,11 @@ def train(
     from attrs import evolve
 
     from graspsense.cli.progress import ProgressLine
+    from graspsense.core.checkpoints import checkpoints_of, split_checkpoints
     from graspsense.core.errors import ConfigError
     from graspsense.core.model import train as trained
     from graspsense.core.model import write_model
+    from graspsense.evaluation.checkpoints import checkpoint_models
     from graspsense.evaluation.doubt import calibrated_sets
     from graspsense.evaluation.gathered_warnings import gathered_warnings
 
@@ -75,10 +80,14 @@ def train(
         raise ConfigError(f"--out {out}: the name of a model's file must end in .json")
     if not overwrite:
         refuse_existing(out, keep)
+    times = checkpoints_of(checkpoints)
     learner = learner_of(source, classifier, given)
     with ProgressLine() as progress:
-        labelled = trials_of(source, progress, given)
+        labelled = trials_of(source, progress, given, times)
     labelled = _with_target(labelled, target)
+    parts = split_checkpoints(labelled, times) if times else ()
+    if parts:
+        labelled = parts[-1].labelled
     notes = list(labelled.notes)
     with gathered_warnings(notes):
         model = trained(
@@ -91,6 +100,7 @@ def train(
             provenance={"command": command_line(("keep", "overwrite", "as_json"))},
         )
         model = evolve(model, sets=calibrated_sets(learner, labelled, given["seed"]))
+        model = evolve(model, checkpoints=checkpoint_models(model, learner, parts[:-1], given["seed"]))
     write_model(path, model)
     if keep:
         from graspsense.sources.features_csv import write_labelled
@@ -113,6 +123,14 @@ def _as_values(model: Model) -> dict[str, Any]:
         "labels": list(model.classifier.classes()),
         "provenance": dict(model.provenance),
         "sets": None if model.sets is None else model.sets.to_json(),
+        "checkpoints": [
+            {
+                "after_contact_s": after_s,
+                "trials": part.provenance["trials"],
+                "sets": None if part.sets is None else part.sets.to_json(),
+            }
+            for after_s, part in model.checkpoints
+        ],
     }
 
 
@@ -125,6 +143,9 @@ def _say_trained(out: str, model: Model) -> None:
         if model.sets.trials:
             share = f"{100 * model.sets.unknown / model.sets.trials:.1f} %"
             echo_entry("unknown", f"{share} of the held-out trials are called unknown (false alarms)")
+    for after_s, part in model.checkpoints:
+        sets = "" if part.sets is None else f", sets {part.sets.in_words}"
+        echo_entry(f"{after_s:g} s", f"after the contact: {part.provenance['trials']} grasps{sets}")
     # In one line, so that it can be copied.
     click.echo(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
 

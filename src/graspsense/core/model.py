@@ -66,6 +66,8 @@ class Model:
     provenance: Mapping[str, Any]
     sets: PredictionSets | None = None
     """Calibrated prediction sets; None in a model of an earlier version."""
+    checkpoints: tuple[tuple[float, Model], ...] = ()
+    """The models for grasps that go on: each with the seconds after the contact up to which it knows them."""
 
     @property
     def simulated(self) -> bool:
@@ -83,9 +85,17 @@ class Model:
             if key in settings
         ]
         number = self.provenance.get("trials", "?")
-        return f"{self.name}: {self.component} trained on {number} {kind}" + (
-            f" at {', '.join(at)}" if at else ""
+        return (
+            f"{self.name}: {self.component} trained on {number} {kind}"
+            + (f" at {', '.join(at)}" if at else "")
+            + (f", {self.after_s:g} s after the contact" if self.after_s is not None else "")
         )
+
+    @property
+    def after_s(self) -> float | None:
+        """The time after the contact up to which it knows a grasp; None for whole grasps."""
+        after_s = self.provenance.get("after_contact_s")
+        return None if after_s is None else float(after_s)
 
     def predict(
         self, features: Features, settings: Settings | None = None, device: DeviceInfo | None = None
@@ -219,8 +229,51 @@ class Model:
             "unknown": self.novelty.to_json(),
             **({} if self.sets is None else {"sets": self.sets.to_json()}),
             "model": self.classifier.to_json(),
+            **(
+                {}
+                if not self.checkpoints
+                else {"checkpoints": [_part_as_json(*one) for one in self.checkpoints]}
+            ),
         }
         return {**content, "sha256": _digest(content)}
+
+
+def _part_as_json(after_s: float, part: Model) -> dict[str, Any]:
+    """Return what the model of a checkpoint has of its own; the rest is that of the model of whole grasps."""
+    return {
+        "after_contact_s": after_s,
+        "trials": part.provenance["trials"],
+        "by_label": json_ready(part.provenance["by_label"]),
+        "unknown": part.novelty.to_json(),
+        "sets": None if part.sets is None else part.sets.to_json(),
+        "model": part.classifier.to_json(),
+    }
+
+
+def checkpoint_model(whole: Model, after_s: float, part: Model) -> Model:
+    """Return the model of the checkpoint `after_s` (s), as a part of that of whole grasps."""
+    own = {key: part.provenance[key] for key in ("trials", "by_label")}
+    return evolve(
+        part,
+        name=whole.name,
+        provenance={**whole.provenance, **own, "after_contact_s": after_s},
+        checkpoints=(),
+    )
+
+
+def _part_from_json(whole: Model, component: Component, config: Any, kept: Mapping[str, Any]) -> Model:
+    """Return the model of a checkpoint. Raises KeyError, TypeError, ValueError or DataDamaged."""
+    classifier = component.create(config)
+    classifier.from_json(kept["model"])
+    sets = kept["sets"]
+    part = evolve(
+        whole,
+        classifier=classifier,
+        novelty=novelty_from(whole.names, whole.units, kept["unknown"]),
+        sets=None if sets is None else sets_from(sets, classifier.classes()),
+        provenance={"trials": int(kept["trials"]), "by_label": dict(kept["by_label"])},
+    )
+    return checkpoint_model(whole, float(kept["after_contact_s"]), part)
 
 
 def _not_compared(chosen: SelectedComponent) -> frozenset[str]:
@@ -306,12 +359,13 @@ def load_model(name: str, plugins: Plugins, component: Component | None = None) 
     from graspsense.core.config import build
 
     settings = settings_from_json(content["settings"], component.config_class())
-    classifier = component.create(build(component, settings))
+    config = build(component, settings)
+    classifier = component.create(config)
     try:
         names = tuple(str(one[0]) for one in content["features"])
         units = tuple(str(one[1]) for one in content["features"])
         classifier.from_json(content["model"])
-        return Model(
+        model = Model(
             name=name,
             component=made_by,
             settings=settings,
@@ -323,6 +377,8 @@ def load_model(name: str, plugins: Plugins, component: Component | None = None) 
             provenance=content["provenance"],
             sets=sets_from(content["sets"], classifier.classes()) if "sets" in content else None,
         )
+        parts = [_part_from_json(model, component, config, kept) for kept in content.get("checkpoints", ())]
+        return evolve(model, checkpoints=tuple((float(part.after_s or 0.0), part) for part in parts))
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise DataDamaged(f"model {name!r} is damaged: {type(error).__name__}: {error}") from error
 

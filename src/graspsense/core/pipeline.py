@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import nan
 from pathlib import Path
+from typing import Any
 
 from attrs import frozen
 
+from graspsense.core.anytime import anytime_of
 from graspsense.core.config import Flag, Settings, resolve
 from graspsense.core.errors import named
 from graspsense.core.features import UNKNOWN, Features, Prediction, missing
-from graspsense.core.model import model_for
+from graspsense.core.model import Model, model_for
 from graspsense.core.plugins import Plugins, installed
-from graspsense.core.roles import DeviceInfo
-from graspsense.core.runner import Sink, run_grasp
+from graspsense.core.roles import DeviceInfo, FeatureSet
+from graspsense.core.runner import Grasp, Sink, run_grasp
+from graspsense.core.signals import Outcome
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
 from graspsense.core.wiring import check
 
@@ -88,6 +91,7 @@ def grasp_with(
     model = model_for(settings, plugins)
     backend, controller = settings.gripper.create(), settings.controller.create()
     feature_set = settings.features.create()
+    anytime = anytime_of(model, feature_set, settings)
     run = RunInfo(
         components=settings.components,
         settings=settings.values,
@@ -101,19 +105,20 @@ def grasp_with(
             on_event(event)
 
     plugins.run_starting(run)
-    grasp = run_grasp(backend, controller, settings.run, sinks=sinks, on_event=tell, on_open=on_open)
-    # The grasp is done: its trace is kept whatever fails from here on.
     try:
-        features = feature_set.extract(grasp.trace)
-    except Exception as error:
-        features = _undefined(settings, f"{settings.features.component.qualified} failed: {named(error)}")
-    prediction = None
-    if model is not None:
-        try:
-            prediction = model.predict(features, settings, grasp.device)
-        except Exception as error:
-            why = f"{model.component} failed: {named(error)}"
-            prediction = Prediction(label=UNKNOWN, probabilities={}, because=(why,))
+        grasp = run_grasp(
+            backend, controller, settings.run, sinks=sinks, on_event=tell, on_open=on_open, watcher=anytime
+        )
+    finally:
+        if anytime is not None:
+            anytime.end()
+    checkpoints = () if anytime is None else tuple(anytime.predictions)
+    prediction: Prediction | None
+    if grasp.outcome == Outcome.RECOGNISED:
+        # A model of whole grasps does not know a squeeze that was ended early.
+        features, prediction = checkpoints[-1].features, checkpoints[-1].prediction
+    else:
+        features, prediction = _recognised(settings, feature_set, model, grasp)
     trial = Trial(
         run=run,
         trace=grasp.trace,
@@ -127,9 +132,27 @@ def grasp_with(
         events=grasp.events,
         seconds_simulated=grasp.seconds_simulated,
         seconds_wall=grasp.seconds_wall,
+        checkpoints=checkpoints,
     )
     plugins.run_finished(run, trial)
     return trial
+
+
+def _recognised(
+    settings: Settings, feature_set: FeatureSet[Any], model: Model | None, grasp: Grasp
+) -> tuple[Features, Prediction | None]:
+    """Return the features and the prediction of a whole grasp; its trace is kept whatever fails here."""
+    try:
+        features = feature_set.extract(grasp.trace)
+    except Exception as error:
+        features = _undefined(settings, f"{settings.features.component.qualified} failed: {named(error)}")
+    if model is None:
+        return features, None
+    try:
+        return features, model.predict(features, settings, grasp.device)
+    except Exception as error:
+        why = f"{model.component} failed: {named(error)}"
+        return features, Prediction(label=UNKNOWN, probabilities={}, because=(why,))
 
 
 def _undefined(settings: Settings, why: str) -> Features:

@@ -67,3 +67,8 @@ class RunConfig:
         plausible=(1e-4, 0.1),
         meaning="Limit of the speed on a real gripper before the first contact.",
     )
+    stop_when_sure: bool = setting(
+        default=False,
+        meaning="Whether the squeeze ends as soon as the prediction set has one label; needs a model with checkpoints "
+        "(graspsense train --checkpoints).",
+    )

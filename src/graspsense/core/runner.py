@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from itertools import count
 from math import ceil
-from typing import Any, Final, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 from attrs import evolve, frozen
 
@@ -30,16 +30,21 @@ from graspsense.core.signals import APPROACH, RUNNING, SQUEEZE, Command, Frame, 
 from graspsense.core.tick import (
     OPEN_SPEED_M_S,
     OPEN_WINDOW_S,
+    RELEASE,
     TARING,
     Schedule,
     TickParams,
     TickState,
     events_of,
     first_state,
+    stopped,
     tick,
 )
 from graspsense.core.trace import SI_UNITS, Trace, TraceRecorder
-from graspsense.core.trial import GraspEvent, event_name
+from graspsense.core.trial import EventSource, GraspEvent, event_name
+
+if TYPE_CHECKING:
+    from graspsense.core.anytime import Watcher
 
 
 class Sink(Protocol):
@@ -47,6 +52,14 @@ class Sink(Protocol):
 
     def take(self, reading: Reading, phase: int, command: Command) -> None:
         """Receive one tick."""
+
+
+@runtime_checkable
+class EventSink(Protocol):
+    """A sink that also receives the events of a grasp. It must not block."""
+
+    def event(self, event: GraspEvent) -> None:
+        """Receive one event."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -134,11 +147,13 @@ def run_grasp(
     sinks: Iterable[Sink] = (),
     on_event: Callable[[GraspEvent], None] | None = None,
     on_open: Callable[[DeviceInfo], None] | None = None,
+    watcher: Watcher | None = None,
 ) -> Grasp:
     """Run one grasp and return it, whatever its outcome.
 
     `on_open` is called with the description of the opened gripper before any command; an exception from it ends the
-    run. Raises NoDevice if the gripper cannot be opened. Every later failure is an outcome.
+    run. `watcher` sees each tick and can end the squeeze, which the release follows as usual. Raises NoDevice if the
+    gripper cannot be opened. Every later failure is an outcome.
     """
     began = time.perf_counter()
     with Interrupts() as interrupts:
@@ -150,6 +165,8 @@ def run_grasp(
             if on_open is not None:
                 on_open(info)
             grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
+            if watcher is not None:
+                grasp.watch_with(watcher)
             with _no_collection():
                 outcome, reason = grasp.drive()
         except BaseException:
@@ -221,6 +238,8 @@ class _Grasp:
         interrupts: Interrupts,
     ) -> None:
         self.backend, self.run, self.info, self.on_event = backend, run, info, on_event
+        self.watcher: Watcher | None = None
+        self.stop_reason = ""
         self.sinks, self.interrupts = list(sinks), interrupts
         self.step = type(controller).step
         self.event_names = type(controller).events
@@ -231,6 +250,11 @@ class _Grasp:
         self.late = self.guarded = 0
         self.first_t_s: float | None = None
         self.last: Frame | None = None
+
+    def watch_with(self, watcher: Watcher) -> None:
+        """Let this watcher see the ticks from the contact on."""
+        self.watcher = watcher
+        watcher.begin(self.recorder, self.info, self._predicted)
 
     def drive(self) -> tuple[Outcome, str]:
         """Run the loop and return the outcome. The gripper was then commanded to open or relax."""
@@ -255,7 +279,10 @@ class _Grasp:
             self._let_go(opens=not lost and not self.state.done)
         if ending is None:
             ending = ended_by_itself(self.state)
-        if self.state.law.outcome != RUNNING and ending[0] in (Outcome.DEVICE_LOST, Outcome.ABORTED):
+        failed = ending[0] in (Outcome.DEVICE_LOST, Outcome.ABORTED)
+        if self.stop_reason and not failed:
+            return Outcome.RECOGNISED, self.stop_reason
+        if self.state.law.outcome != RUNNING and failed:
             ending = (
                 ending[0],
                 f"{ending[1]} (after the grasp had ended: {Outcome(self.state.law.outcome).words})",
@@ -320,6 +347,8 @@ class _Grasp:
                         # A failing sink must not change the outcome of a grasp.
                         self.sinks = sinks = [one for one in sinks if one is not sink]
                         self._event(frame.t_s, Phase(phase), f"{type(sink).__name__} failed: {named(error)}")
+                if self.watcher is not None and phase < RELEASE and not state.done:
+                    state = self._watched(self.watcher, frame, state)
             if state.done or watcher.stopped:
                 return
 
@@ -346,14 +375,27 @@ class _Grasp:
                 event = self._event(frame.t_s, Phase(phase), event_name(self.event_names, i), "controller")
                 self.recorder.events.append(event)
 
-    def _event(
-        self, t_s: float, phase: Phase, what: str, source: Literal["runner", "controller"] = "runner"
-    ) -> GraspEvent:
+    def _event(self, t_s: float, phase: Phase, what: str, source: EventSource = "runner") -> GraspEvent:
         event = GraspEvent(t_s, phase, what, source)
         self.events.append(event)
         if self.on_event is not None:
             self.on_event(event)
+        for sink in self.sinks:
+            if isinstance(sink, EventSink):
+                with suppress(Exception):  # as with ticks, a failing sink must not change the outcome
+                    sink.event(event)
         return event
+
+    def _watched(self, watcher: Watcher, frame: Frame, state: TickState) -> TickState:
+        """Return the state after this tick: that of a release if the watcher has a reason to stop the squeeze."""
+        self.stop_reason = watcher.watch(frame, state.phase)
+        if self.stop_reason:
+            self.state = state = stopped(self.params.schedule, state, frame)
+        return state
+
+    def _predicted(self, t_s: float, phase: int, what: str) -> None:
+        """Log a prediction that was made while the grasp goes on."""
+        self._event(t_s, Phase(phase), what, "model")
 
     def _let_go(self, opens: bool) -> None:
         """Open the fingers, then relax. A failure of one step must not prevent the next.

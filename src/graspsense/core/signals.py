@@ -154,6 +154,7 @@ class Outcome(enum.IntEnum):
     SLIPPED = 8
     DEVICE_LOST = 9
     ABORTED = 10
+    RECOGNISED = 11
 
     @property
     def words(self) -> str:

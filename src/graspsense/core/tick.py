@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from graspsense.core.contact import RestState, at_rest, update_rest
 from graspsense.core.guard import GuardParams, GuardState, guard
-from graspsense.core.signals import RUNNING, STEADY, Command, Phase, Reading
+from graspsense.core.signals import RUNNING, STEADY, Command, Frame, Phase, Reading
 
 OPENING = int(Phase.OPENING)
 TARING = int(Phase.TARING)
@@ -67,6 +67,17 @@ class TickState(NamedTuple):
 def first_state(law: Any) -> TickState:
     """Return the state before the first tick, given that of the controller."""
     return TickState(-1, 0.0, RestState(0.0, 0.0), 0, law, GuardState(0, 0, 0), 0, 0)
+
+
+def stopped(schedule: Schedule, state: TickState, frame: Frame) -> TickState:
+    """Return the state in which the next tick releases the object, whatever the controller would have done.
+
+    A recording without a release is over.
+    """
+    still = RestState(frame.t_s, frame.gap_m)
+    if schedule.opens == 0:
+        return state._replace(done=1, since_t_s=frame.t_s, still=still)
+    return state._replace(phase=RELEASE, since_t_s=frame.t_s, still=still)
 
 
 def _unbound(params: Any, state: Any, reading: Reading) -> tuple[Command, Any]:

@@ -23,6 +23,8 @@ SI_UNITS: Final[Mapping[str, str]] = {"t": "s", **CHANNELS}
 
 _FRAME_COLUMNS: Final = Frame._fields
 TICK_COLUMNS: Final = (*(name for name in _FRAME_COLUMNS if name != "dt_s"), "phase", "command")
+BLOCK: Final = 512
+"""Frames that are converted at once. In a thread beside a control loop, a conversion holds the interpreter lock."""
 PAD_COLUMNS: Final = ("pad_t_s", "pad_left", "pad_right")
 
 
@@ -178,8 +180,11 @@ def trace_of(
     `signals` are the values of `Reading.signals` in each tick, if the gripper has further channels.
     """
     width = len(_FRAME_COLUMNS)
-    numbers = np.fromiter(chain.from_iterable(frames), dtype=np.float64, count=len(frames) * width)
-    table = numbers.reshape(len(frames), width)
+    table = np.empty((len(frames), width))
+    for start in range(0, len(frames), BLOCK):
+        block = frames[start : start + BLOCK]
+        numbers = np.fromiter(chain.from_iterable(block), dtype=np.float64, count=len(block) * width)
+        table[start : start + BLOCK] = numbers.reshape(len(block), width)
     columns: dict[str, Any] = {
         name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(_FRAME_COLUMNS) if name != "dt_s"
     }

@@ -10,6 +10,7 @@ from attrs import field, frozen
 from graspsense.core.signals import Outcome, Phase
 
 if TYPE_CHECKING:
+    from graspsense.core.anytime import CheckpointPrediction
     from graspsense.core.features import Features, Prediction
     from graspsense.core.roles import DeviceInfo
     from graspsense.core.trace import Trace
@@ -25,18 +26,23 @@ class RunInfo:
     labels: Mapping[str, str] = field(factory=dict)
 
 
+EventSource = Literal["runner", "controller", "model"]
+"""What an event of a grasp comes from."""
+
+
 @frozen
 class GraspEvent:
     """An event of a grasp: its time (s), the phase, and a sentence.
 
     `source` is `runner` for a change of phase, an action of the guard or a sink that failed, and `controller` for an
-    event that the controller told; `what` is then the name of the event, one of `Controller.events`.
+    event that the controller told; `what` is then the name of the event, one of `Controller.events`. It is `model` for
+    a prediction while the grasp goes on.
     """
 
     t_s: float
     phase: Phase
     what: str
-    source: Literal["runner", "controller"] = "runner"
+    source: EventSource = "runner"
 
 
 def event_name(names: Sequence[str], number: int) -> str:
@@ -50,7 +56,8 @@ class Trial:
 
     `reason` explains the outcome if this is needed. `device` describes the gripper as it was opened. `report` holds
     the counters of the gripper, and the true values if it is simulated. `counts` are those of the runner: ticks, late
-    frames, actions of the guard.
+    frames, actions of the guard. `checkpoints` are the predictions while the grasp went on. With the outcome
+    `recognised`, the last of them ended the squeeze: it is the prediction, and its features are those of the trial.
     """
 
     run: RunInfo
@@ -65,6 +72,7 @@ class Trial:
     events: tuple[GraspEvent, ...]
     seconds_simulated: float | None
     seconds_wall: float
+    checkpoints: tuple[CheckpointPrediction, ...] = ()
 
     def __repr__(self) -> str:
         parts = [self.outcome.words, *self.run.labels.values(), f"{len(self.trace)} ticks"]
@@ -87,13 +95,11 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
         "features": features.as_dict(),
         "units": dict(zip(features.names, features.units, strict=True)),
         "reasons": dict(features.reasons),
-        "prediction": None
-        if prediction is None
-        else {
-            **prediction.as_json(),
-            "warnings": list(prediction.warnings),
-            "model": prediction.model,
-        },
+        "prediction": None if prediction is None else _prediction_as_json(prediction),
+        "checkpoints": [
+            {"after_s": one.after_s, "t_s": one.t_s, **_prediction_as_json(one.prediction)}
+            for one in trial.checkpoints
+        ],
         "components": dict(trial.run.components),
         "seed": trial.run.seed,
         "labels": dict(trial.run.labels),
@@ -114,6 +120,10 @@ def trial_as_json(trial: Trial) -> dict[str, Any]:
     }
 
 
+def _prediction_as_json(prediction: Prediction) -> dict[str, Any]:
+    return {**prediction.as_json(), "warnings": list(prediction.warnings), "model": prediction.model}
+
+
 def event_as_json(event: GraspEvent) -> dict[str, Any]:
     """Return an event as JSON values."""
     return {
@@ -126,10 +136,9 @@ def event_as_json(event: GraspEvent) -> dict[str, Any]:
 
 def event_from_json(value: Mapping[str, Any]) -> GraspEvent:
     """Return the event of `event_as_json`; without a source it is of the runner. Raises KeyError, ValueError."""
-    told = value.get("source") == "controller"
-    return GraspEvent(
-        float(value["t_s"]),
-        Phase[str(value["phase"]).upper()],
-        str(value["what"]),
-        "controller" if told else "runner",
-    )
+    source: EventSource = "runner"
+    if value.get("source") == "controller":
+        source = "controller"
+    elif value.get("source") == "model":
+        source = "model"
+    return GraspEvent(float(value["t_s"]), Phase[str(value["phase"]).upper()], str(value["what"]), source)

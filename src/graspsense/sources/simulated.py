@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import Attribute, evolve, field, frozen
 
+from graspsense.core.checkpoints import with_checkpoints
 from graspsense.core.errors import ComponentFailed, ConfigError, named
 from graspsense.core.features import Features, table_of
 from graspsense.core.labelled import Labelled, class_of
@@ -156,8 +157,11 @@ def simulated(
     seed: int = 0,
     progress: Progress | None = None,
     on_trace: OnTrace | None = None,
+    checkpoints_s: Sequence[float] = (),
 ) -> Labelled:
     """Grasp the objects of every group under these settings and return the labelled trials.
+
+    With `checkpoints_s` (s after the contact), they have the features of `CheckpointFeatures`.
 
     Raises ConfigError if the gripper is not simulated, UnknownName for an object that it does not know.
     """
@@ -167,7 +171,12 @@ def simulated(
         progress(0, len(plan.scenes))
     rows: list[Features] = []
     before: list[Features] = []
-    for features, features_before, trace in _grasps(settings, plan, progress, traces=on_trace is not None):
+    feature_set = with_checkpoints(settings.features.create(), checkpoints_s)
+    extract = _Extraction(
+        settings.features.component.qualified, feature_set, contact_force_of(settings.values)
+    )
+    wanted = on_trace is not None
+    for features, features_before, trace in _grasps(settings, plan, progress, extract, traces=wanted):
         if on_trace is not None and trace is not None:
             on_trace(len(rows), plan.labels[len(rows)], trace)
         rows.append(features)
@@ -244,13 +253,15 @@ class _Extraction:
 
 
 def _grasps(
-    settings: Settings, plan: SimulationPlan, progress: Progress | None, *, traces: bool
+    settings: Settings,
+    plan: SimulationPlan,
+    progress: Progress | None,
+    extract: _Extraction,
+    *,
+    traces: bool,
 ) -> Iterator[tuple[Features, Features, Trace | None]]:
     """Yield the features of each trial, those from before contact, and its trace if `traces` asks for it."""
     backend, controller = settings.gripper.create(), settings.controller.create()
-    extract = _Extraction(
-        settings.features.component.qualified, settings.features.create(), contact_force_of(settings.values)
-    )
     total = len(plan.scenes)
     if isinstance(backend, BatchBackend):
         # A trace has half a megabyte, so traces come in batches.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import evolve, fields_dict, frozen
 
+from graspsense.core.checkpoints import with_checkpoints
 from graspsense.core.errors import ConfigError, PluginUnavailable
 from graspsense.core.labelled import Labelled
 from graspsense.core.strict import ValidationFailed, structured
@@ -48,6 +49,8 @@ class TrialSource(Group):
     """CSV, store: the column, or the number among the labels, that is to be predicted in place of the label."""
     unreliable: bool = False
     """Data set: whether to include trials that its author calls unreliable."""
+    checkpoints_s: tuple[float, ...] = ()
+    """Times after the contact at which the features are extracted as well, as by `CheckpointFeatures`."""
 
     @property
     def kind(self) -> Kind:
@@ -122,17 +125,24 @@ def labelled_trials(
         raise ConfigError(f"{source.source} has no numbers to predict: they are in a CSV file or in a store")
     if source.kind == "simulated":
         found = simulated(
-            settings(), groups=groups_of(source), seed=seed, progress=progress, on_trace=on_trace
+            settings(),
+            groups=groups_of(source),
+            seed=seed,
+            progress=progress,
+            on_trace=on_trace,
+            checkpoints_s=source.checkpoints_s,
         )
     elif source.kind == "CSV":
         found = _csv(source)
-    elif source.source.startswith(STORE) and (changed or source.value is not None):
+    elif source.source.startswith(STORE) and (changed or source.value is not None or source.checkpoints_s):
         from graspsense.store.dataset import labelled_store
 
         folder = source.source.removeprefix(STORE)
-        found = labelled_store(folder, changed, value=source.value, progress=progress)
+        found = labelled_store(
+            folder, changed, value=source.value, checkpoints_s=source.checkpoints_s, progress=progress
+        )
     else:
-        found = _data_set(source, features())
+        found = _data_set(source, with_checkpoints(features(), source.checkpoints_s))
     return found.of_class(source.only) if source.only else found
 
 

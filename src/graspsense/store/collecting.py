@@ -163,7 +163,7 @@ class Collection:
 
     def _report(self, word: str, grasp: RecordedTrial) -> str:
         trial = grasp.trial
-        counted = trial.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST)
+        counted = trial.outcome not in (Outcome.ABORTED, Outcome.DEVICE_LOST, Outcome.RECOGNISED)
         reason = f": {trial.reason}" if trial.reason else ""
         line = f"trial {grasp.number}, {word}: {trial.outcome.words}{reason}"
         if not counted:

@@ -24,7 +24,7 @@ from graspsense.core.target_value import TargetValue, values_of_labels
 from graspsense.recording.controls import controls
 from graspsense.recording.provenance import recipe
 from graspsense.recording.trial_record import FeatureValues
-from graspsense.store.extract_again import ExtractedAgain, extract_again
+from graspsense.store.extract_again import ExtractedAgain, ExtractedTrials, extract_again
 from graspsense.store.first_line import first_lines
 from graspsense.store.store import COUNTS, Store
 from graspsense.store.time_recorded import order_recorded
@@ -86,30 +86,35 @@ def labelled_store(
     *,
     flags: Sequence[Flag] = (),
     value: str | None = None,
+    checkpoints_s: Sequence[float] = (),
     progress: Progress | None = None,
 ) -> Labelled:
     """Return the labelled trials of the store in this folder that have the feature set of the newest one.
 
-    With `options` as after `-o` (`features.contact_force_n=0.1`), or `flags`, the features of all labelled trials are
-    extracted again with these settings. With `value`, the trials are those that have this number among their labels,
-    and it is the target. Raises ConfigError if there is no store or no such trial, DataDamaged.
+    With `options` as after `-o`, `flags` or `checkpoints_s`, the features of all labelled trials are extracted again
+    with these settings, and at these times after the contact as well. With `value`, the trials are those that have this
+    number among their labels, and it is the target. Raises ConfigError if there is no such trial, DataDamaged.
     """
     wanted = COUNTS if value is not None else f"{COUNTS} AND label IS NOT NULL"
     with Store.read(folder) as store:
         newest_number, feature_set = _newest(store, wanted)
         newest = store.trial(newest_number)
-        changed = (*options, *(flag.key for flag in flags))
+        changed = (
+            *options,
+            *(flag.key for flag in flags),
+            *(f"checkpoint {one:g} s" for one in checkpoints_s),
+        )
         rows = _read_rows(store, wanted, None if changed else feature_set)
         target, notes = None, [] if changed else _of_recording(store, wanted, len(rows))
         if value is not None:
             rows, target = _with_value(rows, value, folder, notes)
         settings, components = newest.recipe, newest.record.provenance.get("components", {})
         if changed:
-            extracted = extract_again(store, rows.id, options, flags=flags, progress=progress)
+            extracted = extract_again(
+                store, rows.id, options, flags=flags, checkpoints_s=checkpoints_s, progress=progress
+            )
             rows, tables = _tables_again(rows, extracted.trials, changed, notes)
-            # The gripper is the one that grasped, not the replay.
-            settings = {**recipe(extracted.settings), "gripper": settings.get("gripper", {})}
-            components = {**extracted.components, "gripper": components.get("gripper", "")}
+            settings, components = _with_gripper(extracted, settings, components)
         else:
             tables = _stored_tables(store, folder, rows, feature_set)
         first_line, unused = first_lines(store, rows.recording, rows.origin), _unused(store)
@@ -131,13 +136,29 @@ def labelled_store(
         ),
         value=target,
         notes=(*notes, *_notes(len(set(rows.recipe)), sum(rows.simulated), len(rows)), *unused),
-        provenance={
-            "simulated": any(rows.simulated),
-            "store": str(folder),
-            "newest_trial": newest_number,
-            "settings": settings,
-            "components": components,
-        },
+        provenance=_provenance(folder, rows, newest_number, settings, components),
+    )
+
+
+def _provenance(
+    folder: str, rows: _Rows, newest: int, settings: Mapping[str, Any], components: Mapping[str, str]
+) -> dict[str, Any]:
+    return {
+        "simulated": any(rows.simulated),
+        "store": str(folder),
+        "newest_trial": newest,
+        "settings": settings,
+        "components": components,
+    }
+
+
+def _with_gripper(
+    extracted: ExtractedTrials, settings: Mapping[str, Any], components: Mapping[str, str]
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return settings and components of trials that were extracted again; the gripper is the one that grasped."""
+    return (
+        {**recipe(extracted.settings), "gripper": settings.get("gripper", {})},
+        {**extracted.components, "gripper": components.get("gripper", "")},
     )
 
 
@@ -247,7 +268,11 @@ def _unused(store: Store) -> tuple[str, ...]:
             sum({COUNTS} AND label IS NULL),
             sum({COUNTS} AND id IN (SELECT trial FROM change WHERE "action" = 'relabel')) FROM trial"""
     )
-    reasons = {"set aside": aside, "aborted or incomplete": aborted, "without a label": unlabelled}
+    reasons = {
+        "set aside": aside,
+        "aborted, ended early or incomplete": aborted,
+        "without a label": unlabelled,
+    }
     notes = []
     if any(reasons.values()):
         text = ", ".join(f"{n} {reason}" for reason, n in reasons.items() if n)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from attrs import evolve, frozen
 
+from graspsense.core.checkpoints import with_checkpoints
 from graspsense.core.config import NONE, Flag, Settings, resolve, without_followers
 from graspsense.core.errors import ComponentFailed, ConfigError, named
 from graspsense.core.layers import Layer
@@ -54,11 +55,13 @@ def extract_again(
     options: Sequence[str] = (),
     *,
     flags: Sequence[Flag] = (),
+    checkpoints_s: Sequence[float] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> ExtractedTrials:
     """Return the features of these trials with changed settings; `options` are as typed after `-o`.
 
-    `flags` are changes that did not come as text. Raises ConfigError if a setting is not one of `CHANGEABLE` or wrong,
+    `flags` are changes that did not come as text. With `checkpoints_s` (s after the contact), the features are those of
+    `CheckpointFeatures`. Raises ConfigError if a setting is not one of `CHANGEABLE` or wrong,
     DataDamaged if a recording is lost or damaged, and ComponentFailed if a feature set fails.
     """
     _refuse_other_tables(options)
@@ -73,7 +76,7 @@ def extract_again(
         if text not in resolved:
             resolved[text] = _resolved(own, recording, options, flags)
         settings = resolved[text]
-        trials.append(_extracted(settings, recording))
+        trials.append(_extracted(settings, recording, checkpoints_s))
         if progress is not None:
             progress(done + 1, len(numbers))
     if settings is None:
@@ -110,12 +113,13 @@ def _resolved(
     return settings
 
 
-def _extracted(settings: Settings, recording: str) -> ExtractedAgain:
+def _extracted(settings: Settings, recording: str, checkpoints_s: Sequence[float]) -> ExtractedAgain:
     gripper = settings.gripper
     backend = gripper.component.create(evolve(gripper.config, recording=recording))
     grasp = run_grasp(backend, settings.controller.create(), settings.run)
     try:
-        features = settings.features.create().extract(grasp.trace)
+        feature_set = with_checkpoints(settings.features.create(), checkpoints_s)
+        features = feature_set.extract(grasp.trace)
     except Exception as error:
         raise ComponentFailed(
             f"feature set {settings.features.component.qualified} failed on {recording}: {named(error)}"

@@ -48,7 +48,7 @@ from graspsense.store.rows import (
 from graspsense.store.schema import NEWEST, migrate
 
 RECORDING_NAME: Final = re.compile(r"[\w.-]+\.mcap")
-NOT_ENDED: Final = ("aborted", "device lost")
+NOT_ENDED: Final = ("aborted", "device lost", "recognised")
 """Outcomes of a grasp that did not end by itself. Such a trial is stored, but not learned from."""
 COUNTS: Final = f"set_aside IS NULL AND complete = 1 AND outcome NOT IN {NOT_ENDED!r}"
 """SQL condition of the trials that count: complete, not set aside, and ended by themselves."""

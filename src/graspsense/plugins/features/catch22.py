@@ -36,7 +36,9 @@ class Catch22Config:
         unit="N",
         above=0.0,
         plausible=(0.01, 20.0),
-        meaning="Force on each pad from which on it touches the object.",
+        meaning="Force on each pad from which on it touches the object; that of the controller unless it is given "
+        "here.",
+        follows="controller.contact_force_n",
     )
 
 

@@ -1,0 +1,261 @@
+"""Predictions while a grasp goes on: the same part of a grasp in training and in use, and the end of a sure squeeze."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from graspsense.core.anytime import Anytime, anytime_of
+from graspsense.core.checkpoints import (
+    CheckpointFeatures,
+    checkpoints_of,
+    contact_of,
+    reaches,
+    split_checkpoints,
+    until_checkpoint,
+    used,
+)
+from graspsense.core.config import SelectedComponent, build, resolve
+from graspsense.core.errors import ConfigError
+from graspsense.core.features import table_of
+from graspsense.core.labelled import Labelled
+from graspsense.core.model import load_model, train, write_model
+from graspsense.core.plugins import installed
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
+from graspsense.core.signals import Outcome, Phase
+from graspsense.evaluation.checkpoints import checkpoint_models
+from graspsense.evaluation.doubt import calibrated_sets
+from graspsense.plugin_api import create
+from graspsense.testing.model_gripper import ModelGripper
+
+CHECKPOINTS = (0.02, 0.05, 0.3)
+CHANNELS = frozenset({"gap", "velocity", "effort", "force_left", "force_right"})
+RUN = RunConfig(hold_s=0.1)
+
+
+class Watched(ModelGripper):
+    """A model gripper that keeps its commands with the gap before them; `clock` as a real one has it.
+
+    Its ticks take no time, so that `wait` stands for the time until the next one.
+    """
+
+    def __init__(self, width_m, stiffness_n_m, clock="virtual", wait=None):
+        super().__init__(CHANNELS, width_m, stiffness_n_m)
+        self.clock, self.commanded, self.closed, self.wait = clock, [], 0, wait
+
+    def open(self, seed):
+        return evolve(super().open(seed), clock=self.clock, simulated=self.clock == "virtual")
+
+    def read(self, timeout_s):
+        if self.wait is not None:
+            self.wait()
+        return super().read(timeout_s)
+
+    def apply(self, command):
+        self.commanded.append((command, self._gap))
+        super().apply(command)
+
+    def close(self):
+        self.closed += 1
+
+
+def grasp_of(gripper, **more):
+    controller = create("controller", "hybrid", closing_speed_m_s=0.02)
+    return run_grasp(gripper, controller, RUN, **more)
+
+
+def curve():
+    return create("feature-set", "graspsense/curve")
+
+
+@pytest.fixture(scope="module")
+def traces():
+    """Twelve soft and twelve stiff objects of the same width."""
+    rng = np.random.default_rng(1)
+    stiffness = {"soft": 2000.0, "stiff": 9000.0}
+    return [
+        (label, grasp_of(Watched(0.07, k * rng.uniform(0.9, 1.1))).trace)
+        for label, k in stiffness.items()
+        for _ in range(12)
+    ]
+
+
+@pytest.fixture(scope="module")
+def trials(traces):
+    features = CheckpointFeatures(curve(), CHECKPOINTS)
+    return Labelled(
+        source="grasps of a model gripper",
+        table=table_of([features.extract(trace) for _, trace in traces]),
+        labels=tuple(label for label, _ in traces),
+    )
+
+
+@pytest.fixture(scope="module")
+def model(trials):
+    component = installed().find("classifier", "c45")
+    learner = SelectedComponent(component, build(component, {}))
+    *parts, whole = split_checkpoints(trials, CHECKPOINTS)
+    of_whole = train(component, learner.config, whole.labelled, name="test")
+    of_whole = evolve(of_whole, sets=calibrated_sets(learner, whole.labelled, 0))
+    return evolve(of_whole, checkpoints=checkpoint_models(of_whole, learner, parts, 0))
+
+
+def watcher(model, *, stops=False):
+    return Anytime(model, curve(), resolve("default"), stops=stops)
+
+
+def test_the_features_of_a_checkpoint_are_those_of_the_trace_up_to_it(traces, trials):
+    part = split_checkpoints(trials, CHECKPOINTS)[1]
+    assert part.after_s == 0.05
+    for k, (_, trace) in enumerate(traces):
+        cut = until_checkpoint(trace, contact_of(trace), 0.05)
+        assert cut.phase.max() < Phase.RELEASE
+        assert np.array_equal(part.labelled.table.values[k], curve().extract(cut).values, equal_nan=True)
+        assert part.used_s[k] == pytest.approx(0.05, abs=0.0011)
+    assert part.labelled.table.names == split_checkpoints(trials, CHECKPOINTS)[-1].labelled.table.names
+
+
+def test_a_grasp_that_has_ended_reaches_no_later_checkpoint(traces):
+    _, trace = traces[0]
+    contact = contact_of(trace)
+    seconds, newtons = used(trace, contact)
+    assert reaches(trace, contact, seconds - 0.01)
+    assert not reaches(trace, contact, seconds + 0.01)
+    assert used(trace, contact, seconds + 5.0) == (seconds, newtons)
+    early_s, early_n = used(trace, contact, 0.02)
+    assert early_s < seconds
+    assert early_n < newtons
+
+
+def test_predictions_in_the_loop_are_those_of_the_same_part_afterwards(model, tmp_path):
+    write_model(tmp_path / "kept.json", model)
+    loaded = load_model(str(tmp_path / "kept.json"), installed())
+    assert [after_s for after_s, _ in loaded.checkpoints] == list(CHECKPOINTS)
+    anytime = watcher(loaded)
+    grasp = grasp_of(Watched(0.07, 2000.0), watcher=anytime)
+    anytime.end()
+
+    assert grasp.outcome == Outcome.STEADY
+    assert [one.after_s for one in anytime.predictions] == list(CHECKPOINTS)
+    contact = contact_of(grasp.trace)
+    for (after_s, part), made in zip(model.checkpoints, anytime.predictions, strict=True):
+        features = curve().extract(until_checkpoint(grasp.trace, contact, after_s))
+        assert made.features.values == pytest.approx(features.values, nan_ok=True, rel=1e-12)
+        assert made.prediction.label == part.predict(features).label
+    told = [event.what for event in grasp.events if event.source == "model"]
+    assert told == [one.words for one in anytime.predictions]
+    assert told[-1].startswith("0.3 s after the contact: soft")
+    assert "0.3 s after the contact" in anytime.predictions[-1].prediction.model
+
+
+@pytest.mark.parametrize("clock", ["virtual", "device"])
+def test_a_sure_prediction_ends_the_squeeze_and_the_release_is_the_usual_one(model, clock):
+    anytime = watcher(model, stops=True)
+
+    def until_predicted():
+        if anytime._running is not None:
+            anytime._running.result()
+
+    gripper = Watched(0.07, 9000.0, clock, until_predicted)
+    grasp = grasp_of(gripper, watcher=anytime)
+    anytime.end()
+
+    assert grasp.outcome == Outcome.RECOGNISED
+    assert "after the contact: stiff, 90 %" in grasp.reason
+    assert anytime.predictions[-1].prediction.prediction_set == ("stiff",)
+    contact = contact_of(grasp.trace)
+    stopped_s = anytime.predictions[-1].t_s
+    assert [Phase(p) for p in dict.fromkeys(grasp.trace.phase.tolist())] == [
+        Phase.APPROACH,
+        Phase.SQUEEZE,
+        *([Phase.HOLD] if (grasp.trace.phase == Phase.HOLD).any() else []),
+        Phase.RELEASE,
+    ]
+    # The tick after the decision opens; from there on nothing closes, and the fingers end open and relaxed.
+    after = int(np.flatnonzero(grasp.trace.t_s > stopped_s)[0])
+    assert (grasp.trace.phase[after:] == Phase.RELEASE).all()
+    assert (grasp.trace.command[after:] > 0.0).all(), "a positive velocity opens"
+    assert gripper.commanded[-1][0].value == 0.0
+    assert gripper.commanded[-1][1] > 0.077
+    assert gripper.closed == 1
+    assert stopped_s - contact < 0.06
+
+
+def test_a_prediction_that_takes_long_makes_no_tick_wait_and_the_next_checkpoint_is_skipped(model):
+    """The first prediction ends only when the gripper is closed."""
+    done = threading.Event()
+
+    class Slow:
+        sets = None
+
+        def predict(self, features, settings, device):
+            if device is not None:  # not while it is prepared
+                assert done.wait(30.0)
+            return model.predict(features, settings, device)
+
+    class Gripper(Watched):
+        def close(self):
+            super().close()
+            done.set()
+
+    slow = evolve(model, checkpoints=((0.02, Slow()), (0.05, Slow())))
+    anytime = watcher(slow, stops=True)
+    grasp = grasp_of(Gripper(0.07, 2000.0, "device"), watcher=anytime)
+    anytime.end()
+
+    assert grasp.outcome == Outcome.STEADY
+    told = [event.what for event in grasp.events if event.source == "model"]
+    assert told == ["0.05 s after the contact: no prediction, the one before still runs"]
+
+
+def test_a_prediction_that_fails_does_not_end_the_grasp(model):
+    class Broken:
+        sets = None
+
+        def predict(self, features, settings, device):
+            raise ZeroDivisionError("no weights")
+
+    anytime = watcher(evolve(model, checkpoints=((0.02, Broken()),)), stops=True)
+    grasp = grasp_of(Watched(0.07, 2000.0), watcher=anytime)
+    assert grasp.outcome == Outcome.STEADY
+    (told,) = [event.what for event in grasp.events if event.source == "model"]
+    assert "0.02 s after the contact: the prediction failed: ZeroDivisionError: no weights" in told
+
+
+def test_only_a_model_with_checkpoints_and_sets_can_stop_a_squeeze(model):
+    settings = resolve("default", options=("run.stop_when_sure=true",))
+    with pytest.raises(ConfigError, match=r"has no checkpoints.*train .*--checkpoints"):
+        anytime_of(evolve(model, checkpoints=()), curve(), settings)
+    with pytest.raises(ConfigError, match="there is no classifier"):
+        anytime_of(None, curve(), settings)
+    unsure = tuple((after_s, evolve(part, sets=None)) for after_s, part in model.checkpoints)
+    with pytest.raises(ConfigError, match="no prediction sets"):
+        anytime_of(evolve(model, checkpoints=unsure), curve(), settings)
+    assert anytime_of(evolve(model, checkpoints=()), curve(), resolve("default")) is None
+
+
+@pytest.mark.parametrize("text", ["", "soon", "0", "-0.1", "0.2,0.1", "0.1,0.1", "nan", "inf"])
+def test_checkpoints_that_are_no_times(text):
+    with pytest.raises(ConfigError, match=r"as in 0.1,0.2,0.4"):
+        checkpoints_of(text)
+
+
+def test_a_source_of_features_alone_has_no_checkpoints(trials):
+    plain = split_checkpoints(trials, CHECKPOINTS)[-1].labelled
+    with pytest.raises(ConfigError, match="gives features and not the traces"):
+        split_checkpoints(plain, CHECKPOINTS)
+
+
+def test_a_checkpoint_that_hardly_any_grasp_reaches(traces):
+    features = CheckpointFeatures(curve(), (60.0,))
+    late = Labelled(
+        source="grasps",
+        table=table_of([features.extract(trace) for _, trace in traces]),
+        labels=tuple(label for label, _ in traces),
+    )
+    with pytest.raises(ConfigError, match="only 0 of 24 grasps still go on 60 s after the contact"):
+        split_checkpoints(late, (60.0,))
