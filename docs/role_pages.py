@@ -26,7 +26,10 @@ from graspsense.core.features import Features, FeatureTable, Prediction
 from graspsense.core.reasons import Contribution, FeatureValue, Reason
 from graspsense.core.trace import ImageTrace, SampleTrace, Trace
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
+from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.recording.replayable import Recording
 from graspsense.scaffold.make import KINDS, plugin_module, words_of
+from graspsense.sources.grasp_columns import GraspColumns, checked_recording
 from graspsense.testing import CHECKS, MINIMUM_CHECKS
 
 FOLDER = Path(__file__).parent / "roles"
@@ -35,6 +38,7 @@ TITLES = {
     "controller": "A controller",
     "feature-set": "A feature set",
     "classifier": "A classifier",
+    "dataset": "A reader of a data set",
     "distribution": "A distribution",
 }
 BASES = {
@@ -96,8 +100,72 @@ FLOWING: tuple[Any, ...] = (
 HEAD = "<!-- Written by docs/role_pages.py from the code: change that. -->\n"
 
 
+def dataset_page() -> str:
+    """Return the page of a reader of a data set, which is a function and no component."""
+    return "\n".join(
+        [
+            HEAD + f"# {TITLES['dataset']}",
+            "",
+            "This page describes readers of recorded grasps. A manifest ([import](../import.md)) describes most files "
+            "without any code. A reader is for files that a manifest cannot describe.",
+            "",
+            "A reader is a function `recordings(folder)` that yields a `LabelledRecording` for each grasp. With the "
+            "name of its entry, the data set can be",
+            "",
+            "- evaluated: `graspsense evaluate NAME:FOLDER`;",
+            "- imported into a store, with its recordings: `graspsense import NAME:FOLDER --save DIR`;",
+            "- looked at before: `graspsense import NAME:FOLDER --check`;",
+            "- replayed grasp by grasp: `graspsense replay NAME:FOLDER#3`, or `gripper.recording=NAME:FOLDER#3` of the "
+            "gripper `replay`.",
+            "",
+            "`graspsense plugins new NAME --role dataset` creates a package to start from: the example below. The hook "
+            f"[graspsense_datasets](../hooks.md{_dataset_anchor()}) declares readers.",
+            "",
+            "## LabelledRecording",
+            "",
+            f"    {_attrs_signature(LabelledRecording)}",
+            "",
+            _text(LabelledRecording),
+            "",
+            "## Recording",
+            "",
+            f"    {_attrs_signature(Recording)}",
+            "",
+            _text(Recording),
+            "",
+            "## GraspColumns",
+            "",
+            f"    {_attrs_signature(GraspColumns)}",
+            "",
+            _text(GraspColumns),
+            "",
+            f"`checked_recording(columns)`: {_text(checked_recording)}",
+            "",
+            "## Fields of the entry",
+            "",
+            *_entry(entries.DatasetEntry),
+            "## Complete example",
+            "",
+            *_example("dataset"),
+        ]
+    )
+
+
+def _dataset_anchor() -> str:
+    spec = hookspecs.graspsense_datasets
+    return _section(f"graspsense_datasets{inspect.signature(spec)}".replace("'", "")).removeprefix(
+        "../hooks.md"
+    )
+
+
+def _attrs_signature(cls: Any) -> str:
+    return f"{cls.__name__}({', '.join(one.name for one in attrs.fields(cls))})"
+
+
 def page(role: str) -> str:
     """Return the page of a role."""
+    if role == "dataset":
+        return dataset_page()
     lines = [HEAD + f"# {TITLES[role]}", ""]
     if role != "distribution":
         base: Any = BASES[role]

@@ -134,6 +134,7 @@ _TABLE: Final[Table] = {
         "labelled": ("ControlFeatures", "Labelled"),
         "recording.labelled_recording": ("LabelledRecording",),
         "recording.replayable": ("Recording",),
+        "sources.grasp_columns": ("GraspColumns", "checked_recording"),
     },
     "Tests of a plugin": {
         "testing.conformance": ("parametrize_checks",),

@@ -141,6 +141,8 @@ from graspsense.core.labelled import ControlFeatures as ControlFeatures
 from graspsense.core.labelled import Labelled as Labelled
 from graspsense.recording.labelled_recording import LabelledRecording as LabelledRecording
 from graspsense.recording.replayable import Recording as Recording
+from graspsense.sources.grasp_columns import GraspColumns as GraspColumns
+from graspsense.sources.grasp_columns import checked_recording as checked_recording
 
 # Tests of a plugin
 from graspsense.testing.conformance import parametrize_checks as parametrize_checks

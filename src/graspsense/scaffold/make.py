@@ -75,6 +75,14 @@ KINDS: Final[Mapping[str, ScaffoldKind]] = {
         ("graspsense-sim-gripper>=0.1,<0.2",),
         "graspsense run --object scene.toml -o classifier.type=none",
     ),
+    "dataset": ScaffoldKind(
+        None,
+        "reader",
+        "a reader of recorded grasps, which can be evaluated, imported and replayed",
+        "DatasetEntry",
+        ("numpy>=1.26",),
+        "graspsense evaluate $part:FOLDER",
+    ),
     "observer": ScaffoldKind(
         None, "observer", "an observer that logs how each grasp ended", "", (), "graspsense run"
     ),
