@@ -147,6 +147,7 @@ def _import(save: str, recordings: Sequence[ImportedRecording], chosen: _Chosen,
     from graspsense.cli.progress import ProgressLine
     from graspsense.core.errors import ConfigError
     from graspsense.core.plugins import installed
+    from graspsense.sources.dataset_recordings import handed_over
     from graspsense.sources.importing import import_recording
     from graspsense.store.imported_contents import AlreadyImported, ImportedContents
     from graspsense.store.store import Store
@@ -158,13 +159,13 @@ def _import(save: str, recordings: Sequence[ImportedRecording], chosen: _Chosen,
     with Store.open(save) as store, ProgressLine() as progress:
         contents = ImportedContents(store)
         for done, one in enumerate(recordings):
-            try:
-                trial, number = import_recording(
-                    store, chosen.settings(one), installed(), one.labelled, contents
-                )
-            except AlreadyImported as error:
-                refused.append(str(error))
-                continue
+            with handed_over(one.name, one.labelled.recording):
+                try:
+                    settings = chosen.settings(one)
+                    trial, number = import_recording(store, settings, installed(), one.labelled, contents)
+                except AlreadyImported as error:
+                    refused.append(str(error))
+                    continue
             outcomes[trial.outcome.words] = outcomes.get(trial.outcome.words, 0) + 1
             source = one.labelled.source
             kept.append({"source": source, "trial": number, "outcome": trial.outcome.words})

@@ -47,8 +47,6 @@ def recordings_of(kind: str, place: str) -> Iterator[LabelledRecording]:
 
 def numbered_recording(kind: str, name: str) -> Recording:
     """Return the recording that `PLACE#NUMBER` names. Raises ConfigError if there is none, and as `recordings_of`."""
-    if f"{kind}:{name}" in _handed:
-        return _handed[f"{kind}:{name}"]
     match = _NUMBERED.fullmatch(name)
     if match is None:
         raise ConfigError(
@@ -62,8 +60,13 @@ def numbered_recording(kind: str, name: str) -> Recording:
     return found.recording
 
 
+def handed_recording(name: str) -> Recording | None:
+    """Return the recording that is being imported under this name, None if it is another one."""
+    return _handed.get(name)
+
+
 class handed_over:  # noqa: N801 - used as a context manager, like those of contextlib
-    """While a recording is imported, `numbered_recording` returns it under its name without reading its file again."""
+    """While a recording is imported, `handed_recording` returns it under its name, so that its file is read once."""
 
     def __init__(self, name: str, recording: Recording) -> None:
         self.name, self.recording = name, recording

@@ -17,7 +17,6 @@ from graspsense.recording.layout import DEVICE, RESULT, START, TICK, pads_number
 from graspsense.recording.replayable import content_sha256
 from graspsense.recording.trial_record import TrialRecord
 from graspsense.recording.writer import RecordingWriter
-from graspsense.sources.dataset_recordings import handed_over
 from graspsense.store.imported_contents import CONTENT, ImportedContents
 
 if TYPE_CHECKING:
@@ -59,8 +58,7 @@ def import_recording(
     record = TrialRecord.begin(settings, labels, "import")
     about = {CONTENT: sha256, "source": labelled.source}
     record = evolve(record, provenance={**record.provenance, **about})
-    with handed_over(settings.values["gripper"]["recording"], labelled.recording):
-        trial = grasp_with(settings, plugins, labels=labels)
+    trial = grasp_with(settings, plugins, labels=labels)
     record = record.with_device(trial.device).with_result(trial)
     path = store.new_recording(record.made_at)
     try:

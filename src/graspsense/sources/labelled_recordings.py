@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from graspsense.core.errors import ConfigError
-from graspsense.core.features import Features, table_of
+from graspsense.core.features import Features, FeatureTable, table_of
 from graspsense.core.labelled import Labelled, class_of
 from graspsense.core.roles import FeatureSet
 from graspsense.core.signals import APPROACH
@@ -20,6 +22,7 @@ from graspsense.recording.controls import controls
 from graspsense.recording.labelled_recording import LabelledRecording
 from graspsense.recording.replayable import Recording
 from graspsense.sources.dataset_recordings import recordings_of
+from graspsense.store.first_line import NAMES, UNITS, numbers_of
 
 
 def labelled_recordings(kind: str, place: str, features: FeatureSet[Any]) -> Labelled:
@@ -55,7 +58,9 @@ def labelled_recordings(kind: str, place: str, features: FeatureSet[Any]) -> Lab
         no_instances="the data set does not say which trials are of the same object",
         order=order,
         no_order="" if order is not None else "the data set does not say when each trial was recorded",
-        **controls(table, table_of(before)),
+        **controls(
+            table, table_of(before), before_missing=_why_missing(before), first_line=_first_lines(facts)
+        ),
         notes=tuple(notes),
         provenance={"simulated": False},
     )
@@ -91,6 +96,18 @@ def _order(facts: Sequence[LabelledRecording]) -> tuple[int, ...] | None:
         return None
     ranks = {key: rank for rank, key in enumerate(sorted(set(keys)))}
     return tuple(ranks[key] for key in keys)
+
+
+def _first_lines(facts: Sequence[LabelledRecording]) -> FeatureTable:
+    """Return the numbers of the first frame of each recording."""
+    values = np.array([numbers_of(one.recording.readings[0].frame) for one in facts], dtype=np.float64)
+    values[np.isinf(values)] = np.nan
+    return FeatureTable(names=NAMES, units=UNITS, values=values)
+
+
+def _why_missing(before: Sequence[Features]) -> str:
+    """Return why trials have no features from before contact, empty if all have them."""
+    return next((reason for one in before for reason in one.reasons.values()), "")
 
 
 def _counted(notices: Any) -> list[str]:

@@ -19,6 +19,7 @@ from graspsense.core.signals import CHANNELS, EFFORT, Command, Pads, Reading
 from graspsense.recording.replayable import Recording
 from graspsense.sources.dataset_recordings import (
     datasets_with_recordings,
+    handed_recording,
     is_recording_number,
     numbered_recording,
 )
@@ -69,6 +70,9 @@ def known_kinds() -> tuple[str, ...]:
 
 def read_named(kind: str, name: str) -> Recording:
     """Return the recording of this kind and name. Raises ConfigError, DataDamaged."""
+    handed = handed_recording(f"{kind}:{name}")
+    if handed is not None:
+        return handed
     if kind in KINDS and not is_recording_number(kind, name):
         return KINDS[kind](name)
     return numbered_recording(kind, name)

@@ -10,7 +10,7 @@ import numpy as np
 
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.features import FeatureTable
-from graspsense.core.signals import CHANNELS
+from graspsense.core.signals import CHANNELS, Frame
 from graspsense.recording.reader import read_first_frame
 
 if TYPE_CHECKING:
@@ -28,6 +28,11 @@ NAMES: Final = tuple(f"{channel}_first" for channel in _FIELDS)
 UNITS: Final = tuple(CHANNELS[channel] for channel in _FIELDS)
 
 
+def numbers_of(frame: Frame) -> list[float]:
+    """Return the numbers of a frame, in the order of `NAMES`."""
+    return [getattr(frame, field) for field in _FIELDS.values()]
+
+
 def first_lines(store: Store, recordings: Sequence[str], origins: Sequence[str]) -> FeatureTable | None:
     """Return the numbers of the first frame of each trial, NaN if it was not imported; None if none was.
 
@@ -42,6 +47,6 @@ def first_lines(store: Store, recordings: Sequence[str], origins: Sequence[str])
         with suppress(ConfigError, DataDamaged):
             frame = read_first_frame(store.recording_path(recording))
             if frame is not None:
-                values[row] = [getattr(frame, field) for field in _FIELDS.values()]
+                values[row] = numbers_of(frame)
     values[np.isinf(values)] = np.nan
     return FeatureTable(names=NAMES, units=UNITS, values=values)
