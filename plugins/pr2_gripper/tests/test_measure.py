@@ -24,7 +24,7 @@ def report(ticks: int = 0, velocity_mtick_s: int = 0, status: int = 0, time_us: 
 def image(counter: int, left: dict[int, int] | None = None, right: dict[int, int] | None = None) -> RawImage:
     """An image with these counts over the zero of `TIP` on these cells."""
     cells = [int(TIP[i]) + over.get(i, 0) for over in (left or {}, right or {}) for i in range(22)]
-    return RawImage(counter, 1000 * counter, tuple(cells))
+    return RawImage(counter, 1000 * counter, tuple(map(float, cells)))
 
 
 def raw(base: RawImage, at: int, value: int) -> RawImage:
@@ -94,7 +94,7 @@ def test_cell_that_does_not_answer_adds_no_force_and_is_flagged(dead: int, devic
 
 def test_whole_tip_that_does_not_answer_has_no_force(device_identity: Any) -> None:
     measure = tared(device_identity())
-    dead = RawImage(9, 0, (0,) * 22 + tuple(int(c) for c in TIP))
+    dead = RawImage(9, 0, (0.0,) * 22 + tuple(TIP))
     frame = measure.reading(report(), dead).frame
     assert math.isnan(frame.force_left_n)
     assert frame.force_right_n == pytest.approx(0.0)

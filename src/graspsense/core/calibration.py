@@ -59,11 +59,12 @@ def masked(cells: Cells, zero: Cells) -> tuple[Cells, int]:
 
     A cell whose zero is 0 was dead during the tare, and counts as dead afterwards.
     """
-    for cell, none in zip(cells, zero, strict=True):
-        if not answers(cell) or none == 0.0:
-            break
-    else:
-        return cells, 0
+    total = sum(cells)
+    if min(cells) > 0.0 and max(cells) < LARGEST_COUNT and total == total and 0.0 not in zero:
+        return (
+            cells,
+            0,
+        )  # all of them answer; NaN is neither the smallest nor the largest, but shows in the sum
     good = [answers(c) and z != 0.0 for c, z in zip(cells, zero, strict=True)]
     kept = tuple([c if ok else z for c, z, ok in zip(cells, zero, good, strict=True)])
     return kept, good.count(False)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Callable
+from itertools import chain
 from typing import Any, Final
 
 from attrs import field, frozen
@@ -163,7 +164,7 @@ def _samples_source(i: int) -> Callable[[Reading], tuple[Any, ...] | None]:
         t_s, counter, new, values = reading.signals[i]
         if not new:
             return None
-        return (t_s, counter, new, len(values[0]), *[number for row in values for number in row])
+        return (t_s, counter, new, len(values[0]), *chain.from_iterable(values))
 
     return numbers
 

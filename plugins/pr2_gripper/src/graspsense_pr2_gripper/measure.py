@@ -142,8 +142,7 @@ class Measure:
             self._compute_forces()
 
     def _take(self, image: RawImage) -> None:
-        cells = tuple(map(float, image.cells))
-        left, right = cells[:CELLS], cells[CELLS:]
+        left, right = image.cells[:CELLS], image.cells[CELLS:]
         if self._swap:
             left, right = right, left
         if self._mirror[0]:

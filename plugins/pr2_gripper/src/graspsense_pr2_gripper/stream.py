@@ -30,7 +30,7 @@ class RawImage(NamedTuple):
 
     counter: int
     time_us: int
-    cells: tuple[int, ...]
+    cells: tuple[float, ...]
 
 
 class Restarted(Exception):
@@ -67,7 +67,7 @@ class Stream:
         self._number = 0
         self._taken_us = 0
         self._have = 0
-        self._cells = [0] * IMAGE_CELLS
+        self._cells = [0.0] * IMAGE_CELLS
 
     def take(self, data: bytes) -> InputReport | None:
         """Return the report if it is newer than all before, else None. Raises Restarted."""
@@ -133,7 +133,8 @@ class Stream:
             return
         self._have |= bit
         first = report.slice * SLICE_CELLS
-        self._cells[first : first + SLICE_CELLS] = report.cells
+        # Converted slice by slice, since the tick in which an image is complete has enough to do.
+        self._cells[first : first + SLICE_CELLS] = map(float, report.cells)
         if self._have == _ALL_SLICES:
             counts.images += 1
             self.image = RawImage(counts.images, self._taken_us, tuple(self._cells))

@@ -312,7 +312,7 @@ def _draw_noise(noise: NDArray[np.float64], blocks: Iterator[NDArray[np.float64]
 def _as_lists(buffers: Buffers) -> Buffers:
     pads = PadBuffers(*(np.asarray(array).tolist() for array in buffers.pads))
     palm = PalmBuffers(*(np.asarray(array).tolist() for array in buffers.palm)) if buffers.palm else ()
-    return Buffers(pads, *(np.asarray(array).tolist() for array in buffers[1:-1]), palm=palm)
+    return Buffers(pads, *(np.asarray(array).tolist() for array in buffers[1:-1]))._replace(palm=palm)
 
 
 def _with_more_images(buffers: Buffers, noise: NDArray[np.float64]) -> Buffers:

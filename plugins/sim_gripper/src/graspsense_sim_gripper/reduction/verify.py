@@ -214,7 +214,7 @@ class TrialGrasps:
                 recorded = (table, phases) if on_arrays else (table.tolist(), phases.tolist())
                 progress = progress._replace(loop=progress.loop._replace(recorded=0))
                 palm = _palm_buffers(on_arrays, table.shape[1]) if made.has_palm else ()
-                start, written = progress, Buffers(*buffers, *recorded, palm=palm)
+                start, written = progress, Buffers(*buffers, *recorded)._replace(palm=palm)
                 progress = loop(grasp_params, start, written)
                 if progress.loop.failed == 1:
                     before = before_failure(loop, grasp_params, start, written, progress)
