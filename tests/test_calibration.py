@@ -2,7 +2,7 @@
 
 import pytest
 
-from graspsense.core.calibration import edge_force, pad_force, tare, zero_of
+from graspsense.core.calibration import edge_force, masked, pad_force, tare, zero_of
 from graspsense.core.errors import TareRefused
 from graspsense.core.signals import Pads
 from graspsense.testing.model_gripper import CELLS
@@ -28,6 +28,23 @@ def test_edge_force_is_the_largest_single_edge_cell_each_with_its_own_scale():
     cells[3] += 120.0  # a tip cell, 600 counts/N
     cells[10] += 9000.0  # a pad cell: no edge
     assert edge_force(cells, zero, EDGE_COUNTS_PER_N) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("place", [0, 10, CELLS - 1])
+@pytest.mark.parametrize("reading", [0.0, 65535.0, float("nan")])
+def test_a_cell_that_does_not_answer_is_left_out_wherever_it_is(place, reading):
+    zero = tuple(3000.0 + i for i in range(CELLS))
+    cells = [3500.0] * CELLS
+    assert masked(tuple(cells), zero) == (tuple(cells), 0)
+    cells[place] = reading
+    kept, dead = masked(tuple(cells), zero)
+    assert dead == 1
+    assert kept == (*cells[:place], zero[place], *cells[place + 1 :])
+
+
+def test_a_cell_that_was_dead_in_the_tare_is_dead_afterwards():
+    zero = (3000.0, 0.0, 3000.0)
+    assert masked((3500.0,) * 3, zero) == ((3500.0, 0.0, 3500.0), 1)
 
 
 def test_the_zero_is_the_mean_of_all_images_not_the_last():

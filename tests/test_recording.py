@@ -9,6 +9,7 @@ import struct
 import subprocess
 import sys
 import time
+from collections import namedtuple
 from itertools import pairwise
 
 import pytest
@@ -18,7 +19,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from graspsense import load_pipeline
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.signals import Reading
+from graspsense.core.signals import Image, Reading, Samples
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import START
 from graspsense.recording.reader import read_recorded
@@ -145,6 +146,32 @@ def test_a_writer_that_does_not_follow_holds_nobody_up_and_loses_nothing(tmp_pat
     assert recorded.dropped == 0
     grasp = read_recorded(tmp_path / "g.mcap")
     assert grasp.ticks["t_s"].tolist() == [frame(k).t_s for k in range(20_000)]
+
+
+def test_messages_of_a_tick_that_the_pipe_takes_in_part_only_are_whole(tmp_path):
+    """Samples and an image of 2000 cells are 16 kB a tick, four times what a pipe takes at once or not at all."""
+    signals = namedtuple("Signals", ("acceleration", "palm"))
+    recorder = Recorder(tmp_path / "g.mcap")
+    recorder.metadata(START, begun().section(START))
+    pid, ticks = recorder._process.pid, 300
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        for k in range(ticks):
+            samples = Samples(
+                k * 1e-3, 3 * k + 3, 2, ((k + 0.1, -1.0), (k + 0.2, -1.0), (math.nan, math.nan))
+            )
+            palm = Image(k * 1e-3, k + 1, tuple(k + 0.5 * i for i in range(2000)))
+            recorder.take(Reading(frame(k), pads(k), signals(samples, palm)), 3, command(k))
+    finally:
+        os.kill(pid, signal.SIGCONT)
+    recorded = recorder.finish()
+    assert (recorded.ticks, recorded.dropped) == (ticks, 0)
+    assert recorded.deferred > 0
+    grasp = read_recorded(tmp_path / "g.mcap")
+    assert grasp.ticks["t_s"].tolist() == [frame(k).t_s for k in range(ticks)]
+    read = [reading.signals for reading in grasp.readings()]
+    assert [one.palm.cells[1999] for one in read] == [k + 999.5 for k in range(ticks)]
+    assert [one.acceleration.values[1][0] for one in read] == [k + 0.2 for k in range(ticks)]
 
 
 def test_a_writer_that_has_died_does_not_stop_the_grasp(tmp_path):
