@@ -35,9 +35,11 @@ from graspsense_sim_gripper.stepping.tr_bdf2 import tr_bdf2
 from graspsense_sim_gripper.stepping.verlet import verlet
 from graspsense_sim_gripper.terms.phi import phi1
 
-LAG_PIECES: Final = 4
+LAG_PIECES: Final = 4.0
+LAG_SHARE: Final = 0.25
 MAX_LAG_PIECES: Final = 1000
-"""Pieces per time constant in which the force of a drive that lags is constant, and how many there are at most."""
+"""Pieces per time constant in which the force of a drive that lags is constant: at least the first number, or the
+second over the cube root of the tolerance, since their error is of second order. The third is the most in a tick."""
 BISECTION: Final = 0.5
 """A step that contains an event of a term is repeated with this share of its length, until it is `MIN_STEP_S` long."""
 REST_SHARE: Final = 1e-12
@@ -49,7 +51,8 @@ def move(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> 
     lag = params.drive.lag_s
     n_pieces, h, mean = 1, dt, effort_n
     if lag > 0.0:
-        n_pieces = min(max(math.ceil(LAG_PIECES * dt / lag), 1), MAX_LAG_PIECES)
+        per_lag = max(LAG_PIECES, LAG_SHARE * params.steps.tolerance ** (-1.0 / 3.0))
+        n_pieces = max(math.ceil(min(per_lag * dt / lag, MAX_LAG_PIECES)), 1)
         h = dt / n_pieces
     for _ in range(n_pieces):
         if lag > 0.0:

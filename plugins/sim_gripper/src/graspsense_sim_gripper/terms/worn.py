@@ -36,12 +36,14 @@ class WornState(NamedTuple):
 def worn(
     params: Worn, state: WornState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, WornState]:
-    """Return the force of the shell with the damage at the end of the step."""
-    work = state.work_j
+    """Return the force of the shell with the damage at the end of the step; of second order, by Heun's method."""
+    before = work = state.work_j
     force = _force(params, work, d1)
     if d1 > d0:
-        work += max(0.5 * (state.force_n + force) * (d1 - d0), 0.0)
-        force = _force(params, work, d1)
+        for _ in range(2):
+            # First with the damage before the step, then with that after it.
+            work = before + max(0.5 * (state.force_n + force) * (d1 - d0), 0.0)
+            force = _force(params, work, d1)
     return force, WornState(work, force)
 
 
