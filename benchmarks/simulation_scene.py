@@ -1,4 +1,4 @@
-"""The scene that peers are measured on: its exact solution, its control law, and our simulator on it.
+"""A scene of linear contact: its exact solution and its control law.
 
     M x'' = u - B x' - f,    m y'' = f - k y - c y',    f = kc max(0, x - y - x0)
 
@@ -10,7 +10,6 @@ drive of constant mass with the ideal sensor, x being 70 mm less the gap; the co
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -25,13 +24,7 @@ from graspsense.plugin_api import (
     STEADY,
     Command,
     Controller,
-    RunConfig,
-    entry_point,
 )
-from graspsense_sim_gripper.batch.job import Job, Storage, grasp_compiled
-from graspsense_sim_gripper.build import unverified_setup
-from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
-from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 
 M, B, LIGHT, C, K, KC, X0 = 1.0, 20.0, 0.02, 5.0, 2e3, 2e4, 0.02
@@ -214,54 +207,3 @@ def exact_closed() -> Run:
 
 def exact_open(us: Any) -> Run:
     return exact(lambda tick, x, v, f: float(us[tick]))
-
-
-# ------------------------------------------------------------------------------------------------- ours
-
-
-SETTINGS: dict[str, dict[str, Any]] = {
-    "as shipped": {},
-    **{f"accuracy {accuracy:g}": {"accuracy": accuracy} for accuracy in (0.3, 0.1, 0.001, 1e-4)},
-    **{
-        f"steps of {1e6 * step_s:g} us": {"step_s": step_s, "scheme": "explicit"}
-        for step_s in (1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
-    },
-}
-"""From which the cheapest is taken that is as good as is asked for; as of the peers' steps and tolerances."""
-
-
-class Ours:
-    """Our simulator with these settings, compiled and ready."""
-
-    def __init__(self, what: str, config: SimConfig, law: Controller[Any] | None = None) -> None:
-        self.what = f"graspsense, {what}"
-        self.setup = unverified_setup(config, config.object, 0)
-        self.law = law or Law(None)
-        # The trace is kept: what is measured includes recording it and making its columns.
-        self.job = Job(
-            config=config, controller=self.law, run=RunConfig(hold_s=0.0), extract=None, traces=True
-        )
-        composition = composition_of(config, self.setup)
-        self.loop = compiled_loop(composition, type(self.law).step)
-        self.storage = Storage()
-        with compiling(composition):
-            self.once()
-        self.loop = entry_point(self.loop)
-
-    def once(self) -> Run:
-        """Return one run."""
-        began = time.thread_time()
-        trace = grasp_compiled(self.job, self.setup, self.loop, self.storage).trace
-        seconds = time.thread_time() - began
-        part = slice(0, TICKS)
-        return Run(
-            x=self.job.config.open_gap_m - trace.gap_m[part],
-            force=trace.force_left_n[part],
-            u=trace.command[part],
-            seconds=seconds,
-            what=self.what,
-        )
-
-    def run(self, repeats: int) -> Run:
-        """Return the fastest of so many."""
-        return min((self.once() for _ in range(repeats)), key=lambda one: one.seconds)

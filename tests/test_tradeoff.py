@@ -49,27 +49,6 @@ TRADE = SimulationTrade(
     ),
     made={"date": "2026-11-21", "numpy": "2.4"},
 )
-PEERS = {
-    "made": {"date": "2026-11-20"},
-    "scene": "a surface",
-    "runs": [
-        {
-            "engine": "graspsense",
-            "what": "graspsense, as shipped",
-            "seconds": 1e-3,
-            "rms": 1e-5,
-            "peak": 1e-6,
-        },
-        {"engine": "Other Euler", "what": "Other 1.0 Euler", "seconds": 1e-1, "rms": None, "peak": None},
-    ],
-    "other_4e-4": 44.5,
-    "other_4e-4_is": "Other 1.0 Euler over graspsense, as shipped",
-    "other_1e-6": None,
-    "grasps_per_s_by_count": {
-        "100": {"ms_of_processor_a_grasp": 0.5},
-        "1000": {"ms_of_processor_a_grasp": 0.6},
-    },
-}
 
 
 def test_a_row_says_time_set_up_errors_and_what_failed():
@@ -83,26 +62,21 @@ def test_a_row_says_time_set_up_errors_and_what_failed():
     assert by_step["broken", "1 ms"][3:7] == ("-", "12.5", "-", "-")
 
 
-def test_the_page_has_both_tables_with_date_and_versions():
-    page = simulation_markdown(TRADE, PEERS)
+def test_the_page_has_the_table_with_date_and_versions():
+    page = simulation_markdown(TRADE)
     assert "date 2026-11-21" in page
     assert "numpy 2.4" in page
-    assert "| Other 1.0 Euler | 100 | - | - |" in page
-    assert "| `other_4e-4` | 44.5 | Other 1.0 Euler over graspsense, as shipped |" in page
-    assert "| `grasps_per_s_by_count` | 0.6 | ms of processor a grasp, of 1000 |" in page
-    assert "other_1e-6" not in page
+    assert "| even | full | 1 ms | 1 | 12.5 | 1.0e-02 |" in page
     assert "simulated" in page
-    assert "Other" not in simulation_markdown(TRADE, None)
 
 
-@pytest.mark.parametrize("peers", [None, PEERS])
-def test_the_picture_is_drawn_with_failures_floors_and_peers(tmp_path, peers):
+def test_the_picture_is_drawn_with_failures_and_floors(tmp_path):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
     file = tmp_path / "trade.png"
-    simulation_png(TRADE, peers, file)
+    simulation_png(TRADE, file)
     assert file.read_bytes().startswith(b"\x89PNG")
     with pytest.raises(ConfigError, match="cannot be written"):
-        simulation_png(TRADE, peers, tmp_path / "no" / "trade.png")
+        simulation_png(TRADE, tmp_path / "no" / "trade.png")
 
 
 def ended(arguments):
@@ -117,17 +91,6 @@ def test_a_gripper_with_nothing_to_trade_is_refused(capsys, tmp_path):
     options = ["--gripper", "replay", "-o", f"gripper.recording=csv:{file}"]
     assert ended(["tradeoff", "simulation", *options]) == 2
     assert "no accuracy to trade for time" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [("{", "is not what"), ('{"runs": [{"what": 1}]}', "is not what"), ('{"runs": []}', "has no runs")],
-)
-def test_a_wrong_file_of_peers_is_told_before_anything_runs(capsys, tmp_path, text, says):
-    file = tmp_path / "peers.json"
-    file.write_text(text)
-    assert ended(["tradeoff", "simulation", "--peers", str(file)]) == 2
-    assert says in capsys.readouterr().err
 
 
 def test_the_group_lists_what_there_is(capsys):

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,9 +11,6 @@ from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json, file_to_write
 from graspsense.cli.terminal import echo, echo_table, talk
 from graspsense.cli.tradeoff_recognition import commands
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 
 @click.group(short_help="Measure recognition or accuracy against cost.")
@@ -39,7 +34,6 @@ for _one in commands():
 @click.option(
     "--seeds", type=click.IntRange(min=1), default=2, show_default=True, help="Grasps of each scene."
 )
-@click.option("--peers", metavar="FILE", help="Output of `benchmarks/simulation.py --json`, for comparison.")
 @click.option("--png", metavar="FILE", callback=file_to_write, help="Draw the result.")
 @click.option(
     "--markdown", metavar="FILE", callback=file_to_write, help="Write the tables as a Markdown page."
@@ -48,7 +42,6 @@ for _one in commands():
 def simulation(
     scenes: tuple[str, ...],
     seeds: int,
-    peers: str | None,
     png: str | None,
     markdown: str | None,
     as_json: bool,
@@ -68,7 +61,6 @@ def simulation(
     from graspsense.experiments.simulation import SCENES, trade_simulation
     from graspsense.report.simulation import simulation_markdown, simulation_png, simulation_rows
 
-    beside = _peers(peers) if peers else None
     settings = settings_of(pipeline, gripper, object_name, options, seed, force)
     wanted = scenes or ((object_name,) if object_name else SCENES)
     first = settings.run.seed
@@ -77,37 +69,18 @@ def simulation(
             settings, scenes=wanted, seeds=range(first, first + seeds), progress=progress
         )
     if png:
-        simulation_png(found, beside, Path(png))
+        simulation_png(found, Path(png))
         talk(f"drawn in {png}")
     if markdown:
         picture = os.path.relpath(png, Path(markdown).parent) if png else None
         try:
-            Path(markdown).write_text(simulation_markdown(found, beside, picture), encoding="utf-8")
+            Path(markdown).write_text(simulation_markdown(found, picture), encoding="utf-8")
         except OSError as error:
             raise click.ClickException(f"{markdown} cannot be written: {error.strerror}") from error
         talk(f"written to {markdown}")
     if as_json:
-        echo_json({**found.as_json(), "peers": beside})
+        echo_json(found.as_json())
         return
     made = ", ".join(f"{key} {value}" for key, value in found.made.items())
     echo(f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each\n{made}\n")
     echo_table(*simulation_rows(found))
-
-
-def _peers(file: str) -> Mapping[str, Any]:
-    try:
-        found = json.loads(Path(file).read_text(encoding="utf-8"))
-        # Read here, so that a wrong file is told before minutes of measuring.
-        runs = [
-            (run["what"], run["engine"], run["seconds"], run["rms"], run["peak"]) for run in found["runs"]
-        ]
-    except OSError as error:
-        raise click.BadParameter(f"{file}: {error.strerror}", param_hint="--peers") from error
-    except (ValueError, KeyError, TypeError) as error:
-        raise click.BadParameter(
-            f"{file} is not what benchmarks/simulation.py --json prints ({type(error).__name__}: {error})",
-            param_hint="--peers",
-        ) from error
-    if not runs:
-        raise click.BadParameter(f"{file} has no runs", param_hint="--peers")
-    return found  # type: ignore[no-any-return]

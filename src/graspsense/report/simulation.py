@@ -1,9 +1,9 @@
-"""The error of a simulator against its processor time, as a table and as a picture, beside that of other engines."""
+"""The error of a simulator against its processor time, as a table and as a picture."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -74,10 +74,8 @@ def simulation_rows(trade: SimulationTrade) -> tuple[tuple[str, ...], list[tuple
     return header, rows
 
 
-def simulation_markdown(
-    trade: SimulationTrade, peers: Mapping[str, Any] | None, picture: str | None = None
-) -> str:
-    """Return the page: the table of variants, the picture if there is one, and the table of other engines."""
+def simulation_markdown(trade: SimulationTrade, picture: str | None = None) -> str:
+    """Return the page: the table of variants, and the picture if there is one."""
     made = ", ".join(f"{key} {value}" for key, value in trade.made.items())
     lines = [
         "# Accuracy and time of the simulator",
@@ -92,42 +90,7 @@ def simulation_markdown(
         *([f"![Error against time]({picture})", ""] if picture else []),
         *_markdown(*simulation_rows(trade)),
     ]
-    if peers is not None:
-        lines += ["", "## Other engines", "", *peers_markdown(peers)]
     return "\n".join(lines) + "\n"
-
-
-def peers_markdown(peers: Mapping[str, Any]) -> list[str]:
-    """Return the tables of `benchmarks/simulation.py`: its runs, and the figures that it derives from them."""
-    made = ", ".join(f"{key} {value}" for key, value in peers.get("made", {}).items())
-    rows = [
-        (
-            str(run["what"]),
-            f"{1e3 * run['seconds']:.3g}",
-            _short(_number(run["rms"])),
-            _short(_number(run["peak"])),
-        )
-        for run in peers["runs"]
-    ]
-    return [
-        str(peers.get("scene", "")),
-        f"From `benchmarks/simulation.py`: {made}.",
-        "",
-        *_markdown(("ENGINE", "MS A GRASP", "FORCE TRACE, RMS", "PEAK FORCE"), rows),
-        "",
-        *_markdown(("FIGURE", "VALUE", "OF"), [*_figures(peers)]),
-    ]
-
-
-def _figures(peers: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
-    """Yield the name, value and meaning of each figure; a figure that depends on a count gets a row for each count."""
-    for name, value in peers.items():
-        if isinstance(value, int | float):
-            yield f"`{name}`", f"{value:.4g}", str(peers.get(f"{name}_is", ""))
-        elif isinstance(value, Mapping) and name != "made":
-            for count, figures in value.items():
-                for what, figure in figures.items():
-                    yield f"`{name}`", f"{figure:.4g}", f"{what.replace('_', ' ')}, of {count}"
 
 
 def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -135,8 +98,8 @@ def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]
     return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
 
 
-def simulation_png(trade: SimulationTrade, peers: Mapping[str, Any] | None, path: Path) -> None:
-    """Draw one panel for each quantity, and one for other engines.
+def simulation_png(trade: SimulationTrade, path: Path) -> None:
+    """Draw one panel for each quantity.
 
     Raises PluginUnavailable without matplotlib, ConfigError if the file cannot be written.
     """
@@ -146,7 +109,7 @@ def simulation_png(trade: SimulationTrade, peers: Mapping[str, Any] | None, path
     except ImportError as error:
         raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
     names = trade.quantities
-    panels = len(names) + (1 if peers is not None else 0)
+    panels = len(names)
     columns = 3
     rows = -(-panels // columns)
     figure = Figure(figsize=(4.6 * columns, 3.5 * rows + 1.3), dpi=120, layout="constrained")
@@ -157,8 +120,6 @@ def simulation_png(trade: SimulationTrade, peers: Mapping[str, Any] | None, path
         handles.update(_draw_curves(ax, trade, name))
         handles.update(_draw_floors(ax, trade, name))
         _axes(ax, name, "error, relative")
-    if peers is not None:
-        _draw_peers(axes[len(names)], peers)
     for ax in axes[panels:]:
         ax.set_axis_off()
     failed = [p for p in trade.points if p.failure]
@@ -216,25 +177,6 @@ def _draw_floors(ax: Any, trade: SimulationTrade, quantity: str) -> dict[str, An
     return handles
 
 
-def _draw_peers(ax: Any, peers: Mapping[str, Any]) -> None:
-    """Draw one curve for each engine and method, on the scene of the benchmark."""
-    groups: dict[str, list[tuple[float, float]]] = {}
-    for run in peers["runs"]:
-        rms = _number(run["rms"])
-        if math.isfinite(rms):
-            groups.setdefault(str(run["engine"]), []).append((1e3 * run["seconds"], max(rms, LEAST_ERROR)))
-    for k, (engine, points) in enumerate(groups.items()):
-        points.sort()
-        style = (
-            {"color": "black", "lw": 1.8}
-            if engine.startswith("graspsense")
-            else {"color": f"C{k}", "lw": 1.0}
-        )
-        ax.plot(*zip(*points, strict=True), marker="os^vDP*X"[k % 8], ms=3.5, label=engine, **style)
-    _axes(ax, "other engines, on the scene of the benchmark", "force trace, rms")
-    ax.legend(fontsize=6)
-
-
 def _axes(ax: Any, title: str, y: str) -> None:
     ax.set_xscale("log")
     ax.set_yscale("log")
@@ -243,10 +185,6 @@ def _axes(ax: Any, title: str, y: str) -> None:
     ax.set_ylabel(y, fontsize=8)
     ax.tick_params(labelsize=7, which="both")
     ax.grid(True, which="major", lw=0.3)
-
-
-def _number(value: Any) -> float:
-    return math.nan if value is None or isinstance(value, str) else float(value)
 
 
 def _short(error: float) -> str:
