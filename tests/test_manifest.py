@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 from textwrap import dedent
 
 import numpy as np
@@ -58,18 +59,14 @@ def run(capsys, *arguments):
     return ended.value.code, out, err
 
 
-# The layouts of the public sets of docs/other_data.md.
+# The layouts of the public sets of docs/other_data.md, with the manifests of that page.
 
-FRUIT = """
-    files = ["{label}/{part}Set/{instance}/ForceData_*.csv", "{label}/trainingSet/data_{instance:d}.npy"]
-    time = "Time"
-    rate_hz = 100
-    gap = ["60 - Pos [mm]", "60 - c1/95.4929 [mm]"]
-    force = ["Force", "c2"]
-    cut = "rupture"
-    duplicates = "drop"
-    values = { break_force = "break_force.npy" }
-"""
+
+def shipped(name):
+    return (Path(__file__).parents[1] / "docs" / "manifests" / f"{name}.toml").read_text()
+
+
+FRUIT = shipped("fruit")
 
 
 def test_fruit_squeezed_until_it_breaks(tmp_path):
@@ -92,7 +89,7 @@ def test_fruit_squeezed_until_it_breaks(tmp_path):
         "kiwi",
         "20241124_151319",
     )
-    assert (kiwi.values, banana.values) == ({"break_force": 2.62}, {})
+    assert (kiwi.values, banana.values) == ({"break_force [N]": 2.62}, {})
     for one in (banana, kiwi):
         assert column(one, "gap_m") == pytest.approx(gap[:180], abs=1e-12)
         assert len(one.recording.readings) == 180  # up to the largest force before the rupture
@@ -102,42 +99,28 @@ def test_fruit_squeezed_until_it_breaks(tmp_path):
     assert banana.recording.rate_hz == pytest.approx(100.0)
 
 
-JACO = r"""
-    files = "data.csv"
-    start = 'seq,(?P<order>\d+),stamp start,(?P<began>[^,]+),stamp end,(?P<ended>[^,]+).*label,(?P<object>\d+)'
-    time = "(timestep - 1)*(ended - began)/299 [ns]"
-    channels = { finger1 = "'eucl force 1' [N]", finger2 = "'eucl force 2' [N]", finger3 = "norm('opto3_?') [N]" }
-    left = "max(finger1, finger2)"
-    right = "finger3"
-    gap = "100 - mean('finger?_pos') [mm]"
-    label = "object{object}"
-    recorded = "{began}"
-"""
+JACO = shipped("jaco")
 
 
 def jaco(path):
     gap, force = squeezing()
-    lines = ["Philip,Number of samples,2"]
+    lines = ["A,Number of samples,2"]
     for order, (label, grows) in enumerate([(17, 1.0), (3, 0.5)]):
         began = 1592233887442126035 + order * 60_000_000_000
         lines.append(
-            f"header,seq,{order},stamp start,{began},stamp end,{began + 2_990_000_000},class label,{label}"
+            f"header,seq,{order},stamp start,{began},stamp end,{began + 490_000_000},class label,{label}"
         )
-        lines.append(
-            "timestep,eucl force 1,eucl force 2,opto3_x,opto3_y,opto3_z,finger1_pos,finger2_pos,finger3_pos"
-        )
+        lines.append("timestep,eucl force 1,eucl force 2,eucl force 3,finger1_pos,finger2_pos,finger3_pos")
         for k in range(len(T_S)):
             f = force[k] * grows
             position = 100.0 - gap[k] * 1e3
-            lines.append(
-                f"{k + 1},{f},{0.5 * f},{0.6 * f},{0.8 * f},0,{position - 3},{position},{position + 3}"
-            )
+            lines.append(f"{k + 1},{f},{0.5 * f},{f},{position - 3},{position},{position + 3}")
     path.write_text("\n".join(lines) + "\n")
     return gap, force
 
 
 def test_three_fingers_in_blocks_of_one_file_are_folded_and_kept(tmp_path):
-    gap, force = jaco(tmp_path / "data.csv")
+    gap, force = jaco(tmp_path / "000_real_life_data.csv")
 
     first, second = recordings(tmp_path, JACO)
 
@@ -153,17 +136,7 @@ def test_three_fingers_in_blocks_of_one_file_are_folded_and_kept(tmp_path):
     assert "the left pad is max(finger1, finger2), the right pad is finger3" in first.recording.notes
 
 
-BIOTAC = """
-    files = "data/{material}_{object:d}_{order:d}_HOLD.mat"
-    label = "{material}"
-    instance = "{object}"
-    rate_hz = 100
-    gap = "JPos"
-    effort = "-JEff"
-    left = "F0pdc [counts]"
-    right = "F1pdc [counts]"
-    channels = { electrodes = "F0Electrodes [counts]" }
-"""
+BIOTAC = shipped("pr2_biotac")
 
 
 def test_matrices_of_a_mat_file_become_columns_and_arrays(tmp_path):
@@ -171,7 +144,7 @@ def test_matrices_of_a_mat_file_become_columns_and_arrays(tmp_path):
     (tmp_path / "data").mkdir()
     variables = {
         "JPos": gap[None], "JEff": -force[None], "F0pdc": force[None].astype(np.uint16), "F1pdc": force[None],
-        "F0Electrodes": np.arange(19 * 300).reshape(19, 300),
+        "F0Electrodes": np.arange(19 * 300).reshape(19, 300), "F1Electrodes": np.ones((19, 300)),
     }  # fmt: skip
     for trial in (2, 10):
         savemat(tmp_path / f"data/black_foam_110_{trial}_HOLD.mat", variables)
@@ -179,30 +152,25 @@ def test_matrices_of_a_mat_file_become_columns_and_arrays(tmp_path):
     second, tenth = recordings(tmp_path, BIOTAC)
 
     assert (second.order, tenth.order) == (2.0, 10.0)  # not in the order of the texts
-    assert (second.label, second.instance) == ("black_foam", "110")
+    assert second.label == "black_foam"
     assert second.recording.units == {"force_left": "counts", "force_right": "counts"}
     assert column(second, "effort_n") == pytest.approx(force)
-    (array,) = second.recording.channels
-    assert (array.name, array.unit, array.cells) == ("electrodes", "counts", 19)
-    assert second.recording.readings[5].signals.electrodes.cells == tuple(5.0 + 300.0 * k for k in range(19))
+    array, other = second.recording.channels
+    assert (array.name, array.unit, array.cells) == ("left_electrodes", "counts", 19)
+    assert other.name == "right_electrodes"
+    assert second.recording.readings[5].signals.left_electrodes.cells == tuple(
+        5.0 + 300.0 * k for k in range(19)
+    )
 
 
-STABILITY = """
-    files = "palm_{palm}.csv"
-    split = "rows"
-    label = "slipped{slipped}"
-    instance = "{object}"
-    left = "mean('ff_biotac_*', 'mf_biotac_*') [counts]"
-    right = "mean('th_biotac_*') [counts]"
-    channels = { first_finger = "'ff_biotac_*' [counts]", thumb = "'th_biotac_*' [counts]" }
-"""
+STABILITY = shipped("biotac_sp")
 
 
 def test_each_row_of_a_table_is_a_reading_with_its_arrays(tmp_path):
     fingers = ("ff", "mf", "th")
     names = ["object", "slipped", *(f"{one}_biotac_{k}" for one in fingers for k in range(1, 25))]
     rows = [["pringles", 0, *range(72)], ["toy car", 1, *range(100, 172)]]
-    (tmp_path / "palm_down.csv").write_text(
+    (tmp_path / "bts3v2_palm_down.csv").write_text(
         "\n".join(",".join(map(str, row)) for row in [names, *rows]) + "\n"
     )
 
@@ -215,26 +183,14 @@ def test_each_row_of_a_table_is_a_reading_with_its_arrays(tmp_path):
     assert slipped.recording.units["t"] == "sample"
 
 
-TAPS = """
-    files = "taps.npz"
-    split = "tap"
-    label = "{material}"
-    rate_hz = 100
-    gap = "spread [mm]"
-    force = "sum(taxels)*0.1"
-    channels = { fingertip = "taxels [counts]" }
-    zero = "20 samples"
-    list = ""
-    order = "{tap}"
-"""
+TAPS = shipped("barrett_taps")
 
 
 def test_taps_in_one_array_are_split_by_a_column(tmp_path):
     gap, force = squeezing()
     np.savez(
-        tmp_path / "taps.npz",
+        tmp_path / "felt.npz",
         tap=np.repeat([1, 2], 300),
-        material=np.array("felt"),
         spread=np.tile(gap, 2) * 1e3,
         taxels=np.tile(np.outer(10.0 * force, np.full(24, 1 / 24)) + 7.0, (2, 1)),
     )
@@ -244,6 +200,13 @@ def test_taps_in_one_array_are_split_by_a_column(tmp_path):
     assert (first.label, first.order, second.order) == ("felt", 1.0, 2.0)
     assert column(second, "force_left_n") == pytest.approx(force, abs=1e-9)
     assert second.recording.readings[0].signals.fingertip.cells == pytest.approx((0.0,) * 24)
+
+
+def test_the_page_of_public_data_sets_shows_these_manifests():
+    docs = Path(__file__).parents[1] / "docs"
+    page = (docs / "other_data.md").read_text()
+    for path in (docs / "manifests").glob("*.toml"):
+        assert path.read_text() in page, path.name
 
 
 # Formats.
@@ -494,7 +457,7 @@ def test_a_mistake_in_a_manifest_is_told_with_what_is_allowed(text, says, tmp_pa
 
 
 def test_a_whole_set_is_imported_evaluated_and_replayed(tmp_path, capsys):
-    _, force = jaco(tmp_path / "data.csv")
+    _, force = jaco(tmp_path / "000_real_life_data.csv")
     described, store = manifest(tmp_path, JACO), tmp_path / "store"
 
     code, out, err = run(capsys, "import", described, "--save", store, "-o", "classifier.type=none", "--json")
@@ -504,7 +467,7 @@ def test_a_whole_set_is_imported_evaluated_and_replayed(tmp_path, capsys):
     with Store.read(store) as opened:
         labels = [dict(opened.trial(number).record.labels) for number in (1, 2)]
         recording = read_recorded(opened.trial(1).recording)
-        assert opened.trial(1).record.provenance["source"] == "data.csv, line 3"
+        assert opened.trial(1).record.provenance["source"] == "000_real_life_data.csv, line 3"
     assert labels[0] == {"label": "object17", "recorded_at": "2020-06-15T15:11:27.442126+00:00", "order": "0"}
     assert recording.readings()[-1].signals.finger2 == pytest.approx(0.5 * force[-1])
     assert [one.name for one in recording.channels] == ["finger1", "finger2", "finger3"]
@@ -514,13 +477,18 @@ def test_a_whole_set_is_imported_evaluated_and_replayed(tmp_path, capsys):
     assert features["p_first"] == pytest.approx(same["p_first"], abs=2e-3)
     code, _, err = run(capsys, "import", described, "--save", store, "-o", "classifier.type=none")
     assert (code, "same content as trial 1" in err) == (2, True)
+    code, _, err = run(capsys, "import", f"manifest:{described}#2", "--save", tmp_path / "second")
+    assert (code, "object3" in dict(Store.read(tmp_path / "second").trial(1).record.labels).values()) == (
+        0,
+        True,
+    )
     code, _, err = run(capsys, "replay", f"manifest:{described}#3")
     assert (code, "fewer than 3 recordings" in err) == (2, True)
 
 
 def test_check_says_what_it_understood_and_draws_a_grasp_without_storing(tmp_path, capsys, monkeypatch):
     pytest.importorskip("matplotlib", reason="needs the extra plot")
-    jaco(tmp_path / "data.csv")
+    jaco(tmp_path / "000_real_life_data.csv")
     monkeypatch.chdir(tmp_path)
     described = manifest(tmp_path, JACO)
 

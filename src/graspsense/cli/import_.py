@@ -184,7 +184,8 @@ def _import(save: str, recordings: Sequence[ImportedRecording], chosen: _Chosen,
     echo(f"  {chosen.words}", err=as_json)
     _echo_notices(_summary(recordings), err=as_json)
     if refused:
-        echo(f"  {len(refused)} recordings left out: {refused[0]}", Style.CAUTION, err=as_json)
+        word = "recording" if len(refused) == 1 else "recordings"
+        echo(f"  {len(refused)} {word} left out: {refused[0]}", Style.CAUTION, err=as_json)
     if as_json:
         echo_json({"store": save, "trials": kept, "refused": refused, "thresholds": chosen.words})
 
@@ -204,7 +205,7 @@ def _show(recordings: Sequence[ImportedRecording], chosen: _Chosen, picture: Pat
         echo_json({**asdict(summary), "thresholds": chosen.words})
     else:
         _echo_summary(summary)
-        echo_entry("thresholds", chosen.words)
+        echo_entry("thresholds", chosen.words.partition(": ")[2])
         _echo_notices(summary, err=False)
     middle = recordings[len(recordings) // 2]
     with handed_over(middle.name, middle.labelled.recording):

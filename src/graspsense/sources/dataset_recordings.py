@@ -45,7 +45,7 @@ def recordings_of(kind: str, place: str) -> Iterator[LabelledRecording]:
         raise ComponentFailed(f"the reader of data set {dataset.qualified} failed: {named(error)}") from error
 
 
-def numbered_recording(kind: str, name: str) -> Recording:
+def numbered_recording(kind: str, name: str) -> LabelledRecording:
     """Return the recording that `PLACE#NUMBER` names. Raises ConfigError if there is none, and as `recordings_of`."""
     match = _NUMBERED.fullmatch(name)
     if match is None:
@@ -57,7 +57,7 @@ def numbered_recording(kind: str, name: str) -> Recording:
     found = next(islice(recordings_of(kind, match["place"]), number - 1, None), None)
     if found is None:
         raise ConfigError(f"{kind}:{match['place']} has fewer than {number} recordings")
-    return found.recording
+    return found
 
 
 def handed_recording(name: str) -> Recording | None:

@@ -9,7 +9,12 @@ from attrs import evolve, frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.recording.labelled_recording import LabelledRecording
-from graspsense.sources.dataset_recordings import datasets_with_recordings, recordings_of
+from graspsense.sources.dataset_recordings import (
+    datasets_with_recordings,
+    is_recording_number,
+    numbered_recording,
+    recordings_of,
+)
 from graspsense.sources.grasp_csv import named
 from graspsense.sources.replay import KINDS, kind_and_name, read_named
 from graspsense.store.labels import labels_of
@@ -48,6 +53,10 @@ def recordings_to_import(
         return
     name = f"csv:{named(source, columns)}" if is_csv(source) else source
     kind, file = kind_and_name(name)
+    if is_recording_number(kind, file):
+        numbered = numbered_recording(kind, file)
+        yield ImportedRecording(source=source, name=name, labelled=_relabelled(numbered, label))
+        return
     if kind not in KINDS:
         known = ", ".join(f"{one}:" for one in dict.fromkeys((*KINDS, *datasets_with_recordings())))
         raise ConfigError(
@@ -63,7 +72,7 @@ def _dataset(source: str) -> tuple[str, str] | None:
     if source.lower().endswith(".toml") and ":" not in source:
         return "manifest", source
     kind, _, place = source.partition(":")
-    if not place or kind not in datasets_with_recordings():
+    if not place or kind not in datasets_with_recordings() or is_recording_number(kind, place):
         return None
     return (kind, place) if kind not in KINDS or Path(place).expanduser().is_dir() else None
 

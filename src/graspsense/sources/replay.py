@@ -75,7 +75,7 @@ def read_named(kind: str, name: str) -> Recording:
         return handed
     if kind in KINDS and not is_recording_number(kind, name):
         return KINDS[kind](name)
-    return numbered_recording(kind, name)
+    return numbered_recording(kind, name).recording
 
 
 def kind_and_name(recording: str) -> tuple[str, str]:

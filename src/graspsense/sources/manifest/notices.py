@@ -11,6 +11,8 @@ from graspsense.sources.grasp_columns import GraspColumns
 
 BEGINS_LOADED: Final = 0.25
 """Share of its range above which the force of the first sample is that of a contact, or of a wrong zero."""
+JUMP: Final = 20.0
+"""A time step of so many usual ones is a jump."""
 MILLIMETRES: Final = 0.5
 """A gap beyond this (m) is in another unit."""
 
@@ -56,8 +58,8 @@ def notices_of(columns: GraspColumns, *, zeroed: bool) -> Iterator[str]:
         yield 'the force does not begin at zero: if the fingers were free then, write zero = "10 samples"'
     steps = np.diff(columns.t_s)
     usual = float(np.median(steps))
-    if float(steps.max()) > 20.0 * usual > 0.0:
+    if float(steps.max()) > JUMP * usual > 0.0:
         yield (
-            f"the time jumps by {float(steps.max()):.3g} s, where {usual:.3g} s are usual: does the file hold several "
-            'grasps? split = "force" finds them, split = "COLUMN" splits it by a column'
+            f"the time jumps by more than {JUMP:g} usual steps: does the file hold several grasps? "
+            'split = "force" finds them, split = "COLUMN" splits it by a column'
         )
