@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import sys
 from math import inf, isnan
 
@@ -30,7 +31,7 @@ from graspsense.plugin_api import (
     TactileArray,
     hookimpl,
 )
-from graspsense.recording.export_trace import write_npz
+from graspsense.recording.export_trace import write_csv, write_npz
 from graspsense.recording.reader import read_recorded
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
@@ -210,3 +211,17 @@ def test_an_export_has_the_signals_as_arrays(recorded, tmp_path):
         assert np.array_equal(exported["signal_acceleration_t_s"], signals["acceleration"].t_s)
         assert np.array_equal(exported["signal_acceleration"], signals["acceleration"].values)
         assert np.array_equal(exported["signal_motor_temperature"], signals["motor_temperature"])
+
+
+def test_an_export_as_csv_has_a_line_for_each_sample_with_its_time_and_axes(recorded, tmp_path):
+    trial, path, _ = recorded
+    write_csv(tmp_path / "grasp.csv", read_recorded(path))
+    with (tmp_path / "grasp-acceleration.csv").open(newline="") as file:
+        head, *rows = csv.reader(file)
+    acceleration = trial.trace.signals["acceleration"]
+    assert head == ["t_s", "x", "y"]
+    assert [float(row[0]) for row in rows] == acceleration.t_s.tolist()
+    assert [list(map(float, row[1:])) for row in rows] == acceleration.values.tolist()
+    with (tmp_path / "grasp-palm.csv").open(newline="") as file:
+        images = list(csv.DictReader(file))
+    assert [float(row["cells_05"]) for row in images] == trial.trace.signals["palm"].cells[:, 5].tolist()

@@ -5,15 +5,16 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from graspsense.core.entries import FastChannel
 from graspsense.core.trace import PAD_COLUMNS, TICK_COLUMNS, ImageTrace
 from graspsense.recording.atomic_file import write_new
-from graspsense.recording.layout import TICK_FIELDS
+from graspsense.recording.layout import SIGNAL_TOPIC, TICK_FIELDS
 from graspsense.recording.parquet import parquet
 
 if TYPE_CHECKING:
@@ -25,10 +26,11 @@ if TYPE_CHECKING:
 def write_csv(path: Path, grasp: RecordedGrasp) -> None:
     """Write one line per tick, with an empty cell for a missing channel.
 
-    Images of the fingertips go to `NAME-pads.csv`, and each other topic to a file that is named after it.
+    Images of the fingertips go to `NAME-pads.csv`, and each other topic to a file that is named after it. That of a
+    fast channel has one line per sample, with the time and each axis.
     """
-    for name, found in grasp.topics.items():
-        write_new(_beside(path, name), _csv(*_flat(found.rows)))
+    for name, (rows, fields) in _tables(grasp):
+        write_new(_beside(path, name), _csv(rows, fields))
     write_new(path, _csv(grasp.ticks.tolist(), TICK_FIELDS))
 
 
@@ -56,8 +58,7 @@ def write_npz(path: Path, grasp: RecordedGrasp) -> None:
 def write_parquet(path: Path, grasp: RecordedGrasp) -> None:
     """Write one row per tick, and the other topics as `write_csv` does. Raises PluginUnavailable without pyarrow."""
     ticks = parquet({name: (grasp.ticks[name], "") for name in TICK_FIELDS})
-    for name, found in grasp.topics.items():
-        rows, fields = _flat(found.rows)
+    for name, (rows, fields) in _tables(grasp):
         columns = zip(*rows, strict=True)
         write_new(
             _beside(path, name), parquet({n: (np.array(c), "") for n, c in zip(fields, columns, strict=True)})
@@ -75,6 +76,8 @@ def write_toml(path: Path, grasp: RecordedGrasp) -> None:
     write_new(path, grasp.record().settings_text.encode())
 
 
+Table = tuple[list[tuple[Any, ...]], tuple[str, ...]]
+"""Rows, and the names of their columns."""
 WRITERS: Final[Mapping[str, Callable[[Path, RecordedGrasp], None]]] = {
     ".csv": write_csv,
     ".npz": write_npz,
@@ -85,7 +88,23 @@ WRITERS: Final[Mapping[str, Callable[[Path, RecordedGrasp], None]]] = {
 """File extension to the function that writes it."""
 
 
-def _flat(rows: NDArray[np.void]) -> tuple[list[tuple[Any, ...]], tuple[str, ...]]:
+def _tables(grasp: RecordedGrasp) -> Iterator[tuple[str, Table]]:
+    """Yield each topic beside the ticks, with its rows and the names of their columns."""
+    fast = {
+        SIGNAL_TOPIC + channel.name: channel for channel in grasp.channels if isinstance(channel, FastChannel)
+    }
+    signals = grasp.trace().signals if fast else {}
+    for name, found in grasp.topics.items():
+        channel = fast.get(name)
+        if channel is None:
+            yield name, _flat(found.rows)
+        else:
+            samples = signals[channel.name]
+            rows = np.column_stack([samples.t_s, samples.values]).tolist()
+            yield name, (list(map(tuple, rows)), ("t_s", *channel.axes))
+
+
+def _flat(rows: NDArray[np.void]) -> Table:
     """Return the rows of a topic with a number a column, and the names of these: those of an array are numbered."""
     fields: list[str] = []
     columns: list[list[Any]] = []
