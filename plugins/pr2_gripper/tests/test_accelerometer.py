@@ -202,6 +202,7 @@ pipeline.grasp(seed=1, sinks=[recorder, Killing()])
 """
 
 
+@pytest.mark.slow
 def test_samples_survive_a_killed_program_a_replay_and_an_export_to_the_last_bit(tmp_path: Path) -> None:
     options = [
         *("gripper.type=pr2", "gripper.transport=emulated", "gripper.calibration=none"),

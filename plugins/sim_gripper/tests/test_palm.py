@@ -59,17 +59,23 @@ def felt(forces_n):
     return np.array(rows)
 
 
+@pytest.mark.parametrize("sensor", ["pads", pytest.param("ideal", marks=pytest.mark.slow)])
+def test_the_loop_gives_the_samples_of_the_runner(sensor):
+    check_loop(evolve(CAN, sensor=sensor), compiled=False)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("sensor", ["pads", "ideal"])
-def test_runner_plain_loop_and_compiled_loop_give_the_same_samples(sensor):
+def test_the_compiled_loop_gives_the_samples_of_the_runner(sensor):
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
-    config = evolve(CAN, sensor=sensor)
+    check_loop(evolve(CAN, sensor=sensor), compiled=True)
+
+
+def check_loop(config, compiled):
     run = grasp(config)
-    for compiled in (False, True):
-        batch = run_many(config, HYBRID, [config.object], [5], compiled=compiled)[0].trace
-        assert acceleration(batch).t_s.tobytes() == acceleration(run).t_s.tobytes()
-        np.testing.assert_allclose(
-            acceleration(batch).values, acceleration(run).values, rtol=1e-9, atol=1e-12
-        )
+    batch = run_many(config, HYBRID, [config.object], [5], compiled=compiled)[0].trace
+    assert acceleration(batch).t_s.tobytes() == acceleration(run).t_s.tobytes()
+    np.testing.assert_allclose(acceleration(batch).values, acceleration(run).values, rtol=1e-9, atol=1e-12)
     assert len(acceleration(run).t_s) == 3 * len(run)
     assert acceleration(run).lost == 0
 
