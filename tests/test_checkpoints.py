@@ -27,12 +27,12 @@ from graspsense.core.plugins import installed
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
 from graspsense.core.signals import Outcome, Phase
-from graspsense.evaluation.checkpoints import checkpoint_models
+from graspsense.evaluation.checkpoints import SURE, WHOLE, checkpoint_models, early_recognition
 from graspsense.evaluation.doubt import calibrated_sets
 from graspsense.plugin_api import create
 from graspsense.testing.model_gripper import ModelGripper
 
-CHECKPOINTS = (0.02, 0.05, 0.3)
+CHECKPOINTS = (0.02, 0.05)
 CHANNELS = frozenset({"gap", "velocity", "effort", "force_left", "force_right"})
 RUN = RunConfig(hold_s=0.1)
 
@@ -74,13 +74,13 @@ def curve():
 
 @pytest.fixture(scope="module")
 def traces():
-    """Twelve soft and twelve stiff objects of the same width."""
+    """Ten soft and ten stiff objects of the same width."""
     rng = np.random.default_rng(1)
     stiffness = {"soft": 2000.0, "stiff": 9000.0}
     return [
         (label, grasp_of(Watched(0.07, k * rng.uniform(0.9, 1.1))).trace)
         for label, k in stiffness.items()
-        for _ in range(12)
+        for _ in range(10)
     ]
 
 
@@ -91,15 +91,20 @@ def trials(traces):
         source="grasps of a model gripper",
         table=table_of([features.extract(trace) for _, trace in traces]),
         labels=tuple(label for label, _ in traces),
+        instances=tuple(f"{label}#{k}" for k, (label, _) in enumerate(traces)),
     )
 
 
 @pytest.fixture(scope="module")
-def model(trials):
+def learner():
     component = installed().find("classifier", "c45")
-    learner = SelectedComponent(component, build(component, {}))
+    return SelectedComponent(component, build(component, {}))
+
+
+@pytest.fixture(scope="module")
+def model(trials, learner):
     *parts, whole = split_checkpoints(trials, CHECKPOINTS)
-    of_whole = train(component, learner.config, whole.labelled, name="test")
+    of_whole = train(learner.component, learner.config, whole.labelled, name="test")
     of_whole = evolve(of_whole, sets=calibrated_sets(learner, whole.labelled, 0))
     return evolve(of_whole, checkpoints=checkpoint_models(of_whole, learner, parts, 0))
 
@@ -148,8 +153,8 @@ def test_predictions_in_the_loop_are_those_of_the_same_part_afterwards(model, tm
         assert made.prediction.label == part.predict(features).label
     told = [event.what for event in grasp.events if event.source == "model"]
     assert told == [one.words for one in anytime.predictions]
-    assert told[-1].startswith("0.3 s after the contact: soft")
-    assert "0.3 s after the contact" in anytime.predictions[-1].prediction.model
+    assert told[-1].startswith("0.05 s after the contact: soft")
+    assert "0.05 s after the contact" in anytime.predictions[-1].prediction.model
 
 
 @pytest.mark.parametrize("clock", ["virtual", "device"])
@@ -257,5 +262,31 @@ def test_a_checkpoint_that_hardly_any_grasp_reaches(traces):
         table=table_of([features.extract(trace) for _, trace in traces]),
         labels=tuple(label for label, _ in traces),
     )
-    with pytest.raises(ConfigError, match="only 0 of 24 grasps still go on 60 s after the contact"):
+    with pytest.raises(ConfigError, match="only 0 of 20 grasps still go on 60 s after the contact"):
         split_checkpoints(late, (60.0,))
+
+
+def test_recognition_against_seconds_and_newtons(trials, learner):
+    """The later the answer, the more it costs; a sure squeeze costs no more than a whole one."""
+    found = early_recognition(learner, split_checkpoints(trials, CHECKPOINTS))
+    rows = {row.name: row for row in found.rows}
+    assert list(rows) == ["0.02 s", "0.05 s", WHOLE, SURE]
+    assert found.protocol == "instance_held_out"
+    first, second, whole, sure = rows.values()
+    assert first.seconds < second.seconds < whole.seconds
+    assert first.newtons < second.newtons < whole.newtons
+    assert whole.rate.correct >= 18, "the stiffness tells them apart"
+    # Every grasp that is ended early saves what is between its checkpoint and its end.
+    early = sure.single.correct
+    assert early > 0
+    assert first.seconds <= sure.seconds < whole.seconds
+    assert sure.newtons < whole.newtons
+    assert sure.covered.n == early
+
+
+def test_trials_without_enough_instances_have_rates_but_no_sets(trials, learner):
+    few = trials.rows(np.array([0, 1, 2, 10, 11, 12]))
+    found = early_recognition(learner, split_checkpoints(few, CHECKPOINTS), folds=3)
+    assert [row.name for row in found.rows] == ["0.02 s", "0.05 s", WHOLE]
+    assert "90 % needs 9" in found.reason
+    assert all(row.covered is None for row in found.rows)

@@ -28,6 +28,7 @@ LONG_FUNCTIONS: dict[str, str] = {}
 MANY_PARAMETERS = {
     "graspsense/cli/collect.py:collect": OPTIONS,
     "graspsense/cli/emulate.py:emulate": OPTIONS,
+    "graspsense/cli/evaluate.py:evaluate": OPTIONS,
     "graspsense/cli/experiment.py:experiment": OPTIONS,
     "graspsense/cli/import_.py:import_": OPTIONS,
     "graspsense/cli/report.py:report": OPTIONS,

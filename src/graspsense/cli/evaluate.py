@@ -8,10 +8,22 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from graspsense.cli.output import echo_json, file_to_write
-from graspsense.cli.sources import SOURCES, classifier_option, learner_of, source_options, trials_of
+from graspsense.cli.sources import (
+    SOURCES,
+    checkpoints_option,
+    classifier_option,
+    learner_of,
+    source_options,
+    trials_of,
+)
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from graspsense.core.checkpoints import CheckpointTrials
+    from graspsense.core.labelled import Labelled
+    from graspsense.evaluation.checkpoints import EarlyRecognition
     from graspsense.evaluation.results import Evaluation, Measurement
 
 
@@ -37,6 +49,7 @@ if TYPE_CHECKING:
 @click.option(
     "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
 )
+@checkpoints_option
 @classifier_option
 @source_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -46,18 +59,23 @@ def evaluate(
     folds: int,
     png: str | None,
     keep: str | None,
+    checkpoints: str | None,
     classifier: str | None,
     as_json: bool,
     **given: Any,
 ) -> None:
     """Measure and print."""
     from graspsense.cli.progress import ProgressLine
+    from graspsense.core.checkpoints import checkpoints_of
     from graspsense.core.strict import plain
+    from graspsense.evaluation.checkpoints import early_recognition
     from graspsense.evaluation.evaluate import evaluate as measure
 
+    times = checkpoints_of(checkpoints)
     learner = learner_of(source, classifier, given)
     with ProgressLine() as progress:
-        labelled = trials_of(source, progress, given)
+        labelled = trials_of(source, progress, given, times)
+        labelled, parts = _parts(labelled, times, target)
         if keep:
             from graspsense.sources.features_csv import write_labelled
 
@@ -72,6 +90,7 @@ def evaluate(
             settings={key: value for key, value in plain(learner.config).items() if key != "model"},
             progress=progress,
         )
+        early = early_recognition(learner, parts, folds=folds, seed=given["seed"]) if parts else None
     if png:
         from graspsense.report.confusion import confusion_png
 
@@ -81,9 +100,56 @@ def evaluate(
     if as_json:
         from graspsense.evaluation.json_codec import to_json
 
-        echo_json(to_json(evaluation))
+        values = to_json(evaluation)
+        echo_json(values if early is None else {**values, "early": to_json(early)})
     else:
         _print(evaluation)
+        if early is not None:
+            _print_early(early)
+
+
+def _parts(
+    labelled: Labelled, times: Sequence[float], target: str
+) -> tuple[Labelled, tuple[CheckpointTrials, ...]]:
+    """Return the trials, and the parts of them up to each checkpoint with the labels of the target."""
+    from graspsense.core.checkpoints import split_checkpoints
+    from graspsense.core.errors import ConfigError
+
+    if not times:
+        return labelled, ()
+    if target == "state":
+        raise ConfigError(
+            "--checkpoints goes with --target both or class: recognise one class with --only CLASS"
+        )
+    return (
+        split_checkpoints(labelled, times)[-1].labelled,
+        split_checkpoints(labelled.aimed(target), times),
+    )
+
+
+def _print_early(found: EarlyRecognition) -> None:
+    from graspsense.evaluation.checkpoints import SURE
+    from graspsense.evaluation.intervals import percentage, percentages
+
+    echo(f"\nanswers while the grasp goes on, by {found.protocol}")
+    if found.reason:
+        echo(f"no prediction sets: {found.reason}", indent=2)
+    rows = []
+    for row in found.rows:
+        told = [
+            "-" if one is None else percentage(one.rate) if one.n else "-"
+            for one in (row.covered, row.single)
+        ]
+        newtons = "-" if row.newtons is None else f"{row.newtons:.2f} N"
+        costs = (f"{row.seconds:.3f} s", newtons)
+        rows.append((row.name, percentage(row.rate.rate), percentages(row.rate.interval), *costs, *told))
+    heads = ("ANSWER AFTER", "RATE", "95 %", "TIME", "FORCE", "TRUE LABEL IN SET", "SETS OF ONE")
+    echo_table(heads, rows)
+    if found.rows[-1].name == SURE:
+        echo(
+            f"{SURE}: the last two are the rate among the grasps that were ended early, and their share",
+            indent=2,
+        )
 
 
 def _print(found: Evaluation) -> None:

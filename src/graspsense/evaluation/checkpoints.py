@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from attrs import evolve
+import numpy as np
+from attrs import evolve, frozen
 
 from graspsense.core.model import Model, checkpoint_model, train
-from graspsense.evaluation.doubt import calibrated_sets
+from graspsense.evaluation.crossval import Pooled, cross_validate
+from graspsense.evaluation.doubt import calibrated_sets, exchangeable_instances, held_out_members
+from graspsense.evaluation.folds import instance_held_out, stratified
+from graspsense.evaluation.intervals import RecognitionRate, rate_of
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from graspsense.core.checkpoints import CheckpointTrials
     from graspsense.core.config import SelectedComponent
+    from graspsense.core.labelled import Labelled
+    from graspsense.evaluation.folds import Folds
+
+WHOLE: Final = "whole grasp"
+SURE: Final = "stop when sure"
 
 
 def checkpoint_models(
@@ -32,3 +43,163 @@ def checkpoint_models(
         model = evolve(model, sets=calibrated_sets(learner, labelled, seed))
         models.append((part.after_s, checkpoint_model(whole, part.after_s, model)))
     return tuple(models)
+
+
+@frozen(kw_only=True)
+class EarlyRate:
+    """The recognition rate of answers that are given at one time of each grasp, and what they cost.
+
+    `name` is a checkpoint (`0.2 s`), `WHOLE` or `SURE`. `seconds` is the mean time from the contact to the answer, and
+    `newtons` the mean over the grasps of the largest force of the pads until then (None without any). `covered` is the
+    share of the prediction sets with the true label, and `single` that of the sets with one label; for `SURE`, they are
+    the rate among the grasps that were ended early, and their share. They are None without sets.
+    """
+
+    name: str
+    rate: RecognitionRate
+    seconds: float
+    newtons: float | None
+    covered: RecognitionRate | None = None
+    single: RecognitionRate | None = None
+
+
+@frozen(kw_only=True)
+class EarlyRecognition:
+    """Recognition at each checkpoint, of whole grasps, and with the end of a squeeze that is sure.
+
+    `protocol` says how trials were held out. `reason` says why there are no sets, and so no row `SURE`.
+    """
+
+    protocol: str
+    rows: tuple[EarlyRate, ...]
+    reason: str = ""
+
+
+def early_recognition(
+    learner: SelectedComponent, parts: Sequence[CheckpointTrials], *, folds: int = 10, seed: int = 0
+) -> EarlyRecognition:
+    """Return the recognition at the checkpoints of these trials, and last of the whole grasps, on the same folds.
+
+    Whole instances are held out where they are known. At each checkpoint, a model of the other folds answers for the
+    trials that reach it, from the same part of the trials. A trial that has ended before keeps the answer of its whole
+    grasp. Raises ConfigError if the trials cannot be divided into folds.
+    """
+    whole = parts[-1].labelled
+    instances = exchangeable_instances(whole)
+    of = (
+        stratified(whole.labels, min(folds, len(whole)), seed)
+        if instances is None
+        else instance_held_out(whole.labels, instances, folds, seed)
+    )
+    answers = [_answers(learner, part, instances, of, seed) for part in parts]
+    ended = answers[-1].predicted
+    rows = []
+    for part, one in zip(parts, answers, strict=True):
+        predicted = [a or b for a, b in zip(one.predicted, ended, strict=True)]
+        name = WHOLE if part.after_s is None else f"{part.after_s:g} s"
+        rows.append(_row(name, whole, part, one, predicted))
+    reason = next((one.reason for one in answers if one.reason), "")
+    if not reason:
+        rows.append(_stopped(whole, parts, answers))
+    return EarlyRecognition(
+        protocol="stratified" if instances is None else "instance_held_out",
+        rows=tuple(rows),
+        reason=reason,
+    )
+
+
+@frozen(kw_only=True, eq=False)
+class _Answers:
+    """The answers at one checkpoint, for all trials: empty for one that does not reach it.
+
+    `sizes` is the number of labels in the prediction set, 0 if it is unknown, and `covered` whether the true one is
+    among them; without sets, `reason` says why.
+    """
+
+    predicted: tuple[str, ...]
+    sizes: NDArray[np.int64]
+    covered: NDArray[np.bool_]
+    reason: str = ""
+
+
+def _answers(
+    learner: SelectedComponent,
+    part: CheckpointTrials,
+    instances: Sequence[str] | None,
+    of: Folds,
+    seed: int,
+) -> _Answers:
+    labels, numbers, n = part.labelled.labels, part.rows.tolist(), len(of)
+    own = None if instances is None else [instances[i] for i in numbers]
+    groups, folds = [np.arange(len(labels))], [of[part.rows]]
+    pooled = cross_validate(learner, part.labelled.table, labels, groups, folds, seed=seed)
+    predicted = [""] * n
+    for i, label in zip(numbers, pooled.predicted, strict=True):
+        predicted[i] = label
+    sizes, covered, reason = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_), ""
+    inside = held_out_members(pooled, labels, own, groups, folds)
+    if isinstance(inside, str):
+        reason = inside
+    else:
+        sizes[part.rows] = np.where(pooled.unlike, 0, inside.sum(axis=1))
+        covered[part.rows] = _true_inside(pooled, inside, labels)
+    return _Answers(predicted=tuple(predicted), sizes=sizes, covered=covered, reason=reason)
+
+
+def _true_inside(pooled: Pooled, inside: NDArray[np.bool_], labels: Sequence[str]) -> NDArray[np.bool_]:
+    columns = [pooled.classes.index(label) for label in labels]
+    result: NDArray[np.bool_] = inside[np.arange(len(labels)), columns]
+    return result
+
+
+def _row(
+    name: str, whole: Labelled, part: CheckpointTrials, one: _Answers, predicted: Sequence[str]
+) -> EarlyRate:
+    reached = part.rows.tolist()
+    right = [a == b for a, b in zip(predicted, whole.labels, strict=True)]
+    return EarlyRate(
+        name=name,
+        rate=_rate(whole, right, range(len(whole))),
+        seconds=_mean(part.used_s) or 0.0,
+        newtons=_mean(part.used_n),
+        covered=None if one.reason else _rate(whole, one.covered.tolist(), reached),
+        single=None if one.reason else _rate(whole, (one.sizes == 1).tolist(), reached),
+    )
+
+
+def _stopped(whole: Labelled, parts: Sequence[CheckpointTrials], answers: Sequence[_Answers]) -> EarlyRate:
+    """Return the rate if each squeeze ends at the first checkpoint at which the set has one label."""
+    predicted, seconds, newtons = (
+        list(answers[-1].predicted),
+        parts[-1].used_s.copy(),
+        parts[-1].used_n.copy(),
+    )
+    stopped = np.zeros(len(whole), dtype=np.bool_)
+    for part, one in zip(parts[:-1], answers[:-1], strict=True):
+        now = (one.sizes == 1) & ~stopped
+        for i in np.flatnonzero(now).tolist():
+            predicted[i] = one.predicted[i]
+        seconds[now], newtons[now] = part.used_s[now], part.used_n[now]
+        stopped |= now
+    right = [a == b for a, b in zip(predicted, whole.labels, strict=True)]
+    early = np.flatnonzero(stopped).tolist()
+    return EarlyRate(
+        name=SURE,
+        rate=_rate(whole, right, range(len(whole))),
+        seconds=_mean(seconds) or 0.0,
+        newtons=_mean(newtons),
+        covered=_rate(whole, right, early) if early else None,
+        single=_rate(whole, stopped.tolist(), range(len(whole))),
+    )
+
+
+def _rate(whole: Labelled, right: Sequence[bool], rows: Sequence[int]) -> RecognitionRate:
+    """Return the rate among these trials."""
+    instances = None if whole.instances is None else [whole.instances[i] for i in rows]
+    return rate_of([right[i] for i in rows], instances, whole.no_interval)
+
+
+def _mean(values: NDArray[np.float64]) -> float | None:
+    """Return the mean of the values that are known, None if none is."""
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else None

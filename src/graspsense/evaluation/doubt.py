@@ -99,6 +99,36 @@ def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
     return labelled.instances if several else None
 
 
+def held_out_members(
+    pooled: Pooled,
+    labels: Sequence[str],
+    instances: Sequence[str] | None,
+    groups: Groups,
+    folds: Sequence[Folds],
+) -> NDArray[np.bool_] | str:
+    """Return which labels belong to the set of each held-out trial, shape (trials, classes), or why there are no sets.
+
+    The sets of a fold are calibrated with the predictions of the other folds.
+    """
+    truth = _of_truth(pooled, labels)
+    inside = np.zeros(pooled.scores.shape, dtype=np.bool_)
+    for rows, of in zip(groups, folds, strict=True):
+        for fold in np.unique(of).tolist():
+            test, others = rows[of == fold], rows[of != fold].tolist()
+            sets = sets_of(
+                truth[others],
+                [labels[i] for i in others],
+                None if instances is None else [instances[i] for i in others],
+            )
+            if not sets.thresholds:
+                return sets.reason
+            known = [k for k, name in enumerate(pooled.classes) if name in sets.thresholds]
+            # A label that the other folds do not have has no threshold: it is not a member of any set.
+            names = [pooled.classes[k] for k in known]
+            inside[np.ix_(test, known)] = sets.members(pooled.scores[np.ix_(test, known)], names)
+    return inside
+
+
 def set_coverage(
     pooled: Pooled,
     labels: Sequence[str],
@@ -113,22 +143,9 @@ def set_coverage(
     thresholds know the instance that they are tested on.
     """
     unit = "trials" if instances is None else "instances"
-    truth = _of_truth(pooled, labels)
-    inside = np.zeros(pooled.scores.shape, dtype=np.bool_)
-    for rows, of in zip(groups, folds, strict=True):
-        for fold in np.unique(of).tolist():
-            test, others = rows[of == fold], rows[of != fold].tolist()
-            sets = sets_of(
-                truth[others],
-                [labels[i] for i in others],
-                None if instances is None else [instances[i] for i in others],
-            )
-            if not sets.thresholds:
-                return SetCoverage(asked=COVERAGE, unit=unit, reason=sets.reason)
-            known = [k for k, name in enumerate(pooled.classes) if name in sets.thresholds]
-            # A label that the other folds do not have has no threshold: it is not a member of any set.
-            names = [pooled.classes[k] for k in known]
-            inside[np.ix_(test, known)] = sets.members(pooled.scores[np.ix_(test, known)], names)
+    inside = held_out_members(pooled, labels, instances, groups, folds)
+    if isinstance(inside, str):
+        return SetCoverage(asked=COVERAGE, unit=unit, reason=inside)
     column = {name: k for k, name in enumerate(pooled.classes)}
     covered = [bool(inside[i, column[label]]) for i, label in enumerate(labels)]
     sizes = inside.sum(axis=1)
