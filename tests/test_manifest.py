@@ -131,7 +131,10 @@ def test_three_fingers_in_blocks_of_one_file_are_folded_and_kept(tmp_path):
     assert column(second, "force_left_n") == pytest.approx(0.5 * force)
     assert column(second, "force_right_n") == pytest.approx(0.5 * force)
     channels = [(one.name, one.unit) for one in first.recording.channels]
-    assert channels == [("finger1", "N"), ("finger2", "N"), ("finger3", "N")]
+    assert channels[:4] == [("finger1", "N"), ("finger2", "N"), ("finger3", "N"), ("position1", "mm")]
+    assert first.recording.readings[0].signals.position1 == pytest.approx(
+        37.0
+    )  # 3 less than the mean of the three
     assert first.recording.readings[-1].signals.finger2 == pytest.approx(0.5 * force[-1])
     assert "the left pad is max(finger1, finger2), the right pad is finger3" in first.recording.notes
 
@@ -442,6 +445,9 @@ def test_a_gap_in_millimetres_and_counts_called_newtons_are_refused(tmp_path):
         (PLAIN + 'split = "trial"', r"split: jar.csv has no column 'trial'"),
         (PLAIN + 'values = { hardness = "F" }', r"values.hardness changes during jar.csv: take peak"),
         (PLAIN.replace('time = "t"', ""), r"jar.csv has no time: write time = .* or rate_hz = 100"),
+        (PLAIN + 'channels = { force_left = "F" }', r"'force_left' cannot be the name of a channel"),
+        (PLAIN + 'channels = { class = "F" }', r"'class' cannot be the name of a channel"),
+        (PLAIN + 'channels = { F1 = "F" }', r"'F1' cannot be the name of a channel: write small letters"),
         (PLAIN + 'start = "("', r"manifest.toml:\d: start: '\(' is not a regular expression"),
         (PLAIN + 'folder = "elsewhere"', "there is no folder .*elsewhere"),
     ],
@@ -470,7 +476,7 @@ def test_a_whole_set_is_imported_evaluated_and_replayed(tmp_path, capsys):
         assert opened.trial(1).record.provenance["source"] == "000_real_life_data.csv, line 3"
     assert labels[0] == {"label": "object17", "recorded_at": "2020-06-15T15:11:27.442126+00:00", "order": "0"}
     assert recording.readings()[-1].signals.finger2 == pytest.approx(0.5 * force[-1])
-    assert [one.name for one in recording.channels] == ["finger1", "finger2", "finger3"]
+    assert [one.name for one in recording.channels][:3] == ["finger1", "finger2", "finger3"]
     features = json.loads(run(capsys, "replay", f"{store}#1", "--json")[1])["features"]
     same = json.loads(run(capsys, "replay", f"manifest:{described}#1", "--pipeline", "default",
         "-o", "classifier.type=none", "--json")[1])["features"]  # fmt: skip
@@ -496,7 +502,7 @@ def test_check_says_what_it_understood_and_draws_a_grasp_without_storing(tmp_pat
 
     assert code == 0, err
     assert "object17  1       unknown  300      100       40 to 60  0 to 20  0 to 20" in out
-    assert "channels    finger1 [N], finger2 [N], finger3 [N]" in out
+    assert "channels    finger1 [N], finger2 [N], finger3 [N], position1 [mm]" in out
     assert "recorded    2020-06-15T15:11:27.442126+00:00 to 2020-06-15T15:12:27.442126+00:00" in out
     assert (tmp_path / "import-check.png").read_bytes().startswith(b"\x89PNG")
     assert not (tmp_path / "store").exists()

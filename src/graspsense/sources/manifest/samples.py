@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from keyword import iskeyword
 from typing import Final
 
 import numpy as np
 
 from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.signals import CHANNELS
 from graspsense.sources.grasp_columns import GraspColumns
 from graspsense.sources.manifest.available import AvailableColumns
 from graspsense.sources.manifest.description import ReadManifest, samples_of
@@ -14,6 +17,9 @@ from graspsense.sources.manifest.steps import without_duplicates
 from graspsense.sources.manifest.table import ColumnTable, Numbers
 
 EARLIEST_STAMP_S: Final = 1e6
+"""A first time beyond this is a stamp of a clock, and times are counted from it."""
+_NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
+_TAKEN: Final = frozenset({*CHANNELS, "force", "t"})
 
 
 def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
@@ -120,7 +126,7 @@ def _channels(
     arrays: dict[str, Numbers] = {}
     units: dict[str, str] = {}
     for name, expression in manifest.channels.items():
-        if not name.isidentifier() or not name[:1].islower() or name in ("gap", "effort", "velocity", "pads"):
+        if not _NAME.fullmatch(name) or iskeyword(name) or name in _TAKEN:
             raise ConfigError(
                 f"{manifest.place}: channels: {name!r} cannot be the name of a channel: write small letters, digits "
                 "and underscores, a letter first, and no name of a channel of every gripper"
