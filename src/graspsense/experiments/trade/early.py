@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from attrs import field, frozen
 
+from graspsense.core.checkpoints import contact_of, until_checkpoint
 from graspsense.core.features import Features, table_of
 from graspsense.core.signals import Phase
 from graspsense.core.strict import structured
@@ -52,12 +53,12 @@ def early(params: Mapping[str, Any], seed: int) -> RecognitionResult:
 
     def cut(number: int, label: str, trace: Trace) -> None:
         del number, label
-        squeezed = np.flatnonzero(trace.phase >= int(Phase.SQUEEZE))
+        touched = contact_of(trace)
         ended = np.flatnonzero(trace.phase >= int(Phase.HOLD))
-        contact = float(trace.t_s[squeezed[0]]) if len(squeezed) else float(trace.t_s[-1])
         end = float(trace.t_s[ended[0]]) if len(ended) else float(trace.t_s[-1])
+        contact = end if touched is None else touched
         for moment in moments:
-            rows[moment].append(feature_set.extract(trace.until(contact + moment)))
+            rows[moment].append(feature_set.extract(until_checkpoint(trace, contact, moment)))
             used_s[moment].append(min(moment, end - contact))
 
     data = simulated(settings, groups=trial_groups(params), seed=seed, on_trace=cut)
