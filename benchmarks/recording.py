@@ -3,19 +3,21 @@
     python benchmarks/recording.py [--json] [--rounds 10] [--seconds 4]
 
 Runs with and without a recorder alternate, in an order drawn anew each round. A tick is from the moment the
-gripper's read returns to the moment it is called again: the law, the guard, the trace, and the sinks. The interval
-is of the difference of the two p99 over resampled rounds.
+gripper's read returns to the moment it is called again: the law, the guard, the trace, and the sinks. The command is
+applied before the sinks, so the time until then is given as well. The intervals are of the difference of the two p99
+over resampled rounds.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import platform
 import random
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from importlib.metadata import version
 from math import inf
@@ -43,7 +45,7 @@ class Paced(SensorBackend[None]):
 
     def __init__(self, ticks: int) -> None:
         super().__init__(None)
-        self.ticks, self.k, self.took = ticks, -1, []
+        self.ticks, self.k, self.took, self.until_command = ticks, -1, [], []
         self.began = self.given = 0.0
 
     def open(self, seed: int) -> DeviceInfo:
@@ -75,7 +77,8 @@ class Paced(SensorBackend[None]):
         return reading
 
     def apply(self, command: Command) -> None:
-        pass
+        if len(self.until_command) <= self.k:
+            self.until_command.append(time.perf_counter() - self.given)
 
     def tare(self, images: Sequence[Pads]) -> None:
         pass
@@ -84,7 +87,7 @@ class Paced(SensorBackend[None]):
         pass
 
 
-def one_run(ticks: int, path: Path | None) -> tuple[list[float], RecordingInfo | None]:
+def one_run(ticks: int, path: Path | None) -> tuple[list[float], list[float], RecordingInfo | None]:
     gripper = Paced(ticks)
     controller = create("controller", "hybrid")
     recorder = None
@@ -92,11 +95,26 @@ def one_run(ticks: int, path: Path | None) -> tuple[list[float], RecordingInfo |
         recorder = Recorder(path)
         recorder.wait_ready()
     run_grasp(gripper, controller, RunConfig(), sinks=[] if recorder is None else [recorder])
-    return gripper.took, None if recorder is None else recorder.finish()
+    done = None if recorder is None else recorder.finish()
+    return gripper.took, gripper.until_command, done
 
 
 def p99_us(runs: Sequence[Sequence[float]]) -> float:
     return float(np.percentile(np.concatenate([np.asarray(run) for run in runs]), 99) * 1e6)
+
+
+def added(
+    took: Mapping[bool, Sequence[Sequence[float]]], generator: np.random.Generator
+) -> tuple[float, list[float]]:
+    """Return the difference of the p99 with and without a recorder (us), and its interval."""
+    rounds = len(took[True])
+    differences = []
+    for _ in range(1000):
+        which = generator.integers(rounds, size=rounds)
+        differences.append(p99_us([took[True][i] for i in which]) - p99_us([took[False][i] for i in which]))
+    return p99_us(took[True]) - p99_us(took[False]), [
+        float(v) for v in np.percentile(differences, [2.5, 97.5])
+    ]
 
 
 def main() -> None:
@@ -109,25 +127,25 @@ def main() -> None:
     given = parser.parse_args()
     ticks = round(given.seconds * RATE_HZ)
     took: dict[bool, list[list[float]]] = {False: [], True: []}
+    until_command: dict[bool, list[list[float]]] = {False: [], True: []}
     written: list[RecordingInfo] = []
     rng = random.Random(1)
     with tempfile.TemporaryDirectory() as folder:
         for k in range(given.rounds):
             for recorded in rng.sample([False, True], 2):
-                run, done = one_run(ticks, Path(folder) / f"{k}.mcap" if recorded else None)
+                run, commanded, done = one_run(ticks, Path(folder) / f"{k}.mcap" if recorded else None)
                 took[recorded].append(run)
+                until_command[recorded].append(commanded)
                 written += [done] if done else []
     generator = np.random.default_rng(1)
-    differences = []
-    for _ in range(1000):
-        which = generator.integers(given.rounds, size=given.rounds)
-        differences.append(p99_us([took[True][i] for i in which]) - p99_us([took[False][i] for i in which]))
-    added = p99_us(took[True]) - p99_us(took[False])
+    added_us, interval = added(took, generator)
+    added_to_command_us, to_command_interval = added(until_command, generator)
     result = {
         "date": date.today().isoformat(),
         "machine": f"{platform.processor() or platform.machine()}, {platform.system()} {platform.release()}",
         "python": platform.python_version(),
         "mcap": version("mcap"),
+        "load_average": round(os.getloadavg()[0], 2),
         "rate_hz": RATE_HZ,
         "channels": len(TICK_FIELDS) + len(pads_topic(CELLS).fields),
         "rounds": given.rounds,
@@ -136,8 +154,12 @@ def main() -> None:
         "p50_us_with": float(np.median(np.concatenate(took[True])) * 1e6),
         "p99_us_without": p99_us(took[False]),
         "p99_us_with": p99_us(took[True]),
-        "added_p99_us": added,
-        "added_p99_us_interval": [float(v) for v in np.percentile(differences, [2.5, 97.5])],
+        "added_p99_us": added_us,
+        "added_p99_us_interval": interval,
+        "p99_us_to_command_without": p99_us(until_command[False]),
+        "p99_us_to_command_with": p99_us(until_command[True]),
+        "added_p99_us_to_command": added_to_command_us,
+        "added_p99_us_to_command_interval": to_command_interval,
         "goal_us": GOAL_US,
         "recorded_ticks": sum(one.ticks for one in written),
         "deferred": sum(one.deferred for one in written),
@@ -148,7 +170,7 @@ def main() -> None:
         print(json.dumps(result, indent=2))
         return
     for key, value in result.items():
-        print(f"{key:<24}{value if not isinstance(value, float) else round(value, 2)}")
+        print(f"{key:<34}{value if not isinstance(value, float) else round(value, 2)}")
 
 
 if __name__ == "__main__":
