@@ -1,6 +1,6 @@
 """C4.5 beside its peers: fit, predict and memory, against scikit-learn's entropy tree at min_samples_leaf=25.
 
-    python benchmarks/c45.py [--rows 1000 10000 ...] [--repeats N] [--json]
+    python benchmarks/c45.py [--rows 1000 10000 ...] [--repeats N] [--json] [--short]
 
 Peers in the same run: scikit-learn; Weka's J48 to 10^5 rows where Java is there and WEKA_JAR names weka.jar (3.9.6);
 imodels to 10^3 rows where it is installed. Times are CPU seconds of this process (of Java: as it reports them), the
@@ -241,11 +241,14 @@ def main() -> None:
     )
     parser.add_argument("--no-memory", action="store_true", help="leave the memory out (it needs Linux)")
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     parser.add_argument("--peak-of", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.peak_of:
         print_own_peak(arguments.peak_of, arguments.rows[0])
         return
+    if arguments.short:
+        arguments.rows, arguments.repeats = [1_000], 1
     with_memory = not arguments.no_memory and Path("/proc/self/clear_refs").exists()
     rows = [run_size(n, arguments.repeats, with_memory) for n in arguments.rows]
     about = machine()

@@ -1,6 +1,6 @@
 """One control tick of the PR2 driver, and how late the host wakes up for a report. No hardware.
 
-    python benchmarks/control.py [--grasps N] [--seconds S] [--json]
+    python benchmarks/control.py [--grasps N] [--seconds S] [--json] [--short]
 
 The tick is what the runner does from the moment a report's bytes are in the process to the moment the command's are
 handed to the wire: decode, count, convert, the hybrid controller's step, the guard, encode. The reports are those of
@@ -149,7 +149,10 @@ def main() -> None:
     parser.add_argument("--grasps", type=int, default=5, help="how often the grasp is played back")
     parser.add_argument("--seconds", type=float, default=5.0, help="how long the wake-ups are watched")
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     asked = parser.parse_args()
+    if asked.short:
+        asked.grasps, asked.seconds = 1, 0.5
     result = {
         "date": date.today().isoformat(),
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}",

@@ -1,9 +1,10 @@
 """Measure the processor time per trial of the experiments that come with graspsense.
 
-    python benchmarks/experiment_times.py [NAME...]
+    python benchmarks/experiment_times.py [NAME...] [--short]
 
 Runs two tasks of each experiment in this process and writes `src/graspsense/experiments/durations.toml`, from which
 `graspsense experiment` tells how long an experiment takes. Names measure these alone and keep the other figures.
+`--short` measures the first of them and writes nothing.
 """
 
 from __future__ import annotations
@@ -51,10 +52,12 @@ def processor() -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME")
-    asked = parser.parse_args().names
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
+    given = parser.parse_args()
+    asked = given.names or [name for name in shipped() if not read_experiment(name).parts]
     values = tomllib.loads(FILE.read_text()) if FILE.is_file() else {}
     shares, kinds = dict(values.get("seconds_per_trial", {})), dict(values.get("kinds", {}))
-    for name in asked or [name for name in shipped() if not read_experiment(name).parts]:
+    for name in asked[:1] if given.short else asked:
         begun = time.monotonic()
         kinds[name], shares[name] = seconds_per_trial(name)
         print(
@@ -62,6 +65,8 @@ def main() -> None:
             f"load {os.getloadavg()[0]:.1f})",
             flush=True,
         )
+        if given.short:
+            return
         lines = [
             "# Written by benchmarks/experiment_times.py: processor seconds per trial of each experiment.",
             f'processor = "{processor()}"',

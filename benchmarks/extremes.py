@@ -1,13 +1,13 @@
 """Extreme parameters of the simulator: one row for each case, with the property that must hold. All simulated.
 
-    python benchmarks/extremes.py [--quick] [--json] [--table]
+    python benchmarks/extremes.py [--short] [--json] [--table]
 
 The fingers close at a set speed, touch, and squeeze with a constant effort for a while. There is no controller, except
 in the rows on the sampled controller, so a failure is one of the plant. A scene runs as it does for a user: by exact
 discretisation if it is piecewise linear (as `by` says), otherwise by time steps. The reference of a case has all
 terms, and halves the steps of each tick until the result converges. For the stiff contacts and light masses of the grid
 it is compiled if numba is installed; a squeeze there lasts 0.15 s, after which the bouncing has ended. `--table` prints
-the table of the documentation. `--quick` uses fewer stiffnesses and masses, and no tick of 1e-5 s.
+the table of the documentation. `--short` uses fewer stiffnesses and masses, and no tick of 1e-5 s.
 """
 
 from __future__ import annotations
@@ -167,10 +167,10 @@ def light_surface(stiffness: float, ratio: float, mass_kg: float = 1.0) -> Objec
     )
 
 
-def stiffness_and_mass(quick: bool) -> Iterator[Row]:
+def stiffness_and_mass(short: bool) -> Iterator[Row]:
     """By steps, with static friction above Coulomb friction, and by exact discretisation, with both equal."""
-    stiffnesses = (1e2, 1e4, 1e6, 1e9) if quick else (1.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9)
-    ratios = (1e-3, 1e3) if quick else (1e-6, 1e-3, 1.0, 1e3)
+    stiffnesses = (1e2, 1e4, 1e6, 1e9) if short else (1.0, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9)
+    ratios = (1e-3, 1e3) if short else (1e-6, 1e-3, 1.0, 1e3)
     rubs = evolve(BASE, moving_mass_kg=1.0, pad_stiffness_n_m=math.inf, damping_n_s_m=20.0, coulomb_n=0.5)
     for config in (evolve(rubs, breakaway_n=0.6), evolve(rubs, breakaway_n=0.5)):
         for stiffness in stiffnesses:
@@ -190,7 +190,7 @@ def stiffness_and_mass(quick: bool) -> Iterator[Row]:
                 }
 
 
-def thin_object(quick: bool) -> Iterator[Row]:
+def thin_object(short: bool) -> Iterator[Row]:
     """Thin or light objects are not passed through, under the full effort or while they are thrown back."""
     config = evolve(BASE, pad_stiffness_n_m=math.inf)
     for width in (1e-5, 1e-3):
@@ -276,7 +276,7 @@ def across(case: str, of: Callable[[float], ObjectSpec], values: Sequence[float]
         }
 
 
-def head_space(quick: bool) -> Iterator[Row]:
+def head_space(short: bool) -> Iterator[Row]:
     """A fraction of air in half a litre: little air tends to the wall's A^2 / C, much air to the empty bottle."""
     for share in (1e-3, 1e-2, 1e-1, 0.5, 1.0):
         row = against_reference(BASE, gas(5e-4 * share))
@@ -286,7 +286,7 @@ def head_space(quick: bool) -> Iterator[Row]:
     yield tends("head space (filled in)", lambda share: gas(5e-4 * (1.0 - share)), gas(5e-4), 0.02, 1.0)
 
 
-def vents(quick: bool) -> Iterator[Row]:
+def vents(short: bool) -> Iterator[Row]:
     """A narrow vent tends to a sealed bottle in proportion to its area; a wide one tends to no gas at all."""
     areas = (0.0, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
     for area in areas:
@@ -301,7 +301,7 @@ def branch(tau_s: float) -> ObjectSpec:
     return object_of(SHELL, ("maxwell", {"k_n_m": 1000.0, "tau_s": tau_s}))
 
 
-def relaxation(quick: bool) -> Iterator[Row]:
+def relaxation(short: bool) -> Iterator[Row]:
     """A fast branch tends to a damper k tau, and so to nothing; a slow one to a spring."""
     times = (1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e3, 1e6, 1e9)
     for tau in times:
@@ -322,7 +322,7 @@ def relaxation(quick: bool) -> Iterator[Row]:
     yield from across("relaxation time", branch, times)
 
 
-def energy(quick: bool) -> Iterator[Row]:
+def energy(short: bool) -> Iterator[Row]:
     """With the drive off and no friction: kinetic energy and that of the springs, tick by tick, in and out again."""
     mass, k1 = 100.0, 2e4
     for k3 in (0.0, 1e9):
@@ -359,7 +359,7 @@ def energy(quick: bool) -> Iterator[Row]:
                 }
 
 
-def stuck(quick: bool) -> Iterator[Row]:
+def stuck(short: bool) -> Iterator[Row]:
     """Below breakaway the fingers do not move, above it they do, and they stay at rest for any time."""
     bottle = find("odwalla:full_closed")
     for geared, friction in ((True, 8.0), (False, 7.0)):
@@ -421,7 +421,7 @@ def _hold(what: str, plant: Ready, state: PlantState, dt: float, count: int = 10
     }
 
 
-def approach(quick: bool) -> Iterator[Row]:
+def approach(short: bool) -> Iterator[Row]:
     """Against a spring without friction F + sqrt(F^2 + v^2 k m), of which v sqrt(k m) is left without effort.
 
     With a damper beyond the critical one the peak falls to the static value, F itself, as the speed falls.
@@ -461,10 +461,10 @@ def approach(quick: bool) -> Iterator[Row]:
         before = over
 
 
-def ticks(quick: bool) -> Iterator[Row]:
+def ticks(short: bool) -> Iterator[Row]:
     bottle, linear = find("odwalla:empty_open"), branch(0.1)
     for rate in (1e5, 1e3, 1e2, 10.0):
-        if quick and rate > 1e4:
+        if short and rate > 1e4:
             continue
         for spec, friction in ((bottle, 8.0), (linear, BASE.coulomb_n)):
             row = against_reference(evolve(BASE, rate_hz=rate, breakaway_n=friction), spec, seconds=0.5)
@@ -501,7 +501,7 @@ def _looped(rate_hz: float) -> Row:
     }
 
 
-def sizes(quick: bool) -> Iterator[Row]:
+def sizes(short: bool) -> Iterator[Row]:
     wrong: dict[str, Callable[[], Any]] = {
         "width_m nan": lambda: object_of(width_m=math.nan),
         "width_m -0.01": lambda: object_of(width_m=-0.01),
@@ -575,11 +575,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quick", action="store_true", help="fewer values a case")
+    parser.add_argument("--short", action="store_true", help="fewer values a case")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--table", action="store_true")
     given = parser.parse_args()
-    rows = [row for case in CASES for row in case(given.quick)]
+    rows = [row for case in CASES for row in case(given.short)]
     result = {
         "date": date.today().isoformat(),
         "machine": f"{platform.machine()}, {platform.system()} {platform.release()}",
@@ -594,8 +594,8 @@ def main() -> None:
         print(json.dumps(result, indent=2))
         return
     if given.table:
-        quick = " --quick" if given.quick else ""
-        print(f"From `python benchmarks/extremes.py{quick} --table`, {machine()}.\n")
+        short = " --short" if given.short else ""
+        print(f"From `python benchmarks/extremes.py{short} --table`, {machine()}.\n")
         print("\n".join(table(rows)))
         return
     for row in rows:

@@ -1,6 +1,6 @@
 """Fits the twelve free figures of the simulator's containers again, from values that were not fitted. Simulated.
 
-    python benchmarks/fit.py [--list] [--quick] [--seeds 4] [--rounds 2] [--json]
+    python benchmarks/fit.py [--list] [--short] [--seeds 4] [--rounds 2] [--json]
 
 For each container three figures may be fitted: the share of the force that lands on the cells, the loss in its full,
 open state, and a scale on the spread of stiffness. The targets are Tables II and III of the paper, at 20 N, and the
@@ -19,7 +19,7 @@ reproduce adds 118 for any figures. The rate of the whole tree is printed and is
 
 Printed are the start, the end and the catalogue with their objectives, also on seeds that were not used for fitting,
 and for each figure the values of its grid that are about as good. `--list` prints only those of the catalogue. The fit
-takes ten to fifteen minutes on two cores; `--quick` uses coarse grids, one seed and one round, to show that it runs.
+takes ten to fifteen minutes on two cores; `--short` uses coarse grids, one seed and one round, to show that it runs.
 """
 
 from __future__ import annotations
@@ -364,7 +364,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--list", action="store_true")
-    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--rounds", type=int, default=2)
     parser.add_argument("--json", action="store_true")
@@ -378,13 +378,13 @@ def main() -> None:
     columns = {"catalogue": shipped}
     if not given.list:
         began = time.time()
-        n = 1 if given.quick else given.seeds
+        n = 1 if given.short else given.seeds
         bench, further = Bench(range(n)), Bench(range(n, 2 * n))
         found = descend(
             lambda values: objective(bench.rates(values)),
             start(),
-            {name: grid[::4] if given.quick else grid for name, grid in GRIDS.items()},
-            1 if given.quick else given.rounds,
+            {name: grid[::4] if given.short else grid for name, grid in GRIDS.items()},
+            1 if given.short else given.rounds,
             lambda text: print(f"{text} ({time.time() - began:.0f} s)", file=sys.stderr),
         )
         columns = {"start": start(), "found": found.values, "catalogue": shipped}

@@ -1,6 +1,6 @@
 """How much faster than real time a grasp runs in the interpreter: plant, sensors, controller, guard, trace, features.
 
-    python benchmarks/grasp.py [--json]
+    python benchmarks/grasp.py [--json] [--short]
 
 The grasp is that of `graspsense run --object block` (about 7 s on the gripper's clock). Given are the smallest
 processor time of several grasps in a process that has run one before, the median and the largest (other work on the
@@ -29,12 +29,13 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--json", action="store_true")
-    as_json = parser.parse_args().json
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
+    given = parser.parse_args()
 
     pipeline = load_pipeline("default", options=["gripper.object=block", "classifier.type=none"])
     pipeline.grasp()
     taken = []
-    for _ in range(REPEATS):
+    for _ in range(1 if given.short else REPEATS):
         began = time.process_time()
         trial = pipeline.grasp()
         taken.append(time.process_time() - began)
@@ -52,22 +53,21 @@ def main() -> None:
         "seconds_cpu_max": max(taken),
         "realtime_factor": simulated / seconds,
         "us_per_tick": 1e6 * seconds / (simulated * 1000.0),
-        "realtime_factor_compiled": compiled_factor(simulated),
+        "realtime_factor_compiled": compiled_factor(simulated, 2 if given.short else 100),
     }
-    if as_json:
+    if given.json:
         print(json.dumps(result, indent=2))
         return
     for key, value in result.items():
         print(f"{key:<26}{value if not isinstance(value, float) else round(value, 4)}")
 
 
-def compiled_factor(simulated: float) -> float | None:
-    """Return the factor of the compiled loop with its trace; None without numba."""
+def compiled_factor(simulated: float, many: int) -> float | None:
+    """Return the factor of the compiled loop with its trace, from so many grasps; None without numba."""
     if find_spec("numba") is None:
         return None
     gripper = create("sensor-backend", "sim", object="block")
     controller = create("controller", "hybrid")
-    many = 100
     gripper.run_many(controller, ["block"] * many, range(many))
     began = time.process_time()
     gripper.run_many(controller, ["block"] * many, range(many))

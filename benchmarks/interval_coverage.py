@@ -1,6 +1,6 @@
 """Coverage of the 95 % intervals of recognition rates: how often they contain the true rate.
 
-    python benchmarks/interval_coverage.py [--repeats 2000]
+    python benchmarks/interval_coverage.py [--repeats 2000] [--short]
 
 The first table draws the rate of each instance from a beta distribution and its trials from that rate. `correlation` is
 that of two trials of the same instance. It compares the interval that graspsense prints (`graspsense`) with Wilson's of
@@ -101,7 +101,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--repeats", type=int, default=2000)
-    repeats = parser.parse_args().repeats
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
+    given = parser.parse_args()
+    repeats = 2 if given.short else given.repeats
     print(f"{time.strftime('%Y-%m-%d', time.gmtime())}, {platform.platform()}, {repeats} repeats\n")
     print("| instances | rate | correlation | Wilson | t | bootstrap | graspsense | mean width |")
     print("|---|---|---|---|---|---|---|---|")
@@ -113,7 +115,7 @@ def main() -> None:
                 print(f"| {k} | {rate} | {correlation} | {' | '.join(cells)} |", flush=True)
     print("\n| instances | true rate | Wilson | graspsense |\n|---|---|---|---|")
     for k in (6, 12, 24):
-        of = evaluated(k, max(repeats // 4, 20))
+        of = evaluated(k, repeats if given.short else max(repeats // 4, 20))
         print(f"| {k} | {of['rate']:.3f} | {of['wilson']:.3f} | {of['graspsense']:.3f} |", flush=True)
 
 

@@ -1,6 +1,6 @@
 """What recording adds to a control tick: 1 kHz in real time, every tick with a new cell image, 61 numbers a tick.
 
-    python benchmarks/recording.py [--json] [--rounds 10] [--seconds 4]
+    python benchmarks/recording.py [--json] [--rounds 10] [--seconds 4] [--short]
 
 Runs with and without a recorder alternate, in an order drawn anew each round. A tick is from the moment the
 gripper's read returns to the moment it is called again: the law, the guard, the trace, and the sinks. The command is
@@ -124,7 +124,10 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--rounds", type=int, default=10)
     parser.add_argument("--seconds", type=float, default=4.0)
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
+    if given.short:
+        given.rounds, given.seconds = 1, 1.0
     ticks = round(given.seconds * RATE_HZ)
     took: dict[bool, list[list[float]]] = {False: [], True: []}
     until_command: dict[bool, list[list[float]]] = {False: [], True: []}

@@ -1,8 +1,8 @@
 """Compare two versions of the project to the last bit, and their speed in turn. Simulated grasps.
 
-    python benchmarks/same.py BASE [--scenes 60] [--rounds 9] [--only NAME ...] [--keep FOLDER] [--json]
+    python benchmarks/same.py [BASE] [--scenes 60] [--rounds 9] [--only NAME ...] [--keep FOLDER] [--json] [--short]
 
-BASE is a commit, or a folder with a checkout. It is compared with the checkout that this file belongs to, which the
+BASE is a commit, or a folder with a checkout; without it, this checkout is compared with itself. It is compared with the checkout that this file belongs to, which the
 running interpreter has installed. BASE gets an environment of its own: the `.venv` of its checkout, or a new one with
 the same packages (some minutes; `--keep FOLDER` keeps it for the next time). Compiled code and chosen models are cached
 apart for each version.
@@ -157,6 +157,8 @@ def base_version(base: str, keep: Path) -> Version:
     """Return BASE with an environment that has it installed, made in `keep` where there is none yet."""
     if Path(base).is_dir():
         checkout, name = Path(base).resolve(), base
+        if checkout == ROOT:
+            return Version(name="here", checkout=ROOT, python=Path(sys.executable))
         home = keep / "environment"
     else:
         name = run("git", "rev-parse", "--short=12", f"{base}^{{commit}}").strip()
@@ -296,7 +298,9 @@ def text_of(result: Mapping[str, Any]) -> str:
 
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description="Compare two versions of the project to the last bit.")
-    parser.add_argument("base", help="a commit, or a folder with a checkout")
+    parser.add_argument(
+        "base", nargs="?", default=str(ROOT), help="a commit, or a folder with a checkout (this checkout)"
+    )
     parser.add_argument("--scenes", type=int, default=60, help="how many random scenes (60)")
     parser.add_argument(
         "--rounds", type=int, default=9, help="how often each version is timed (9); 0: not at all"
@@ -308,7 +312,11 @@ def parsed() -> argparse.Namespace:
         "--keep", type=Path, help="folder that keeps the environment of BASE for the next time"
     )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
-    return parser.parse_args()
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
+    given = parser.parse_args()
+    if given.short:
+        given.scenes, given.rounds = 1, 0
+    return given
 
 
 def main() -> int:
@@ -321,7 +329,7 @@ def main() -> int:
         here = Version(name="here", checkout=ROOT, python=Path(sys.executable))
         base = base_version(given.base, keep)
         request = {
-            "objects": catalogue(),
+            "objects": catalogue()[:2] if given.short else catalogue(),
             "c45": str(ROOT / "plugins" / "c45" / "tests" / "weka"),
             "folder": str(folder),
             "scenes": scene_files(given.scenes, folder) if "random scenes" in given.only else [],

@@ -1,7 +1,6 @@
 """Whether reduced models have the accuracy asked for, and what they save, on random scenes. Simulated.
-Simulated.
 
-    python benchmarks/selection.py [--scenes 500] [--first 0] [--costs 100] [--json | --table]
+    python benchmarks/selection.py [--scenes 500] [--first 0] [--costs 100] [--json | --table] [--short]
 
 A scene is drawn from the distribution below by its number. It is grasped by the hybrid controller, with ideal sensors,
 in the reduced model for an error of 10 %, 1 % and 0.1 %, once more at 1 % with every term, and in the reference: every
@@ -352,7 +351,10 @@ def main() -> None:
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true")
     form.add_argument("--table", action="store_true", help="Markdown, as in docs/simulator.md")
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
+    if given.short:
+        given.scenes, given.costs = 2, 1
     bench = Bench()
     result = {
         "date": date.today().isoformat(),

@@ -1,6 +1,6 @@
 """How fast a store of 100 000 trials is searched, read as a table, and predicted on.
 
-    python benchmarks/store.py [--json] [--trials 100000] [--folder DIR]
+    python benchmarks/store.py [--json] [--trials 100000] [--folder DIR] [--short]
 
 The rows are made up and their recordings are not there: what is timed is the database. The time of a command is
 that of the work in a process that has started; the median of several.
@@ -90,7 +90,10 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--trials", type=int, default=100_000)
     parser.add_argument("--folder", help="Keep the store here and use it again.")
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
+    if given.short:
+        given.trials = 1_000
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(given.folder or scratch)
         with Store.open(folder) as store:

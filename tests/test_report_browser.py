@@ -8,6 +8,7 @@ from pathlib import Path
 
 import browser as browsers
 import pytest
+from test_report_signals import CHANNELS, grasp
 
 from graspsense.evaluation.confusion import confusion
 from graspsense.experiments.executors.serial import Serial
@@ -17,9 +18,11 @@ from graspsense.experiments.page import write_page
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import summarise
-from graspsense.report.html import Page, Section, bullets, facts
+from graspsense.report.further_channels import channel_figures
+from graspsense.report.html import Page, Section, bullets, facts, panels
 from graspsense.report.matrix import confusion_table
 from graspsense.report.rates import RateRow, rates_over, rates_picture
+from graspsense.report.tactile import tactile_figures
 
 pytestmark = pytest.mark.browser
 
@@ -47,7 +50,18 @@ def pages(tmp_path_factory):
     planned, results = read_experiment(str(folder / "it.toml")), Results(folder / "out")
     run_experiment(planned, results, Serial)
     (folder / "long.html").write_text(long_page())
-    return {"experiment": write_page(summarise(planned, results), results), "long": folder / "long.html"}
+    (folder / "signals.html").write_text(signals_page())
+    return {
+        "experiment": write_page(summarise(planned, results), results),
+        "long": folder / "long.html",
+        "signals": folder / "signals.html",
+    }
+
+
+def signals_page():
+    figures = [*tactile_figures(grasp(), CHANNELS), *channel_figures(grasp(), CHANNELS)]
+    section = Section(id="signals", title="Tactile arrays and further channels", body=panels(figures))
+    return Page(kind="k", title="t", question="q?", answer="a.", sections=(section,)).html()
 
 
 def long_page():
@@ -111,7 +125,7 @@ MEASURE = """(() => {
 })()"""
 
 
-@pytest.mark.parametrize("name", ["experiment", "long"])
+@pytest.mark.parametrize("name", ["experiment", "long", "signals"])
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 @pytest.mark.parametrize("width", WIDTHS)
 def test_nothing_overflows_or_is_clipped(browser, pages, name, width, dark):
@@ -243,7 +257,7 @@ def test_a_drag_enlarges_a_part_of_a_picture_and_a_double_click_restores_it(brow
     assert browser.run("getComputedStyle(document.querySelector('#grasp .reset')).display") == "none"
 
 
-@pytest.mark.parametrize("name", ["experiment", "long"])
+@pytest.mark.parametrize("name", ["experiment", "long", "signals"])
 def test_a_page_is_printed_light_whole_and_without_what_is_only_for_the_screen(browser, pages, name):
     browser.show(pages[name], 720, dark=True, media="print")
     found = browser.run(MEASURE)
@@ -265,7 +279,7 @@ def test_a_page_is_printed_light_whole_and_without_what_is_only_for_the_screen(b
     "GRASPSENSE_AXE" not in os.environ,
     reason="GRASPSENSE_AXE does not name axe.min.js (npm install axe-core)",
 )
-@pytest.mark.parametrize("name", ["experiment", "long"])
+@pytest.mark.parametrize("name", ["experiment", "long", "signals"])
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_page_passes_an_accessibility_check(browser, pages, name, width, dark):
@@ -277,3 +291,13 @@ def test_a_page_passes_an_accessibility_check(browser, pages, name, width, dark)
     )
 
     assert violations == []
+
+
+def test_the_colours_of_a_heat_map_differ_in_light_dark_and_print(browser, pages):
+    colour = "getComputedStyle(document.querySelector('#signals rect[fill*=\"--q8\"]')).fill"
+    seen = []
+    for dark, media in ((False, "screen"), (True, "screen"), (True, "print")):
+        browser.show(pages["signals"], 1280, dark=dark, media=media)
+        seen.append(browser.run(colour))
+
+    assert seen == ["rgb(8, 60, 110)", "rgb(182, 217, 245)", "rgb(8, 60, 110)"]

@@ -90,7 +90,8 @@ def test_a_missing_channel(misfit):
         == """\
 two components do not fit together:
   features lab/rapid needs the channel 'force_left' in N at 100 Hz or more, which gripper lab/mute \
-does not have (it has: none). Choose another gripper.type or features.type (graspsense plugins list)"""
+does not have (it has: none). Choose another gripper.type or features.type (graspsense plugins list)
+  No other installed gripper offers what controller lab/still and features lab/rapid need"""
     )
 
 
@@ -100,7 +101,8 @@ def test_a_rate_that_is_too_low(misfit):
         == """\
 two components do not fit together:
   features lab/rapid needs the channel 'force_left' in N at 100 Hz or more, but gripper lab/full gives it at \
-24 Hz. Choose another gripper.type or features.type (graspsense plugins list)"""
+24 Hz. Choose another gripper.type or features.type (graspsense plugins list)
+  No other installed gripper offers what controller lab/still and features lab/rapid need"""
     )
 
 
@@ -114,7 +116,8 @@ def test_another_unit(misfit):
         == """\
 two components do not fit together:
   features lab/celsius needs the channel 'heat' in degC, but gripper lab/full gives it in K. \
-Choose another gripper.type or features.type (graspsense plugins list)"""
+Choose another gripper.type or features.type (graspsense plugins list)
+  No other installed gripper offers what controller lab/still and features lab/celsius need"""
     )
 
 
@@ -124,15 +127,24 @@ def test_a_command_that_is_not_taken(misfit):
         == """\
 two components do not fit together:
   controller lab/fast commands position, which gripper lab/full does not take (it takes: effort, velocity). \
-Choose another gripper.type or controller.type (graspsense plugins list)"""
+Choose another gripper.type or controller.type (graspsense plugins list)
+  No other installed gripper offers what controller lab/fast and features lab/nothing need"""
     )
+
+
+def test_installed_grippers_that_would_fit_are_listed(misfit):
+    last = misfit("mute", "both", "chitta").splitlines()[-1].strip()
+    needed = "Installed grippers that offer what controller lab/both and features graspsense/chitta need: "
+    assert last.startswith(needed)
+    assert "lab/full" in last.removeprefix(needed).split(", ")
+    assert "lab/bare" not in last
 
 
 def test_every_misfit_is_told_at_once(misfit):
     said = misfit("bare", "hybrid", "chitta")
 
     assert said.startswith("the components do not fit together:\n")
-    assert [line.split(",")[0].strip() for line in said.splitlines()[1:]] == [
+    assert [line.split(",")[0].strip() for line in said.splitlines()[1:-1]] == [
         "controller graspsense/hybrid needs the channel 'velocity' in m/s",
         "controller graspsense/hybrid needs the channel 'force_left' in N",
         "controller graspsense/hybrid needs the channel 'force_right' in N",

@@ -77,8 +77,13 @@ def from_json(value: Mapping[str, Any]) -> Channel:
     cls = KINDS[given.pop("kind")]
     for name, listed in given.items():
         if isinstance(listed, list):
-            given[name] = tuple(tuple(one) if isinstance(one, list) else one for one in listed)
+            given[name] = tuple(_place(one) if isinstance(one, list) else one for one in listed)
     return cls(**given)
+
+
+def _place(numbers: Iterable[float | None]) -> tuple[float, ...]:
+    """Return the position of a cell; JSON has no NaN, so a missing number is null there."""
+    return tuple(nan if number is None else number for number in numbers)
 
 
 @lru_cache(maxsize=256)

@@ -6,8 +6,12 @@ from collections.abc import Sequence
 
 
 def display_unit(unit: str) -> tuple[str, float]:
-    """Return the unit in which a quantity is shown, and the factor to it: mm for m, mm/s for m/s."""
-    return (f"m{unit}", 1e3) if unit == "m" or unit.startswith("m/") else (unit, 1.0)
+    """Return the unit in which a quantity is shown, and the factor to it: mm for m, mm/s for m/s.
+
+    An acceleration stays in m/s2.
+    """
+    length = unit == "m" or (unit.startswith("m/") and not unit.startswith(("m/s2", "m/s^2")))
+    return (f"m{unit}", 1e3) if length else (unit, 1.0)
 
 
 def in_words(value: float, unit: str) -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from graspsense.core.channels import declared_shape
-from graspsense.core.config import SelectedComponent, Settings
+from graspsense.core.config import SelectedComponent, Settings, select_component
 from graspsense.core.entries import Channel, FastChannel, TactileArray
-from graspsense.core.errors import WiringError
-from graspsense.core.plugins import Component
+from graspsense.core.errors import GraspsenseError, WiringError
+from graspsense.core.plugins import Component, installed
 
 
 def check(settings: Settings) -> None:
@@ -17,16 +17,42 @@ def check(settings: Settings) -> None:
     Raises WiringError that lists every mismatch, with both components, what one provides and what the other requires,
     and PluginUnavailable if a component does not declare what it provides or requires.
     """
-    misfits = [
-        *_channel_misfits(settings.gripper, settings.controller),
-        *_channel_misfits(settings.gripper, settings.features),
-        *_command_misfits(settings.gripper, settings.controller),
-    ]
+    misfits = [*_misfits(settings.gripper, settings.controller, settings.features)]
     if misfits:
         head = (
             "the components do not fit together" if len(misfits) > 1 else "two components do not fit together"
         )
-        raise WiringError("\n".join([f"{head}:", *(f"  {one}" for one in misfits)]))
+        raise WiringError("\n".join([f"{head}:", *(f"  {one}" for one in misfits), f"  {_fitting(settings)}"]))
+
+
+def _fitting(settings: Settings) -> str:
+    """Return which installed grippers offer what the controller and the features need, with their default settings."""
+    users = (settings.controller, settings.features)
+    fitting = [
+        gripper.qualified
+        for gripper in installed().components("sensor-backend")
+        if gripper.qualified != settings.gripper.component.qualified and _offers(gripper, users)
+    ]
+    needed = " and ".join(_named(user.component) for user in users)
+    if not fitting:
+        return f"No other installed gripper offers what {needed} need"
+    return f"Installed grippers that offer what {needed} need: {', '.join(sorted(fitting))}"
+
+
+def _offers(gripper: Component, users: tuple[SelectedComponent, SelectedComponent]) -> bool:
+    try:
+        chosen = select_component("sensor-backend", gripper.qualified)
+        return not [*_misfits(chosen, *users)]
+    except GraspsenseError:
+        return False  # it cannot be told without its driver or its settings
+
+
+def _misfits(
+    gripper: SelectedComponent, controller: SelectedComponent, features: SelectedComponent
+) -> Iterator[str]:
+    yield from _channel_misfits(gripper, controller)
+    yield from _channel_misfits(gripper, features)
+    yield from _command_misfits(gripper, controller)
 
 
 def _channel_misfits(gripper: SelectedComponent, user: SelectedComponent) -> Iterator[str]:

@@ -19,9 +19,11 @@ from graspsense.report.evaluation_sections import (
     doubt_section,
     tree_section,
 )
+from graspsense.report.further_channels import channel_figures
 from graspsense.report.grasp_curve import GraspCurve, grasp_curve
-from graspsense.report.html import Page, Section, bullets, facts, folded, pair, paragraph, table
+from graspsense.report.html import Page, Section, bullets, facts, folded, pair, panels, paragraph, table
 from graspsense.report.rates import RateRow
+from graspsense.report.tactile import tactile_figures
 from graspsense.report.traces import features_by_class, features_table, one_grasp, traces_by_class
 from graspsense.report.verdict import headline, verdict
 from graspsense.report.wording import TARGETS, control_words, protocol_words
@@ -203,14 +205,24 @@ def _measurement_sections(trial: StoredTrial, curves: Sequence[GraspCurve]) -> l
     """Return one grasp over time with its features, and some grasps of each label drawn over each other."""
     summary = trial.summary
     label = summary.label or "no label"
+    further = ""
     try:
-        curve = grasp_curve(read_recorded(trial.recording).trace(), label, summary.id)
+        recorded = read_recorded(trial.recording)
+        trace = recorded.trace()
+        curve = grasp_curve(trace, label, summary.id)
         body = one_grasp(curve, f"Trial {summary.id}: {label}, {summary.outcome}, made {summary.made_at}.")
+        channels = recorded.channels
+        figures = [*tactile_figures(trace, channels), *channel_figures(trace, channels)]
+        further = panels(figures) if figures else ""
     except (ConfigError, DataDamaged) as error:
         body = paragraph(f"The recording of trial {summary.id} cannot be shown: {error}")
     features = trial.result.features
     values = features_table(f"Features of trial {summary.id}", features.features, features.values)
     sections = [Section(id="grasp", title="One grasp, from the approach to rest", body=pair(body, values))]
+    if further:
+        sections.append(
+            Section(id="signals", title="The same grasp: tactile arrays and further channels", body=further)
+        )
     if curves:
         text = f"The newest grasps of each label, at most {GRASPS}, drawn over each other."
         body = paragraph(text) + traces_by_class(curves)

@@ -62,6 +62,8 @@ def reaching(values: Sequence[float], start: float, end: float, *, zero: bool = 
 def number(value: float) -> str:
     """Return a number as it is written at an axis."""
     text = f"{value:.4g}"
+    if "e+0" in text and abs(value) < 1e6:
+        text = f"{float(text):.0f}"
     return text.replace("-", "−") if text != "-0" else "0"
 
 
@@ -166,7 +168,8 @@ class Picture:
             self.line([(x, top), (x, bottom)], GRID, width=1)
             self.text(x, bottom + 13, number(value), at="middle", ink=QUIET)
         self.parts.append("</g>")
-        self.text((scale.start + scale.end) / 2, bottom + 28, title, at="middle", ink=QUIET)
+        if title:
+            self.text((scale.start + scale.end) / 2, bottom + 28, title, at="middle", ink=QUIET)
 
     def y_axis(self, scale: AxisScale, left: float, right: float, title: str) -> None:
         """Draw the ticks of a vertical axis, and its title above."""

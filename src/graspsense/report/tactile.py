@@ -1,0 +1,232 @@
+"""Heat maps of the tactile arrays of a grasp: every array at contact, at the peak and at rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.core.entries import Channel, TactileArray
+from graspsense.core.signals import Phase
+from graspsense.core.trace import ImageTrace
+from graspsense.core.trace_plot import contact_time
+from graspsense.core.units import display_unit, without_underscores
+from graspsense.report.heat import COLOURS, HeatScale
+from graspsense.report.html import figure
+from graspsense.report.svg import QUIET, Picture, number
+
+if TYPE_CHECKING:
+    from graspsense.core.trace import Floats, Trace
+
+GAP: Final = 14.0
+"""Between two maps of a picture."""
+TALLEST: Final = 190.0
+"""Limit on the height of a map."""
+LARGEST_CELL: Final = 34.0
+CELL_RIM: Final = 0.06
+"""The part of a cell's width that stays free on each side."""
+
+
+@frozen
+class _Place:
+    """The left upper corner of a cell and its side, in units of the map, whose width is 1."""
+
+    x: float
+    y: float
+    side: float
+
+
+@frozen
+class _Layout:
+    """Where each cell is drawn; `height` is that of the map where its width is 1."""
+
+    cells: tuple[_Place, ...]
+    columns: float
+    height: float
+
+
+def tactile_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
+    """Return one figure for each tactile array that delivered an image.
+
+    A map shows the change of each cell since shortly before contact, in the unit of the array, or the values
+    themselves where there is no image before contact. Both fingertips of `pads` share a figure.
+    """
+    declared = {channel.name: channel for channel in channels if isinstance(channel, TactileArray)}
+    arrays: list[tuple[str, dict[str, ImageTrace], TactileArray]] = []
+    if len(trace.pad_t_s) and trace.pad_left.shape[1]:
+        cells = trace.pad_left.shape[1]
+        fingertips = {
+            "left": ImageTrace(t_s=trace.pad_t_s, cells=trace.pad_left),
+            "right": ImageTrace(t_s=trace.pad_t_s, cells=trace.pad_right),
+        }
+        shape = declared.get("pads")
+        if shape is None or shape.cells != cells:
+            shape = TactileArray("pads", trace.units.get("pads", "counts"), rows=1, columns=cells)
+        arrays.append(("fingertips", fingertips, shape))
+    for name, signal in trace.signals.items():
+        if isinstance(signal, ImageTrace) and len(signal.t_s) and signal.cells.shape[1]:
+            shape = declared.get(name)
+            if shape is None or shape.cells != signal.cells.shape[1]:
+                shape = TactileArray(name, "unknown", rows=1, columns=signal.cells.shape[1])
+            arrays.append((without_underscores(name), {shape.finger: signal}, shape))
+    return [_figure(title, of, shape, moments(trace)) for title, of, shape in arrays]
+
+
+def moments(trace: Trace) -> dict[str, float]:
+    """Return the times of contact, of the greatest pad force, and of rest or else of the end, as far as they exist."""
+    closing = np.flatnonzero(trace.phase < int(Phase.RELEASE))
+    if not len(closing):
+        return {}
+    found: dict[str, float] = {}
+    contact = contact_time(trace)
+    if contact is not None:
+        found["contact"] = contact
+    force = (trace.force_left_n[closing] + trace.force_right_n[closing]) / 2.0
+    if not np.isnan(force).all():
+        found["peak"] = float(trace.t_s[closing[int(np.nanargmax(force))]])
+    held = np.flatnonzero(trace.phase == int(Phase.HOLD))
+    found["rest" if len(held) else "end"] = float(trace.t_s[held[0] if len(held) else closing[-1]])
+    return found
+
+
+def _figure(
+    title: str, images: Mapping[str, ImageTrace], shape: TactileArray, times: Mapping[str, float]
+) -> str:
+    unit, factor = display_unit(shape.unit)
+    shown = {side: _images_at(of, factor, times) for side, of in images.items()}
+    relative = all(at.relative for at in shown.values())
+    facing = list(shape.facing) or [True] * shape.cells
+    scale = HeatScale.over(
+        (
+            float(value)
+            for at in shown.values()
+            for cells in at.values.values()
+            for value, faces in zip(cells, facing, strict=True)
+            if faces
+        ),
+        unit,
+    )
+    layout = layout_of(shape)
+    picture = Picture(0.0)
+    picture.text(2, 14, title, bold=True, size=13)
+    maps = max(len(times), 1)
+    room = (picture.width - GAP * (maps - 1)) / maps
+    width = min(room, layout.columns * LARGEST_CELL, TALLEST / layout.height)
+    top = 44.0
+    said = []
+    for side, at in shown.items():
+        for k, (moment, cells) in enumerate(at.values.items()):
+            left = k * (room + GAP)
+            words = f"{moment}, {side}" if side and len(shown) > 1 else moment
+            picture.text(left, top - 6, words, ink=QUIET)
+            _draw(picture, layout, cells, scale, left, top, width, words)
+            if np.isfinite(cells).any():
+                said.append(f"{words} up to {number(float(np.nanmax(cells)))} {unit}")
+        top += width * layout.height + 26.0
+    scale.legend(picture, 0.0, top - 12.0, min(picture.width, 220.0))
+    picture.height = top + 20.0
+    what = (
+        "Change of each cell since shortly before contact"
+        if relative
+        else "Values of each cell; no image is from before contact"
+    )
+    on = f" on the {shape.finger}" if shape.finger and len(shown) == 1 else ""
+    facts = f"{title}{on}: {shape.cells} cells{' each' if len(shown) > 1 else ''}"
+    words = f"Heat maps of {facts}. {what}: {'; '.join(said)}"
+    caption = f"{facts[0].upper()}{facts[1:]}. {what}, in {unit}. Each map is the last image at that moment."
+    if any(math.isnan(x) for place in shape.positions_m for x in place):
+        caption += " Below the face are the cells that are elsewhere on the fingertip."
+    return figure(picture.svg(words), caption)
+
+
+@frozen
+class _Shown:
+    """The images at the moments, and whether they are relative to the image before contact."""
+
+    values: dict[str, Floats]
+    relative: bool
+
+
+def _images_at(images: ImageTrace, factor: float, times: Mapping[str, float]) -> _Shown:
+    def last(t_s: float) -> int:
+        return int(np.searchsorted(images.t_s, t_s, side="right")) - 1
+
+    before = int(np.searchsorted(images.t_s, times["contact"], side="left")) - 1 if "contact" in times else -1
+    # The image shortly before contact can already show it, so the zero is one image earlier where there is one.
+    zero = images.cells[max(before - 1, 0)] if before >= 0 else np.zeros(images.cells.shape[1])
+    missing = np.full(images.cells.shape[1], np.nan)
+    values = {
+        moment: factor * (images.cells[last(t)] - zero) if last(t) >= 0 else missing
+        for moment, t in times.items()
+    }
+    return _Shown(values, before >= 0)
+
+
+def layout_of(shape: TactileArray) -> _Layout:
+    """Return where each cell is drawn: by its position, the far end of the finger at the top, or by row and column."""
+    if not shape.positions_m:
+        side = 1.0 / shape.columns
+        cells = [
+            _Place(column * side, row * side, side)
+            for row in range(shape.rows)
+            for column in range(shape.columns)
+        ]
+        return _Layout(tuple(cells), float(shape.columns), shape.rows * side)
+    placed = [(x, y) for x, y in shape.positions_m if math.isfinite(x) and math.isfinite(y)]
+    if not placed:
+        return layout_of(TactileArray(shape.name, shape.unit, rows=1, columns=shape.cells))
+    pitch = _pitch(placed)
+    left, far = min(y for _, y in placed), max(x for x, _ in placed)
+    elsewhere = len(shape.positions_m) - len(placed)
+    columns = max((max(y for _, y in placed) - left) / pitch + 1.0, float(min(elsewhere, 4)))
+    face = (far - min(x for x, _ in placed)) / pitch + 1.0
+    side = 1.0 / columns
+    cells, rest = [], 0
+    for x, y in shape.positions_m:
+        if math.isfinite(x) and math.isfinite(y):
+            cells.append(_Place((y - left) / pitch * side, (far - x) / pitch * side, side))
+        else:
+            row, column = divmod(rest, int(columns))
+            cells.append(_Place(column * side, (face + 0.4 + row) * side, side))
+            rest += 1
+    rows = face + (0.4 + math.ceil(elsewhere / int(columns)) if elsewhere else 0.0)
+    return _Layout(tuple(cells), columns, rows * side)
+
+
+def _pitch(placed: Sequence[tuple[float, float]]) -> float:
+    """Return the least distance of two cells along or across the finger; 1 of a single cell."""
+    steps = [
+        after - before
+        for axis in (0, 1)
+        for before, after in pairwise(sorted({round(place[axis], 7) for place in placed}))
+    ]
+    return min(steps, default=1.0)
+
+
+def _draw(
+    picture: Picture,
+    layout: _Layout,
+    values: Floats,
+    scale: HeatScale,
+    left: float,
+    top: float,
+    width: float,
+    words: str,
+) -> None:
+    for i, (place, value) in enumerate(zip(layout.cells, values.tolist(), strict=True)):
+        level = scale.level(value)
+        side = width * place.side
+        x, y = left + width * place.x, top + width * place.y
+        rim = CELL_RIM * side
+        fill = "none" if level < 0 else COLOURS[level]
+        shown = "missing" if level < 0 else f"{number(value)} {scale.unit}"
+        title = escape(f"{words}, cell {i}: {shown}")
+        picture.parts.append(
+            f'<rect x="{x + rim:.1f}" y="{y + rim:.1f}" width="{side - 2 * rim:.1f}" height="{side - 2 * rim:.1f}" '
+            f'fill="{fill}" stroke="{QUIET}" stroke-width="0.5"><title>{title}</title></rect>'
+        )
