@@ -401,3 +401,14 @@ def test_a_store_and_files_with_spaces_in_their_names_work_everywhere(graspsense
     ):
         done = graspsense(*command)
         assert done.returncode == 0, (command, done.stderr)
+
+
+@pytest.mark.parametrize("label", ["nonsense:full", "can", "can:full_opn"])
+def test_an_object_that_the_gripper_does_not_know_is_refused_before_the_store_exists(
+    collect, tmp_path, label
+):
+    done = collect(tmp_path / "t", "\n\n", labels=f"block,{label}")
+    assert done.returncode == 2
+    assert f"object {label.partition(':')[0]!r}" in done.stderr or "no object named 'nonsense'" in done.stderr
+    assert "next:" not in done.stderr
+    assert not (tmp_path / "t").exists()

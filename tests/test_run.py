@@ -11,6 +11,8 @@ import pytest
 from attrs import evolve
 from grippers import Scripted, bottle, squeezing
 
+from graspsense import load_pipeline
+from graspsense.cli.run import effort_words, print_trial
 from graspsense.core.config import resolve
 from graspsense.core.dry_run import dry_run
 from graspsense.core.entries import Channel
@@ -302,3 +304,29 @@ def test_a_dry_run_shows_what_a_gripper_commanded_in_velocity_is_commanded():
     # Until the contact, the guard keeps the speed and the effort of a gripper with a clock of its own low.
     assert phases["approach"].fastest_m_s <= settings.run.first_speed_m_s
     assert 0.0 < phases["approach"].most_n <= settings.run.first_effort_n
+
+
+def test_the_effort_of_a_dry_run_is_told_as_a_limit_where_velocities_are_commanded():
+    assert effort_words(("effort",), -15.0, 20.0) == "-15.0 to +20.0 N"
+    assert effort_words(("velocity",), 5.0, 40.0) == "at most 40.0 N"
+    assert effort_words(("velocity", "force"), 5.0, 40.0) == "+5.0 to +40.0 N or its limit"
+    assert effort_words((), 0.0, 0.0) == ""
+
+
+def test_a_note_says_how_many_ticks_the_guard_limited_and_why_on_a_real_gripper(capsys):
+    trial = load_pipeline(options=["gripper.object=block", "classifier.type=none"]).grasp()
+
+    def note(limited, clock):
+        guarded = evolve(
+            trial, counts={"ticks": 1000, "guarded": limited}, device=evolve(trial.device, clock=clock)
+        )
+        print_trial(guarded)
+        return [line for line in capsys.readouterr().out.splitlines() if "guard" in line]
+
+    settings = "run.first_speed_m_s and run.first_effort_n limit this gripper"
+    assert note(0, "device") == []
+    assert note(50, "virtual") == ["note        the guard limited 50 of 1000 ticks"]
+    assert note(50, "device") == ["note        the guard limited 50 of 1000 ticks"]
+    assert note(500, "virtual") == ["note        the guard limited 500 of 1000 ticks"]
+    (line,) = note(500, "device")
+    assert line == f"note        the guard limited 500 of 1000 ticks: until a contact, {settings}"

@@ -9,8 +9,17 @@ from attrs import evolve, frozen
 from parts import CHANNELS_OF_HAND, Hand, HandConfig
 
 from graspsense import load_pipeline
+from graspsense.core.errors import ConfigError
 from graspsense.core.plugins import IsolatedPlugins
-from graspsense.plugin_api import CHANNELS, Channel, SensorBackend, SensorBackendEntry, hookimpl, setting
+from graspsense.plugin_api import (
+    CHANNELS,
+    Channel,
+    ObjectKind,
+    SensorBackend,
+    SensorBackendEntry,
+    hookimpl,
+    setting,
+)
 from graspsense.sources.simulated import Group, plan_trials
 from graspsense.store.dataset import labelled_store
 from graspsense.store.labels import labels_of
@@ -65,3 +74,14 @@ def test_a_group_may_name_its_objects_by_label_alone():
     settings = load_pipeline(options=["gripper.type=sim", "classifier.type=none"]).settings
     group = Group(named={"odwalla:full_open": "odwalla_worn:full_open"}, instances=2, trials=1)
     assert plan_trials(settings, [group], 0).labels == ("odwalla:full_open",) * 2
+
+
+def test_a_gripper_without_default_objects_names_those_that_can_be_given(monkeypatch):
+    monkeypatch.setattr(
+        "graspsense.sources.simulated.simulated_objects", lambda settings: (ObjectKind(name="foam"),)
+    )
+    settings = load_pipeline(options=["gripper.type=sim", "classifier.type=none"]).settings
+    with pytest.raises(
+        ConfigError, match="no kind of object of this gripper is a default: name --objects, any of foam"
+    ):
+        plan_trials(settings, [Group(instances=2, trials=1)], 0)

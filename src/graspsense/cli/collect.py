@@ -138,12 +138,16 @@ def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
 def _label_selects_object(settings: Settings, labels: Sequence[str], object_is_named: bool) -> bool:
     """Return whether the gripper is told to hold what the label says; a real gripper cannot be told.
 
-    Raises UsageError if the user names an object that contradicts a label.
+    Raises UsageError if the user names an object that contradicts a label, UnknownName if a label is to select an
+    object that the gripper does not know.
     """
     from graspsense.store.labels import agrees
 
-    if not settings.gripper.create().objects():
+    gripper = settings.gripper.create()
+    if not gripper.objects():
         return False
+    for label in labels if not object_is_named else ():
+        gripper.with_object(label)
     for label in labels if object_is_named else ():
         if not agrees(settings, label):
             raise contradiction(settings, label)

@@ -240,6 +240,14 @@ def _shown(value: float, unit: str, reason: str) -> str:
     return with_unit(f"{value * factor:9.3f}", shown)
 
 
+def effort_words(kinds: Sequence[str], least_n: float, most_n: float) -> str:
+    """Return the effort that is commanded; of commands of a velocity or a position, the limit of the effort."""
+    if not set(kinds) & {"effort", "force"}:
+        return f"at most {most_n:.1f} N" if kinds else ""
+    limits = " or its limit" if set(kinds) - {"effort", "force"} else ""
+    return f"{least_n:+.1f} to {most_n:+.1f} N{limits}"
+
+
 def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
     from graspsense.core.dry_run import dry_run
     from graspsense.core.errors import GraspsenseError
@@ -277,7 +285,7 @@ def _say_what_would_be_done(settings: Settings, as_json: bool) -> None:
                 one.phase,
                 ", ".join(one.kinds) or "none",
                 f"{one.seconds:.2f} s",
-                f"{one.least_n:+.1f} to {one.most_n:+.1f} N",
+                effort_words(one.kinds, one.least_n, one.most_n),
                 f"{one.fastest_m_s * 1e3:.0f} mm/s",
                 f"{one.limited} limited" if one.limited else "",
             )

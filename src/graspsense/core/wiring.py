@@ -22,7 +22,9 @@ def check(settings: Settings) -> None:
         head = (
             "the components do not fit together" if len(misfits) > 1 else "two components do not fit together"
         )
-        raise WiringError("\n".join([f"{head}:", *(f"  {one}" for one in misfits), f"  {_fitting(settings)}"]))
+        raise WiringError(
+            "\n".join([f"{head}:", *(f"  {one}" for one in misfits), f"  {_fitting(settings)}"])
+        )
 
 
 def _fitting(settings: Settings) -> str:

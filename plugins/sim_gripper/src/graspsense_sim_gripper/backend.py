@@ -96,7 +96,11 @@ class SimBackend(BatchBackend[SimConfig]):
         return object_kinds()
 
     def with_object(self, name: str) -> SimBackend:
-        """Return this gripper with another object in it: a name, a scene file, or `none`."""
+        """Return this gripper with another object in it: a name, a scene file, or `none`.
+
+        Raises UnknownName for another name, ConfigError for a file that cannot be read as an object.
+        """
+        kinds_in(name)
         return SimBackend(evolve(self.config, object=name))
 
     def expect(self, controller: Controller[Any], run: RunConfig) -> None:
