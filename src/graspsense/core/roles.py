@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from functools import update_wrapper
 from math import nan
 from types import FunctionType
 from typing import (
@@ -289,6 +290,20 @@ class ControllerState(Protocol):
 StepLaw = Callable[[Any, Any, Reading], tuple[Command, Any]]
 
 
+def _copy(function: FunctionType) -> FunctionType:
+    same = FunctionType(
+        function.__code__,
+        function.__globals__,
+        function.__name__,
+        function.__defaults__,
+        function.__closure__,
+    )
+    same.__kwdefaults__ = function.__kwdefaults__
+    update_wrapper(same, function)
+    del same.__wrapped__  # type: ignore[attr-defined]
+    return same
+
+
 class Controller(ABC, Generic[ConfigT]):
     """A control law: a pure step function of named tuples of numbers.
 
@@ -309,9 +324,14 @@ class Controller(ABC, Generic[ConfigT]):
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
-        # What composes a tick has the function alone.
-        if cls.events and "step" in vars(cls) and isinstance(cls.step, FunctionType):
-            cls.step.tells_events = True  # type: ignore[attr-defined]
+        step = cls.step
+        if cls.events and isinstance(step, FunctionType) and not getattr(step, "tells_events", False):
+            if "step" not in vars(cls):
+                # The class that it is inherited from tells no events, so it keeps its own function.
+                step = _copy(step)
+                cls.step = staticmethod(step)  # type: ignore[method-assign]
+            # What composes a tick has the function alone.
+            step.tells_events = True  # type: ignore[attr-defined]
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config

@@ -174,6 +174,10 @@ DEVICE: Final = "graspsense.device"
 RESULT: Final = "graspsense.result"
 """Names of the metadata records, the sections of a `TrialRecord`: how the trial was made, which gripper made it, and
 its result. Each is a map of texts. `settings` is TOML; the others are plain texts or JSON."""
+EVENT: Final = "graspsense.event."
+"""Name of the metadata record of an event of the controller, before its number, which counts from 1. The record is
+written when the event happens, so that a grasp that is cut off keeps its events; the result lists them once more. It is
+a map of texts: `event` is JSON."""
 
 # Protocol to the writer process: one byte for the kind of message, then a body. Ticks have a fixed length. Others state
 # their length first, and those of a topic its number, in the order in which the topics were announced.

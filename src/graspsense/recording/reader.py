@@ -5,6 +5,7 @@ Files are not trusted: lengths are bounded, checksums are verified, and nothing 
 
 from __future__ import annotations
 
+import json
 import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -27,6 +28,7 @@ from graspsense.core.trial import GraspEvent, event_from_json
 from graspsense.recording.layout import (
     CDR_HEADER,
     DEVICE,
+    EVENT,
     PADS_TOPIC,
     PART,
     SCALARS_TOPIC,
@@ -150,13 +152,19 @@ class RecordedGrasp:
         return (*(channel for channel in self.device.channels if channel.name == "pads"), *kept)
 
     def events(self) -> tuple[GraspEvent, ...]:
-        """Return the events that the controller told; none where the recording has no result."""
+        """Return the events that the controller told, also of a grasp that was cut off."""
         try:
             result = self.record().result
-            listed = () if result is None else result.details.get("events", ())
+            listed = self._events_as_told() if result is None else result.details.get("events", ())
             return tuple(event_from_json(one) for one in listed if one.get("source") == "controller")
         except (DataDamaged, *_DAMAGE):
             return ()
+
+    def _events_as_told(self) -> list[Any]:
+        """Return the events that were written when they happened."""
+        names = [name for name in self.metadata if name.startswith(EVENT)]
+        names.sort(key=lambda name: int(name.removeprefix(EVENT)))
+        return [json.loads(self.metadata[name]["event"]) for name in names]
 
     def trace(self) -> Trace:
         """Return the trace of the grasp."""

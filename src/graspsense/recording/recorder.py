@@ -20,9 +20,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
+from graspsense.core.json_values import json_text
 from graspsense.core.signals import Command, Reading
+from graspsense.core.trial import GraspEvent, event_as_json
 from graspsense.recording.atomic_file import SaveFailed
 from graspsense.recording.layout import (
+    EVENT,
     IS_END,
     IS_METADATA,
     IS_SIGNAL,
@@ -96,7 +99,7 @@ class Recorder:
         self._counter = 0
         self._pads: _Channel | None = None
         self._signals: list[tuple[_Channel, Callable[[Reading], tuple[Any, ...] | None]]] | None = None
-        self._announced = 0
+        self._announced = self._events = 0
         # All messages of a tick are packed here and written at once. Less code and fewer objects are faster here than
         # their number suggests: a millisecond after the last tick, the processor's cache holds few of them.
         self._buffer = bytearray(TICK_WIRE.size)
@@ -136,6 +139,13 @@ class Recorder:
                 self._defer(data)
             except OSError:
                 self._broken = True
+
+    def event(self, event: GraspEvent) -> None:
+        """Pass on an event of the controller, so that the recording has it if the grasp is cut off."""
+        if event.source == "controller":
+            self._events += 1
+            body = json.dumps([f"{EVENT}{self._events}", {"event": json_text(event_as_json(event))}]).encode()
+            self._send(LENGTH_WIRE.pack(IS_METADATA, len(body)) + body)
 
     def _announce(self, topic: Topic) -> _Channel:
         body = json.dumps([topic.name, topic.type_name, topic.definition]).encode()

@@ -1,0 +1,146 @@
+"""Events that a controller tells: of an inherited step, in feature sets, and of a grasp that is cut off."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import textwrap
+
+import pytest
+from attrs import frozen
+from grippers import Scripted, bottle, squeezing
+
+from graspsense.core.errors import DeviceLost
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
+from graspsense.core.signals import Outcome, Phase
+from graspsense.core.tick import events_of
+from graspsense.plugin_api import Feature, FeatureSet
+from graspsense.plugins.controllers.hybrid import HybridConfig, HybridController
+from graspsense.recording.reader import read_recorded
+from graspsense.store.recover import recover_store
+from graspsense.store.store import Store
+
+
+def step(params, state, reading):
+    return HybridController.step(params, state, reading)
+
+
+class Untold(HybridController):
+    """The hybrid controller as a class that names no events, with a step that is not marked."""
+
+    events = ()
+    step = staticmethod(step)
+
+
+class Inheriting(Untold):
+    """A class that has no step of its own, and names the event of the state."""
+
+    events = ("touched",)
+
+
+def test_a_class_that_inherits_its_step_tells_its_events():
+    grasp = run_grasp(Scripted(squeezing, bottle), Inheriting(HybridConfig()), RunConfig())
+    (event,) = grasp.trace.events
+    assert (event.what, event.phase) == ("touched", Phase.SQUEEZE)
+    # The class that it inherits from still tells none.
+    assert run_grasp(Scripted(squeezing, bottle), Untold(HybridConfig()), RunConfig()).trace.events == ()
+    assert events_of(Inheriting.step) is not events_of(Untold.step)
+
+
+def test_a_class_without_events_of_its_own_inherits_step_and_events():
+    class Renamed(HybridController):
+        pass
+
+    assert Renamed.step is HybridController.step
+    assert [
+        e.what
+        for e in run_grasp(Scripted(squeezing, bottle), Renamed(HybridConfig()), RunConfig()).trace.events
+    ] == ["contact"]
+
+
+class Lost(Scripted):
+    """A gripper that is lost shortly after both pads touched; `how` is what the loss raises."""
+
+    how: type[BaseException] = DeviceLost
+
+    def read(self, timeout_s):
+        reading = super().read(timeout_s)
+        self.touching = getattr(self, "touching", 0) + (reading.frame.force_left_n > 1.0)
+        if self.touching == 100:
+            raise self.how("gone")
+        return reading
+
+
+@pytest.mark.parametrize(("how", "outcome"), [(DeviceLost, "device lost"), (KeyboardInterrupt, "aborted")])
+def test_a_grasp_that_is_cut_off_keeps_its_events(how, outcome):
+    gripper = Lost(squeezing, bottle)
+    gripper.how = how
+    grasp = run_grasp(gripper, HybridController(HybridConfig()), RunConfig())
+    assert grasp.outcome.words == outcome
+    assert [event.what for event in grasp.trace.events] == ["contact"]
+    assert grasp.outcome is not Outcome.STEADY
+
+
+KILLED = """
+    import os, signal, sys
+    from graspsense import load_pipeline
+    from graspsense.core.plugins import installed
+    from graspsense.store.record_grasp import record_grasp
+    from graspsense.store.store import Store
+
+    class Killer:
+        ticks = 0
+
+        def take(self, reading, phase, command):
+            self.ticks += phase >= 3
+            if self.ticks == 200:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    settings = load_pipeline(options=["gripper.object=block", "classifier.type=none"]).settings
+    with Store.open(sys.argv[1]) as store:
+        record_grasp(store, settings, installed(), labels={}, origin="run", sinks=[Killer()])
+"""
+
+
+def test_a_killed_grasp_keeps_its_events(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(KILLED), str(tmp_path / "trials")], check=False, timeout=120
+    )
+    assert done.returncode == -9
+    with Store.open(tmp_path / "trials") as store:
+        while (recovered := recover_store(store))[0].what == "busy":
+            pass
+        assert [one.what for one in recovered] == ["recovered"]
+        recording = store.trial(1).recording
+    trace = read_recorded(recording).trace()
+    (event,) = trace.events
+    assert (event.what, event.source, event.phase) == ("contact", "controller", Phase.SQUEEZE)
+    assert event.t_s == trace.t_s[trace.phase == Phase.SQUEEZE][0]
+
+
+@frozen(kw_only=True)
+class NoKeys:
+    pass
+
+
+class Delay(FeatureSet[NoKeys]):
+    """The time from the first tick to the first contact that the controller told."""
+
+    requires = ()
+    features = (Feature("contact_at", "s", "time of the contact that the controller told"),)
+
+    def extract(self, trace):
+        told = [event.t_s for event in trace.events if event.what == "contact"]
+        if not told:
+            return self.undefined("the controller told no contact")
+        return self.result({"contact_at": told[0] - trace.t_s[0]})
+
+
+def test_a_feature_set_reads_events():
+    trace = run_grasp(Scripted(squeezing, bottle), HybridController(HybridConfig()), RunConfig()).trace
+    touched = trace.t_s[trace.phase == Phase.SQUEEZE][0]
+    assert Delay(NoKeys()).extract(trace)["contact_at"] == pytest.approx(touched - trace.t_s[0])
+
+    early = Delay(NoKeys()).extract(trace.until(touched - 0.01))
+    assert early.reasons == {"contact_at": "the controller told no contact"}
