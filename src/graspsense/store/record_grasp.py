@@ -63,14 +63,7 @@ def record_grasp(
 
     try:
         recorder.metadata(START, record.section(START))
-        trial = grasp_with(
-            settings,
-            plugins,
-            labels=labels,
-            sinks=[*sinks, recorder],
-            on_event=recorder.event,
-            on_open=opened,
-        )
+        trial = grasp_with(settings, plugins, labels=labels, sinks=[*sinks, recorder], on_open=opened)
         record = record.with_result(trial)
     except BaseException:
         recorder.leave()
