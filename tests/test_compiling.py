@@ -208,6 +208,7 @@ def run(program, tmp_path, *arguments, **environment):
     return done.stdout.splitlines()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_numba")
 def test_compositions_compiled_in_three_processes_stay_themselves_in_a_fourth(tmp_path):
     # Same functions, same types, other parts or other options: under one name, one would run the code of another.
@@ -238,6 +239,7 @@ MAIN = """
 """
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_numba")
 def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
     # numba itself looks at the file of the outermost function alone.
@@ -255,6 +257,7 @@ def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
     assert run(main, tmp_path, **cache) == ["21.0 0"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_numba")
 def test_compiled_code_is_kept_in_the_users_cache_and_nowhere_else(tmp_path):
     program = tmp_path / "source" / "compose.py"

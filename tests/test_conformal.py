@@ -19,6 +19,7 @@ from graspsense.evaluation.json_codec import from_json, to_json
 from graspsense.evaluation.results import Evaluation
 
 NAMES = ("forest", "knn", "mlp", "svm", "tree", "c45")
+SLOW = frozenset(("forest", "mlp"))
 
 
 def bottles(instances=14, each=3, seed=0, spread=0.9):
@@ -88,6 +89,7 @@ def test_a_label_with_few_instances_shares_the_threshold_of_all():
     assert "seldom 6 more" in sets.in_words
 
 
+@pytest.mark.slow
 def test_sets_of_new_instances_cover_90_percent():
     covered = total = 0
     for seed in range(6):
@@ -103,7 +105,10 @@ def test_sets_of_new_instances_cover_90_percent():
     assert 0.87 < covered / total < 0.98  # 90 % is asked for; 21 units, so up to 95 % is expected
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else []) for name in NAMES],
+)
 def test_every_classifier_has_sets_that_loading_keeps_exactly(name, tmp_path):
     trials = bottles()
     model = model_of(trials, name)
@@ -238,6 +243,7 @@ def test_the_commands_print_and_keep_the_sets(csv_file, tmp_path, capsys, monkey
     assert "reliability of the probabilities" in measured
 
 
+@pytest.mark.slow
 def test_the_page_shows_coverage_and_reliability():
     from graspsense.report.evaluation_sections import doubt_section
 

@@ -17,9 +17,11 @@ from graspsense.core.plugins import IsolatedPlugins
 from graspsense.scaffold.make import KINDS, make
 
 COMBINATIONS = [
-    roles for count in (1, 2, len(KINDS) - 1, len(KINDS)) for roles in itertools.combinations(KINDS, count)
+    pytest.param(roles, marks=[] if count in (1, len(KINDS)) else [pytest.mark.slow])
+    for count in (1, 2, len(KINDS) - 1, len(KINDS))
+    for roles in itertools.combinations(KINDS, count)
 ]
-"""Each role alone, each pair, all but one, and all of them."""
+"""Each role alone and all of them; among the slow tests each pair and all but one."""
 
 
 @pytest.mark.parametrize("roles", COMBINATIONS, ids="+".join)

@@ -154,6 +154,7 @@ def job(controller=HYBRID, **more):
     )
 
 
+@pytest.mark.slow
 def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit():
     run = RunConfig(hold_s=math.inf, grasp_timeout_s=0.01, opening_timeout_s=0.1)
     odd = job(config=SimConfig(pad_stiffness_n_m=math.inf, noise_counts=0.0, step_s=1e-4), run=run)

@@ -287,7 +287,9 @@ def test_the_slam_of_a_constant_effort_is_as_large_as_estimated(stiffness, speed
     assert state.peak_n == pytest.approx(peak, rel=0.05)
 
 
-@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE])
+@pytest.mark.parametrize(
+    "scheme", [VERLET, *(pytest.param(one, marks=pytest.mark.slow) for one in (TR_BDF2, MEAN_FORCE))]
+)
 def test_halving_the_step_quarters_the_error_of_the_peak(scheme):
     def peak(steps):
         params = PlantParams(

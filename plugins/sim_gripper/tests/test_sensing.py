@@ -92,6 +92,7 @@ def test_the_ideal_sensor_feels_the_true_force_at_every_tick_and_has_no_cells():
     assert np.count_nonzero(np.diff(trace.force_left_n[squeezing])) > 0.9 * squeezing.sum()
 
 
+@pytest.mark.slow
 def test_the_ideal_sensor_sees_contact_when_it_happens_the_pads_up_to_an_image_later():
     # From wider apart the contact falls into another phase of the pads' clock: 41 ms at 10 mm/s is 0.41 mm.
     delays = []
