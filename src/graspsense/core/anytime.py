@@ -185,7 +185,8 @@ def anytime_of(model: Model | None, feature_set: FeatureSet[Any], settings: Sett
         what = "there is no classifier" if model is None else f"model {model.name!r} has no checkpoints"
         raise ConfigError(
             f"run.stop_when_sure: {what}, so nothing is predicted before the grasp ends. Train a model with "
-            "graspsense train ... --checkpoints 0.1,0.2,0.4 --out FILE.json, and name it: -o classifier.model=FILE.json"
+            "graspsense train ... --checkpoints 0.1,0.2,0.4 --out FILE.json, and name it: "
+            "-o classifier.model=FILE.json. Or let the grasp go on: -o run.stop_when_sure=false"
         )
     if stops and not any(part.sets is not None and part.sets.thresholds for _, part in model.checkpoints):
         sets = model.checkpoints[0][1].sets

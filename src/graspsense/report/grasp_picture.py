@@ -17,6 +17,10 @@ DPI: Final = 120
 """Pixels per inch: the picture is 1020 pixels wide and stays readable when a page scales it to 800."""
 COLUMNS: Final = 40
 """Characters in a line of text beside the curves."""
+HEIGHT_IN: Final = 4.4
+"""Height of the picture; a text of more lines makes it higher."""
+LINE_IN: Final = 0.18
+"""Height of a line of text."""
 
 
 def require_picture(path: Path) -> None:
@@ -40,7 +44,11 @@ def grasp_png(trial: Trial, path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8.5, 4.4), dpi=DPI, layout="constrained")
+    lines = [
+        part for line in _words(trial) for part in wrap(line, COLUMNS, subsequent_indent="      ") or [""]
+    ]
+    height = max(HEIGHT_IN, LINE_IN * len(lines))
+    figure = Figure(figsize=(8.5, height), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(2, 2, width_ratios=(2.1, 1.0))
     force: Any = figure.add_subplot(grid[0, 0])
@@ -48,9 +56,6 @@ def grasp_png(trial: Trial, path: Path) -> None:
     words: Any = figure.add_subplot(grid[:, 1])
     draw_trace(trial.trace, force, gap)
     words.set_axis_off()
-    lines = [
-        part for line in _words(trial) for part in wrap(line, COLUMNS, subsequent_indent="      ") or [""]
-    ]
     words.text(0.0, 1.0, "\n".join(lines), va="top", fontsize=8.5, linespacing=1.45)
     try:
         figure.savefig(path, format="png")
