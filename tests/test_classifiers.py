@@ -14,7 +14,7 @@ from graspsense.core.errors import ConfigError
 from graspsense.core.features import Features, FeatureTable
 from graspsense.plugin_api import create
 
-ALL = ["c45", "svm", "mlp", "forest", "boosted", "knn", "tree"]
+ALL = ["c45", "svm", "mlp", "forest", "boosted", "ebm", "knn", "tree"]
 NAMES, UNITS = ("p_first", "f_steady", "noise"), ("m", "N", "")
 
 
@@ -29,7 +29,12 @@ def trials(n=40, seed=0, missing=0.0):
     return FeatureTable(names=NAMES, units=UNITS, values=values), labels
 
 
+FAST = {"ebm": {"bags": 2, "pairs": 2}, "boosted": {"stages": 40}}
+"""Settings of the classifiers that are slow to fit."""
+
+
 def fitted(name, table, labels, seed=0, **config):
+    config = {**FAST.get(name, {}), **config}
     classifier = create("classifier", name, **config)
     classifier.fit(table, labels, seed)
     return classifier

@@ -35,7 +35,7 @@ def test_contributions_of_a_forest_add_up_to_the_probability(features):
 
 @pytest.mark.parametrize("classes", [2, 3])
 @pytest.mark.parametrize("value", [0.0661, 0.0580])
-@pytest.mark.parametrize("name", ["boosted"])
+@pytest.mark.parametrize("name", ["boosted", "ebm"])
 def test_contributions_in_log_odds_add_up_to_the_odds(name, value, classes):
     table, labels = trials(missing=0.1)
     if classes == 2:
@@ -50,7 +50,7 @@ def test_contributions_in_log_odds_add_up_to_the_odds(name, value, classes):
     assert given[0].against == sorted(said.probabilities, key=said.probabilities.get)[-2]
 
 
-@pytest.mark.parametrize("name", ["forest", "boosted"])
+@pytest.mark.parametrize("name", ["forest", "boosted", "ebm"])
 def test_the_feature_that_tells_the_labels_apart_contributes_most(name):
     said = fitted(name, *trials()).explain(FULL_CAN)
     first = said.because[0]
@@ -101,14 +101,14 @@ def test_a_text_becomes_a_reason_and_json_has_what_a_reason_has():
     assert said.because == (Reason(words="nearest to the mean of can"),)
     assert said.as_json()["because"] == [{"words": "nearest to the mean of can"}]
 
-    for name in ("forest", "boosted", "c45", "knn", "mlp", "svm", "tree"):
+    for name in ("forest", "boosted", "ebm", "c45", "knn", "mlp", "svm", "tree"):
         listed = json.loads(json.dumps(fitted(name, *trials()).explain(MISSING).as_json()))["because"]
         assert all(one["words"] for one in listed)
         missing = [one for one in listed if "is missing" in one["words"]]
         assert missing[0]["features"][0] == {"name": "f_steady", "value": None, "unit": "N"}
         if name in ("c45", "tree"):
             assert any("rule" in one for one in listed)
-        if name in ("forest", "boosted"):
+        if name in ("forest", "boosted", "ebm"):
             assert any(one.get("contribution", {}).get("label") == "can:full" for one in listed)
 
 

@@ -96,7 +96,7 @@ def classifier_option(command: CommandT) -> CommandT:
     return click.option(
         "--classifier",
         metavar="NAME",
-        help=f"c45, svm, mlp, forest, boosted, knn, tree, or one of a plugin. [{DEFAULT_CLASSIFIER}] (classifier.type)",
+        help=f"c45, svm, mlp, forest, boosted, ebm, knn, tree, or another. [{DEFAULT_CLASSIFIER}] (classifier.type)",
     )(command)
 
 

@@ -1,0 +1,275 @@
+"""Explainable boosting: an additive model of single features and of pairs (the extra `ebm`).
+
+The log-odds of a label are a sum of functions of one feature, and of functions of two. Each function is a table of
+scores over intervals of the feature, which interpret fits by boosting (Y. Lou, R. Caruana, J. Gehrke and G. Hooker, KDD
+2013). A model holds the bounds of the intervals and the scores. Prediction needs numpy only; interpret is imported for
+training.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from attrs import frozen
+
+from graspsense.plugin_api import (
+    Classifier,
+    ClassifierConfig,
+    Features,
+    FeatureTable,
+    FeatureValue,
+    PluginUnavailable,
+    Prediction,
+    contribution_reasons,
+    missing_feature,
+    setting,
+)
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+HINT: Final = (
+    'training an ebm needs interpret-core.\n  in a clone: pip install -e ".[ebm]"     published: '
+    'pip install "graspsense[ebm]"'
+)
+
+
+@frozen(kw_only=True)
+class EbmConfig(ClassifierConfig):
+    """Settings of the boosting."""
+
+    pairs: int = setting(
+        default=10, minimum=0, meaning="Largest number of pairs of features with a function."
+    )
+    bags: int = setting(
+        default=8, minimum=1, plausible=(1, 1000), meaning="Number of fits, whose scores are averaged."
+    )
+    bins: int = setting(default=64, minimum=4, meaning="Largest number of intervals of a feature.")
+    pair_bins: int = setting(
+        default=16, minimum=4, meaning="Largest number of intervals of a feature in a pair."
+    )
+    learning_rate: float = setting(
+        default=0.05, above=0.0, plausible=(0.001, 1.0), meaning="Factor of each boosting step."
+    )
+    min_leaf: int = setting(
+        default=4, minimum=1, meaning="Smallest number of training trials on a side of a boosting step."
+    )
+
+
+@frozen(eq=False)
+class Term:
+    """A function of one feature or of two: `scores` has a shape (intervals of each feature ..., labels).
+
+    The first interval of a feature is that of a missing value; `cuts` are the bounds between the others, and a value
+    on a bound belongs to the interval above it.
+    """
+
+    features: tuple[int, ...]
+    cuts: tuple[NDArray[np.float64], ...]
+    scores: NDArray[np.float64]
+
+    def of(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the scores of trials, shape (trials, labels)."""
+        import numpy as np
+
+        where = []
+        for k, cuts in zip(self.features, self.cuts, strict=True):
+            column = values[:, k]
+            where.append(np.where(np.isnan(column), 0, np.searchsorted(cuts, column, side="right") + 1))
+        found: NDArray[np.float64] = self.scores[tuple(where)]
+        return found
+
+
+@frozen(eq=False)
+class AdditiveModel:
+    """The fitted functions, and the log-odds of each label before any feature."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    labels: tuple[str, ...]
+    start: NDArray[np.float64]
+    terms: tuple[Term, ...]
+
+    def log_odds(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the log-odds of each label up to a constant, shape (trials, labels)."""
+        import numpy as np
+
+        total = np.tile(self.start, (len(values), 1))
+        for term in self.terms:
+            total += term.of(values)
+        return total
+
+
+class Ebm(Classifier[EbmConfig]):
+    """An explainable boosting machine. A missing value has a score of its own."""
+
+    _fitted: AdditiveModel | None = None
+
+    def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
+        """Fit the functions. Raises ValueError for fewer than two labels, PluginUnavailable without interpret."""
+        import warnings
+
+        import numpy as np
+
+        if len(set(labels)) < 2:
+            raise ValueError(f"all {len(labels)} trials have one label: there is nothing to tell apart")
+        boosting = _interpret().ExplainableBoostingClassifier(
+            feature_names=list(table.names),
+            feature_types=["continuous"] * len(table.names),
+            interactions=min(self.config.pairs, math.comb(len(table.names), 2)),
+            outer_bags=self.config.bags,
+            max_bins=self.config.bins,
+            max_interaction_bins=self.config.pair_bins,
+            learning_rate=self.config.learning_rate,
+            min_samples_leaf=self.config.min_leaf,
+            # Smoothing takes most of the time of a fit, and gained nothing on grasps.
+            smoothing_rounds=0,
+            interaction_smoothing_rounds=0,
+            n_jobs=1,
+            random_state=seed,
+        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about its own pictures, which are not used
+            boosting.fit(table.values, np.array(labels))
+        self._fitted = _model_of(boosting, table)
+
+    def classes(self) -> tuple[str, ...]:
+        """Return the labels in the order of the columns of `probabilities`."""
+        return self._model().labels
+
+    def probabilities(self, table: FeatureTable) -> NDArray[np.float64]:
+        """Return the softmax of the log-odds, shape (trials, classes)."""
+        import numpy as np
+
+        model = self._model()
+        total = model.log_odds(table.columns(model.names).values)
+        powers = np.exp(total - total.max(axis=1, keepdims=True))
+        return np.asarray(powers / powers.sum(axis=1, keepdims=True))
+
+    def explain(self, features: Features) -> Prediction:
+        """Return the prediction with the contributions to the odds against the next most probable label."""
+        import numpy as np
+
+        model = self._model()
+        values = [features[name] for name in model.names]
+        row = np.array([values])
+        total = model.log_odds(row)[0]
+        powers = np.exp(total - total.max())
+        shares = dict(zip(model.labels, (powers / powers.sum()).tolist(), strict=True))
+        first, second = np.argsort(-total, kind="stable")[:2].tolist()
+        given = [
+            FeatureValue(name, None if math.isnan(value) else value, unit)
+            for name, unit, value in zip(model.names, model.units, values, strict=True)
+        ]
+        parts = []
+        for term in model.terms:
+            scores = term.of(row)[0]
+            parts.append((tuple(given[k] for k in term.features), float(scores[first] - scores[second])))
+        missing = [
+            missing_feature(one.name, one.unit, f": {features.reasons.get(one.name, 'no reason given')}")
+            for one in given
+            if one.value is None
+        ]
+        return Prediction(
+            label=model.labels[first],
+            probabilities=shares,
+            because=(
+                *missing,
+                *contribution_reasons(
+                    parts,
+                    float(model.start[first] - model.start[second]),
+                    scale="log-odds",
+                    label=model.labels[first],
+                    against=model.labels[second],
+                ),
+            ),
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the bounds and the scores."""
+        model = self._model()
+        return {
+            "features": [list(one) for one in zip(model.names, model.units, strict=True)],
+            "labels": list(model.labels),
+            "start": model.start.tolist(),
+            "terms": [
+                {
+                    "features": list(term.features),
+                    "cuts": [cuts.tolist() for cuts in term.cuts],
+                    "scores": term.scores.tolist(),
+                }
+                for term in model.terms
+            ],
+        }
+
+    def from_json(self, model: Mapping[str, Any]) -> None:
+        """Restore the model. Raises KeyError, TypeError or ValueError."""
+        import numpy as np
+
+        names, units = zip(*((str(name), str(unit)) for name, unit in model["features"]), strict=True)
+        labels = tuple(str(label) for label in model["labels"])
+        start = np.array(model["start"], dtype=np.float64)
+        if len(labels) < 2 or start.shape != (len(labels),) or not np.isfinite(start).all():
+            raise ValueError("its log-odds before any feature do not fit its labels")
+        terms = tuple(_term_from(one, len(names), len(labels)) for one in model["terms"])
+        self._fitted = AdditiveModel(names, units, labels, start, terms)
+
+    def _model(self) -> AdditiveModel:
+        if self._fitted is None:
+            raise ValueError("the classifier is neither fitted nor loaded yet")
+        return self._fitted
+
+
+def _model_of(boosting: Any, table: FeatureTable) -> AdditiveModel:
+    """Return the functions of a fitted machine of interpret.
+
+    Its intervals of a feature are coarser in a pair than alone. It has one more interval than are needed here, the
+    last, for names of categories that training did not have; and for two labels it has the scores of the second only.
+    """
+    import numpy as np
+
+    def columns(scores: Any) -> NDArray[np.float64]:
+        given = np.asarray(scores, dtype=np.float64)
+        return given if len(boosting.classes_) > 2 else np.stack((np.zeros_like(given), given), axis=-1)
+
+    terms = []
+    for features, scores in zip(boosting.term_features_, boosting.term_scores_, strict=True):
+        levels = [boosting.bins_[k] for k in features]
+        cuts = tuple(
+            np.asarray(of[min(len(features), len(of)) - 1], dtype=np.float64).copy() for of in levels
+        )
+        known = columns(scores)[(slice(-1),) * len(features)].copy()
+        terms.append(Term(tuple(int(k) for k in features), cuts, known))
+    start = columns(boosting.intercept_)
+    return AdditiveModel(
+        names=table.names,
+        units=table.units,
+        labels=tuple(str(label) for label in boosting.classes_),
+        start=start.reshape(len(boosting.classes_)),
+        terms=tuple(terms),
+    )
+
+
+def _term_from(kept: Mapping[str, Any], features: int, labels: int) -> Term:
+    import numpy as np
+
+    of = tuple(int(k) for k in kept["features"])
+    cuts = tuple(np.array(one, dtype=np.float64) for one in kept["cuts"])
+    scores = np.array(kept["scores"], dtype=np.float64)
+    shape = (*(len(one) + 2 for one in cuts), labels)
+    if not of or len(cuts) != len(of) or not all(0 <= k < features for k in of) or scores.shape != shape:
+        raise ValueError("a function of it does not fit its features, bounds and labels")
+    if not np.isfinite(scores).all() or not all((np.diff(one) > 0).all() for one in cuts):
+        raise ValueError("a function of it has scores that are not finite, or bounds that do not increase")
+    return Term(of, cuts, scores)
+
+
+def _interpret() -> Any:
+    try:
+        import interpret.glassbox
+    except ImportError as error:
+        raise PluginUnavailable(HINT) from error
+    return interpret.glassbox
