@@ -112,7 +112,7 @@ class TestEvery:
         classifier = fitted(name, *trials(missing=0.1), seed=3)
         table, _ = trials(seed=4, missing=0.1)
         kept = json.loads(json.dumps(classifier.to_json(), allow_nan=False))
-        again = create("classifier", name)
+        again = create("classifier", name, **FAST.get(name, {}))
         again.from_json(kept)
 
         assert again.classes() == classifier.classes()
