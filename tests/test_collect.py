@@ -54,6 +54,8 @@ def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(col
     result = json.loads(done.stdout)
     assert result["counts"] == {"can:full_open": 2, "block": 2}
     assert result["complete"]
+    assert result["sets"]["unit"] == "trials"
+    assert all(9 - result["counts"][label] == n for label, n in result["sets"]["lacking"].items())
     kept = trials_in(tmp_path / "t")
     assert [number for number, _, _ in kept] == result["trials"] == [1, 2, 3, 4, 5, 6]
     assert kept[0][2] == "undone by the operator"

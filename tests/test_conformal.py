@@ -9,7 +9,7 @@ import pytest
 from attrs import evolve
 from test_evaluate import judged, labelled, learner
 
-from graspsense.core.conformal import sets_of, units_needed
+from graspsense.core.conformal import sets_of, units_lacking, units_needed
 from graspsense.core.errors import DataDamaged
 from graspsense.core.features import UNKNOWN
 from graspsense.core.model import load_model, train, write_model
@@ -77,6 +77,14 @@ def test_eight_instances_are_too_few_and_nine_are_enough():
     assert few.of({"a": 1.0}, "a") == ()
     assert enough.thresholds["a"].own
     assert enough.thresholds["a"].units == 9
+
+
+def test_what_a_label_lacks_for_sets_is_counted_in_instances_where_each_label_has_several():
+    two = {("full", "full#1"): 20, ("full", "full#2"): 1, ("empty", "empty#1"): 5, ("empty", "empty#2"): 5}
+
+    assert units_lacking(two) == ("instances", {"empty": 7, "full": 7})
+    assert units_lacking({**two, ("jar", "jar#1"): 4}) == ("trials", {"empty": 0, "full": 0, "jar": 5})
+    assert units_lacking({("full", None): 12}, 0.95) == ("trials", {"full": 7})
 
 
 def test_a_label_with_few_instances_shares_the_threshold_of_all():

@@ -124,15 +124,30 @@ def _show(word: str, trial: Trial) -> None:
 
 
 def _print_counts(save: str, collection: Collection, as_json: bool) -> None:
+    from graspsense.core.conformal import COVERAGE, units_lacking
+
     counts, each = collection.counts(), collection.wanted.each
+    unit, lacking = units_lacking(collection.store.counts())
     if as_json:
         done = all(n >= each for n in counts.values())
         echo_json(
-            {"store": save, "trials": collection.numbers, "counts": counts, "each": each, "complete": done}
+            {
+                "store": save,
+                "trials": collection.numbers,
+                "counts": counts,
+                "each": each,
+                "complete": done,
+                "sets": {"coverage": COVERAGE, "unit": unit, "lacking": lacking},
+            }
         )
         return
     for word, n in counts.items():
         echo_entry(word, f"{n:>4} of {each}", Style.GOOD if n >= each else None, width=24)
+    more = [f"{label} {n} more" for label, n in lacking.items() if n]
+    if more:
+        echo_entry(
+            "for sets", f"of {100 * COVERAGE:.0f} %, by {unit}: {', '.join(more)}", Style.CAUTION, width=24
+        )
 
 
 def _label_selects_object(settings: Settings, labels: Sequence[str], object_is_named: bool) -> bool:

@@ -45,6 +45,31 @@ def units_needed(coverage: float = COVERAGE) -> int:
     return n
 
 
+def units_lacking(
+    counts: Mapping[tuple[str, str | None], int], coverage: float = COVERAGE
+) -> tuple[str, dict[str, int]]:
+    """Return the unit of exchangeability, and how many more units each label needs for a threshold of its own.
+
+    `counts` are the trials of each label and instance. The unit is `instances` if every trial has one and every label
+    has several, else `trials`.
+
+    >>> units_lacking({("full", "full#1"): 5, ("full", "full#2"): 5})
+    ('instances', {'full': 7})
+    >>> units_lacking({("full", None): 5})
+    ('trials', {'full': 4})
+    """
+    named: dict[str, set[str | None]] = {}
+    trials: dict[str, int] = {}
+    for (label, instance), n in counts.items():
+        named.setdefault(label, set()).add(instance)
+        trials[label] = trials.get(label, 0) + n
+    by_instance = all(None not in of and len(of) > 1 for of in named.values())
+    have = {label: len(of) for label, of in named.items()} if by_instance else trials
+    needed = units_needed(coverage)
+    lacking = {label: max(needed - n, 0) for label, n in sorted(have.items())}
+    return ("instances" if by_instance else "trials"), lacking
+
+
 def scores_of(probabilities: NDArray[np.float64], closeness: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the scores of trials for labels, of the probabilities and of `Novelty.closeness` (0 to 1)."""
     return probabilities + _CLOSENESS * closeness
