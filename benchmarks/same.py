@@ -2,10 +2,10 @@
 
     python benchmarks/same.py [BASE] [--scenes 60] [--rounds 9] [--only NAME ...] [--keep FOLDER] [--json] [--short]
 
-BASE is a commit, or a folder with a checkout; without it, this checkout is compared with itself. It is compared with the
-checkout that this file belongs to, which the running interpreter has installed. BASE gets an environment of its own:
-the `.venv` of its checkout, or a new one with the same packages (some minutes; `--keep FOLDER` keeps it for the next
-time). Compiled code and chosen models are cached apart for each version.
+BASE is a commit, or a folder with a checkout; without it, this checkout is compared with itself. It is compared with
+the checkout that this file belongs to, which the running interpreter has installed. BASE gets an environment of its
+own: the `.venv` of its checkout, or a new one with the same packages (some minutes; `--keep FOLDER` keeps it for the
+next time). Compiled code and chosen models are cached apart for each version.
 
 Compared are the traces, outcomes and features of every object of the catalogue under three controllers, with ideal
 sensors and with pads, one grasp at a time and as a batch; sixty random scenes of `benchmarks/selection.py`, with the
