@@ -248,7 +248,7 @@ def main() -> None:
         print_own_peak(arguments.peak_of, arguments.rows[0])
         return
     if arguments.short:
-        arguments.rows, arguments.repeats = [1_000], 1
+        arguments.rows, arguments.repeats, arguments.no_memory = [1_000], 1, True
     with_memory = not arguments.no_memory and Path("/proc/self/clear_refs").exists()
     rows = [run_size(n, arguments.repeats, with_memory) for n in arguments.rows]
     about = machine()
