@@ -19,8 +19,8 @@ reproduce adds 118 for any figures. The rate of the whole tree is printed and is
 
 Printed are the start, the end and the catalogue with their objectives, also on seeds that were not used for fitting,
 and for each figure the values of its grid that are about as good. `--list` prints only those of the catalogue. The fit
-takes ten to fifteen minutes on two cores; `--short` uses one value of each grid, one seed and one round, to show that it
-runs.
+takes ten to fifteen minutes on two cores; `--short` uses one value of each grid, one seed and one round,
+to show that it runs.
 """
 
 from __future__ import annotations
