@@ -103,6 +103,7 @@ KILLED = """
 """
 
 
+@pytest.mark.slow
 def test_a_killed_grasp_keeps_its_events(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(KILLED), str(tmp_path / "trials")], check=False, timeout=120
