@@ -117,6 +117,7 @@ def test_sets_of_new_instances_cover_90_percent():
     "name",
     [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else []) for name in NAMES],
 )
+@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")  # mlp, on 42 trials
 def test_every_classifier_has_sets_that_loading_keeps_exactly(name, tmp_path):
     trials = bottles()
     model = model_of(trials, name)

@@ -60,7 +60,7 @@ class EbmConfig(ClassifierConfig):
 
 
 @frozen(eq=False)
-class Term:
+class EbmTerm:
     """A function of one feature or of two: `scores` has a shape (intervals of each feature ..., labels).
 
     The first interval of a feature is that of a missing value; `cuts` are the bounds between the others, and a value
@@ -91,7 +91,7 @@ class AdditiveModel:
     units: tuple[str, ...]
     labels: tuple[str, ...]
     start: NDArray[np.float64]
-    terms: tuple[Term, ...]
+    terms: tuple[EbmTerm, ...]
 
     def log_odds(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the log-odds of each label up to a constant, shape (trials, labels)."""
@@ -242,7 +242,7 @@ def _model_of(boosting: Any, table: FeatureTable) -> AdditiveModel:
             np.asarray(of[min(len(features), len(of)) - 1], dtype=np.float64).copy() for of in levels
         )
         known = columns(scores)[(slice(-1),) * len(features)].copy()
-        terms.append(Term(tuple(int(k) for k in features), cuts, known))
+        terms.append(EbmTerm(tuple(int(k) for k in features), cuts, known))
     start = columns(boosting.intercept_)
     return AdditiveModel(
         names=table.names,
@@ -253,7 +253,7 @@ def _model_of(boosting: Any, table: FeatureTable) -> AdditiveModel:
     )
 
 
-def _term_from(kept: Mapping[str, Any], features: int, labels: int) -> Term:
+def _term_from(kept: Mapping[str, Any], features: int, labels: int) -> EbmTerm:
     import numpy as np
 
     of = tuple(int(k) for k in kept["features"])
@@ -264,7 +264,7 @@ def _term_from(kept: Mapping[str, Any], features: int, labels: int) -> Term:
         raise ValueError("a function of it does not fit its features, bounds and labels")
     if not np.isfinite(scores).all() or not all((np.diff(one) > 0).all() for one in cuts):
         raise ValueError("a function of it has scores that are not finite, or bounds that do not increase")
-    return Term(of, cuts, scores)
+    return EbmTerm(of, cuts, scores)
 
 
 def _interpret() -> Any:

@@ -34,7 +34,7 @@ STILL_CLOSED: Final = 0.02
 
 
 @frozen(kw_only=True, eq=False)
-class Samples:
+class CurveSamples:
     """The samples of a trace that have a gap and a force: arrays (n,); `pads` has a row for each pad that is used."""
 
     t_s: Floats
@@ -43,7 +43,7 @@ class Samples:
     phase: NDArray[np.int64]
 
 
-def samples_of(trace: Trace, contact_force_n: float) -> Samples | str:
+def samples_of(trace: Trace, contact_force_n: float) -> CurveSamples | str:
     """Return the samples of a trace, or why there are none.
 
     A pad that never feels the contact force (N) before the release is not used, unless no pad feels it.
@@ -74,7 +74,7 @@ def samples_of(trace: Trace, contact_force_n: float) -> Samples | str:
     forces = np.array([force[at] for force in pads])
     new = _new_forces(trace.t_s[at], forces)
     at = at[new]
-    return Samples(t_s=trace.t_s[at], gap_m=trace.gap_m[at], pads=forces[:, new], phase=trace.phase[at])
+    return CurveSamples(t_s=trace.t_s[at], gap_m=trace.gap_m[at], pads=forces[:, new], phase=trace.phase[at])
 
 
 def _new_forces(t_s: Floats, pads: Floats) -> NDArray[np.int64] | slice:
@@ -145,7 +145,7 @@ class ContactCurve:
         return k, since * (self.force_n[k] + self.half_rise[k] * since)
 
 
-def contact_curve(samples: Samples, contact_force_n: float) -> ContactCurve | str:
+def contact_curve(samples: CurveSamples, contact_force_n: float) -> ContactCurve | str:
     """Return the curve from the contact on, or why there is no contact.
 
     Contact is the first time at which each pad feels the contact force (N) before the release.
