@@ -49,6 +49,10 @@ class _Layout:
     columns: float
     height: float
 
+    def at(self, left: float, top: float, width: float) -> list[_Place]:
+        """Return the cells of a map with this left upper corner and this width in a picture."""
+        return [_Place(left + width * cell.x, top + width * cell.y, width * cell.side) for cell in self.cells]
+
 
 def tactile_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
     """Return one figure for each tactile array that delivered an image.
@@ -124,7 +128,7 @@ def _figure(
             left = k * (room + GAP)
             words = f"{moment}, {side}" if side and len(shown) > 1 else moment
             picture.text(left, top - 6, words, ink=QUIET)
-            _draw(picture, layout, cells, scale, left, top, width, words)
+            _draw(picture, layout.at(left, top, width), cells, scale, words)
             if np.isfinite(cells).any():
                 said.append(f"{words} up to {number(float(np.nanmax(cells)))} {unit}")
         top += width * layout.height + 26.0
@@ -210,18 +214,14 @@ def _pitch(placed: Sequence[tuple[float, float]]) -> float:
 
 def _draw(
     picture: Picture,
-    layout: _Layout,
+    places: Sequence[_Place],
     values: Floats,
     scale: HeatScale,
-    left: float,
-    top: float,
-    width: float,
     words: str,
 ) -> None:
-    for i, (place, value) in enumerate(zip(layout.cells, values.tolist(), strict=True)):
+    for i, (place, value) in enumerate(zip(places, values.tolist(), strict=True)):
         level = scale.level(value)
-        side = width * place.side
-        x, y = left + width * place.x, top + width * place.y
+        x, y, side = place.x, place.y, place.side
         rim = CELL_RIM * side
         fill = "none" if level < 0 else COLOURS[level]
         shown = "missing" if level < 0 else f"{number(value)} {scale.unit}"
