@@ -315,7 +315,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     if given.short:
-        given.scenes, given.rounds = 1, 0
+        given.rounds, given.only = 0, COMPARED[:1]
     return given
 
 
