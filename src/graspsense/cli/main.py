@@ -36,6 +36,7 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "train": ("graspsense.cli.train:train", "Train a model on labelled trials."),
     "predict": ("graspsense.cli.predict:predict", "Predict the labels of trials."),
     "evaluate": ("graspsense.cli.evaluate:evaluate", "Measure the recognition rate by cross-validation."),
+    "compare": ("graspsense.cli.compare:compare", "Compare classifiers and feature sets."),
     "experiment": ("graspsense.cli.experiment:experiment", "Run or resume an experiment from a file."),
     "tradeoff": ("graspsense.cli.tradeoff:tradeoff", "Measure recognition or accuracy against cost."),
     "report": ("graspsense.cli.report:report", "Write the report page of a store or an experiment."),

@@ -148,25 +148,29 @@ def wilson(correct: float, n: float, quantile: float = Z) -> Interval:
 
 
 def difference(
-    first: Sequence[bool], second: Sequence[bool], instances: Sequence[str] | None = None
+    first: Sequence[bool],
+    second: Sequence[bool],
+    instances: Sequence[str] | None = None,
+    comparisons: int = 1,
 ) -> Difference:
     """Return the rate of `first` minus that of `second`; both state which of the same trials are correct.
 
     With `instances`, the object of each trial, the interval is Student's t of the differences by instance, and never
-    narrower than that of independent trials. Raises ValueError if the lengths differ or are zero.
+    narrower than that of independent trials. It is corrected for a number of comparisons (Bonferroni). Raises
+    ValueError if the lengths differ or are zero.
     """
     n = len(first)
     if n == 0 or len(second) != n:
         raise ValueError(f"{n} and {len(second)} trials: both must be of the same trials")
     value = (sum(first) - sum(second)) / n
-    independent = _newcombe(first, second)
+    independent = _newcombe(first, second, _z(comparisons))
     if instances is None:
         return Difference(value, independent)
     count = len(set(instances))
     if count < MIN_INSTANCES:
         return Difference(value, None, too_few(count))
     each = [float(x) - float(y) for x, y in zip(first, second, strict=True)]
-    half = _t(count - 1) * math.sqrt(_variance_of_mean(each, instances)[0])
+    half = _t(count - 1, comparisons) * math.sqrt(_variance_of_mean(each, instances)[0])
     low, high = min(value - half, independent[0]), max(value + half, independent[1])
     return Difference(value, (max(low, -1.0), min(high, 1.0)))
 
@@ -182,14 +186,23 @@ def _variance_of_mean(values: Sequence[float], instances: Sequence[str]) -> tupl
     return count / (count - 1) * math.fsum(one * one for one in by_instance.values()) / n**2, count
 
 
-def _t(degrees: int) -> float:
-    """Return the 97.5 % quantile of Student's distribution."""
+def _t(degrees: int, comparisons: int = 1) -> float:
+    """Return the 97.5 % quantile of Student's distribution, for one of several comparisons."""
     from scipy.special import stdtrit
 
-    return float(stdtrit(degrees, 0.975))
+    return float(stdtrit(degrees, 1.0 - 0.025 / comparisons))
 
 
-def _newcombe(first: Sequence[bool], second: Sequence[bool]) -> Interval:
+def _z(comparisons: int) -> float:
+    """Return the 97.5 % quantile of the standard normal distribution, for one of several comparisons."""
+    if comparisons == 1:
+        return Z
+    from scipy.special import ndtri
+
+    return float(ndtri(1.0 - 0.025 / comparisons))
+
+
+def _newcombe(first: Sequence[bool], second: Sequence[bool], quantile: float = Z) -> Interval:
     """Return the interval of a difference on independent trials."""
     n = len(first)
     both = sum(1 for x, y in zip(first, second, strict=True) if x and y)
@@ -198,7 +211,7 @@ def _newcombe(first: Sequence[bool], second: Sequence[bool]) -> Interval:
     neither = n - both - only_first - only_second
     right1, right2 = both + only_first, both + only_second
     p1, p2 = right1 / n, right2 / n
-    (low1, high1), (low2, high2) = wilson(right1, n), wilson(right2, n)
+    (low1, high1), (low2, high2) = wilson(right1, n, quantile), wilson(right2, n, quantile)
     phi = _correlation(both, only_first, only_second, neither)
     below, above = _added(p1 - low1, high2 - p2, phi), _added(high1 - p1, p2 - low2, phi)
     value = p1 - p2

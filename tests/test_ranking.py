@@ -1,0 +1,67 @@
+"""Classifiers and feature sets on the same folds: who is best, equivalent, undecided or worse."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+from attrs import evolve
+from test_conformal import bottles, called
+from test_evaluate import learner
+
+from graspsense.evaluation.intervals import difference
+from graspsense.evaluation.ranking import rank
+
+
+def crossed(**other):
+    trials = bottles(30, spread=0.3)
+    noise = evolve(trials.table, values=np.random.default_rng(1).normal(size=trials.table.values.shape))
+    learners = {name: learner(name) for name in ("tree", "knn", "svm")}
+    return rank(learners, {"force": trials, "noise": evolve(trials, table=noise)}, **other)
+
+
+def test_features_without_information_are_worse_and_the_same_trials_are_compared():
+    found = crossed()
+
+    assert found.protocol == "instance_held_out"
+    assert found.candidates[0].standing == "best"
+    assert found.candidates[0].features == "force"
+    assert {one.standing for one in found.candidates if one.features == "noise"} == {"worse"}
+    assert {one.rates["instance_held_out"].n for one in found.candidates} == {180}
+    assert found.candidates[0].name in found.verdict
+
+
+def test_intervals_are_wider_for_more_comparisons():
+    right, wrong = [True] * 90 + [False] * 10, [True] * 80 + [False] * 20
+    one, ten = difference(right, wrong).interval, difference(right, wrong, comparisons=10).interval
+
+    assert ten[0] < one[0] < one[1] < ten[1]
+
+
+def test_the_command_names_the_best_and_refuses_feature_sets_of_a_csv(tmp_path, capsys):
+    trials = bottles(12)
+    lines = ["label,bottle,force [N],noise"]
+    for label, name, row in zip(trials.labels, trials.instances, trials.table.values.tolist(), strict=True):
+        lines.append(",".join((label, name, *map(repr, row))))
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    arguments = ("compare", str(tmp_path / "t.csv"), "--label", "label", "--instance", "bottle")
+
+    shown = called(capsys, *arguments, "--classifiers", "tree,knn")
+    listed = json.loads(called(capsys, *arguments, "--classifiers", "tree,knn", "--json"))
+
+    assert "has the highest rate" in shown
+    assert "RECORDING ORDER" in shown
+    assert {one["classifier"] for one in listed["candidates"]} == {"tree", "knn"}
+    assert listed["verdict"].startswith(listed["candidates"][0]["classifier"])
+
+
+def test_features_from_before_the_contact_are_a_control_and_not_compared():
+    from graspsense.core.labelled import ControlFeatures
+
+    trials = bottles(12)
+    width = ControlFeatures(table=trials.table, what="the same numbers")
+    found = rank({"tree": learner("tree")}, {"force": evolve(trials, before_contact=width)})
+
+    assert [one.standing for one in found.candidates] == ["best", "control"]
+    assert found.candidates[1].loss is None
+    assert "From before the contact alone, tree recognises" in found.verdict
