@@ -163,6 +163,7 @@ def record_of(grasp: FinishedGrasp, dt_s: float) -> GraspRecord:
         left_n=trace.force_left_n,
         right_n=trace.force_right_n,
         n_rows=int(np.sum(trace.phase <= HOLD)),
+        hold_from=int(np.sum(trace.phase < HOLD)),
         peak_n=grasp.state.peak_n,
     )
 

@@ -7,7 +7,7 @@ import pytest
 from attrs import evolve
 
 from graspsense.core.runner import run_grasp
-from graspsense.plugin_api import HOLD, STEADY, RunConfig, create
+from graspsense.plugin_api import APPROACH, HOLD, SQUEEZE, STEADY, RunConfig, Trace, create
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
@@ -68,6 +68,45 @@ def test_grasps_of_two_kinds_are_without_bound_from_each_other():
     never = evolve(squeeze(), speed_m_s=np.full(1000, -SPEED))
     assert deviation(never, squeeze())[0] == math.inf
     assert deviation(squeeze(), never)[0] == math.inf
+
+
+def test_a_rest_before_the_hold_is_not_the_one_that_is_meant():
+    # At rest from 0.2 to 0.4 s, pressed further until 0.6 s, at rest again: the controller waited for a force.
+    t = np.arange(0.0, 1.0, 1e-3)
+    way = 0.01 * (np.minimum(t, 0.2) + np.clip(t - 0.4, 0.0, 0.2))
+    gap, force = 0.0455 - way, STIFFNESS * np.maximum(way - 0.0005, 0.0)
+    moving = (t < 0.2) | ((t >= 0.4) & (t < 0.6))
+    speed = np.where(moving, -0.01, 0.0)
+    phase = np.where(t < 0.05, APPROACH, np.where(t < 0.7, SQUEEZE, HOLD))
+    nothing = np.full((0, 22), 0)
+    trace = Trace(
+        t_s=t,
+        gap_m=gap,
+        velocity_m_s=speed,
+        effort_n=force,
+        force_left_n=force,
+        force_right_n=force,
+        edge_left_n=np.full(1000, np.nan),
+        edge_right_n=np.full(1000, np.nan),
+        status=np.zeros(1000, int),
+        phase=phase,
+        command=force,
+        pad_t_s=np.zeros(0),
+        pad_left=nothing,
+        pad_right=nothing,
+    )
+    wanted = create("feature-set", "chitta").extract(trace).as_dict()
+    found = evolve(
+        squeeze(),
+        gap_m=gap,
+        speed_m_s=speed,
+        left_n=force,
+        right_n=force,
+        hold_from=int(np.sum(phase < HOLD)),
+    ).quantities()
+    assert found["f_steady"] == pytest.approx(wanted["f_steady"], rel=1e-3)
+    assert found["p_steady"] == pytest.approx(wanted["p_steady"], abs=1.5e-5)
+    assert found["df_dt"] == pytest.approx(wanted["df_dt"], rel=0.01)
 
 
 def test_at_rest_from_the_very_contact_on_there_is_no_rate():

@@ -142,6 +142,7 @@ def course(config, contact_force_n):
         left_n=trace.force_left_n,
         right_n=trace.force_right_n,
         n_rows=int(np.sum(trace.phase <= HOLD)),
+        hold_from=int(np.sum(trace.phase < HOLD)),
         peak_n=grasp.report["true_peak_force_n"],
     )
 
@@ -234,3 +235,13 @@ def test_gas_that_is_spent_is_reported(tmp_path):
         found.append(run_grasp(SimBackend(config), law, RunConfig()).report["beyond"])
     assert found[0] == ""
     assert found[1].startswith("gas: more than its volume was displaced")
+
+
+def test_trial_grasps_end_at_a_limit_of_work_and_the_full_model_runs(monkeypatch):
+    monkeypatch.setattr(verify, "MOST_WORK", 2000)
+    problem = problem_of(CONFIG, ObjectSpec(name="shell", width_m=0.05, terms=(SHELL,)))
+    reduction = select(problem, hybrid(closing_speed_m_s=0.0117))
+    assert reduction.verification is None
+    assert set(reduction.treatment) == {"kept"}
+    told = next(d for d in reduction.decisions if d.term == "trial grasps")
+    assert "limit" in told.decision

@@ -220,3 +220,22 @@ def test_an_oscillation_that_is_too_fast_is_left_out_and_reported(tmp_path):
     assert (slosh["term"], slosh["decision"]) == ("slosh", "dropped")
     assert contact["decision"] == "peak not resolved"
     assert selection["verified"] is None
+
+
+def test_an_object_that_is_too_heavy_to_push_stops_the_finger_and_does_not_throw_it_back():
+    config = SimConfig(sensor="ideal", spread=False, open_gap_m=0.061)
+    spec = ObjectSpec(
+        name="anvil", width_m=0.05, offset_m=0.005, mass_kg=300.0, terms=(("elastic", {"k1_n_m": 2e3}),)
+    )
+    setup = unverified_setup(config, spec, 0)
+    move, state, gaps = composed_move(composition_of(config, setup, pad=False)), setup.state, []
+    for _ in range(300):
+        state = move(setup.plant, state, 23.0, 1e-3)
+        gaps.append(state.motion.gap_m)
+    assert state.motion.speed_rev_s == 0.0
+    # The one finger that touches carries what both exert.
+    assert (state.contact.left_n, state.contact.right_n) == (0.0, pytest.approx(46.0))
+    assert np.all(np.diff(gaps) <= 0.0)
+    # It slides until the friction of the table has taken its speed.
+    assert gaps[-1] == pytest.approx(0.06, abs=5e-5)
+    assert state.step.n_steps < 2000

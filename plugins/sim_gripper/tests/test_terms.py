@@ -21,7 +21,7 @@ from graspsense_sim_gripper.terms.snap import Snap, SnapState, snap
 from graspsense_sim_gripper.terms.surface import Surface, surface
 from graspsense_sim_gripper.terms.term import NoState, Term, WorkingPoint
 from graspsense_sim_gripper.terms.vent import LAMINAR_BELOW_PA, conductance, vented
-from graspsense_sim_gripper.terms.worn import Worn, worn
+from graspsense_sim_gripper.terms.worn import Worn, WornState, worn
 
 
 def along(term, params, state, path, h):
@@ -297,6 +297,31 @@ def test_an_oscillators_motion_is_exact_whatever_the_step(w, ratio, steps):
         pieces = moved(pieces, a, square, 3.0 + 40.0 * 0.01 * k / steps, 40.0, 0.01 / steps)
     scale = 1e-3 + 3.4 / square + 0.01 * 0.2
     assert pieces.y_m == pytest.approx(whole.y_m, abs=1e-8 * scale)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 1e-200, 0.7, 1.0, 2.5, 1e3, 1e6])
+def test_slosh_is_exact_for_a_rate_that_changes_linearly_whatever_its_damping(ratio):
+    mode, forces = Slosh(0.5, 5.0, ratio), []
+    for n in (1, 50):
+        state, h = OscillatorState(0.0, 0.0), 0.02 / n
+        for k in range(n):
+            d0, d1 = (0.02 * t - 0.5 * t * t for t in (k * h, (k + 1) * h))
+            force, state = slosh(mode, state, d0, d1, h, 0.02 - (k + 1) * h)
+        forces.append(force)
+    assert forces[0] == pytest.approx(forces[1], rel=1e-8)
+    if ratio >= 1e3:
+        # The damper carries the mass along: it has the deceleration of the wall, 1 m/s2.
+        assert forces[0] == pytest.approx(-0.5, rel=1e-3)
+
+
+def test_worn_is_of_second_order_in_its_step():
+    shell = Worn(8e3, 1e7, 0.02, 0.5, 1e-3)
+    best, *forces = (
+        along(worn, shell, WornState(0.0, 0.0), ramp(0.003, n), 1e-3)[0][-1] for n in (4096, 16, 32, 64)
+    )
+    errors = [abs(force - best) for force in forces]
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.15)
 
 
 def test_slosh_swings_at_its_frequency_after_a_step():

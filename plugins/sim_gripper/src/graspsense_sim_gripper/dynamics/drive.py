@@ -19,7 +19,7 @@ import math
 from typing import Final, NamedTuple
 
 from graspsense.plugin_api import ScrewLinkage
-from graspsense_sim_gripper.dynamics.state import PlantState
+from graspsense_sim_gripper.dynamics.state import Contact, PlantState
 
 STRIBECK_SPEEDS: Final = 4.5
 """Multiple of the Stribeck speed beyond which the excess is below 2e-9 of its maximum and counts as zero."""
@@ -98,9 +98,21 @@ def acceleration(
     return jacobian_m_rev * per_inertia * (net_n - direction * friction_n - damping_n)
 
 
+def load_at_rest(contact: Contact, effort_n: float) -> float:
+    """Return the mean pad force (N) on fingers at rest under this effort.
+
+    Where the object is only pushed against the friction of the table, that friction resists the effort: it never
+    exceeds it, and so moves no finger.
+    """
+    load = 0.5 * (contact.left_n + contact.right_n)
+    if contact.left.force_n == 0.0 and contact.right.force_n == 0.0:
+        load = min(load, max(effort_n, 0.0))
+    return load
+
+
 def is_held(drive: Drive, state: PlantState, effort_n: float) -> bool:
     """Return whether a drive at rest stays at rest, held by friction or by an end of its travel."""
-    load = 0.5 * (state.contact.left_n + state.contact.right_n)
+    load = load_at_rest(state.contact, effort_n)
     net = load - effort_n
     return (
         abs(net) <= breakaway_friction(drive.friction, load)

@@ -52,6 +52,8 @@ class GraspRecord:
     """Number of rows until the fingers open."""
     peak_n: float
     """The largest force on a pad, also between ticks."""
+    hold_from: int = 0
+    """The row with which the hold begins, or `n_rows` if there is none. A rest counts that lasts into the hold."""
 
     def quantities(self) -> dict[str, float]:
         """Return the six features and the peak force, by the names of `SCALES`; NaN for an undefined feature."""
@@ -67,7 +69,7 @@ class GraspRecord:
         steady, moved = rest
         values["p_steady"] = _at(self.gap_m, steady)
         force = 0.5 * (self.left_n + self.right_n)
-        values["f_steady"] = _at(force, steady + REST_WINDOW_S / self.dt_s)
+        values["f_steady"] = _at(force, max(steady + REST_WINDOW_S / self.dt_s, self._shown_from()))
         values["delta_t"] = (steady - first) * self.dt_s
         if moved:
             values["dp_dt"] = (values["p_steady"] - values["p_first"]) / values["delta_t"]
@@ -78,6 +80,10 @@ class GraspRecord:
         """Return the closing speed (m/s) at the tick before the first force on a pad; 0 if there is none."""
         felt = np.flatnonzero(np.maximum(self.left_n, self.right_n) > 0.0)
         return float(-self.speed_m_s[max(int(felt[0]) - 1, 0)]) if len(felt) else 0.0
+
+    def _shown_from(self) -> int:
+        """Return the first row that can show a rest: that of the hold, or any if there is no hold."""
+        return self.hold_from if self.hold_from < self.n_rows else 0
 
     def _contact(self) -> float | None:
         """Return the interpolated row at which both pads reach the contact force; None if they never do."""
@@ -92,14 +98,15 @@ class GraspRecord:
         """Return the interpolated row at which the fingers come to rest, and whether they moved since the contact.
 
         None if they do not rest for REST_WINDOW_S. The row of the contact does not count as motion, as in the feature
-        set.
+        set. Like there, a rest before the hold does not count if the fingers move again: the controller has waited for
+        more than rest.
         """
         speed = np.abs(self.speed_m_s[: self.n_rows]) - REST_SPEED_M_S
         window = round(REST_WINDOW_S / self.dt_s)
         begin = math.ceil(first)
         moving = [begin - 1, *(np.flatnonzero(speed[begin:] > 0.0) + begin).tolist(), self.n_rows]
         for i, following in pairwise(moving):
-            if following - i > window:
+            if following - i > window and following > self._shown_from():
                 stops = i + float(speed[i] / (speed[i] - speed[i + 1])) if speed[i] > 0.0 else first
                 return max(stops, first), i >= begin
         return None

@@ -25,10 +25,16 @@ from graspsense_sim_gripper.problem import GraspController, Problem
 from graspsense_sim_gripper.reduction.cache import ReductionCache
 from graspsense_sim_gripper.reduction.error import deviation
 from graspsense_sim_gripper.reduction.levels import FULL_SCALES, REFERENCE_SCALES, LevelScale, scales_for
-from graspsense_sim_gripper.reduction.model import DROPPED, Reduction, Verification
+from graspsense_sim_gripper.reduction.model import DROPPED, Reduction, TermDecision, Verification
 from graspsense_sim_gripper.reduction.probe import Grip
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
-from graspsense_sim_gripper.reduction.verify import Sensitivity, TrialGrasps, trial_grasps
+from graspsense_sim_gripper.reduction.verify import (
+    MOST_WORK,
+    Sensitivity,
+    TooMuchWork,
+    TrialGrasps,
+    trial_grasps,
+)
 from graspsense_sim_gripper.stepping.scheme import Steps
 from graspsense_sim_gripper.term_failure import raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
@@ -59,7 +65,8 @@ def select(
 
     Models are cached in memory and on disk, by everything that they depend on. The model is not verified, and its
     `verification` is None, if the settings prescribe the steps or ask for the reference, if the controller raises in
-    the first trial grasp, or if the peak force cannot be resolved (`Reduction.contact`).
+    the first trial grasp, if the peak force cannot be resolved (`Reduction.contact`), or if the trial grasps would take
+    too much work (`MOST_WORK`).
 
     `compiled`: run the trial grasps compiled, if the controller can be compiled. `padding`: the kinds of terms in the
     compiled code, by default those of a batch. Both change the run time only.
@@ -71,7 +78,7 @@ def select(
     reduction = _SELECTED.get(key)
     if reduction is None:
         try:
-            reduction = _select(
+            reduction = _select_within_limit(
                 problem, trial_grasps(problem, controller, compiled=compiled, padding=padding)
             )
         except LAW_ERRORS as error:
@@ -83,6 +90,22 @@ def select(
     return reduction
 
 
+def _select_within_limit(problem: Problem, trial: TrialGrasps) -> Reduction:
+    """Return the model as `_select` does, or the unverified full model if the trial grasps take too much work."""
+    try:
+        return _select(problem, trial)
+    except TooMuchWork:
+        full = propose(problem, grip_of(problem), FULL_SCALES[0])
+    limit = TermDecision(
+        term="trial grasps",
+        decision="stopped at the limit: every term is kept, not verified",
+        what="ticks and steps",
+        number=float(MOST_WORK),
+        error=math.inf,
+    )
+    return evolve(full, decisions=(*full.decisions, limit))
+
+
 def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
     """Return the model as `select` does, without the cache."""
     config, grip = problem.model_config, grip_of(problem)
@@ -92,6 +115,8 @@ def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
         return propose(problem, grip)
     try:
         first = trial.record(reference)
+    except TooMuchWork:
+        raise
     except Exception:
         # A controller that raises does so in the grasp as well, and is reported there.
         return propose(problem, grip)

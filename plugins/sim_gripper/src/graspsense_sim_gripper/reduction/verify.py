@@ -61,8 +61,11 @@ MAX_HOLD_S: Final = 0.3
 """A longer hold is shortened to this in a trial grasp."""
 TICKS_AT_ONCE: Final = 50
 """Largest number of ticks of the approach between two checks of the distance."""
-CAPACITY: Final = 4096
-"""Largest number of ticks in a buffer."""
+CAPACITY: Final = 512
+"""Largest number of ticks in a buffer; after each buffer the work is counted."""
+MOST_WORK: Final = 1_000_000
+"""Largest number of ticks and steps of all trial grasps of one object together: about a minute in the interpreter. It
+counts work and not time, so that the model that is chosen does not depend on the machine."""
 SENSITIVITY: Final = 10.0
 MIN_FORCE_ERROR_N: Final = 0.01
 MAX_FORCE_ERROR_N: Final = 0.25
@@ -70,6 +73,10 @@ MAX_FORCE_ERROR_N: Final = 0.25
 contact, limited to between MIN_FORCE_ERROR_N and MAX_FORCE_ERROR_N times the step tolerance of the level."""
 TRAVEL_ERROR: Final = 0.025
 """The assumed relative error of the distance since the contact is this times the step tolerance of the level."""
+
+
+class TooMuchWork(Exception):
+    """The trial grasps would take more than `MOST_WORK` ticks and steps."""
 
 
 class Sensitivity(NamedTuple):
@@ -118,6 +125,8 @@ class TrialGrasps:
     _records: dict[Any, GraspRecord] = field(factory=dict, init=False)
     _starts: dict[float, _Stage] = field(factory=dict, init=False)
     """The grasp shortly before the first contact, by the step tolerance of the approach."""
+    work: int = field(default=0, init=False)
+    """Ticks and steps of all trial grasps so far."""
 
     def record(self, reduction: Reduction, force_n: float = 0.0, travel: float = 0.0) -> GraspRecord:
         """Return the grasp in this model; the controller reads values with these errors (see `Sensitivity`)."""
@@ -228,9 +237,17 @@ class TrialGrasps:
                         )
                     )
                 rows = (*rows, np.vstack(recorded)[:, : progress.loop.recorded])
+                self._count(start, progress)
             return _Stage(progress, rows, from_open)
 
         return run
+
+    def _count(self, before: SimulationState, after: SimulationState) -> None:
+        """Count the work between two states. Raises TooMuchWork."""
+        self.work += after.loop.ticks - before.loop.ticks
+        self.work += after.plant.step.n_steps - before.plant.step.n_steps
+        if self.work > MOST_WORK:
+            raise TooMuchWork
 
     def _loop(
         self, setup: GraspSetup
@@ -297,7 +314,7 @@ def _record(end: _Stage, bias: Bias, dt_s: float) -> GraspRecord:
     gap_m, left_n, right_n = (
         columns[COLUMNS.index(name)] for name in ("gap_m", "force_left_n", "force_right_n")
     )
-    share = bias.travel_share
+    share, phases = bias.travel_share, np.mod(columns[-1], 1 << EVENT_SHIFT)
     return GraspRecord(
         outcome=int(progress.controller.law.outcome) if progress.controller.guard.stopped == 0 else -1,
         dt_s=dt_s,
@@ -305,7 +322,8 @@ def _record(end: _Stage, bias: Bias, dt_s: float) -> GraspRecord:
         speed_m_s=columns[COLUMNS.index("velocity_m_s")],
         left_n=np.where(left_n != 0.0, left_n - bias.force_n, 0.0),
         right_n=np.where(right_n != 0.0, right_n - bias.force_n, 0.0),
-        n_rows=int(np.sum(np.mod(columns[-1], 1 << EVENT_SHIFT) <= HOLD)),
+        n_rows=int(np.sum(phases <= HOLD)),
+        hold_from=int(np.sum(phases < HOLD)),
         peak_n=progress.plant.peak_n,
     )
 

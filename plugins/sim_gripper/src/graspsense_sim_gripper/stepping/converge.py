@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import Final
 
-from graspsense_sim_gripper.dynamics.state import PlantState
+from graspsense_sim_gripper.dynamics.state import PlantState, StepState
 from graspsense_sim_gripper.stepping.advance import rests, take_steps
 from graspsense_sim_gripper.stepping.coast import SHAPE_SCALE_M, coast
 from graspsense_sim_gripper.stepping.control import MAX_STEPS
 from graspsense_sim_gripper.stepping.scheme import FORCE_SCALE_N, SPEED_SCALE_M_S, PlantParams, Steps
 
 MAX_HALVINGS: Final = 4
+"""Halvings after which a change of `LOOSE` times the tolerance is accepted too."""
+LOOSE: Final = 1e4
+LAST_HALVING: Final = 10
+"""After so many halvings the tick is accepted in any case, and counted as unresolved if it has not converged."""
 ERROR_RATIO: Final = 0.125
 """Ratio of the error of a step to that of a step of half the length."""
 MIN_TOLERANCE: Final = 1e-8
@@ -34,19 +38,27 @@ def refine_until_converged(params: PlantParams, state: PlantState, effort_n: flo
     n_before = n_halvings = 0
     while True:
         after, n = take_steps(PlantParams(drive, model, steps), state, effort_n, dt)
-        if (
-            steps.settle <= 0.0
-            or n_halvings == MAX_HALVINGS
-            # Steps of half the length would be too many, and too short to be of use.
-            or 4 * n > MAX_STEPS
-            or (after.contact.touched == 0 and after.motion.speed_rev_s == 0.0)
-        ):
+        if steps.settle <= 0.0 or (after.contact.touched == 0 and after.motion.speed_rev_s == 0.0):
             return after
         # The steps of the next attempt are the same if half of the tick was their limit already.
         if n > n_before > 0 and _alike(before, after, steps.settle):
             return after
+        # Steps of half the length would be too many, and too short to be of use.
+        too_many = 4 * n > MAX_STEPS
+        if too_many or n_halvings >= MAX_HALVINGS:
+            converged = n_halvings > 0 and _alike(before, after, LOOSE * steps.settle)
+            if converged or too_many or n_halvings >= LAST_HALVING:
+                return after if converged else _unresolved(after)
         steps = _halved(steps, dt)
         before, n_before, n_halvings = after, n, n_halvings + 1
+
+
+def _unresolved(state: PlantState) -> PlantState:
+    """Return the plant after a tick that has not converged."""
+    next_s, n, unresolved = state.step
+    return PlantState(
+        state.motion, state.contact, StepState(next_s, n, unresolved + 1), state.effort_n, state.peak_n
+    )
 
 
 def _alike(before: PlantState, after: PlantState, share: float) -> bool:

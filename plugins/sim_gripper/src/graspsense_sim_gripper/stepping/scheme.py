@@ -14,6 +14,7 @@ from graspsense_sim_gripper.dynamics.drive import (
     Drive,
     acceleration,
     breakaway_friction,
+    load_at_rest,
     sliding_friction,
 )
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
@@ -86,6 +87,8 @@ def start_of(params: PlantParams, state: PlantState, effort_n: float) -> Start:
     load = 0.5 * (contact.left_n + contact.right_n)
     net = load - effort_n
     if speed == 0.0:
+        load = load_at_rest(contact, effort_n)
+        net = load - effort_n
         direction = 1.0 if net > 0.0 else -1.0
         friction_n = breakaway_friction(drive.friction, load)
     else:

@@ -21,21 +21,17 @@ class Slosh(NamedTuple):
 def slosh(
     params: Slosh, state: OscillatorState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, OscillatorState]:
-    """Return the force of the mode.
+    """Return the force of the mode, exact if the rate of compression changes linearly.
 
-    Exact if the rate of compression changes linearly; for a mode that does not oscillate, if the rate is constant. The
-    former follows z = d - y with z'' + 2 a z' + w2 z = d''.
+    z = d - y follows z'' + 2 a z' + w2 z = d''.
     """
     w = 2.0 * math.pi * params.frequency_hz
     a, square = params.damping_ratio * w, w * w
-    if h > 0.0 and params.damping_ratio < 1.0:
+    if h > 0.0:
         mean = (d1 - d0) / h
         start = OscillatorState(d0 - state.y_m, 2.0 * mean - v1 - state.v_m_s)
         between = moved(start, a, square, 2.0 * (v1 - mean) / h, 0.0, h)
         state = OscillatorState(d1 - between.y_m, v1 - between.v_m_s)
-    elif h > 0.0:
-        speed = (d1 - d0) / h
-        state = moved(state, a, square, square * d0 + 2.0 * a * speed, square * speed, h)
     return params.mass_kg * (square * (d1 - state.y_m) + 2.0 * a * (v1 - state.v_m_s)), state
 
 
