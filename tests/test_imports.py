@@ -24,6 +24,7 @@ MAY_KNOW = {
     "store": {"core", "recording", "store"},
     "sources": {"core", "recording", "store", "sources"},
     "evaluation": {"core", "evaluation"},
+    "regression": {"core", "evaluation", "regression"},
     "report": {"core", "recording", "store", "evaluation", "report"},
     "experiments": {"core", "recording", "sources", "evaluation", "report", "experiments"},
     "cli": {
@@ -32,6 +33,7 @@ MAY_KNOW = {
         "store",
         "sources",
         "evaluation",
+        "regression",
         "experiments",
         "report",
         "scaffold",

@@ -40,6 +40,13 @@ _LABEL = 14
 @click.option("--each", type=int, default=10, show_default=True, help="Trials of each label.")
 @click.option("--save", metavar="DIR", default="trials", show_default=True, help="Store for the trials.")
 @click.option("--operator", metavar="NAME", help="Name of the operator, stored with every trial.")
+@click.option(
+    "--value",
+    "values",
+    metavar="NAME=NUMBER",
+    multiple=True,
+    help='A number of these objects, stored with every trial for --target-value: "fill [ml]=250". Can be repeated.',
+)
 @click.option("--changed", is_flag=True, help="Continue with another gripper or other settings.")
 @pipeline_options
 @click.option("--json", "as_json", is_flag=True, help="Print a summary as JSON at the end.")
@@ -48,6 +55,7 @@ def collect(
     each: int,
     save: str,
     operator: str | None,
+    values: tuple[str, ...],
     changed: bool,
     pipeline: str | None,
     gripper: str | None,
@@ -66,6 +74,7 @@ def collect(
     continues where it was. With a simulated gripper, the label selects the object. Answers can come from a file.
     """
     from graspsense.core.plugins import installed
+    from graspsense.core.target_value import value_label
     from graspsense.core.wiring import check
     from graspsense.store.collecting import Collection, Wanted
     from graspsense.store.store import Store
@@ -74,7 +83,7 @@ def collect(
         words=tuple(one.strip() for one in labels.split(",") if one.strip()),
         each=each,
         seed=seed or 0,
-        labels={"operator": operator} if operator else {},
+        labels={**({"operator": operator} if operator else {}), **dict(map(value_label, values))},
     )
     first = settings_of(pipeline, gripper, object_name, options, seed, force)
     check(first)

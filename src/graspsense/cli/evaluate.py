@@ -72,6 +72,11 @@ def evaluate(
     from graspsense.evaluation.evaluate import evaluate as measure
 
     times = checkpoints_of(checkpoints)
+    if given["target_value"]:
+        from graspsense.cli.target_value import evaluate_value
+
+        evaluate_value(source, classifier, folds, keep, as_json, given)
+        return
     learner = learner_of(source, classifier, given)
     with ProgressLine() as progress:
         labelled = trials_of(source, progress, given, times)

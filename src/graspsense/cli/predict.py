@@ -42,7 +42,15 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     from graspsense.core.plugins import installed
     from graspsense.evaluation.intervals import RecognitionRate
     from graspsense.evaluation.json_codec import to_json
+    from graspsense.regression.model import is_regression
 
+    if is_regression(model):
+        from graspsense.cli.target_value import predict_value
+
+        predict_value(model, source, as_json, given)
+        return
+    if given["target_value"]:
+        raise click.UsageError(f"--target-value: model {model} predicts a label, not a number")
     asked = load_model(model, installed())
     table, labels, notes = _trials(asked, source, given)
     mismatch = asked.misfit(table)

@@ -44,6 +44,11 @@ _OPTIONS: Final = (
         help="CSV: comma-separated columns known before contact, for a control.",
     ),
     click.option(
+        "--target-value",
+        metavar="COLUMN",
+        help="CSV, store: a number to predict in place of the label, such as a force at break.",
+    ),
+    click.option(
         "--unreliable", is_flag=True, help="Data set: include trials that its author calls unreliable."
     ),
     click.option(
@@ -139,6 +144,7 @@ def trials_of(
         "order": given["order"],
         "columns": _names(given["features"]),
         "before": _names(given["before"]),
+        "value": given["target_value"],
         "unreliable": given["unreliable"],
         "objects": _names(given["objects"]),
         "instances": given["instances"],

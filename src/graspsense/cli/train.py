@@ -81,6 +81,11 @@ def train(
     if not overwrite:
         refuse_existing(out, keep)
     times = checkpoints_of(checkpoints)
+    if given["target_value"]:
+        from graspsense.cli.target_value import train_value
+
+        train_value(source, classifier, out, keep, as_json, given)
+        return
     learner = learner_of(source, classifier, given)
     with ProgressLine() as progress:
         labelled = trials_of(source, progress, given, times)

@@ -196,19 +196,22 @@ def sets_of(
     if count < needed:
         reason = f"{count} calibration {unit}, {100 * coverage:.0f} % needs {needed}"
         return PredictionSets(coverage=coverage, unit=unit, thresholds={}, reason=reason)
-    shared = _threshold(true_scores, units, coverage)
+    shared = calibrated_threshold(true_scores, units, coverage)
     thresholds = {}
     for name in sorted(set(labels)):
         rows = given == name
         of_label = len(np.unique(units[rows]))
         own = of_label >= needed
-        value = _threshold(true_scores[rows], units[rows], coverage) if own else shared
+        value = calibrated_threshold(true_scores[rows], units[rows], coverage) if own else shared
         thresholds[name] = LabelThreshold(score=value, units=of_label, own=own)
     return PredictionSets(coverage=coverage, unit=unit, thresholds=thresholds)
 
 
-def _threshold(scores: NDArray[np.float64], units: NDArray[np.str_], coverage: float) -> float:
-    """Return the largest score that the weighted share `coverage` of the trials reaches."""
+def calibrated_threshold(scores: NDArray[np.float64], units: NDArray[np.str_], coverage: float) -> float:
+    """Return the largest score that the weighted share `coverage` of the trials reaches.
+
+    `units` names the unit of exchangeability of each trial; each of K units has the weight 1 / (K + 1).
+    """
     _, unit_of, trials_of_unit = np.unique(units, return_inverse=True, return_counts=True)
     weights = 1.0 / ((len(trials_of_unit) + 1) * trials_of_unit[unit_of])
     order = np.argsort(-scores, kind="stable")

@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from graspsense.core.roles import Classifier, DeviceInfo
 
 FORMAT: Final = "graspsense model"
+REGRESSION_FORMAT: Final = "graspsense regression model"
+"""The `format` of a model that predicts a number (`graspsense.regression`)."""
 VERSION: Final = 1
 
 _EQUAL: Final = 1e-6
@@ -235,7 +237,7 @@ class Model:
                 else {"checkpoints": [_part_as_json(*one) for one in self.checkpoints]}
             ),
         }
-        return {**content, "sha256": _digest(content)}
+        return {**content, "sha256": digest(content)}
 
 
 def _part_as_json(after_s: float, part: Model) -> dict[str, Any]:
@@ -333,8 +335,13 @@ def train(
 
 def write_model(path: Path, model: Model) -> None:
     """Write the file of a model atomically. Raises OSError."""
-    # One line for each key: readable, and much shorter than one for each number.
-    lines = (f"{json.dumps(key)}: {_json(value)}" for key, value in model.as_json().items())
+    write_json_lines(path, model.as_json())
+
+
+def write_json_lines(path: Path, content: Mapping[str, Any]) -> None:
+    """Write the content of a model atomically, one line for each key. Raises OSError."""
+    # Readable, and much shorter than one line for each number.
+    lines = (f"{json.dumps(key)}: {_json(value)}" for key, value in content.items())
     part = path.with_name(path.name + ".part")
     part.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
     os.replace(part, path)
@@ -443,6 +450,10 @@ def _content(name: str, text: bytes) -> dict[str, Any]:
         content = json.loads(text)
     except (UnicodeDecodeError, ValueError) as error:
         raise DataDamaged(f"model {name!r} is not JSON: {error}") from error
+    if isinstance(content, dict) and content.get("format") == REGRESSION_FORMAT:
+        raise ConfigError(
+            f"model {name!r} predicts a number, not a label: use it with graspsense predict {name} SOURCE"
+        )
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise DataDamaged(f'{name!r} is not a model of graspsense: it lacks "format": "{FORMAT}"')
     if content.get("version") != VERSION:
@@ -450,7 +461,7 @@ def _content(name: str, text: bytes) -> dict[str, Any]:
             f"model {name!r} has version {content.get('version')!r}; this graspsense ({__version__}) reads {VERSION}"
         )
     rest = {key: value for key, value in content.items() if key != "sha256"}
-    if content.get("sha256") != _digest(rest):
+    if content.get("sha256") != digest(rest):
         raise DataDamaged(f"model {name!r} was changed or damaged: its sha256 does not match")
     expected = {"classifier": str, "settings": dict, "features": list, "provenance": dict, "unknown": dict}
     for key, kind in expected.items():
@@ -463,7 +474,8 @@ def _json(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
-def _digest(content: Mapping[str, Any]) -> str:
+def digest(content: Mapping[str, Any]) -> str:
+    """Return the hash of the content of a model."""
     text = json.dumps(content, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 

@@ -16,6 +16,8 @@ from attrs import frozen
 from graspsense.core.errors import ConfigError, suggestion
 
 _HEADING: Final = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]")
+RESERVED: Final = ("label", "instance", "order", "recorded_at", "operator")
+"""Labels of a trial that are not numbers to predict."""
 
 
 @frozen(kw_only=True)
@@ -37,6 +39,20 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     return (match["name"], match["unit"].strip()) if match else (heading, "")
 
 
+def value_label(text: str) -> tuple[str, str]:
+    """Return the heading and the number of a text such as `fill [ml]=250`, as labels of a trial hold them.
+
+    Raises ConfigError if it is not of this form.
+    """
+    heading, equals, cell = (part.strip() for part in text.partition("="))
+    if not equals or not heading or number_of(cell) is None or name_and_unit(heading)[0] in RESERVED:
+        raise ConfigError(
+            f'{text!r} is not a number of a trial: write NAME [UNIT]=NUMBER, as in "fill [ml]=250"; the name is none '
+            f"of {', '.join(RESERVED)}"
+        )
+    return heading, cell
+
+
 def values_of_labels(name: str, labels: Sequence[str], where: str) -> tuple[str, list[float]]:
     """Return the unit of a number and its value in each trial, NaN where a trial does not have it.
 
@@ -51,9 +67,9 @@ def values_of_labels(name: str, labels: Sequence[str], where: str) -> tuple[str,
         for heading, cell in json.loads(text).items():
             called, unit = name_and_unit(heading)
             number = number_of(cell)
-            if number is not None and heading not in ("label", "instance", "order"):
+            if number is not None and called not in RESERVED:
                 known.add(called)
-            if called != name:
+            if called != name or called in RESERVED:
                 continue
             if number is None:
                 raise ConfigError(

@@ -139,8 +139,8 @@ def set_coverage(
 ) -> SetCoverage:
     """Return how often the sets of held-out trials contain the true label.
 
-    The sets of a fold are calibrated with the predictions of the other folds, so that neither the model nor the
-    thresholds know the instance that they are tested on.
+    The sets of a fold are calibrated with the predictions of the other folds. The model of the fold does not know the
+    instances that it is tested on. The thresholds do indirectly: the models of the other folds were trained on them.
     """
     unit = "trials" if instances is None else "instances"
     inside = held_out_members(pooled, labels, instances, groups, folds)

@@ -175,6 +175,24 @@ def difference(
     return Difference(value, (max(low, -1.0), min(high, 1.0)))
 
 
+def mean_interval(
+    values: Sequence[float], instances: Sequence[str] | None = None
+) -> tuple[Interval | None, str]:
+    """Return the 95 % interval of a mean by Student's t, or None with the reason.
+
+    With `instances`, the object of each trial, these are as if drawn at random; else the trials are.
+    """
+    units = [str(i) for i in range(len(values))] if instances is None else instances
+    count = len(set(units))
+    if count < MIN_INSTANCES:
+        if instances is not None:
+            return None, too_few(count)
+        return None, f"{count} trial{'' if count == 1 else 's'}, at least {MIN_INSTANCES} are needed"
+    mean = math.fsum(values) / len(values)
+    half = _t(count - 1) * math.sqrt(_variance_of_mean(values, units)[0])
+    return (mean - half, mean + half), ""
+
+
 def _variance_of_mean(values: Sequence[float], instances: Sequence[str]) -> tuple[float, int]:
     """Return the variance of a mean over instances drawn at random (linearised ratio), and their number."""
     n = len(values)

@@ -20,9 +20,9 @@ import numpy as np
 
 from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.core.features import FeatureTable
+from graspsense.core.target_value import name_and_unit
 
 _MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "?"})
-_HEADING: Final = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]")
 _DECIMAL_COMMA: Final = re.compile(r"[-+]?\d+,\d+")
 
 
@@ -38,14 +38,13 @@ class CsvColumns:
         self.units: dict[str, str] = {}
         self.names: list[str] = []
         for heading in header:
-            match = _HEADING.fullmatch(heading)
-            name = match["name"] if match else heading
+            name, unit = name_and_unit(heading)
             if not name:
                 raise DataDamaged(f"{path}: column {len(self.names) + 1} has no name in the header")
             if name in self.units:
                 raise DataDamaged(f"{path}: two columns are named {name!r}: rename one")
             self.names.append(name)
-            self.units[name] = match["unit"].strip() if match else ""
+            self.units[name] = unit
         self.cells = {name: [row[k] for row in rows] for k, name in enumerate(self.names)}
 
     def __len__(self) -> int:

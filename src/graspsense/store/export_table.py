@@ -15,7 +15,7 @@ from attrs import frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.core.features import FeatureTable
-from graspsense.core.target_value import name_and_unit, number_of
+from graspsense.core.target_value import RESERVED, name_and_unit, number_of
 from graspsense.recording.atomic_file import write_new
 from graspsense.recording.parquet import parquet
 from graspsense.store.dataset import feature_table
@@ -121,7 +121,7 @@ def _numbers_to_predict(labels: Sequence[Mapping[str, str]]) -> FeatureTable:
         heading: name_and_unit(heading)
         for one in labels
         for heading, cell in one.items()
-        if heading not in ("label", "instance", RECORDED_AT, ORDER) and number_of(cell) is not None
+        if name_and_unit(heading)[0] not in RESERVED and number_of(cell) is not None
     }
     values = np.full((len(labels), len(headings)), np.nan)
     for row, one in enumerate(labels):

@@ -1,0 +1,268 @@
+"""`evaluate`, `train` and `predict` with --target-value: a number in place of a label."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from graspsense.cli.output import echo_json
+from graspsense.cli.sources import command_line, is_csv, trials_of
+from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.core.features import FeatureTable
+    from graspsense.core.labelled import Labelled
+    from graspsense.regression.model import PredictedValue, RegressionModel
+    from graspsense.regression.results import RegressionEvaluation, RegressionMeasurement
+
+_FOR_LABELS: Final = ("png", "target", "checkpoints")
+
+
+def refuse_options_for_labels(options: Sequence[str]) -> None:
+    """Refuse options that mean nothing for a number. Raises UsageError."""
+    context = click.get_current_context()
+    for name in _FOR_LABELS:
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"--{name} is for labels, and --target-value names a number", context)
+    for option in options:
+        if option.partition(".")[0].strip() == "classifier":
+            raise click.UsageError(
+                f"-o {option}: the estimators of numbers have no settings; select one with --classifier",
+                context,
+            )
+
+
+def evaluate_value(
+    source: str, estimator: str | None, folds: int, keep: str | None, as_json: bool, given: Mapping[str, Any]
+) -> None:
+    """Cross-validate the prediction of a number, and print it."""
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.evaluation.json_codec import to_json
+    from graspsense.regression.estimators import DEFAULT_ESTIMATOR
+    from graspsense.regression.evaluate import evaluate_regression
+
+    refuse_options_for_labels(given["options"])
+    with ProgressLine() as progress:
+        labelled = _trials(source, estimator, progress, given)
+        _keep(keep, labelled)
+        found = evaluate_regression(
+            estimator or DEFAULT_ESTIMATOR, labelled, folds=folds, seed=given["seed"], progress=progress
+        )
+    if as_json:
+        echo_json(to_json(found))
+    else:
+        _print_evaluation(found)
+
+
+def train_value(
+    source: str, estimator: str | None, out: str, keep: str | None, as_json: bool, given: Mapping[str, Any]
+) -> None:
+    """Train a model of a number, write it, and print what it was trained on."""
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.core.conformal import COVERAGE
+    from graspsense.evaluation.gathered_warnings import gathered_warnings
+    from graspsense.regression.estimators import DEFAULT_ESTIMATOR
+    from graspsense.regression.model import train_regression, write_regression
+
+    refuse_options_for_labels(given["options"])
+    with ProgressLine() as progress:
+        labelled = _trials(source, estimator, progress, given)
+    notes = list(labelled.notes)
+    with gathered_warnings(notes):
+        model = train_regression(
+            estimator or DEFAULT_ESTIMATOR,
+            labelled,
+            name=Path(out).stem,
+            seed=given["seed"],
+            provenance={"command": command_line(("keep", "overwrite", "as_json"))},
+        )
+    write_regression(Path(out), model)
+    _keep(keep, labelled)
+    for note in notes:
+        talk(f"note: {note}")
+    if as_json:
+        content = model.as_json()
+        kept = ("estimator", "target_value", "features", "provenance", "interval")
+        echo_json({"model": out, **{key: content[key] for key in kept}, "trials": len(labelled)})
+        return
+    echo(f"{out}: {model.in_a_line}", indent=2)
+    unit = model.target.unit
+    echo_entry(
+        "interval",
+        f"none: {model.no_interval}"
+        if model.half_width is None
+        else f"{100 * COVERAGE:.0f} %, prediction plus or minus {_with_unit(model.half_width, unit)}",
+    )
+    # In one line, so that it can be copied.
+    click.echo(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
+
+
+def predict_value(model_name: str, source: str, as_json: bool, given: Mapping[str, Any]) -> None:
+    """Predict a number for each trial, and compare it with the true one if --target-value names it."""
+    from graspsense.evaluation.json_codec import to_json
+    from graspsense.regression.error import error_of
+    from graspsense.regression.model import load_regression
+
+    model = load_regression(model_name)
+    table, truth, notes = _to_predict(model, source, given)
+    predictions = model.predict(table)
+    error = None
+    if truth is not None:
+        error = error_of([one.value - true for one, true in zip(predictions, truth, strict=True)], None)
+    if as_json:
+        echo_json(
+            {
+                "model": model.in_a_line,
+                "target_value": model.target.name,
+                "unit": model.target.unit,
+                "n": len(predictions),
+                "predictions": [
+                    {
+                        "value": one.value,
+                        "interval": None if one.low is None else [one.low, one.high],
+                        "unlike": one.unlike,
+                        **({} if truth is None else {"truth": truth[i]}),
+                    }
+                    for i, one in enumerate(predictions)
+                ],
+                "error": None if error is None else to_json(error),
+                "warnings": list(model.warnings),
+                "notes": list(notes),
+            }
+        )
+        return
+    _print_predictions(model, predictions, truth)
+    echo()
+    if error is not None:
+        echo_entry("error", f"{error.words(model.target.unit)} on average, in absolute value")
+    echo_entry("model", model.in_a_line)
+    for text in model.warnings:
+        echo_entry("warning", text, Style.CAUTION)
+    for text in notes:
+        echo_entry("note", text)
+
+
+def _trials(source: str, estimator: str | None, progress: ProgressLine, given: Mapping[str, Any]) -> Labelled:
+    from graspsense.regression.estimators import check_estimator
+
+    if estimator is not None:
+        check_estimator(estimator)
+    return trials_of(source, progress, given)
+
+
+def _keep(keep: str | None, labelled: Labelled) -> None:
+    if keep:
+        from graspsense.sources.features_csv import write_labelled
+
+        write_labelled(Path(keep), labelled)
+
+
+def _to_predict(
+    model: RegressionModel, source: str, given: Mapping[str, Any]
+) -> tuple[FeatureTable, Sequence[float] | None, tuple[str, ...]]:
+    """Return the features of the trials, the true numbers (None if they are not named), and notes."""
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.core.errors import ConfigError
+
+    if is_csv(source) and not given["target_value"] and not given["label"]:
+        from graspsense.sources.features_csv import read_table
+
+        return read_table(Path(source), model.table.names), None, ()
+    with ProgressLine() as progress:
+        named = given["features"] or (",".join(model.table.names) if is_csv(source) else None)
+        labelled = trials_of(source, progress, {**given, "features": named})
+    if labelled.value is None:
+        return labelled.table, None, labelled.notes
+    if model.target.unit and labelled.value.unit and model.target.unit != labelled.value.unit:
+        raise ConfigError(
+            f"model {model.name!r} predicts {model.target.name} in {model.target.unit}; {labelled.value.name} of "
+            f"{source} is in {labelled.value.unit}"
+        )
+    return labelled.table, labelled.value.values, labelled.notes
+
+
+def _print_predictions(
+    model: RegressionModel, predictions: Sequence[PredictedValue], truth: Sequence[float] | None
+) -> None:
+    unit = f" [{model.target.unit}]" if model.target.unit else ""
+    header = ("TRIAL", f"PREDICTION{unit}", "90 % INTERVAL", *(("TRUE", "ERROR") if truth else ()), "NOTE")
+    rows = []
+    for i, one in enumerate(predictions):
+        interval = "" if one.low is None else f"{one.low:.4g} to {one.high:.4g}"
+        true = () if truth is None else (f"{truth[i]:.4g}", f"{one.value - truth[i]:+.3g}")
+        rows.append((str(i + 1), f"{one.value:.4g}", interval, *true, one.unlike))
+    echo_table(header, rows)
+
+
+def _print_evaluation(found: RegressionEvaluation) -> None:
+    unseen = found.protocol == "instance_held_out"
+    objects = "objects of which no grasp was used for training" if unseen else (
+        "objects of which other grasps may have been used for training"
+    )  # fmt: skip
+    echo(
+        f"{found.estimator} predicts {found.target_value} of {found.headline.n} trials of {found.source} with a mean "
+        f"absolute error of {found.headline.words(found.unit)}, on {objects}.",
+        Style.HEADING,
+    )
+    for warning in found.warnings:
+        echo_entry("WARNING", warning, Style.CAUTION)
+    echo()
+    echo_entry("error", f"{found.headline.words(found.unit)}, by {found.protocol}")
+    echo_entry(
+        "", f"root of the mean squared error {_with_unit(found.headline.root_mean_square, found.unit)}"
+    )
+    if found.explained is not None:
+        echo_entry("R2", f"{found.explained:.2f} (1 is perfect, 0 is no better than the mean)")
+    intervals = found.intervals
+    if intervals.covered is None or intervals.mean_half_width is None:
+        echo_entry("intervals", f"not measured ({intervals.reason})")
+    else:
+        echo_entry(
+            "intervals",
+            f"{intervals.covered.words} contain the true number; {100 * intervals.asked:.0f} % asked for, by "
+            f"{intervals.unit}; plus or minus {_with_unit(intervals.mean_half_width, found.unit)} on average",
+        )
+    echo_entry("features", ", ".join(name for name, _ in found.features))
+    for note in found.notes:
+        echo_entry("note", note)
+    echo()
+    all_of = {**found.protocols, **found.controls}
+    unit = f" [{found.unit}]" if found.unit else ""
+    echo_table(
+        ("PROTOCOL OR CONTROL", f"ERROR{unit}", "95 %", "TRIALS", "LARGER BY", "WHAT"),
+        [_row(name, one, found.headline.n) for name, one in all_of.items() if one.error is not None],
+    )
+    for name, one in all_of.items():
+        if one.error is None:
+            echo(f"{name}: not measured ({one.reason})", indent=2)
+
+
+def _row(name: str, measured: RegressionMeasurement, trials: int) -> tuple[str, ...]:
+    error, by = measured.error, measured.difference
+    assert error is not None
+    interval = (
+        "no interval" if error.interval is None else f"{error.interval[0]:.4g} to {error.interval[1]:.4g}"
+    )
+    larger = ""
+    if by is not None:
+        larger = f"{by.value:+.3g}"
+        if by.interval is not None:
+            larger += f" ({by.interval[0]:+.3g} to {by.interval[1]:+.3g})"
+    of = f" (compared with {measured.difference_of})" if measured.difference_of else ""
+    return (
+        name,
+        f"{error.mean_absolute:.4g}",
+        interval,
+        f"{error.n} of {trials}",
+        larger,
+        f"{measured.what}{of}",
+    )
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.4g} {unit}".rstrip()

@@ -1,0 +1,395 @@
+"""Evaluating predicted numbers by cross-validation, with the controls that rates of labels have.
+
+`docs/evaluation.md` defines every number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.core.conformal import COVERAGE, calibrated_threshold, units_needed
+from graspsense.core.errors import ConfigError
+from graspsense.evaluation.folds import in_order, instance_held_out, stratified
+from graspsense.evaluation.gathered_warnings import gathered_warnings
+from graspsense.evaluation.intervals import MIN_INSTANCES, rate_of
+from graspsense.regression.error import RegressionError, difference_of_errors, error_of
+from graspsense.regression.estimators import FittedRegression, check_estimator
+from graspsense.regression.results import IntervalCoverage, RegressionEvaluation, RegressionMeasurement
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.labelled import ControlFeatures, Labelled
+    from graspsense.evaluation.folds import Folds
+
+INSTANCE_HELD_OUT: Final = "instance_held_out"
+PERMUTATIONS: Final = 19
+"""Number of permutations of the numbers: the smallest with which p can be 0.05."""
+
+Progress = Callable[[str, int, int], None]
+
+
+def evaluate_regression(
+    estimator: str,
+    labelled: Labelled,
+    *,
+    folds: int = 10,
+    seed: int = 0,
+    permutations: int = PERMUTATIONS,
+    progress: Progress | None = None,
+) -> RegressionEvaluation:
+    """Cross-validate an estimator on trials with a number to predict, `labelled.value`, with controls.
+
+    Raises ConfigError for an unknown estimator, if there is no number or only one, or if there are too few trials.
+    """
+    check_estimator(estimator)
+    target = labelled.value
+    if target is None:
+        raise ConfigError(f"{labelled.source} has no number to predict: name it with --target-value")
+    if len(set(target.values)) < 2:
+        raise ConfigError(
+            f"every trial of {labelled.source} has the same {target.name}: there is nothing to predict"
+        )
+    notes = list(labelled.notes)
+    evaluator = _Evaluator(estimator, labelled, np.array(target.values), folds, seed, progress)
+    with gathered_warnings(notes):
+        evaluator.measure_protocols()
+        evaluator.measure_controls(permutations)
+    headline = evaluator.headline
+    if evaluator.instances is not None and len(set(evaluator.instances)) < MIN_INSTANCES:
+        notes.append(
+            f"{len(set(evaluator.instances))} instances: with fewer than {MIN_INSTANCES}, errors and differences have "
+            "no interval, and the controls give no warning"
+        )
+    table = labelled.table
+    return RegressionEvaluation(
+        source=labelled.source,
+        estimator=estimator,
+        target_value=target.name,
+        unit=target.unit,
+        features=tuple(zip(table.names, table.units, strict=True)),
+        folds=folds,
+        seed=seed,
+        protocol=headline.protocol,
+        headline=evaluator.error(headline.predicted),
+        explained=evaluator.explained(),
+        protocols=evaluator.protocols,
+        controls=evaluator.controls,
+        intervals=evaluator.interval_coverage(),
+        predictions=tuple(zip(target.values, headline.predicted.tolist(), strict=True)),
+        warnings=tuple(evaluator.warnings()),
+        notes=tuple(notes),
+    )
+
+
+def interval_radius(errors: NDArray[np.float64], instances: Sequence[str] | None) -> tuple[float | None, str]:
+    """Return half the width of a prediction interval that held-out errors calibrate, or None with the reason.
+
+    The unit of exchangeability is the instance, as in the prediction sets of labels (`graspsense.core.conformal`).
+    """
+    unit = "trials" if instances is None else "instances"
+    units = np.array([str(i) for i in range(len(errors))] if instances is None else instances)
+    count, needed = len(np.unique(units)), units_needed(COVERAGE)
+    if count < needed:
+        return None, f"{count} calibration {unit}, {100 * COVERAGE:.0f} % needs {needed}"
+    return -calibrated_threshold(-np.abs(errors), units, COVERAGE), ""
+
+
+def held_out_predictions(
+    estimator: str,
+    features: NDArray[np.float64],
+    values: NDArray[np.float64],
+    folds: Folds,
+    seed: int,
+    step: Callable[[], None] | None = None,
+) -> NDArray[np.float64]:
+    """Return the prediction of each trial by an estimator that was fitted to the trials of the other folds.
+
+    Folds whose training trials are fewer than two are predicted by their mean.
+    """
+    predicted = np.empty(len(values))
+    for fold in np.unique(folds).tolist():
+        test = folds == fold
+        if int((~test).sum()) < 2:
+            predicted[test] = values[~test].mean() if (~test).any() else values.mean()
+        else:
+            predicted[test] = FittedRegression(estimator, features[~test], values[~test], seed).predict(
+                features[test]
+            )
+        if step is not None:
+            step()
+    return predicted
+
+
+def held_out_folds(labelled: Labelled, k: int, seed: int) -> Folds:
+    """Return folds of whole instances if these are known, else of trials. Raises ConfigError if there are too few."""
+    alike = [""] * len(labelled)
+    if labelled.instances is not None and len(set(labelled.instances)) > 1:
+        return instance_held_out(alike, labelled.instances, k, seed)
+    return stratified(alike, k, seed)
+
+
+@frozen(eq=False)
+class _Headline:
+    """The predictions that the headline is about, with their protocol and folds."""
+
+    protocol: str
+    predicted: NDArray[np.float64]
+    folds: Folds
+
+
+class _Evaluator:
+    """The measurements of one evaluation."""
+
+    def __init__(
+        self,
+        estimator: str,
+        trials: Labelled,
+        values: NDArray[np.float64],
+        k: int,
+        seed: int,
+        progress: Progress | None,
+    ) -> None:
+        self.estimator, self.trials, self.values = estimator, trials, values
+        self.k, self.seed, self.progress = k, seed, progress
+        several = trials.instances is not None and len(set(trials.instances)) > 1
+        self.instances = trials.instances if several else None
+        self.plain_name = f"{k}_fold"
+        self.protocols: dict[str, RegressionMeasurement] = {}
+        self.controls: dict[str, RegressionMeasurement] = {}
+        self._errors: dict[str, tuple[NDArray[np.float64], list[int]]] = {}
+        """The errors of the controls with other features and of the mean, and the trials that these are of."""
+
+    def measure_protocols(self) -> None:
+        """Measure the error under each protocol. The headline holds out whole instances if they are known."""
+        alike = [""] * len(self.values)
+        folds = stratified(alike, self.k, self.seed)
+        plain = self._predicted(self.plain_name, self.trials.table.values, folds)
+        self.plain = _Headline(self.plain_name, plain, folds)
+        what = f"at most {self.k} folds of whole instances: no model was trained on the object that it is tested on"
+        if self.instances is None:
+            self.headline = self.plain
+            reason = self.trials.no_instances or "no instances are named"
+            self.protocols[INSTANCE_HELD_OUT] = RegressionMeasurement(what=what, reason=reason)
+        else:
+            held = instance_held_out(alike, self.instances, self.k, self.seed)
+            predicted = self._predicted(INSTANCE_HELD_OUT, self.trials.table.values, held)
+            self.headline = _Headline(INSTANCE_HELD_OUT, predicted, held)
+            self.protocols[INSTANCE_HELD_OUT] = self._against(what, predicted, self.plain)
+        self.protocols[self.plain_name] = RegressionMeasurement(
+            what=f"{self.k} folds of shuffled trials", error=self.error(plain)
+        )
+
+    def measure_controls(self, permutations: int) -> None:
+        """Measure what the number can be predicted from besides the squeeze."""
+        trials = self.trials
+        mean = np.empty(len(self.values))
+        for fold in np.unique(self.headline.folds).tolist():
+            test = self.headline.folds == fold
+            mean[test] = self.values[~test].mean()
+        self._errors["mean_only"] = (mean - self.values, list(range(len(mean))))
+        self.controls["mean_only"] = self._against(
+            "always the mean of the training trials", mean, self.headline
+        )
+        self._other_features("width_only", trials.width, "the width alone", trials.no_width)
+        self._other_features(
+            "before_contact",
+            trials.before_contact,
+            "features from before contact only",
+            trials.no_before_contact,
+        )
+        if trials.first_line is not None:
+            self._other_features("first_line", trials.first_line, "", "")
+        self.controls[INSTANCE_HELD_OUT] = self.protocols[INSTANCE_HELD_OUT]
+        self._in_order()
+        self._shuffled(permutations)
+
+    def error(self, predicted: NDArray[np.float64], rows: Sequence[int] | None = None) -> RegressionError:
+        """Return the error of these predictions, among these trials (default: all)."""
+        rows = range(len(self.values)) if rows is None else rows
+        errors = (predicted - self.values).tolist()
+        return error_of([errors[i] for i in rows], self._instances_of(rows))
+
+    def explained(self) -> float | None:
+        """Return 1 minus the squared errors over those of the mean."""
+        mean = float((self._errors["mean_only"][0] ** 2).sum())
+        return (
+            None if mean == 0.0 else 1.0 - float(((self.headline.predicted - self.values) ** 2).sum()) / mean
+        )
+
+    def interval_coverage(self) -> IntervalCoverage:
+        """Return how often prediction intervals contain the true number; each fold is calibrated by the others."""
+        unit = "trials" if self.instances is None else "instances"
+        errors = self.headline.predicted - self.values
+        inside = np.zeros(len(errors), dtype=np.bool_)
+        radii = np.empty(len(errors))
+        for fold in np.unique(self.headline.folds).tolist():
+            test = self.headline.folds == fold
+            others = np.flatnonzero(~test)
+            radius, reason = interval_radius(errors[others], self._instances_of(others.tolist()))
+            if radius is None:
+                return IntervalCoverage(asked=COVERAGE, unit=unit, reason=reason)
+            radii[test], inside[test] = radius, np.abs(errors[test]) <= radius
+        return IntervalCoverage(
+            asked=COVERAGE,
+            unit=unit,
+            covered=rate_of(inside.tolist(), self.instances),
+            mean_half_width=float(radii.mean()),
+        )
+
+    def warnings(self) -> list[str]:
+        """Return what the controls say against the headline."""
+        unit, texts = self.trials.value.unit if self.trials.value is not None else "", []
+        if not _is_worse(self.controls["mean_only"]):
+            texts.append("the error is not shown to be below that of always predicting the mean")
+        for name, when in (
+            ("before_contact", "before contact"),
+            ("first_line", "the first line of the recording"),
+        ):
+            control = self.controls.get(name)
+            if control is not None and control.error is not None and self._beats_mean(name):
+                texts.append(
+                    f"from {when} alone the error is {control.error.words(unit)}, below that of the mean: the "
+                    "recording itself reveals the number"
+                )
+        width = self.controls["width_only"]
+        if width.difference is not None and width.difference.interval is not None and not _is_worse(width):
+            texts.append(
+                "the error with the width alone is not shown to be larger: the squeeze may not add anything"
+            )
+        for name, why in (
+            (INSTANCE_HELD_OUT, "part of the accuracy within folds comes from having seen the same objects"),
+            ("recording_order", "part of the accuracy within folds comes from the time of recording"),
+        ):
+            if _is_worse(self.controls[name]):
+                by = self.controls[name].difference
+                assert by is not None
+                texts.append(f"the error of {name} is larger by {by.value:.4g} {unit}".rstrip() + f": {why}")
+        return texts
+
+    def _beats_mean(self, name: str) -> bool:
+        errors, rows = self._errors[name]
+        mean = self._errors["mean_only"][0]
+        return difference_of_errors(
+            [mean[i] for i in rows], [errors[i] for i in rows], self._instances_of(rows)
+        ).is_positive
+
+    def _instances_of(self, rows: Sequence[int]) -> list[str] | None:
+        return None if self.instances is None else [self.instances[i] for i in rows]
+
+    def _predicted(
+        self,
+        name: str,
+        features: NDArray[np.float64],
+        folds: Folds,
+        values: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        total, done = len(np.unique(folds)), 0
+
+        def step() -> None:
+            nonlocal done
+            done += 1
+            if self.progress is not None:
+                self.progress(name, done, total)
+
+        given = self.values if values is None else values
+        return held_out_predictions(self.estimator, features, given, folds, self.seed, step)
+
+    def _against(
+        self,
+        what: str,
+        predicted: NDArray[np.float64],
+        other: _Headline,
+        rows: Sequence[int] | None = None,
+    ) -> RegressionMeasurement:
+        """Return the error with its difference to another protocol, both on these trials (default: all)."""
+        rows = range(len(self.values)) if rows is None else rows
+        errors, others = predicted - self.values, other.predicted - self.values
+        by = difference_of_errors(
+            [errors[i] for i in rows], [others[i] for i in rows], self._instances_of(rows)
+        )
+        return RegressionMeasurement(
+            what=what, error=self.error(predicted, rows), difference=by, difference_of=other.protocol
+        )
+
+    def _other_features(self, name: str, control: ControlFeatures | None, default: str, reason: str) -> None:
+        """Measure the error with other features, among the trials that have any of them."""
+        if control is None:
+            self.controls[name] = RegressionMeasurement(
+                what=default, reason=reason or "these trials have no such features"
+            )
+            return
+        having = np.array(~np.isnan(control.table.values).all(axis=1))
+        n, of = int(having.sum()), len(having)
+        why = f": {control.missing}" if control.missing else ""
+        words = f"{n} of {of} trials have such features{why}"
+        folds = self.headline.folds[having]
+        if n == 0 or len(np.unique(folds)) < 2:
+            too_few = "; these are too few to learn from" if n else ""
+            self.controls[name] = RegressionMeasurement(what=control.what, reason=f"{words}{too_few}")
+            return
+        predicted = np.full(of, np.nan)
+        predicted[having] = self._predicted(name, control.table.values[having], folds, self.values[having])
+        rows = np.flatnonzero(having).tolist()
+        self._errors[name] = (predicted - self.values, rows)
+        what = control.what if n == of else f"{control.what}; {words}"
+        self.controls[name] = self._against(what, predicted, self.headline, rows)
+
+    def _in_order(self) -> None:
+        what = f"{self.k} folds; each is a block of trials in the order of recording"
+        if self.trials.order is None:
+            reason = self.trials.no_order or "the order of recording is not known"
+            self.controls["recording_order"] = RegressionMeasurement(what=what, reason=reason)
+            return
+        folds = in_order([""] * len(self.values), self.trials.order, self.k)
+        predicted = self._predicted("recording_order", self.trials.table.values, folds)
+        self.controls["recording_order"] = self._against(what, predicted, self.plain)
+
+    def _shuffled(self, permutations: int) -> None:
+        """Measure the error on numbers that are exchanged among instances, and the permutation p of the headline."""
+        rng = np.random.default_rng(self.seed)
+        means = []
+        for k in range(permutations):
+            values = self._permuted(rng)
+            name = f"shuffled_values {k + 1}/{permutations}"
+            predicted = self._predicted(name, self.trials.table.values, self.headline.folds, values)
+            means.append(float(np.abs(predicted - values).mean()))
+        reached = self.error(self.headline.predicted).mean_absolute
+        p = None
+        if permutations >= PERMUTATIONS:
+            p = (sum(mean <= reached for mean in means) + 1) / (len(means) + 1)
+        mean = float(np.mean(means)) if means else float("nan")
+        what = f"mean of {permutations} permutations of the numbers, in the folds of the headline"
+        error = RegressionError(
+            n=len(self.values),
+            mean_absolute=mean,
+            root_mean_square=float("nan"),
+            interval=None,
+            no_interval="a mean over permutations",
+        )
+        self.controls["shuffled_values"] = RegressionMeasurement(
+            what=what + ("" if p is None else f"; permutation p of the headline: {p:.2g}"),
+            error=error,
+            permutation_p=p,
+        )
+
+    def _permuted(self, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return the numbers exchanged among whole instances; among the trials if no instances are known."""
+        if self.instances is None:
+            return rng.permutation(self.values)
+        names = np.array(self.instances)
+        blocks = [np.flatnonzero(names == name) for name in np.unique(names)]
+        order = rng.permutation(len(blocks))
+        values = np.empty(len(self.values))
+        given = np.concatenate([self.values[blocks[k]] for k in order])
+        values[np.concatenate([blocks[k] for k in rng.permutation(len(blocks))])] = given
+        return values
+
+
+def _is_worse(control: RegressionMeasurement) -> bool:
+    """Return whether the error of a control is shown to be larger than that which it is compared with."""
+    return control.difference is not None and control.difference.is_positive

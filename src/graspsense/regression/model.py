@@ -1,0 +1,255 @@
+"""A trained model of a number, in one JSON file without code.
+
+The file holds the training trials, the name of the estimator and the seed, and the estimator is fitted again when it is
+loaded: nothing is imported, evaluated or unpickled. Its `sha256` is the hash of the other content.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from attrs import frozen
+
+from graspsense import __version__
+from graspsense.core.conformal import COVERAGE
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.features import FeatureTable
+from graspsense.core.json_values import json_ready
+from graspsense.core.model import REGRESSION_FORMAT, digest, write_json_lines
+from graspsense.core.novelty import Novelty, novelty_of
+from graspsense.core.target_value import TargetValue
+from graspsense.regression.estimators import ESTIMATORS, FittedRegression
+from graspsense.regression.evaluate import held_out_folds, held_out_predictions, interval_radius
+
+if TYPE_CHECKING:
+    from graspsense.core.labelled import Labelled
+
+VERSION: Final = 1
+FOLDS: Final = 10
+
+
+@frozen(kw_only=True)
+class PredictedValue:
+    """A predicted number with its interval, of which both ends are None if there was too little to calibrate it.
+
+    `unlike` says why the trial is unlike all training trials; empty if it is like them.
+    """
+
+    value: float
+    low: float | None
+    high: float | None
+    unlike: str = ""
+
+
+@frozen(kw_only=True, eq=False)
+class RegressionModel:
+    """A fitted estimator with its training trials. `half_width` is that of a 90 % prediction interval, or None."""
+
+    name: str
+    estimator: str
+    fitted: FittedRegression
+    table: FeatureTable
+    target: TargetValue
+    seed: int
+    novelty: Novelty
+    half_width: float | None
+    no_interval: str
+    made_with: str
+    provenance: Mapping[str, Any]
+
+    @property
+    def in_a_line(self) -> str:
+        """The estimator and its training data, in one line."""
+        unit = f" [{self.target.unit}]" if self.target.unit else ""
+        return (
+            f"{self.name}: {self.estimator} predicts {self.target.name}{unit}, trained on {len(self.table)} trials of "
+            f"{self.provenance.get('source', '?')}"
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A warning if another version of scikit-learn fitted the estimator."""
+        if self.made_with == _sklearn():
+            return ()
+        return (f"this model was made with {self.made_with} and made again with {_sklearn()}: it may differ",)
+
+    def predict(self, table: FeatureTable) -> list[PredictedValue]:
+        """Return the prediction of each trial. Raises ConfigError if a feature is missing, or has another unit."""
+        lacking = [name for name in self.table.names if name not in table.names]
+        if lacking:
+            raise ConfigError(
+                f"model {self.name!r} takes the features {', '.join(self.table.names)}; there is no "
+                f"{', '.join(lacking)} here (there are: {', '.join(table.names)})"
+            )
+        chosen = table.columns(self.table.names)
+        for name, own, given in zip(self.table.names, self.table.units, chosen.units, strict=True):
+            if own and given and own != given:
+                raise ConfigError(f"model {self.name!r} takes {name} in {own}; here it is in {given}")
+        half = self.half_width
+        return [
+            PredictedValue(
+                value=value,
+                low=None if half is None else value - half,
+                high=None if half is None else value + half,
+                unlike=str(getattr(self.novelty.unlike(chosen.row(i)), "words", "")),
+            )
+            for i, value in enumerate(self.fitted.predict(chosen.values).tolist())
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the content of the file of the model."""
+        content = {
+            "format": REGRESSION_FORMAT,
+            "version": VERSION,
+            "estimator": self.estimator,
+            "target_value": [self.target.name, self.target.unit],
+            "features": [list(one) for one in zip(self.table.names, self.table.units, strict=True)],
+            "provenance": json_ready(self.provenance),
+            "interval": {
+                "coverage": COVERAGE,
+                "half_width": self.half_width,
+                "reason": self.no_interval,
+            },
+            "made_with": self.made_with,
+            "seed": self.seed,
+            "values": list(self.target.values),
+            "trials": [
+                [None if math.isnan(value) else value for value in row] for row in self.table.values.tolist()
+            ],
+        }
+        return {**content, "sha256": digest(content)}
+
+
+def train_regression(
+    estimator: str,
+    labelled: Labelled,
+    *,
+    name: str,
+    seed: int = 0,
+    provenance: Mapping[str, Any] | None = None,
+) -> RegressionModel:
+    """Return an estimator that is fitted to these trials, with a prediction interval from held-out instances.
+
+    Raises ConfigError if nothing can be learned from them.
+    """
+    target = labelled.value
+    if target is None or len(set(target.values)) < 2:
+        raise ConfigError(f"{labelled.source} has fewer than two different numbers to learn from")
+    values = np.array(target.values)
+    half_width, reason = None, ""
+    try:
+        folds = held_out_folds(labelled, min(FOLDS, len(values)), seed)
+        predicted = held_out_predictions(estimator, labelled.table.values, values, folds, seed)
+        half_width, reason = interval_radius(predicted - values, labelled.instances)
+    except ConfigError as error:
+        reason = str(error)
+    return RegressionModel(
+        name=name,
+        estimator=estimator,
+        fitted=FittedRegression(estimator, labelled.table.values, values, seed),
+        table=labelled.table,
+        target=target,
+        seed=seed,
+        novelty=_novelty(labelled.table),
+        half_width=half_width,
+        no_interval=reason,
+        made_with=_sklearn(),
+        provenance={
+            "source": labelled.source,
+            "trials": len(labelled),
+            "seed": seed,
+            "versions": {
+                "graspsense": __version__,
+                "numpy": np.__version__,
+                "python": platform.python_version(),
+            },
+            **labelled.provenance,
+            **(provenance or {}),
+        },
+    )
+
+
+def write_regression(path: Path, model: RegressionModel) -> None:
+    """Write the file of a model atomically. Raises OSError."""
+    write_json_lines(path, model.as_json())
+
+
+def is_regression(name: str) -> bool:
+    """Return whether this file is a model of a number."""
+    try:
+        content = json.loads(Path(name).expanduser().read_bytes()) if name.endswith(".json") else None
+    except (OSError, ValueError):
+        return False
+    return isinstance(content, dict) and content.get("format") == REGRESSION_FORMAT
+
+
+def load_regression(name: str) -> RegressionModel:
+    """Return the model in a file. Raises ConfigError if it cannot be read, DataDamaged if it is not such a model."""
+    try:
+        content = json.loads(Path(name).expanduser().read_bytes())
+    except OSError as error:
+        raise ConfigError(f"model {name} cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise DataDamaged(f"model {name!r} is not JSON: {error}") from error
+    if not isinstance(content, dict) or content.get("format") != REGRESSION_FORMAT:
+        raise DataDamaged(f'{name!r} is not a model of a number: it lacks "format": "{REGRESSION_FORMAT}"')
+    if content.get("version") != VERSION:
+        raise DataDamaged(
+            f"model {name!r} has version {content.get('version')!r}; this graspsense ({__version__}) reads {VERSION}"
+        )
+    rest = {key: value for key, value in content.items() if key != "sha256"}
+    if content.get("sha256") != digest(rest):
+        raise DataDamaged(f"model {name!r} was changed or damaged: its sha256 does not match")
+    try:
+        return _restored(Path(name).stem, content)
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise DataDamaged(f"model {name!r} is damaged: {type(error).__name__}: {error}") from error
+
+
+def _restored(name: str, content: Mapping[str, Any]) -> RegressionModel:
+    """Return the model of the content of a file. Raises KeyError, IndexError, TypeError or ValueError."""
+    names, units = zip(*((str(one), str(unit)) for one, unit in content["features"]), strict=True)
+    values = tuple(float(value) for value in content["values"])
+    trials = np.array(content["trials"], dtype=np.float64)
+    if trials.shape != (len(values), len(names)) or np.isinf(trials).any() or not np.isfinite(values).all():
+        raise ValueError("its training trials do not fit its numbers and features")
+    if content["estimator"] not in ESTIMATORS:
+        raise ValueError(f"there is no estimator {content['estimator']!r}")
+    table = FeatureTable(names=names, units=units, values=trials)
+    half_width = content["interval"]["half_width"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # The training told of them.
+        fitted = FittedRegression(content["estimator"], trials, np.array(values), int(content["seed"]))
+    return RegressionModel(
+        name=name,
+        estimator=str(content["estimator"]),
+        fitted=fitted,
+        table=table,
+        target=TargetValue(
+            name=str(content["target_value"][0]), unit=str(content["target_value"][1]), values=values
+        ),
+        seed=int(content["seed"]),
+        novelty=_novelty(table),
+        half_width=None if half_width is None else float(half_width),
+        no_interval=str(content["interval"]["reason"]),
+        made_with=str(content["made_with"]),
+        provenance=dict(content["provenance"]),
+    )
+
+
+def _novelty(table: FeatureTable) -> Novelty:
+    """Return the range of all training trials: they are of one kind."""
+    return novelty_of(table, ["the training trials"] * len(table))
+
+
+def _sklearn() -> str:
+    import sklearn
+
+    return f"scikit-learn {sklearn.__version__}"

@@ -1,0 +1,324 @@
+"""Numbers to predict: a force at break, a fill level. Training, prediction and evaluation with controls."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+from kept import keep
+
+from graspsense.cli.main import main
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.features import FeatureTable
+from graspsense.core.labelled import ControlFeatures, Labelled
+from graspsense.core.model import load_model
+from graspsense.core.plugins import installed
+from graspsense.core.target_value import TargetValue, value_label
+from graspsense.evaluation.json_codec import to_json
+from graspsense.regression.estimators import ESTIMATORS
+from graspsense.regression.evaluate import evaluate_regression
+from graspsense.regression.model import load_regression, train_regression, write_regression
+from graspsense.store.store import Store
+
+
+def table(*columns, names=("p_first", "f_steady")):
+    values = np.column_stack(columns)
+    return FeatureTable(names=names[: values.shape[1]], units=("m", "N")[: values.shape[1]], values=values)
+
+
+def bottles(objects=20, each=4, seed=0, noise=0.1, **more):
+    """Bottles whose stiffness is their fill level; the width says nothing about it."""
+    rng = np.random.default_rng(seed)
+    of = np.repeat(np.arange(objects), each)
+    fill = rng.uniform(0.0, 10.0, objects)[of]
+    width = 0.06 + 0.001 * rng.normal(size=objects)[of]
+    force = fill + noise * rng.normal(size=len(of))
+    features = table(width, force)
+    return Labelled(
+        source="bottles",
+        table=features,
+        labels=("bottle",) * len(of),
+        instances=tuple(f"bottle#{k}" for k in of),
+        order=tuple(rng.permutation(len(of)).tolist()),
+        width=ControlFeatures(table=features.columns(["p_first"]), what="p_first alone"),
+        value=TargetValue(name="fill", unit="ml", values=tuple(fill.tolist())),
+        **more,
+    )
+
+
+def measured(trials, estimator="ridge", **more):
+    return evaluate_regression(estimator, trials, folds=5, **{"permutations": 3, **more})
+
+
+@pytest.fixture
+def run(capsys):
+    def command(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main(list(map(str, arguments)))
+        out, err = capsys.readouterr()
+        return ended.value.code, out, err
+
+    return command
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_every_estimator_predicts_what_a_feature_tells(estimator):
+    found = measured(bottles(each=2), estimator, permutations=1)
+    assert found.protocol == "instance_held_out"
+    assert found.headline.instances == 20
+    assert found.headline.mean_absolute < 0.5 * found.controls["mean_only"].error.mean_absolute
+    assert found.controls["mean_only"].difference.is_positive
+    assert found.controls["width_only"].difference.is_positive
+    assert not [one for one in found.warnings if "mean" in one or "width" in one]
+    assert found.explained > 0.7
+
+
+def test_the_error_is_that_of_the_predictions_and_its_interval_that_of_the_instances():
+    found = measured(bottles(noise=1.0))
+    errors = np.array([predicted - true for true, predicted in found.predictions])
+    assert found.headline.mean_absolute == pytest.approx(np.abs(errors).mean())
+    assert found.headline.root_mean_square == pytest.approx(math.sqrt((errors**2).mean()))
+    # With as many trials in each instance, this is Student's interval of the means of the instances.
+    means = np.abs(errors).reshape(20, 4).mean(axis=1)
+    half = 2.093024054408263 * means.std(ddof=1) / math.sqrt(20)
+    assert found.headline.interval == pytest.approx((means.mean() - half, means.mean() + half))
+
+
+@pytest.mark.slow
+def test_noise_is_not_predicted_and_said_so():
+    trials = bottles()
+    rng = np.random.default_rng(3)
+    found = measured(
+        Labelled(
+            source="noise",
+            table=table(rng.normal(size=80), rng.normal(size=80)),
+            labels=trials.labels,
+            instances=trials.instances,
+            value=trials.value,
+        ),
+        permutations=19,
+    )
+    assert any("not shown to be below that of always predicting the mean" in one for one in found.warnings)
+    assert found.explained < 0.2
+    assert found.controls["shuffled_values"].permutation_p > 0.05
+    assert measured(bottles(), permutations=19).controls["shuffled_values"].permutation_p == 0.05
+
+
+def test_a_number_that_is_the_instance_is_found_out():
+    """A feature that is a fingerprint of the bottle: trials of the same bottle in training give the number away."""
+    trials = bottles()
+    rng = np.random.default_rng(1)
+    fingerprint = rng.normal(size=20).repeat(4) + 1e-4 * rng.normal(size=80)
+    found = measured(
+        Labelled(
+            source="fingerprints",
+            table=table(fingerprint),
+            labels=trials.labels,
+            instances=trials.instances,
+            value=trials.value,
+        ),
+        "tree",
+    )
+    assert found.protocols["5_fold"].error.mean_absolute < 0.5 * found.headline.mean_absolute
+    assert any("having seen the same objects" in one for one in found.warnings)
+
+
+def test_what_the_width_or_the_recording_tells_is_a_warning():
+    trials = bottles()
+    told = ControlFeatures(table=trials.table.columns(["f_steady"]), what="all of it")
+    found = measured(
+        Labelled(
+            source="told",
+            table=trials.table,
+            labels=trials.labels,
+            instances=trials.instances,
+            value=trials.value,
+            width=told,
+            before_contact=told,
+            first_line=ControlFeatures(table=table(np.full(80, np.nan)), what="the first frame"),
+        )
+    )
+    assert any("the error with the width alone is not shown to be larger" in one for one in found.warnings)
+    assert any("from before contact alone" in one for one in found.warnings)
+    assert found.controls["first_line"].reason == "0 of 80 trials have such features"
+    assert found.controls["recording_order"].error is None
+
+
+@pytest.mark.slow
+def test_prediction_intervals_contain_nine_of_ten_new_objects():
+    covered = [measured(bottles(objects=40, seed=seed, noise=1.0)).intervals for seed in range(3)]
+    assert np.mean([one.covered.rate for one in covered]) == pytest.approx(0.9, abs=0.06)
+    assert all(1.0 < one.mean_half_width < 3.0 for one in covered)
+    few = measured(bottles(objects=8)).intervals
+    assert few.covered is None
+    assert few.reason.endswith("calibration instances, 90 % needs 9")
+
+
+def test_the_evaluation_is_json_and_repeatable():
+    trials = bottles(each=1)
+    first, again = (
+        json.dumps(to_json(measured(trials, "tree", permutations=1)), allow_nan=False) for _ in range(2)
+    )
+    assert first == again
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_a_model_predicts_the_same_after_loading(tmp_path, estimator):
+    trials = bottles(objects=12)
+    trials.table.values[3, 1] = np.nan
+    model = train_regression(estimator, trials, name="m")
+    write_regression(tmp_path / "m.json", model)
+    again = load_regression(str(tmp_path / "m.json"))
+    assert again.predict(trials.table) == model.predict(trials.table)
+    assert (again.target, again.half_width) == (model.target, model.half_width)
+    assert model.half_width is not None
+
+
+def test_a_trial_unlike_all_training_trials_is_marked():
+    model = train_regression("ridge", bottles(), name="m")
+    usual, wide = model.predict(table([0.06, 0.5], [5.0, 5.0]))
+    assert usual.unlike == ""
+    assert "p_first" in wide.unlike
+    assert usual.low < usual.value < usual.high
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"seed": 5}, "sha256 does not match"),
+        ({"version": 9}, "version 9"),
+        ({"format": "other"}, "not a model of a number"),
+    ],
+)
+def test_a_damaged_model_is_refused(tmp_path, change, says):
+    path = tmp_path / "m.json"
+    write_regression(path, train_regression("ridge", bottles(), name="m"))
+    path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
+    with pytest.raises(DataDamaged, match=says):
+        load_regression(str(path))
+
+
+def test_a_model_of_a_number_is_not_one_of_labels(tmp_path):
+    path = tmp_path / "m.json"
+    write_regression(path, train_regression("ridge", bottles(), name="m"))
+    with pytest.raises(ConfigError, match="predicts a number, not a label: use it with graspsense predict"):
+        load_model(str(path), installed())
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A store of twelve bottles of two trials each, with the fill level among the labels of most."""
+    with Store.open(tmp_path / "trials") as store:
+        for k in range(24):
+            fill = 10.0 * (k // 2 * 7 % 12)
+            labels = {"fill [ml]": str(fill)} if k < 22 else {"colour": "red"}
+            keep(
+                store, "bottle", f"bottle#{k // 2}", values=(0.06, 1.0 + fill + k % 2), ticks=9, labels=labels
+            )
+    return tmp_path / "trials"
+
+
+def test_a_store_is_trained_on_predicted_and_evaluated(folder, run, tmp_path):
+    code, out, err = run(
+        "evaluate", f"store:{folder}", "--target-value", "fill", "--classifier", "ridge", "--json"
+    )
+    assert code == 0, err
+    found = json.loads(out)
+    assert (found["unit"], found["headline"]["n"], found["headline"]["instances"]) == ("ml", 22, 11)
+    assert (
+        found["headline"]["mean_absolute"] < 10.0 < found["controls"]["mean_only"]["error"]["mean_absolute"]
+    )
+    assert "2 trials are left out: they have no fill" in found["notes"]
+
+    model = tmp_path / "m.json"
+    arguments = (
+        "train",
+        f"store:{folder}",
+        "--target-value",
+        "fill",
+        "--classifier",
+        "ridge",
+        "--out",
+        model,
+    )
+    code, out, err = run(*arguments)
+    assert code == 0, err
+    assert "ridge predicts fill [ml], trained on 22 trials" in out
+    assert run(*arguments)[0] == 2  # it exists
+
+    code, out, err = run("predict", model, f"store:{folder}", "--target-value", "fill", "--json")
+    assert code == 0, err
+    told = json.loads(out)
+    assert told["n"] == 22
+    assert told["error"]["mean_absolute"] < 10.0
+    assert told["predictions"][4]["truth"] == 20.0
+    assert told["predictions"][4]["value"] == pytest.approx(20.0, abs=10.0)
+    assert "PREDICTION [ml]" in run("predict", model, f"store:{folder}")[1]
+
+
+@pytest.mark.slow
+def test_an_export_and_a_csv_of_other_programs_give_the_same(folder, run, tmp_path):
+    assert run("export", folder, "--to", tmp_path / "t.csv")[0] == 0
+    with (tmp_path / "t.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    with (tmp_path / "other.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["bottle", "fill [ml]", "p_first [m]", "f_steady [N]"])
+        writer.writerows(
+            [row["instance"], row["value.fill [ml]"], row["p_first [m]"], row["f_steady [N]"]] for row in rows
+        )
+    more = ("--target-value", "fill", "--classifier", "ridge", "--json")
+    stored, exported, other = (
+        json.loads(run("evaluate", source, *more, *options)[1])
+        for source, options in (
+            (f"store:{folder}", ()),
+            (tmp_path / "t.csv", ()),
+            (tmp_path / "other.csv", ("--instance", "bottle")),
+        )
+    )
+    for found in (stored, exported):
+        found.pop("source"), found.pop("notes")
+    assert exported == stored
+    assert other["headline"] == stored["headline"]
+    assert other["unit"] == "ml"
+    assert ["fill", "ml"] not in other["features"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--target-value", "fil"), "There are: fill. Did you mean 'fill'"),
+        (("--target-value", "colour"), "is 'red', which is not a finite number"),
+        (
+            ("--target-value", "fill", "--classifier", "c45"),
+            "'c45' cannot predict a number. Known: forest, knn",
+        ),
+        (("--target-value", "fill", "--target", "class"), "--target is for labels"),
+        (
+            ("--target-value", "fill", "-o", "classifier.trees=3"),
+            "the estimators of numbers have no settings",
+        ),
+        (("--target-value", "fill", "--folds", "99"), "22 trials cannot be split into 99 folds"),
+    ],
+)
+def test_what_makes_no_sense_is_told(folder, run, arguments, says):
+    code, _, err = run("evaluate", f"store:{folder}", *arguments)
+    assert (code, says in " ".join(err.split())) == (2, True), err
+
+
+def test_simulated_trials_have_no_numbers(run):
+    code, _, err = run("evaluate", "simulated", "--target-value", "fill")
+    assert code == 2
+    assert "has no numbers to predict: they are in a CSV file or in a store" in err
+
+
+@pytest.mark.parametrize("text", ["fill", "=3", "fill [ml]=", "fill=much", "label=3", "fill=inf"])
+def test_a_number_of_a_trial_is_name_and_number(text):
+    with pytest.raises(ConfigError, match="is not a number of a trial"):
+        value_label(text)
+    assert value_label("fill [ml] = 250") == ("fill [ml]", "250")
