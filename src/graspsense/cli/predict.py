@@ -47,8 +47,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     if is_regression(model):
         from graspsense.cli.target_value import predict_value
 
-        predict_value(model, source, as_json, given)
-        return
+        return predict_value(model, source, as_json, given)
     if given["target_value"]:
         raise click.UsageError(f"--target-value: model {model} predicts a label, not a number")
     asked = load_model(model, installed())

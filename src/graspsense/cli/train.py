@@ -68,18 +68,13 @@ def train(
 
     from graspsense.cli.progress import ProgressLine
     from graspsense.core.checkpoints import checkpoints_of, split_checkpoints
-    from graspsense.core.errors import ConfigError
     from graspsense.core.model import train as trained
     from graspsense.core.model import write_model
     from graspsense.evaluation.checkpoints import checkpoint_models
     from graspsense.evaluation.doubt import calibrated_sets
     from graspsense.evaluation.gathered_warnings import gathered_warnings
 
-    path = Path(out)
-    if path.suffix != ".json":
-        raise ConfigError(f"--out {out}: the name of a model's file must end in .json")
-    if not overwrite:
-        refuse_existing(out, keep)
+    path = _path_of_model(out, keep, overwrite)
     times = checkpoints_of(checkpoints)
     if given["target_value"]:
         from graspsense.cli.target_value import train_value
@@ -117,6 +112,17 @@ def train(
         echo_json({"model": out, **_as_values(model), "trials": len(labelled)})
     else:
         _say_trained(out, model)
+
+
+def _path_of_model(out: str, keep: str | None, overwrite: bool) -> Path:
+    """Return the path of the model. Raises ConfigError for another ending, or for a file that must not be replaced."""
+    from graspsense.core.errors import ConfigError
+
+    if not out.endswith(".json"):
+        raise ConfigError(f"--out {out}: the name of a model's file must end in .json")
+    if not overwrite:
+        refuse_existing(out, keep)
+    return Path(out)
 
 
 def _as_values(model: Model) -> dict[str, Any]:
