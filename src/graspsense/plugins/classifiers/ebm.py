@@ -36,6 +36,9 @@ HINT: Final = (
     'pip install "graspsense[ebm]"'
 )
 
+MAX_ROUNDS: Final = 500
+"""Largest number of steps of each function. Held-out trials end the boosting earlier, unless these are too few."""
+
 
 @frozen(kw_only=True)
 class EbmConfig(ClassifierConfig):
@@ -125,6 +128,7 @@ class Ebm(Classifier[EbmConfig]):
             max_interaction_bins=self.config.pair_bins,
             learning_rate=self.config.learning_rate,
             min_samples_leaf=self.config.min_leaf,
+            max_rounds=MAX_ROUNDS,
             # Smoothing takes most of the time of a fit, and gained nothing on grasps.
             smoothing_rounds=0,
             interaction_smoothing_rounds=0,
