@@ -94,7 +94,7 @@ def _surface_output(s: Any, mode: Any) -> tuple[float, float, float]:
 
 GAS_K, GAS_MAXWELL, GAS_TAU = 1500.0, 1500.0, 0.15
 GAS_AREA, GAS_VOLUME, GAS_PRESSURE, GAS_EXPONENT, GAS_VENT = 1.2e-3, 5e-4, 101325.0, 1.4, 1e-6
-# Quadratic and linear loss of the sharp-edged opening: p = R q + L q |q|, equal at 1 Pa.
+# Quadratic and linear loss of the sharp-edged opening: p = R q + L q |q|, equal at 8 Pa.
 _INERTIAL = 0.5 * 1.2 / (0.6 * GAS_VENT) ** 2
 _VISCOUS = 2.0 * math.sqrt(_INERTIAL)
 
