@@ -810,7 +810,7 @@ class Stubborn(Nearest):
         return evolve(super().explain(features), label="bottle:full_open")
 
 
-@mutant("classifier", "explains-its-predictions", "give the reason in words and units")
+@mutant("classifier", "explains-its-predictions", "give each reason in words and units")
 class Silent(Nearest):
     def explain(self, features):
         return evolve(super().explain(features), because=())

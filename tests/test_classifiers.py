@@ -45,6 +45,7 @@ def rate(classifier, table, labels):
     return np.mean([classifier.classes()[k] == label for k, label in zip(answers, labels, strict=True)])
 
 
+@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")  # mlp, on few trials
 @pytest.mark.parametrize("name", ALL)
 class TestEvery:
     def test_it_learns_what_can_be_learned(self, name):

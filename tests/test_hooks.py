@@ -147,7 +147,7 @@ def test_hook_graspsense_models():
 def test_hook_graspsense_datasets():
     plugins = IsolatedPlugins(example("graspsense_datasets"))
 
-    assert plugins.dataset("lab-csv").entry.target == "lab_hand.csv:read"
+    assert plugins.dataset("lab-csv").entry.recordings == "lab_hand.csv:recordings"
 
 
 def test_hook_graspsense_commands():

@@ -44,12 +44,12 @@ def test_it_comes_back_the_same_without_its_training_trials(name, tmp_path):
 
 def resigned(path, change):
     """Change a model's content and give it the hash of the changed one, as somebody with bad intent would."""
-    from graspsense.core.model import _digest
+    from graspsense.core.model import digest
 
     content = json.loads(path.read_text())
     change(content["model"])
     content.pop("sha256")
-    path.write_text(json.dumps({**content, "sha256": _digest(content)}))
+    path.write_text(json.dumps({**content, "sha256": digest(content)}))
 
 
 def test_types_that_are_not_listed_are_refused_before_anything_is_made(tmp_path):

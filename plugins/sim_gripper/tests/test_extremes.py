@@ -27,7 +27,7 @@ SLOW = {"stiffness_and_mass", "head_space", "vents", "relaxation", "ticks"}
     ids=lambda case: case.__name__,
 )
 def test_what_must_hold_holds(case):
-    rows = list(case(quick=True))
+    rows = list(case(short=True))
     assert rows
     assert [row for row in rows if not row["holds"]] == []
     assert all(row.get("finite", True) for row in rows)
@@ -35,5 +35,5 @@ def test_what_must_hold_holds(case):
 
 @pytest.mark.long
 def test_every_row_holds():
-    rows = [row for case in extremes.CASES for row in case(quick=False)]
+    rows = [row for case in extremes.CASES for row in case(short=False)]
     assert [row for row in rows if not row["holds"]] == []

@@ -73,6 +73,7 @@ def import_(
     """
     from graspsense.core.errors import ConfigError
     from graspsense.sources.import_sources import is_csv, recordings_to_import
+    from graspsense.store.labels import labels_of
 
     given = _columns({"time": time, "gap": gap, "effort": effort, "velocity": velocity}, forces)
     for source in sources:
@@ -84,6 +85,8 @@ def import_(
         )
     if plot is not None and not check:
         raise click.UsageError("--plot is for --check")
+    if label is not None:
+        labels_of(label)  # what is not a label is refused as such, before any file is read
     chosen = _Chosen(pipeline, options)
     recordings = [one for source in sources for one in recordings_to_import(source, given, label)]
     if not recordings:

@@ -5,10 +5,9 @@ A trial has such numbers among its labels, under a heading with the unit as in a
 
 from __future__ import annotations
 
-import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from attrs import frozen
@@ -53,18 +52,18 @@ def value_label(text: str) -> tuple[str, str]:
     return heading, cell
 
 
-def values_of_labels(name: str, labels: Sequence[str], where: str) -> tuple[str, list[float]]:
+def values_of_labels(name: str, labels: Sequence[Mapping[str, str]], where: str) -> tuple[str, list[float]]:
     """Return the unit of a number and its value in each trial, NaN where a trial does not have it.
 
-    `labels` are those of each trial as JSON. Raises ConfigError if no trial has the number, if its values are not
+    `labels` are those of each trial. Raises ConfigError if no trial has the number, if its values are not
     numbers, or if it has several units.
     """
     units: dict[str, None] = {}
     known: set[str] = set()
     values = []
-    for text in labels:
+    for one in labels:
         value = math.nan
-        for heading, cell in json.loads(text).items():
+        for heading, cell in one.items():
             called, unit = name_and_unit(heading)
             number = number_of(cell)
             if number is not None and called not in RESERVED:

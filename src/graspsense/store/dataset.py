@@ -26,6 +26,7 @@ from graspsense.recording.provenance import recipe
 from graspsense.recording.trial_record import FeatureValues
 from graspsense.store.extract_again import ExtractedAgain, ExtractedTrials, extract_again
 from graspsense.store.first_line import first_lines
+from graspsense.store.opening import decoded
 from graspsense.store.store import COUNTS, Store
 from graspsense.store.time_recorded import order_recorded
 
@@ -199,7 +200,8 @@ def _read_rows(store: Store, wanted: str, feature_set: int | None) -> _Rows:
 
 def _with_value(rows: _Rows, name: str, folder: str, notes: list[str]) -> tuple[_Rows, TargetValue]:
     """Return the rows that have this number among their labels, and the numbers."""
-    unit, values = values_of_labels(name, rows.labels, f"the store in {folder}")
+    labels = [decoded(folder, text) for text in rows.labels]
+    unit, values = values_of_labels(name, labels, f"the store in {folder}")
     having = [i for i, number in enumerate(values) if number == number]
     if len(having) < len(values):
         notes.append(f"{len(values) - len(having)} trials are left out: they have no {name}")
@@ -215,7 +217,7 @@ def _stored_tables(store: Store, folder: str, rows: _Rows, feature_set: int) -> 
         before=_unpacked_table(folder, sets[rows.before_set[0]], rows.before_contact)
         if same_before
         else None,
-        before_missing=_most_frequent_reason([json.loads(text) for text in rows.missing_before]),
+        before_missing=_most_frequent_reason([decoded(folder, text) for text in rows.missing_before]),
     )
 
 

@@ -20,6 +20,7 @@ from graspsense.recording.atomic_file import write_new
 from graspsense.recording.parquet import parquet
 from graspsense.store.dataset import feature_table
 from graspsense.store.first_line import first_lines
+from graspsense.store.opening import decoded
 from graspsense.store.store import Store
 from graspsense.store.time_recorded import ORDER, RECORDED_AT
 
@@ -93,7 +94,7 @@ def trial_table(folder: str | Path) -> TrialTable:
     if not rows:
         aside = f" that is not set aside ({set_aside} are)" if set_aside else ""
         raise ConfigError(f"the store in {folder} has no trial to export{aside}")
-    labels = [json.loads(text) for text in columns["labels"]]
+    labels = [decoded(folder, text) for text in columns["labels"]]
     columns |= {name: tuple(one.get(name) for one in labels) for name in (RECORDED_AT, ORDER)}
     before = _unpacked(folder, sets, columns["before_set"], columns["before_contact"])
     parts = [(BEFORE, before), (FIRST, first_line), (VALUE, _numbers_to_predict(labels))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sqlite3
 import tempfile
@@ -33,6 +34,17 @@ _REPAIR: Final = (
 def damaged(folder: Path, problem: str) -> DataDamaged:
     """Return the error for a damaged store, with advice on its repair."""
     return DataDamaged(f"the store in {folder} is damaged: {problem}. {_REPAIR.format(folder=folder)}")
+
+
+def decoded(folder: str | Path, text: str) -> dict[str, str]:
+    """Return the object in a JSON column of a row, such as the labels of a trial. Raises DataDamaged."""
+    try:
+        value = json.loads(text)
+    except (TypeError, ValueError) as error:
+        raise damaged(Path(folder), f"a row has {text!r} instead of JSON ({error})") from error
+    if not isinstance(value, dict):
+        raise damaged(Path(folder), f"a row has {text!r} instead of a JSON object")
+    return value
 
 
 def is_new(folder: Path) -> bool:
