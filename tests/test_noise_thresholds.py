@@ -72,6 +72,13 @@ def test_recordings_that_begin_close_to_the_object_are_not_too_wide():
     assert "1 of 2 recordings touch within 1 mm of their beginning" in chosen.words
 
 
+def test_a_force_that_grows_from_the_first_sample_is_not_taken_for_noise():
+    """Recordings that begin in contact: the first third of a slow squeeze up to 25 N reaches 1.6 N."""
+    whole = [squeeze(peak_n=25.0, seed=k) for k in range(5)]
+    squeezed = [evolve(one, readings=one.readings[1000:]) for one in whole]
+    assert "controller.contact_force_n" not in thresholds_for(squeezed).settings
+
+
 def test_forces_that_are_no_more_than_noise_are_doubted():
     chosen = thresholds_for([squeeze(peak_n=0.0, force_noise_n=1.0, seed=k) for k in range(3)])
     assert "check the unit and the zero" in chosen.words

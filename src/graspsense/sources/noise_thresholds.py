@@ -4,9 +4,9 @@ The default thresholds are those of the PR2 gripper. Where they do not fit the r
 in the noise, or never, and rest never. The thresholds that are chosen here are the same for all recordings of an
 import, so that their features are comparable.
 
-The noise of a force is its scatter in the first third of the time before it reaches a fifth of its peak, or, in a
-recording that begins in contact, that of its second differences; the noise of the gap is that of its second
-differences. Scatter is the median absolute deviation times 1.4826, which is the standard deviation of normal noise; the
+The noise of a force is its scatter in the first third of the time before it reaches a fifth of its peak. In a recording
+that begins in contact, or whose force grows from the beginning, it is that of its second differences, as is the noise
+of the gap. Scatter is the median absolute deviation times 1.4826, which is the standard deviation of normal noise; the
 second difference of independent noise has sqrt(6) times its standard deviation.
 """
 
@@ -169,10 +169,17 @@ def _free_force(force: NDArray[np.float64]) -> float:
     early = known[: int(reached.argmax())] if reached.any() else known
     # The last part of a recording that begins close to the object is already a squeeze.
     early = early[: max(len(early) // 3, _FEW)]
-    if len(early) < _FEW:
+    if len(early) < _FEW or _rises(early):
         return _FORCE_SIGMAS * _scatter_of_differences(known)
     middle = float(np.median(early))
     return abs(middle) + _FORCE_SIGMAS * _NORMAL * float(np.median(np.abs(early - middle)))
+
+
+def _rises(force: NDArray[np.float64]) -> bool:
+    """Return whether a force grows by more than its noise explains, so that something is squeezed already."""
+    third = max(len(force) // 3, 1)
+    growth = float(np.median(force[-third:]) - np.median(force[:third]))
+    return growth > _FORCE_SIGMAS * _scatter_of_differences(force)
 
 
 def _gap_at_rest(gap: NDArray[np.float64]) -> float:
