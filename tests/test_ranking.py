@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 
 import numpy as np
+import pytest
 from attrs import evolve
 from test_conformal import bottles, called
 from test_evaluate import learner
 
+from graspsense.cli.main import main
 from graspsense.evaluation.intervals import difference
 from graspsense.evaluation.ranking import rank
 
@@ -53,6 +55,14 @@ def test_the_command_names_the_best_and_refuses_feature_sets_of_a_csv(tmp_path, 
     assert "RECORDING ORDER" in shown
     assert {one["classifier"] for one in listed["candidates"]} == {"tree", "knn"}
     assert listed["verdict"].startswith(listed["candidates"][0]["classifier"])
+    for option, says in (
+        ("--feature-sets", "not for a CSV"),
+        ("--target-value", "compare is for classifiers"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main([*arguments, option, "curve"])
+        assert ended.value.code == 2
+        assert says in capsys.readouterr().err
 
 
 def test_features_from_before_the_contact_are_a_control_and_not_compared():

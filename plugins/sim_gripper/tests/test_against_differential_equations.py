@@ -824,14 +824,21 @@ def test_the_reference_is_the_solution_of_the_equations(name, place, gripper):
     assert max(errors(name, place, gripper)) <= 3e-5
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "place", "gripper"), [scene for scene in every(8) if scene not in QUICK])
+def marked(most, few):
+    """Return the scenes of `every(most)`: those of `every(few)` for CI, the others among the long tests."""
+    ci = set(every(few))
+    scenes = [scene for scene in every(most) if scene not in QUICK]
+    return [
+        pytest.param(*scene, marks=pytest.mark.slow if scene in ci else pytest.mark.long) for scene in scenes
+    ]
+
+
+@pytest.mark.parametrize(("name", "place", "gripper"), marked(8, 2))
 def test_the_reference_is_the_solution_of_the_equations_for_every_term(name, place, gripper):
     assert max(errors(name, place, gripper)) <= 3e-5
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("accuracy", [0.1, 0.01, 1e-3])
-@pytest.mark.parametrize(("name", "place", "gripper"), list(every(2)))
+@pytest.mark.parametrize(("name", "place", "gripper"), marked(2, 1))
 def test_steps_for_an_accuracy_have_it(name, place, gripper, accuracy):
     assert max(errors(name, place, gripper, fidelity="full", accuracy=accuracy)) <= accuracy

@@ -46,6 +46,10 @@ def compare(
 
     if feature_sets and is_csv(source):
         raise click.UsageError("--feature-sets is not for a CSV source, which has its features as columns")
+    if given["target_value"]:
+        raise click.UsageError(
+            "compare is for classifiers; --target-value is for train, predict and evaluate"
+        )
     names = _names(classifiers, "--classifiers")
     learners = {name: learner_of(source, name, given) for name in names}
     with ProgressLine() as progress:
