@@ -16,7 +16,8 @@ def conductance(opening_m2: float, rise_pa: float) -> float:
     """Return the conductance (m3/s/Pa) of an opening (m2, positive): flow over pressure difference.
 
     Viscous and inertial losses add up: p = R q + B q |q| with B = rho / (2 (C_d A)^2). R is chosen so that both are
-    equal at eight times `LAMINAR_BELOW_PA`. The flow is then linear near zero, and a square root of the pressure far from it.
+    equal at eight times `LAMINAR_BELOW_PA`. The flow is then linear near zero, and a square root of the pressure far
+    from it.
     """
     viscous, inertial = _losses(opening_m2)
     return 2.0 / (viscous + math.sqrt(viscous * viscous + 4.0 * inertial * abs(rise_pa)))
