@@ -351,6 +351,8 @@ def descend(
                 at = grid.index(value)
                 grid = [0.5 * (value + one) for one in (*grid[max(at - 1, 0) : at], *grid[at + 1 : at + 2])]
             costs = {one: least if one == value else cost({**found, key: one}) for one in grid}
+            if not costs:
+                continue  # A grid of one value has no middles.
             best = min(costs, key=lambda one: costs[one])
             if costs[best] < least:
                 found[key], least = best, costs[best]

@@ -95,6 +95,8 @@ def test_a_label_with_few_instances_shares_the_threshold_of_all():
     assert sets.thresholds["often"].own
     assert not sets.thresholds["seldom"].own
     assert "seldom 6 more" in sets.in_words
+    few = evolve(sets, thresholds=dict.fromkeys(("a", "b"), sets.thresholds["seldom"]))
+    assert few.in_words.endswith("6 more of each")
 
 
 @pytest.mark.slow

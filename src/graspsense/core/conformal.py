@@ -142,7 +142,10 @@ class PredictionSets:
             return (
                 f"{text} ({min(one.units for one in self.thresholds.values())} {self.unit} or more of each)"
             )
-        lacking = ", ".join(f"{name} {needed - units} more" for name, units in sorted(shared.items()))
+        if len(shared) > 1 and len(shared) == len(self.thresholds) and len(set(shared.values())) == 1:
+            lacking = f"{needed - next(iter(shared.values()))} more of each"
+        else:
+            lacking = ", ".join(f"{name} {needed - units} more" for name, units in sorted(shared.items()))
         return (
             f"{text}, over all labels together for the others; a label needs {needed} {self.unit}: {lacking}"
         )
