@@ -17,11 +17,11 @@ from graspsense.core.plugins import IsolatedPlugins
 from graspsense.scaffold.make import KINDS, make
 
 COMBINATIONS = [
-    pytest.param(roles, marks=[] if count in (1, len(KINDS)) else [pytest.mark.slow])
+    pytest.param(roles, marks=[] if count in (1, len(KINDS)) else [pytest.mark.long])
     for count in (1, 2, len(KINDS) - 1, len(KINDS))
     for roles in itertools.combinations(KINDS, count)
 ]
-"""Each role alone and all of them; among the slow tests each pair and all but one."""
+"""Each role alone and all of them; among the long tests each pair and all but one."""
 
 
 @pytest.mark.parametrize("roles", COMBINATIONS, ids="+".join)
