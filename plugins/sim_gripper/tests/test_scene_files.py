@@ -9,6 +9,7 @@ import sys
 from textwrap import dedent
 
 import pytest
+from attrs import evolve
 from click.testing import CliRunner
 
 from graspsense.cli.main import cli
@@ -20,7 +21,7 @@ from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.compiled.compose import plant_move
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import find, shipped_scenes
+from graspsense_sim_gripper.objects.library import find, shipped_scenes, split_number
 from graspsense_sim_gripper.terms.registry import laws_of
 
 HYBRID = create("controller", "hybrid")
@@ -52,6 +53,41 @@ def test_a_file_needs_no_more_than_a_width_and_its_terms(scene):
     assert (spec.name, spec.width_m, spec.held) == ("bottle", 0.06, False)
     # In the canonical order, whatever the file's.
     assert [kind for kind, _ in spec.terms] == ["elastic", "maxwell"]
+
+
+def test_the_text_of_a_scene_is_grasped_like_its_file(scene):
+    text, config = dedent(BOTTLE), SimConfig(fidelity="fixed", scheme="explicit")
+    from_file, from_text, other = run_many(config, HYBRID, [scene(BOTTLE), text, f"{text}#3"], [5, 5, 5])
+    assert from_text.trace.force_left_n.tolist() == from_file.trace.force_left_n.tolist()
+    # It has no spread, so its third instance is the nominal one.
+    assert other.outcome == from_text.outcome
+    assert split_number(f"{text}#3") == (text, 3)
+    assert split_number(f"{text}# a comment\n") == (f"{text}# a comment\n", None)
+
+
+def test_a_text_that_is_not_a_scene_is_refused():
+    with pytest.raises(ConfigError, match="scene in memory: widht_m: no such key"):
+        find("widht_m = 0.05\n")
+
+
+def test_a_fixed_model_keeps_every_term_and_is_not_verified():
+    config = SimConfig(object=dedent(BOTTLE), fidelity="fixed", scheme="explicit", sensor="ideal")
+    backend = SimBackend(config)
+    backend.open(0)
+    selection = backend.report()["selection"]
+    decisions = {row["term"]: row["decision"] for row in selection["decisions"]}
+    assert decisions == {"elastic": "kept", "maxwell": "kept", "steps": "Verlet", "contact": "not examined"}
+    assert selection["verified"] is None
+    fixed, full = (
+        run_many(evolve(config, fidelity=fidelity), HYBRID, [config.object], [2])[0].trace
+        for fidelity in ("fixed", "full")
+    )
+    assert fixed.gap_m.tolist() == full.gap_m.tolist()
+
+
+def test_a_fixed_model_needs_a_scheme():
+    with pytest.raises(ValueError, match="set scheme to explicit"):
+        SimConfig(fidelity="fixed")
 
 
 @pytest.mark.parametrize("name", sorted(shipped_scenes()))

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 from attrs import frozen
 
 from graspsense.plugin_api import CHANGES_NO_RESULT, NAMES_INPUT, setting
+
+
+def _has_scheme(config: SimConfig, attribute: Any, fidelity: str) -> None:
+    """Raise ValueError if nothing may be selected and no scheme is given."""
+    if fidelity == "fixed" and config.scheme == "auto":
+        raise ValueError(
+            "fixed selects nothing, so it needs a scheme: set scheme to explicit (velocity Verlet), or to implicit "
+            "(TR-BDF2) where the damping of the object over the moving mass, times the tick, exceeds 1"
+        )
 
 
 @frozen(kw_only=True, cache_hash=True)
@@ -19,7 +28,7 @@ class SimConfig:
         effect=NAMES_INPUT,
         meaning="Name in the catalogue with its state, as in odwalla:full_closed or can:empty_open; none: no "
         "object. can:empty_open#3 is one particular can: its width and stiffness are the same in every "
-        "trial. Or a scene file, as in my_bottle.toml.",
+        "trial. Or a scene file, as in my_bottle.toml, or the text of one.",
     )
     spread: bool = setting(
         default=True,
@@ -39,10 +48,12 @@ class SimConfig:
         maximum=0.5,
         meaning="Relative error that features, peak force and trace may have; model and steps follow from it.",
     )
-    fidelity: Literal["scene", "full", "reference"] = setting(
+    fidelity: Literal["scene", "full", "reference", "fixed"] = setting(
         default="scene",
+        validator=_has_scheme,
         meaning="scene: the terms that the accuracy needs. full: every term. reference: every term, in steps that "
-        "are halved until the result no longer changes.",
+        "are halved until the result no longer changes. fixed: every term with the given `scheme`; nothing is "
+        "selected and no trial grasp verifies it.",
     )
     expected_force_n: float | None = setting(
         default=None,

@@ -1,4 +1,6 @@
-"""Finding an object by name: in the catalogue, among the scenes that are shipped, or in a scene file of the user.
+"""Finding an object by name: in the catalogue, among the scenes that are shipped, or in a scene of the user.
+
+A scene of the user is a file, or the text of such a file: then no file is needed.
 
 In the catalogue every value has an origin and a reason; a scene file needs neither.
 """
@@ -27,6 +29,8 @@ from graspsense_sim_gripper.objects.spec import (
 
 CONTAINERS: Final = ("odwalla", "naked", "can", "water")
 """The containers of Chitta, Piccoli and Sturm (ICRA 2010), section III.E: trials are simulated with them by default."""
+SCENE_IN_MEMORY: Final = "scene in memory"
+"""The name of an object that is given by the text of its scene."""
 ORIGINS: Final = ("measured", "datasheet", "published elsewhere", "assumed")
 """The possible origins of a value of the catalogue, besides a fit."""
 FITTED_TO: Final = "fitted to "
@@ -79,11 +83,20 @@ def object_kinds() -> tuple[ObjectKind, ...]:
     return (*kinds, *(ObjectKind(name=name) for name in shipped_scenes() if name not in states))
 
 
+def is_scene_text(name: str) -> bool:
+    """Return whether this is the text of a scene file instead of a name: whether it has a line break."""
+    return "\n" in name
+
+
 def split_number(name: str) -> tuple[str, int | None]:
     """Return the name without the number of an instance, and the number or None; `can:full_open#3` gives 3.
 
-    Raises UnknownName if the text after `#` is not a whole number.
+    Of the text of a scene, a last line `#3` is the number. Raises UnknownName if the text after `#` is not a whole
+    number.
     """
+    if is_scene_text(name):
+        text, _, last = name.rpartition("\n#")
+        return (f"{text}\n", int(last)) if last.isascii() and last.isdigit() else (name, None)
     plain, mark, number = name.partition("#")
     if not mark:
         return plain, None
@@ -93,11 +106,13 @@ def split_number(name: str) -> tuple[str, int | None]:
 
 
 def find(name: str) -> ObjectSpec:
-    """Return the object of this name, or of the scene file if the name ends in `.toml`.
+    """Return the object of this name, of the scene file if the name ends in `.toml`, or of the text of a scene.
 
     A name is looked up in the catalogue, and then among the shipped scenes. Raises UnknownName with the known names,
-    ConfigError for a file that cannot be read as an object.
+    ConfigError for a file or a text that cannot be read as an object.
     """
+    if is_scene_text(name):
+        return parse_scene(name, SCENE_IN_MEMORY, SCENE_IN_MEMORY)
     if name.endswith(".toml"):
         return _read_scene(Path(name))
     known = catalogue()

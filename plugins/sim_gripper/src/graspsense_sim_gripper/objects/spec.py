@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Callable, Mapping
-from functools import cache, cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Final, NamedTuple
 
 from attrs import field, fields_dict, frozen
@@ -105,7 +105,7 @@ def spec_with_sorted_terms(values: TomlTable, terms: list[TermEntry]) -> ObjectS
     return ObjectSpec(**values, terms=tuple(terms[i] for i in order))
 
 
-@cache
+@lru_cache(maxsize=1024)
 def parse_scene(text: str, name: str, where: str) -> ObjectSpec:
     """Return the object that the text of a scene file describes. `where` names the file in error messages.
 

@@ -60,7 +60,9 @@ REFERENCE_SCALES: Final = {
 """The scale of the full model that a candidate is compared with, by the `refinement` of the candidate's own scale."""
 
 
-def scales_for(fidelity: Literal["scene", "full", "reference"], spread: bool) -> tuple[LevelScale, ...]:
+def scales_for(
+    fidelity: Literal["scene", "full", "reference", "fixed"], spread: bool
+) -> tuple[LevelScale, ...]:
     """Return the scales to try, in order. `spread`: whether instances differ from the nominal object."""
     if fidelity != "scene":
         return FULL_SCALES

@@ -36,6 +36,8 @@ FORCE_N: Final = 20.0
 SPEED_M_S: Final = 0.01
 """The gripping force and the closing speed that are assumed without other information: those of the paper (Chitta,
 Piccoli and Sturm, ICRA 2010)."""
+USUAL_POINT: Final = WorkingPoint(1e-3, SPEED_M_S, 1.0, FORCE_N)
+"""The working point that the rates of terms are given for where nothing is selected."""
 REFERENCE_ACCURACY: Final = 1e-3
 """The steps of a reference begin with the tolerance for this accuracy, or for a finer one that is requested."""
 CONVERGED: Final = 1e-7
@@ -111,6 +113,39 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = UNVERIFIED) -> Red
     )
 
 
+def fixed(problem: Problem) -> Reduction:
+    """Return the model with every term and the scheme of the settings: nothing is computed in order to select it.
+
+    The steps follow from the accuracy, or from `step_s`. Raises TypeError if there is no object.
+    """
+    config, setup = problem.model_config, _nominal(problem)
+    kinds, params = setup.kinds, setup.terms
+    level = FULL_SCALES[0].at(config.accuracy)
+    steps = _with_settings(steps_for(level, VERLET, setup.dt_s), config)
+    swings = _frequencies(kinds, setup.plant.object, USUAL_POINT)
+    fastest = max(swings.values(), default=0.0)
+    if fastest > 0.0:
+        angle = min(math.sqrt(SWING_SHARE * level.step_tol), MAX_SWING_RAD)
+        steps = steps._replace(longest_touched_s=max(angle / fastest, setup.dt_s / MOST_SWING_STEPS))
+    what = "given by the settings"
+    return Reduction(
+        accuracy=config.accuracy,
+        treatment=(KEPT,) * (len(kinds) + 1),
+        point=USUAL_POINT,
+        steps=steps,
+        decisions=tuple(
+            TermDecision(term=kind, decision=KEPT, what=what, number=0.0, error=0.0) for kind in kinds
+        ),
+        scheme=TermDecision(term="steps", decision=SCHEMES[steps.scheme], what=what, number=0.0, error=0.0),
+        contact=TermDecision(term="contact", decision="not examined", what=what, number=0.0, error=0.0),
+        error=0.0,
+        oscillates=any(
+            _oscillates(kind, term, USUAL_POINT) for kind, term in zip(kinds, params, strict=True)
+        ),
+        level=level,
+    )
+
+
 def _mass_kg(drive: Drive, gap_m: float) -> float:
     """Return the mass (kg) that moves with the gap: the rotor's inertia through the linkage, J (2 pi)^2 / g^2."""
     _, jacobian = gap_and_rate(drive.link, revolutions_at(drive.link, gap_m))
@@ -156,16 +191,21 @@ def _oscillates(kind: str, params: TermParams, point: WorkingPoint) -> bool:
 
 
 def _swings(grip: Grip, model: ObjectModel) -> dict[int, float]:
-    """Return the angular frequency (rad/s) of each term of this model by its index, 0 if it does not oscillate.
+    """Return the angular frequency (rad/s) of each term that this model keeps, by its index."""
+    kept = _frequencies(grip.kinds, grip.model, grip.point)
+    return {i: per_s for i, per_s in kept.items() if model.terms[i + 1].active == 1}
 
-    A term with a contact of its own divides its steps itself.
+
+def _frequencies(kinds: Sequence[str], model: ObjectModel, point: WorkingPoint) -> dict[int, float]:
+    """Return the angular frequency (rad/s) of each term by its index, 0 if it does not oscillate.
+
+    A term with a contact of its own divides its steps itself, and is left out.
     """
     swings = {}
-    for i, kind in enumerate(grip.kinds):
-        term, params = find_term(kind)[1], grip.model.terms[i + 1].params
-        if model.terms[i + 1].active == 0 or isinstance(term.linear(params), OwnContact):
-            continue
-        swings[i] = max((r.per_s for r in term.rates(params, grip.point) if r.what == "swings"), default=0.0)
+    for i, kind in enumerate(kinds):
+        term, params = find_term(kind)[1], model.terms[i + 1].params
+        if not isinstance(term.linear(params), OwnContact):
+            swings[i] = max((r.per_s for r in term.rates(params, point) if r.what == "swings"), default=0.0)
     return swings
 
 

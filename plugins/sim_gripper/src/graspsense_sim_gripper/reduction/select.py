@@ -27,7 +27,7 @@ from graspsense_sim_gripper.reduction.error import deviation
 from graspsense_sim_gripper.reduction.levels import FULL_SCALES, REFERENCE_SCALES, LevelScale, scales_for
 from graspsense_sim_gripper.reduction.model import DROPPED, Reduction, TermDecision, Verification
 from graspsense_sim_gripper.reduction.probe import Grip
-from graspsense_sim_gripper.reduction.propose import grip_of, propose
+from graspsense_sim_gripper.reduction.propose import fixed, grip_of, propose
 from graspsense_sim_gripper.reduction.verify import (
     MOST_WORK,
     Sensitivity,
@@ -64,9 +64,9 @@ def select(
     """Return the reduced model of a problem's object, verified by trial grasps under the controller.
 
     Models are cached in memory and on disk, by everything that they depend on. The model is not verified, and its
-    `verification` is None, if the settings prescribe the steps or ask for the reference, if the controller raises in
-    the first trial grasp, if the peak force cannot be resolved (`Reduction.contact`), or if the trial grasps would take
-    too much work (`MOST_WORK`).
+    `verification` is None, if the settings fix the model, prescribe the steps or ask for the reference, if the
+    controller raises in the first trial grasp, if the peak force cannot be resolved (`Reduction.contact`), or if the
+    trial grasps would take too much work (`MOST_WORK`).
 
     `compiled`: run the trial grasps compiled, if the controller can be compiled. `padding`: the kinds of terms in the
     compiled code, by default those of a batch. Both change the run time only.
@@ -74,6 +74,8 @@ def select(
     Raises ConfigError if no model reaches the requested accuracy or a term raises an exception, TypeError if there is
     no object.
     """
+    if problem.config.fidelity == "fixed":
+        return fixed(problem)
     key = _SELECTED.key(problem, controller)
     reduction = _SELECTED.get(key)
     if reduction is None:
