@@ -27,6 +27,7 @@ MAY_KNOW = {
     "regression": {"core", "evaluation", "regression"},
     "report": {"core", "recording", "store", "evaluation", "report"},
     "experiments": {"core", "recording", "sources", "evaluation", "report", "experiments"},
+    "inference": set(),
     "cli": {
         "core",
         "recording",
