@@ -8,6 +8,7 @@ import subprocess
 import sys
 from textwrap import dedent
 
+import numpy as np
 import pytest
 from attrs import evolve
 from click.testing import CliRunner
@@ -21,6 +22,7 @@ from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.build import unverified_setup
 from graspsense_sim_gripper.compiled.compose import plant_move
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.instance import sample
 from graspsense_sim_gripper.objects.library import find, shipped_scenes, split_number
 from graspsense_sim_gripper.terms.registry import laws_of
 
@@ -83,6 +85,48 @@ def test_a_fixed_model_keeps_every_term_and_is_not_verified():
         for fidelity in ("fixed", "full")
     )
     assert fixed.gap_m.tolist() == full.gap_m.tolist()
+
+
+SPREAD = """width_m = 0.06
+[[terms]]
+type = "elastic"
+k1_n_m = 4000.0
+[[terms]]
+type = "fracture"
+force_n = 6.0
+spread = { force_n = 0.3 }
+"""
+
+
+def test_a_parameter_with_a_spread_varies_between_instances_and_alone():
+    spec, without = find(SPREAD), find(SPREAD.replace("spread = { force_n = 0.3 }", ""))
+    forces = [sample(spec, np.random.default_rng(seed)).terms[1].force_n for seed in range(2000)]
+    assert np.std(np.log(forces)) == pytest.approx(0.3, rel=0.05)
+    assert np.median(forces) == pytest.approx(6.0, rel=0.05)
+    assert sample(spec, None).terms[1].force_n == 6.0
+    one, other = (sample(each, np.random.default_rng(7), 3) for each in (spec, without))
+    assert (one.width_m, one.offset_m, one.terms[0]) == (other.width_m, other.offset_m, other.terms[0])
+    # A numbered instance is the same in every trial.
+    assert sample(spec, np.random.default_rng(8), 3).terms == one.terms != sample(spec, None).terms
+
+
+@pytest.mark.parametrize(
+    ("terms", "says"),
+    [
+        ('type = "fracture"', "give force_n or compression_m"),
+        ('type = "fracture"\nforce_n = 5.0\nleft = 2', "left = 2 must be at most 1"),
+        ('type = "elastic"\nk1_n_m = 0\nk3_n_m3 = -1e6', "the shell would pull"),
+        ('type = "elastic"\nk1_n_m = 100\nk3_n_m3 = -1e12', r"has to be at least -1.48e\+07"),
+        ('type = "elastic"\nk1_n_m = -100', "k1_n_m: -100 is negative"),
+        ('type = "elastic"\nk1_n_m = 100\nspread = { k = 1 }', "no such parameter 'k'"),
+        ('type = "elastic"\nk1_n_m = 100\nspread = { k1_n_m = 5 }', "spread.k1_n_m: 5 is too large"),
+        ('type = "elastic"\nk1_n_m = 100\nspread = 1', "write a table such as"),
+        ('type = "fracture"\nforce_n=1\n[[terms]]\ntype = "fracture"\nforce_n=2', "an object can have one"),
+    ],
+)
+def test_parameters_without_a_law_are_refused(terms, says):
+    with pytest.raises(ConfigError, match=says):
+        find(f"width_m = 0.06\n[[terms]]\n{terms}\n")
 
 
 def test_a_fixed_model_needs_a_scheme():

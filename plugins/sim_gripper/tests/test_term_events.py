@@ -60,6 +60,54 @@ def test_a_rigid_body_breaks_at_its_crush_force(scheme, forced, held, pads_n_m):
     assert 0.0 < forces[-1] < 5.0
 
 
+@pytest.mark.parametrize("forced", [{}, FORCED])
+@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE])
+@pytest.mark.parametrize("held", [False, True])
+def test_an_object_of_any_terms_breaks_at_a_force(scheme, forced, held):
+    terms = {
+        "elastic": {"k1_n_m": 2e4, "k3_n_m3": -1e9},
+        "maxwell": {"k_n_m": 3e3, "tau_s": 0.05},
+        "fracture": {"force_n": 10.0, "left": 0.25},
+    }
+    state, forces = pressed(terms, held=held, scheme=scheme, **forced)
+    assert state.contact.left.states[3].broken == 1
+    k = int(np.argmax(np.diff(forces) < -1.0)) + 1
+    assert forces[:k].max() <= 10.0 < 1.02 * forces[:k].max() * (1.2 if forced else 1.0)
+    assert forces[k] < 7.0
+    assert state.step.unresolved + state.contact.unbalanced == 0
+
+
+@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE])
+def test_an_object_breaks_at_a_compression(scheme):
+    terms = {"elastic": {"k1_n_m": 5e3}, "fracture": {"compression_m": 1e-3}}
+    state, forces = pressed(terms, scheme=scheme)
+    # Nothing is left of it, so the peak is the force at the break.
+    assert state.peak_n == pytest.approx(5.0, rel=1e-5)
+    assert forces[-1] == 0.0
+
+
+def test_a_fracture_is_the_same_compiled_and_plain_and_in_a_reduced_model():
+    scene = """width_m = 0.05
+[[terms]]
+type = "fracture"
+force_n = 9.0
+left = 0.3
+[[terms]]
+type = "elastic"
+k1_n_m = 4000.0
+"""
+    traces = []
+    for settings in ({}, {"compile": "always"}, {"fidelity": "reference"}):
+        gripper = create("sensor-backend", "sim", sensor="ideal", spread=False, **settings)
+        done = gripper.run_many(create("controller", "hybrid"), [scene], [0], traces=True, workers=1)[0]
+        assert done.report["broken"]
+        traces.append(done.trace.force_left_n)
+    plain, compiled, reference = traces
+    np.testing.assert_allclose(compiled, plain, rtol=0.0, atol=1e-9)
+    n = min(len(plain), len(reference))
+    assert np.sqrt(np.mean((plain[:n] - reference[:n]) ** 2) / np.mean(reference[:n] ** 2)) < 0.01
+
+
 @pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE])
 def test_a_shell_snaps_at_its_critical_compression(scheme):
     # Pads softer than the falling part of 20 kN/m, so that the shell jumps across it.

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from graspsense_sim_gripper.terms.elastic import Elastic, elastic
+from graspsense_sim_gripper.terms.elastic import LEAST_SLOPE, Elastic, elastic, shell_force
 from graspsense_sim_gripper.terms.foam import Foam, foam
+from graspsense_sim_gripper.terms.fracture import Fracture
 from graspsense_sim_gripper.terms.gas import Gas, GasState, gas
 from graspsense_sim_gripper.terms.liquid import GRAVITY_M_S2, Liquid, liquid
 from graspsense_sim_gripper.terms.loss import Loss, loss
@@ -42,6 +43,20 @@ def ramp(depth, steps):
 def test_elastic_is_its_polynomial():
     force, _ = elastic(Elastic(2000.0, 3e6), NoState(), 0.0, 0.01, 1e-3, 0.01 / 1e-3)
     assert force == pytest.approx(2000.0 * 0.01 + 3e6 * 1e-6)
+
+
+@given(st.floats(10.0, 1e6), st.floats(0.1, 100.0), st.floats(0.0, 50.0))
+def test_a_softening_shell_is_the_cubic_first_and_always_rises(k1, end_mm, d_mm):
+    end, d = 1e-3 * end_mm, 1e-3 * d_mm
+    k3 = -(1.0 - LEAST_SLOPE) * k1 / (3.0 * end * end)
+    force = shell_force(k1, k3, d)
+    if d < end:
+        assert force == pytest.approx(k1 * d + k3 * d**3)
+    further = shell_force(k1, k3, d + 1e-6)
+    assert LEAST_SLOPE * k1 * 1e-6 * 0.999 <= further - force <= k1 * 1e-6 * 1.001
+    assert shell_force(k1, k3, -d) == -force
+    # A worn shell that has not worn has the same law.
+    assert worn(Worn(k1, k3, 1.0, 0.0, 0.0), WornState(0.0, 0.0), d, d, 1e-3, 0.0)[0] == force
 
 
 def test_rigid_is_hertz_until_it_breaks_and_stays_broken():
@@ -371,9 +386,11 @@ SAMPLES = {
     "surface": Surface(0.02, 2000.0, 5.0, 2e4),
     "liquid": Liquid(1.2e-3, 5e-4, 0.08, 1e-10),
     "slosh": Slosh(0.2, 4.0, 0.02),
+    "fracture": Fracture(10.0),
 }
 VARIANTS = {
     **SAMPLES,
+    "elastic that softens": Elastic(2000.0, -2e7),
     "gas that leaks": SAMPLES["gas"]._replace(vent_m2=1e-6),
     "gas that leaks fast": SAMPLES["gas"]._replace(vent_m2=1e-4),
     "gas that warms": SAMPLES["gas"]._replace(heat_s=0.1),
@@ -442,9 +459,10 @@ def test_every_term_says_how_fast_it_is_and_how_much_it_matters(name):
     term, at = TERMS[name.split()[0]], WorkingPoint(0.005, 0.01, 2.0)
     rates = term.rates(VARIANTS[name], at)
     assert all(math.isfinite(rate.per_s) and rate.per_s > 0.0 for rate in rates)
-    if not isinstance(term.at_rest, NoState) and name not in ("rigid", "gas", "snap"):
+    if not isinstance(term.at_rest, NoState) and name not in ("rigid", "gas", "snap", "fracture"):
         assert rates
-    assert term.importance(VARIANTS[name], at) > 0.0
+    # A term that acts on the sum of the others has no force of its own.
+    assert (term.importance(VARIANTS[name], at) > 0.0) == (term.on_sum is None)
     assert term.importance(VARIANTS[name], WorkingPoint(0.0, 0.0, 1.0)) == 0.0
 
 

@@ -11,10 +11,9 @@ from graspsense.plugin_api import GraspsenseError
 from graspsense_sim_gripper.compiled.compose import plant_move
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.stepping.scheme import PlantParams
-from graspsense_sim_gripper.terms.lumped import lumped
-from graspsense_sim_gripper.terms.registry import find_term, phases_of
+from graspsense_sim_gripper.terms.registry import active_laws, phases_of
 from graspsense_sim_gripper.terms.switchable import Switchable
-from graspsense_sim_gripper.terms.term import LAW_ERRORS, Law, TermState
+from graspsense_sim_gripper.terms.term import LAW_ERRORS, Law, OnSum, SumLaw, TermState
 
 
 class TermFailed(GraspsenseError):
@@ -23,7 +22,10 @@ class TermFailed(GraspsenseError):
 
 def raised_in_term(error: BaseException, kinds: Sequence[str]) -> str:
     """Return in words which term raised this exception in the interpreter; empty if none of these did."""
-    names: dict[CodeType, str] = {find_term(kind)[1].law.__code__: kind for kind in kinds}
+    laws = zip(kinds, active_laws(kinds)[1:], strict=True)
+    names: dict[CodeType, str] = {
+        (law.law if isinstance(law, OnSum) else law).__code__: kind for kind, law in laws
+    }
     for frame, _ in walk_tb(error.__traceback__):
         if frame.f_code in names:
             at = frame.f_locals.get("d1")
@@ -36,7 +38,10 @@ def not_finite_in_tick(
     kinds: Sequence[str], plant: PlantParams, before: PlantState, effort_n: float, dt_s: float
 ) -> str:
     """Return in words which term gives no finite force in the tick that begins with `before`."""
-    laws = [_checked("lumped", lumped), *(_checked(kind, find_term(kind)[1].law) for kind in kinds)]
+    laws = [
+        OnSum(_checked_on_sum(kind, law.law)) if isinstance(law, OnSum) else _checked(kind, law)
+        for kind, law in zip(("lumped", *kinds), active_laws(kinds), strict=True)
+    ]
     move = plant_move(laws, phases_of(kinds))
     try:
         move(plant, before, effort_n, dt_s)
@@ -55,16 +60,32 @@ def _checked(kind: str, law: Law) -> Law:
     ) -> tuple[float, TermState]:
         if term.active == 0:
             return 0.0, state
-        force, after = law(term.params, state, d0, d1, h, v1)
-        for name, value in (("the force", force), *_numbers(after)):
-            if not math.isfinite(value):
-                raise TermFailed(
-                    f"term {kind!r} gave {name} {value} at a compression of {d1 * 1e3:.3g} mm; a law has to give "
-                    "finite numbers at every compression"
-                )
-        return force, after
+        return _finite(kind, law(term.params, state, d0, d1, h, v1), d1)
 
     return checked
+
+
+def _checked_on_sum(kind: str, law: SumLaw) -> SumLaw:
+    """Return the switchable law of a term that acts on the sum, which raises TermFailed as that of `_checked` does."""
+
+    def checked(term: Switchable, state: TermState, force_n: float, d1: float) -> tuple[float, TermState]:
+        if term.active == 0:
+            return force_n, state
+        return _finite(kind, law(term.params, state, force_n, d1), d1)
+
+    return checked
+
+
+def _finite(kind: str, result: tuple[float, TermState], d1: float) -> tuple[float, TermState]:
+    """Return force and state. Raises TermFailed if one of their numbers is not finite."""
+    force, state = result
+    for name, value in (("the force", force), *_numbers(state)):
+        if not math.isfinite(value):
+            raise TermFailed(
+                f"term {kind!r} gave {name} {value} at a compression of {d1 * 1e3:.3g} mm; a law has to give "
+                "finite numbers at every compression"
+            )
+    return result
 
 
 def _numbers(state: TermState) -> Iterator[tuple[str, float]]:

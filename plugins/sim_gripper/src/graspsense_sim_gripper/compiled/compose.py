@@ -27,10 +27,10 @@ from graspsense_sim_gripper.stepping.converge import refine_until_converged
 from graspsense_sim_gripper.stepping.implicit import SpeedSearch
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start
 from graspsense_sim_gripper.stepping.tr_bdf2 import Stage
-from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper, lumped
-from graspsense_sim_gripper.terms.registry import find_term, laws_of, phases_of
-from graspsense_sim_gripper.terms.switchable import Switchable
-from graspsense_sim_gripper.terms.term import LAW_ERRORS, NO_STATE, Law, Phase
+from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
+from graspsense_sim_gripper.terms.registry import active_laws, find_term, laws_of, phases_of
+from graspsense_sim_gripper.terms.switchable import Switchable, switched_on_sum
+from graspsense_sim_gripper.terms.term import LAW_ERRORS, NO_STATE, Law, OnSum, Phase, SumLaw
 
 TermsStates = Any
 """A tuple with a state of its own type for each term."""
@@ -100,12 +100,31 @@ def _sum_of_more(
     return force1 + (force2 + (force3 + force)), (state1, state2, state3, *others)
 
 
-def sum_of(laws: Sequence[Law]) -> Law:
+summands: Law = _no_terms
+on_sum: SumLaw = switched_on_sum
+
+
+def _acted_on(
+    params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermsStates]:
+    total, before = summands(params[:-1], states[:-1], d0, d1, h, v1)
+    force, state = on_sum(params[-1], states[-1], total, d1)
+    return force, (*before, state)
+
+
+def sum_of(laws: Sequence[Law | OnSum]) -> Law:
     """Return one law that is the sum of these; its parameters and states are tuples in the same order.
 
     Forces are added from the last to the first. A term without force then changes no bit of the sum, and a padded
-    object has exactly the force of the original one.
+    object has exactly the force of the original one. The last law may act on the sum of the others.
     """
+    *others, last = laws or [OnSum(switched_on_sum)]
+    if isinstance(last, OnSum):
+        return bind(_acted_on, summands=_summed(others), on_sum=last.law) if laws else _no_terms
+    return _summed(laws)
+
+
+def _summed(laws: Sequence[Any]) -> Law:
     if not laws:
         return _no_terms
     if len(laws) == 1:
@@ -114,20 +133,15 @@ def sum_of(laws: Sequence[Law]) -> Law:
         return bind(_sum_of_2, first=laws[0], second=laws[1])
     if len(laws) == 3:
         return bind(_sum_of_3, first=laws[0], second=laws[1], third=laws[2])
-    return bind(_sum_of_more, first=laws[0], second=laws[1], third=laws[2], rest=sum_of(laws[3:]))
+    return bind(_sum_of_more, first=laws[0], second=laws[1], third=laws[2], rest=_summed(laws[3:]))
 
 
-def active_laws(kinds: Sequence[str]) -> list[Law]:
-    """Return the laws that `laws_of` makes switchable: that of the lumped spring and damper, then that of each term."""
-    return [lumped, *(find_term(kind)[1].law for kind in kinds)]
-
-
-def sum_of_active(laws: Sequence[Law]) -> Law:
+def sum_of_active(laws: Sequence[Law | OnSum]) -> Law:
     """Return what `sum_of` computes with `laws_of`, bit for bit, in a form that suits the interpreter.
 
     It takes the `active_laws`, calls those of the active terms only, and cannot be compiled.
     """
-    from_last = tuple(reversed(list(enumerate(laws))))
+    from_last = tuple([(i, law) for i, law in reversed(list(enumerate(laws))) if not isinstance(law, OnSum)])
 
     def force_of_active(
         params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
@@ -140,7 +154,22 @@ def sum_of_active(laws: Sequence[Law]) -> Law:
                 total = force + total
         return total, tuple(after)
 
-    return force_of_active
+    last = laws[-1] if laws else None
+    if not isinstance(last, OnSum):
+        return force_of_active
+    on_sum = last.law
+
+    def acted_on(
+        params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
+    ) -> tuple[float, TermsStates]:
+        total, after = force_of_active(params, states, d0, d1, h, v1)
+        active, term = params[-1]
+        if active == 0:
+            return total, after
+        force, state = on_sum(term, after[-1], total, d1)
+        return force, (*after[:-1], state)
+
+    return acted_on
 
 
 def _no_phase(states: TermsStates) -> int:
@@ -208,7 +237,7 @@ def contact_solver(kinds: tuple[str, ...]) -> ContactSolver:
 
 
 def plant_move(
-    laws: Sequence[Law],
+    laws: Sequence[Law | OnSum],
     phases: Sequence[tuple[int, Phase]] = (),
     *,
     converges: bool = True,
@@ -257,7 +286,8 @@ def grasp_loop(
 @lru_cache(maxsize=64)
 def guarded_loop(composition: Composition, step: ControllerStep) -> Callable[..., SimulationState]:
     """Return the loop of a grasp by steps in the interpreter, in which a law that raises an exception gives NaN."""
-    force = sum_of_active([_guarded(law) for law in active_laws(composition.kinds)])
+    laws = [law if isinstance(law, OnSum) else _guarded(law) for law in active_laws(composition.kinds)]
+    force = sum_of_active(laws)
     return _loop_of(_step_move(composition), step, force, composition.has_palm)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import cache
 from typing import Final
 
 import numpy as np
 from attrs import frozen
 
-from graspsense_sim_gripper.objects.spec import ObjectSpec, TermParams
+from graspsense_sim_gripper.objects.spec import NominalTerm, ObjectSpec, TermParams
 from graspsense_sim_gripper.terms.registry import find_term
 
 GRAVITY_M_S2: Final = 9.80665
@@ -42,25 +43,22 @@ class Instance:
 def sample(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None = None) -> Instance:
     """Return an instance that `rng` draws from the spreads of the spec; without `rng`, one with the nominal values.
 
-    With a number it is one particular object. Its stiffness and width then depend on the class and the number only, and
-    are the same in every state and every trial; `rng` draws its placement.
+    With a number it is one particular object. Its stiffness, its width and the parameters with a spread of their own
+    then depend on the class and the number only, and are the same in every trial; `rng` draws its placement.
     """
+    n_own = sum(value > 0.0 for term in spec.nominal_terms for value in term.spread)
     draws = rng.standard_normal(5).tolist() if rng is not None else [0.0] * 5
+    # Drawn last, so that parameters with a spread of their own change no other draw.
+    own_draws = rng.standard_normal(n_own).tolist() if rng is not None and n_own else [0.0] * n_own
     if rng is not None and number is not None:
         letters = spec.name.partition(":")[0].encode()
-        draws[:2] = np.random.default_rng([number, *letters]).standard_normal(2).tolist()
+        of_number = np.random.default_rng([number, *letters]).standard_normal(2 + n_own).tolist()
+        draws[:2], own_draws = of_number[:2], of_number[2:]
     # The stiffness is lognormal, and never negative. All other values are clipped at two standard deviations.
     stiffness_factor = math.exp(spec.stiffness_spread * draws[0])
     clipped = [min(max(draw, -2.0), 2.0) for draw in draws]
-    terms = tuple(
-        params._make(
-            [
-                value * stiffness_factor if stiff else value
-                for value, stiff in zip(params, is_stiffness, strict=True)
-            ]
-        )
-        for params, is_stiffness in spec.nominal_terms
-    )
+    own = iter(own_draws)
+    terms = tuple(_sampled_term(term, stiffness_factor, own) for term in spec.nominal_terms)
     dents = (find_term(kind)[1].dent(params) for kind, params in zip(spec.kinds, terms, strict=True))
     return Instance(
         spec=spec,
@@ -71,6 +69,21 @@ def sample(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None
         kinds=spec.kinds,
         terms=terms,
         patch_row=0.7 * clipped[4],
+    )
+
+
+def _sampled_term(term: NominalTerm, stiffness_factor: float, draws: Iterator[float]) -> TermParams:
+    """Return the parameters of a term of an instance; each with a spread of its own takes one of the `draws`."""
+    params, is_stiffness, spread = term
+    values = [
+        value * stiffness_factor if stiff else value
+        for value, stiff in zip(params, is_stiffness, strict=True)
+    ]
+    return params._make(
+        [
+            value * math.exp(own * next(draws)) if own > 0.0 else value
+            for value, own in zip(values, spread, strict=True)
+        ]
     )
 
 

@@ -164,8 +164,8 @@ def parse_entry(name: str, table: TomlTable) -> ObjectSpec:
     reasons: dict[str, str] = {}
     fitted_to: set[str] = set()
 
-    def figure(where: str, entry: TomlValue) -> float:
-        value = _figure(where, entry)
+    def figure(where: str, entry: TomlValue, signed: bool = False) -> float:
+        value = _figure(where, entry, signed)
         reasons[where] = entry["reason"]
         fitted_to.update(_fitted_to(where, entry["origin"]))
         return value
@@ -176,7 +176,11 @@ def parse_entry(name: str, table: TomlTable) -> ObjectSpec:
             values[key] = entry if key in ("summary", "patch") else figure(f"{name}.{key}", entry)
     fields = fields_dict(ObjectSpec)
     unknown = values.keys() - fields.keys()
-    missing = fields.keys() - values.keys() - {"terms", "reasons", "fitted_to", "offset_m", "held", "file"}
+    missing = (
+        fields.keys()
+        - values.keys()
+        - {"terms", "spreads", "reasons", "fitted_to", "offset_m", "held", "file"}
+    )
     if unknown or missing:
         raise ConfigError(f"object {name!r}: unknown {sorted(unknown)}, missing {sorted(missing)}")
     problems: list[str] = []
@@ -196,7 +200,7 @@ def parse_entry(name: str, table: TomlTable) -> ObjectSpec:
         raise ConfigError(f"object {name!r}: {error}") from error
 
 
-def _figure(where: str, entry: TomlValue) -> float:
+def _figure(where: str, entry: TomlValue, signed: bool) -> float:
     if not isinstance(entry, Mapping) or set(entry) != {"value", "origin", "reason"} or not entry["reason"]:
         raise ConfigError(
             f"{where}: write {{ value = NUMBER, origin = ORIGIN, reason = TEXT }}, not {entry!r}"
@@ -204,7 +208,7 @@ def _figure(where: str, entry: TomlValue) -> float:
     value = entry["value"]
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ConfigError(f"{where}: {value!r} is not a finite number")
-    if value < 0.0:
+    if value < 0.0 and not signed:
         raise ConfigError(f"{where}: {value!r} is negative")
     return float(value)
 

@@ -19,6 +19,9 @@ from graspsense_sim_gripper.terms.registry import find_term, in_order
 
 PATCHES: Final = ("line", "face", "point")
 
+MOST_SPREAD: Final = 3.0
+"""The largest standard deviation of the logarithm of a parameter: instances then differ by a factor of 20 and more."""
+
 TomlValue = Any
 """A value of a TOML file, of a type that is still to be checked."""
 TomlTable = Mapping[str, TomlValue]
@@ -26,6 +29,8 @@ TermParams = Any
 """The parameters of a term: a named tuple of the term's own type."""
 TermEntry = tuple[str, Mapping[str, float]]
 """The kind of a term, and its parameters by name."""
+TermSpread = Mapping[str, float]
+"""The standard deviation of the logarithm of parameters of a term between instances, by name."""
 
 
 def _positive() -> float:
@@ -36,11 +41,22 @@ def _not_negative(default: float) -> float:
     return field(default=default, validator=ge(0.0))
 
 
+class ParsedTerm(NamedTuple):
+    """A term of an object as it was read."""
+
+    kind: str
+    params: Mapping[str, float]
+    spread: TermSpread
+
+
 class NominalTerm(NamedTuple):
-    """The nominal parameters of a term, and which of them are stiffnesses and vary between instances."""
+    """The nominal parameters of a term, and how they vary between instances."""
 
     params: TermParams
     is_stiffness: tuple[bool, ...]
+    """Whether the parameter varies with the stiffness of the object."""
+    spread: tuple[float, ...]
+    """The standard deviation of the logarithm of its own variation; 0: it has none."""
 
 
 @frozen(kw_only=True)
@@ -68,6 +84,8 @@ class ObjectSpec:
     mass_kg: float = field(default=0.1, validator=gt(0.0))
     terms: tuple[TermEntry, ...] = ()
     """Kind and parameters of each term, in the canonical order."""
+    spreads: tuple[TermSpread, ...] = ()
+    """The spread of each term's parameters, in the same order; () if no parameter has a spread of its own."""
     reasons: Mapping[str, str] = field(factory=dict)
     fitted_to: tuple[str, ...] = ()
     """The published results to which values of this object were fitted, sorted."""
@@ -83,11 +101,14 @@ class ObjectSpec:
     def nominal_terms(self) -> tuple[NominalTerm, ...]:
         """The nominal parameters of each term."""
         nominal = []
-        for kind, values in self.terms:
+        spreads = self.spreads or ({},) * len(self.terms)
+        for (kind, values), spread in zip(self.terms, spreads, strict=True):
             term = find_term(kind)[1]
             # A default may be written as an integer, and compiled code distinguishes the types.
             params = term.params._make(float(value) for value in term.params(**values))
-            nominal.append(NominalTerm(params, tuple(name in term.stiffnesses for name in params._fields)))
+            stiff = tuple(name in term.stiffnesses for name in params._fields)
+            own = tuple(spread.get(name, 0.0) for name in params._fields)
+            nominal.append(NominalTerm(params, stiff, own))
         return tuple(nominal)
 
     @cached_property
@@ -96,13 +117,23 @@ class ObjectSpec:
         return repr(self)
 
 
-def spec_with_sorted_terms(values: TomlTable, terms: list[TermEntry]) -> ObjectSpec:
+def spec_with_sorted_terms(values: TomlTable, terms: list[ParsedTerm]) -> ObjectSpec:
     """Return the spec with these values, and its terms in the canonical order.
 
-    Raises ValueError if a value is out of the range of its field.
+    Raises ValueError if a value is out of the range of its field, or if two terms act on the sum of the others.
     """
-    order = in_order([kind for kind, _ in terms])
-    return ObjectSpec(**values, terms=tuple(terms[i] for i in order))
+    on_sum = [term.kind for term in terms if find_term(term.kind)[1].on_sum is not None]
+    if len(on_sum) > 1:
+        raise ValueError(
+            f"{len(on_sum)} terms act on the force of all others ({', '.join(on_sum)}): an object can have one"
+        )
+    ordered = [terms[i] for i in in_order([term.kind for term in terms])]
+    spreads = tuple(term.spread for term in ordered)
+    return ObjectSpec(
+        **values,
+        terms=tuple((term.kind, term.params) for term in ordered),
+        spreads=spreads if any(spreads) else (),
+    )
 
 
 @lru_cache(maxsize=1024)
@@ -128,7 +159,7 @@ def parse_scene(text: str, name: str, where: str) -> ObjectSpec:
 
 def _scene_values(table: TomlTable, problems: list[str]) -> dict[str, TomlValue]:
     """Return the values of all keys of a scene except its terms; problems are added to `problems`."""
-    known = fields_dict(ObjectSpec).keys() - {"name", "reasons", "fitted_to", "file"}
+    known = fields_dict(ObjectSpec).keys() - {"name", "reasons", "fitted_to", "file", "spreads"}
     values: dict[str, TomlValue] = {}
     for key, entry in table.items():
         if key not in known:
@@ -145,13 +176,13 @@ def _scene_values(table: TomlTable, problems: list[str]) -> dict[str, TomlValue]
     return values
 
 
-def _scene_terms(tables: TomlValue, problems: list[str]) -> list[TermEntry]:
+def _scene_terms(tables: TomlValue, problems: list[str]) -> list[ParsedTerm]:
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         problems.append("terms: write a table [[terms]] for each")
         return []
 
-    def number(where: str, entry: TomlValue) -> float:
-        return _number(entry, where, problems)
+    def number(where: str, entry: TomlValue, signed: bool) -> float:
+        return _number(entry, where, problems, signed)
 
     terms = []
     for i, table in enumerate(tables, 1):
@@ -180,12 +211,12 @@ def parse_term(
     label: str,
     prefix: str,
     problems: list[str],
-    number: Callable[[str, TomlValue], float],
-) -> TermEntry | None:
-    """Return the qualified kind of a term and its parameters; None if the kind is unknown.
+    number: Callable[[str, TomlValue, bool], float],
+) -> ParsedTerm | None:
+    """Return a term as it was read; None if its kind is unknown.
 
-    Problems are added to `problems`, and begin with `label`. `number(where, entry)` reads one value; `where` is
-    `prefix` followed by the key.
+    Problems are added to `problems`, and begin with `label`. `number(where, entry, signed)` reads one value, which may
+    be negative if it is `signed`; `where` is `prefix` followed by the key.
     """
     try:
         kind, term = find_term(str(table.get("type", "")))
@@ -193,7 +224,7 @@ def parse_term(
         problems.append(f"{label}: {error}")
         return None
     names: list[str] = list(term.params._fields)
-    given = [key for key in table if key != "type"]
+    given = [key for key in table if key not in ("type", "spread")]
     problems += [
         f"{label}: no such key {key!r}. Known: {', '.join(names)}.{suggestion(key, names)}"
         for key in given
@@ -203,11 +234,35 @@ def parse_term(
     if missing:
         problems.append(f"{label}: missing {', '.join(missing)}")
     before = len(problems)
-    values = {key: number(f"{prefix}{key}", table[key]) for key in given if key in names}
+    values = {key: number(f"{prefix}{key}", table[key], key in term.signed) for key in given if key in names}
+    spread = _spread(table.get("spread", {}), label, names, problems)
     if len(problems) == before:
         problems += [
             f"{label} {key}: must be greater than 0"
             for key in values
             if key in term.positive and values[key] <= 0.0
         ]
-    return kind, values
+    if len(problems) == before and not missing:
+        reason = term.refusal(term.params(**values))
+        problems += [f"{label}: {reason}"] if reason else []
+    return ParsedTerm(kind, values, spread)
+
+
+def _spread(entry: TomlValue, label: str, names: list[str], problems: list[str]) -> TermSpread:
+    """Return the spread of a term's parameters; what is wrong with it is added to `problems`."""
+    if not isinstance(entry, Mapping):
+        problems.append(f"{label} spread: write a table such as {{ {names[0]} = 0.1 }}, not {entry!r}")
+        return {}
+    problems += [
+        f"{label} spread: no such parameter {key!r}. Known: {', '.join(names)}.{suggestion(key, names)}"
+        for key in entry
+        if key not in names
+    ]
+    values = {key: _number(value, f"{label} spread.{key}", problems) for key, value in entry.items()}
+    problems += [
+        f"{label} spread.{key}: {value:g} is too large: it is the standard deviation of a logarithm, at most "
+        f"{MOST_SPREAD:g}"
+        for key, value in values.items()
+        if value > MOST_SPREAD
+    ]
+    return values

@@ -28,8 +28,8 @@ from graspsense_sim_gripper.problem import ControllerStep, GraspController, Prob
 from graspsense_sim_gripper.reduction.levels import Level
 from graspsense_sim_gripper.reduction.model import Reduction, TermDecision, Verification
 from graspsense_sim_gripper.stepping.scheme import Steps
-from graspsense_sim_gripper.terms.registry import laws_of
-from graspsense_sim_gripper.terms.term import WorkingPoint
+from graspsense_sim_gripper.terms.registry import active_laws
+from graspsense_sim_gripper.terms.term import OnSum, WorkingPoint
 
 MAX_IN_MEMORY: Final = 512
 """Models in memory, of some 5 kB each; the least recently used is dropped first."""
@@ -110,7 +110,7 @@ def _file_name(key: Key) -> str | None:
     None if the code of a term or of the controller cannot be identified.
     """
     digest = hashlib.sha256(_own_code())
-    functions = (key.step, *laws_of(key.kinds))
+    functions = (key.step, *(law.law if isinstance(law, OnSum) else law for law in active_laws(key.kinds)))
     try:
         marks = [fingerprint(function) for function in functions]
         # The rates and limits of a term are in the same file as its law: the file is identified as well.

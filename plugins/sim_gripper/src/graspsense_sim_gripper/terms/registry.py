@@ -11,6 +11,7 @@ from graspsense.plugin_api import UnknownName, bind, collect, suggestion
 from graspsense_sim_gripper.terms import (
     elastic,
     foam,
+    fracture,
     gas,
     liquid,
     loss,
@@ -22,12 +23,12 @@ from graspsense_sim_gripper.terms import (
     worn,
 )
 from graspsense_sim_gripper.terms.lumped import lumped
-from graspsense_sim_gripper.terms.switchable import switched
-from graspsense_sim_gripper.terms.term import Law, Phase, Term, one_phase
+from graspsense_sim_gripper.terms.switchable import switched, switched_on_sum
+from graspsense_sim_gripper.terms.term import Law, OnSum, Phase, Term, one_phase
 
 TERMS: Final[dict[str, Term]] = {
     module.TERM.name: module.TERM
-    for module in (elastic, rigid, maxwell, gas, loss, foam, snap, worn, surface, liquid, slosh)
+    for module in (elastic, rigid, maxwell, gas, loss, foam, snap, worn, surface, liquid, slosh, fracture)
 }
 """The terms of this package, in the order that every object uses, so that equal terms are compiled once."""
 
@@ -74,20 +75,35 @@ def find_term(name: str) -> tuple[str, Term]:
 
 
 def in_order(names: Sequence[str]) -> list[int]:
-    """Return the indices that sort these names: the terms of this package in their order, then those of plugins."""
+    """Return the indices that sort these names: the terms of this package in their order, then those of plugins.
+
+    The term that acts on the sum of the others is the last. Raises UnknownName.
+    """
     ours = list(TERMS)
-    return sorted(
-        range(len(names)),
-        key=lambda i: (0, ours.index(names[i]), "") if names[i] in TERMS else (1, 0, names[i]),
-    )
+
+    def place(i: int) -> tuple[bool, bool, int, str]:
+        name = names[i]
+        known = name in TERMS
+        return find_term(name)[1].on_sum is not None, not known, ours.index(name) if known else 0, name
+
+    return sorted(range(len(names)), key=place)
 
 
-def laws_of(names: Sequence[str]) -> list[Law]:
+def laws_of(names: Sequence[str]) -> list[Law | OnSum]:
     """Return the laws of an object with these terms: that of the lumped spring and damper, then that of each term.
 
     The parameters of each are `Switchable`. Raises UnknownName.
     """
-    return [bind(switched, law=one) for one in (lumped, *(find_term(name)[1].law for name in names))]
+    return [
+        OnSum(bind(switched_on_sum, on_sum=one.law)) if isinstance(one, OnSum) else bind(switched, law=one)
+        for one in active_laws(names)
+    ]
+
+
+def active_laws(names: Sequence[str]) -> list[Law | OnSum]:
+    """Return the laws that `laws_of` makes switchable: that of the lumped spring and damper, then that of each term."""
+    terms = [find_term(name)[1] for name in names]
+    return [lumped, *(term.law if term.on_sum is None else OnSum(term.on_sum) for term in terms)]
 
 
 def phases_of(names: Sequence[str]) -> list[tuple[int, Phase]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from graspsense_sim_gripper.terms.lumped import lumped
-from graspsense_sim_gripper.terms.term import Law, TermParams, TermState
+from graspsense_sim_gripper.terms.term import Law, SumLaw, TermParams, TermState
 
 
 class Switchable(NamedTuple):
@@ -18,7 +18,12 @@ class Switchable(NamedTuple):
     params: TermParams
 
 
+def _unchanged(params: TermParams, state: TermState, force_n: float, d1: float) -> tuple[float, TermState]:
+    return force_n, state
+
+
 law: Law = lumped
+on_sum: SumLaw = _unchanged
 
 
 def switched(
@@ -28,3 +33,10 @@ def switched(
     if term.active == 0:
         return 0.0, state
     return law(term.params, state, d0, d1, h, v1)
+
+
+def switched_on_sum(term: Switchable, state: TermState, force_n: float, d1: float) -> tuple[float, TermState]:
+    """Return what `on_sum` makes of the force if the term is active, otherwise that force and the old state."""
+    if term.active == 0:
+        return force_n, state
+    return on_sum(term.params, state, force_n, d1)

@@ -16,9 +16,18 @@ Phase = Callable[[TermState], int]
 Law = Callable[[TermParams, TermState, float, float, float, float], tuple[float, TermState]]
 """`law(params, state, d0, d1, h, v1) -> (force, state)`: from d0 to d1 (m) in h (s), then at v1 (m/s)."""
 
+SumLaw = Callable[[TermParams, TermState, float, float], tuple[float, TermState]]
+"""`on_sum(params, state, force_n, d1) -> (force, state)`: the force of the object from the sum of its other terms."""
+
 LAW_ERRORS: Final = (ArithmeticError, ValueError)
 """What a law may raise where it has no value, such as a division by zero or the root of a negative number."""
 PIECES: Final = 256
+
+
+class OnSum(NamedTuple):
+    """The law of a term that acts on the sum of the other terms' forces, in a list of laws: the last of them."""
+
+    law: SumLaw
 
 
 class NoState(NamedTuple):
@@ -107,6 +116,19 @@ def never_beyond(state: TermState) -> str:
     return ""
 
 
+def never_refused(params: TermParams) -> str:
+    """Return "": there is a law for all parameters."""
+    del params
+    return ""
+
+
+def no_force(
+    params: TermParams, state: TermState, d0: float, d1: float, h: float, v1: float
+) -> tuple[float, TermState]:
+    """Return no force: the law of a term that acts on the sum of the others."""
+    return 0.0, state
+
+
 def one_phase(state: TermState) -> int:
     """Return 0: one law holds throughout."""
     del state
@@ -129,7 +151,7 @@ class Term:
     `params` is a named tuple of floats; a scene may omit a field that has a default. The law is a pure function that
     runs both in the interpreter and compiled: floats and named tuples, no closure, no `x**2`. It integrates its own
     state, and is stable however fast that is. `rates` gives the rates of its states at a working point. `positive`
-    names the parameters that must not be zero; none may be negative.
+    names the parameters that must not be zero; only those that `signed` names may be negative.
     """
 
     name: str
@@ -143,6 +165,14 @@ class Term:
     linear: Callable[[TermParams], LinearForm | OwnContact | None] = not_linear
     """Its linear form with these parameters, or None. A scene can be discretised exactly if every term has one."""
     positive: tuple[str, ...] = ()
+    signed: tuple[str, ...] = ()
+    refusal: Callable[[TermParams], str] = never_refused
+    """Returns why there is no law with these parameters and what is allowed, "" if there is one."""
+    on_sum: SumLaw | None = None
+    """The law of a term that acts on the sum of the other terms' forces, as a fracture does; its `law` is `no_force`.
+
+    An object has at most one such term. It runs compiled, like a law.
+    """
     stiffnesses: tuple[str, ...] = ()
     """Parameters that grow with the thickness of the wall; they vary between instances."""
     beyond: Callable[[TermState], str] = never_beyond
@@ -159,7 +189,11 @@ class Term:
         fields = getattr(self.params, "_fields", None)
         if fields is None:
             raise TypeError(f"term {self.name!r}: params is {self.params!r}, which is not a named tuple")
-        strangers = {*self.positive, *self.stiffnesses} - set(fields)
+        if reserved := {"type", "spread"} & set(fields):
+            raise TypeError(
+                f"term {self.name!r}: no parameter may be called {sorted(reserved)}: scenes use that key"
+            )
+        strangers = {*self.positive, *self.signed, *self.stiffnesses} - set(fields)
         if strangers:
             raise TypeError(f"term {self.name!r}: {self.params.__name__} has no field {sorted(strangers)}")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from graspsense_sim_gripper.terms.elastic import shell_force, unstable
 from graspsense_sim_gripper.terms.term import Rate, Term, WorkingPoint
 
 
@@ -52,7 +53,7 @@ def _force(params: Worn, work_j: float, d: float) -> float:
     after = before * math.exp(-work_j / params.wear_j)
     pressed = d - params.set_m * (before - after)
     left = 1.0 - min(params.softening, 1.0) * (1.0 - after)
-    return left * (params.k1_n_m * pressed + params.k3_n_m3 * pressed * pressed * pressed)
+    return left * shell_force(params.k1_n_m, params.k3_n_m3, pressed)
 
 
 def dent(params: Worn) -> float:
@@ -66,6 +67,11 @@ def rates(params: Worn, at: WorkingPoint) -> tuple[Rate, ...]:
     return (Rate("wears", max(force, 0.0) * at.speed_m_s / params.wear_j),)
 
 
+def refusal(params: Worn) -> str:
+    """Return why the shell has no stable law."""
+    return unstable(params.k1_n_m, params.k3_n_m3)
+
+
 TERM = Term(
     name="worn",
     summary="elastic shell that softens and keeps a dent with the work done on it",
@@ -75,5 +81,7 @@ TERM = Term(
     rates=rates,
     dent=dent,
     positive=("k1_n_m", "wear_j"),
+    signed=("k3_n_m3",),
+    refusal=refusal,
     stiffnesses=("k1_n_m", "k3_n_m3"),
 )
