@@ -101,16 +101,20 @@ def _engine(name: str, setting: str, loop: Callable[..., None], scene: PeerScene
 
 
 def _settle(scene: PeerScene) -> Any:
-    """Return a compiled function that applies what is due, as often as modes change in turn."""
+    """Return a compiled function that applies what is due, as often as modes change in turn.
+
+    `happened` is an event that was located and applied a moment ago. A root that lies a rounding error before the
+    event would otherwise undo it.
+    """
     guards, jump, n = scene.guards, scene.jump, scene.n_guards
 
     @njit
-    def settle(s: Any, u: float, mode: Any, g: Any) -> None:
+    def settle(s: Any, u: float, mode: Any, g: Any, happened: int = -1) -> None:
         for _ in range(4):
             changed = False
             guards(s, u, mode, g)
             for k in range(n):
-                if g[k] > 0.0:
+                if g[k] > 0.0 and k != happened:
                     jump(k, s, u, mode)
                     changed = True
                     break
@@ -301,7 +305,7 @@ def _piecewise(scene: PeerScene, solve: Callable[..., tuple[float, Any, int]]) -
             t, s, event = solve(s, u, mode, t)
             if event >= 0:
                 scene.jump(event, s, u, mode)
-                settle(s, u, mode, g)
+                settle(s, u, mode, g, event)
     return Run(x=xs, force=forces, u=us)
 
 
