@@ -102,6 +102,7 @@ def found():
     return evaluate(SelectedComponent(component, component.config_class()()), labelled, classifier="c45")
 
 
+@pytest.mark.slow
 @real_data
 def test_the_first_frame_alone_gives_the_class_away_before_any_touch(found):
     leak = found.controls["before_contact"]
@@ -111,6 +112,7 @@ def test_the_first_frame_alone_gives_the_class_away_before_any_touch(found):
     assert any("from before contact" in warning for warning in found.warnings)
 
 
+@pytest.mark.slow
 @real_data
 def test_features_relative_to_it_are_a_tenth_below_the_absolute_ones(found):
     assert found.protocol == "stratified_10_fold"
@@ -118,6 +120,7 @@ def test_features_relative_to_it_are_a_tenth_below_the_absolute_ones(found):
     assert found.headline.rate > found.controls["majority_class"].rate.rate + 0.2
 
 
+@pytest.mark.slow
 @real_data
 def test_rates_are_split_by_contact_and_do_not_pretend_to_generalise(found):
     """Every class there is one object in one session, so no number of grasps tells of another object."""
@@ -131,6 +134,7 @@ def test_rates_are_split_by_contact_and_do_not_pretend_to_generalise(found):
     assert any("class, object and session are the same" in note for note in found.notes)
 
 
+@pytest.mark.slow
 @real_data
 def test_blocks_of_recording_order_are_reported_with_their_interval(found):
     blocks = found.controls["recording_order"]
@@ -142,6 +146,7 @@ def test_blocks_of_recording_order_are_reported_with_their_interval(found):
     assert blocks.difference_of == "stratified_10_fold"
 
 
+@pytest.mark.slow
 @real_data
 def test_no_instance_can_be_held_out_there(found):
     held = found.controls["instance_held_out"]

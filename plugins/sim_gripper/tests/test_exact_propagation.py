@@ -394,6 +394,7 @@ def test_a_very_light_surface_is_not_penetrated():
 # ------------------------------------------------------------------------------------- as a whole grasp
 
 
+@pytest.mark.slow
 def test_the_report_names_the_exact_discretisation(tmp_path):
     """And that steps do if friction is greater at rest."""
     law = create("controller", "hybrid", probing_force_n=5.0)

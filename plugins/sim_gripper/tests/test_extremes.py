@@ -18,7 +18,7 @@ def module():
 
 
 extremes = module()
-SLOW = {"stiffness_and_mass", "head_space", "vents", "relaxation", "ticks"}
+SLOW = {"stiffness_and_mass", "head_space", "vents", "relaxation", "thin_object", "ticks"}
 
 
 @pytest.mark.parametrize(

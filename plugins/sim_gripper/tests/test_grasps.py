@@ -23,17 +23,17 @@ def peaks(name, force_n, scene, seeds):
     return done, np.array([one.state.peak_n for one in done])
 
 
-# A few in the quick run, all of them in the slow one.
-@pytest.mark.parametrize("phases", [4, pytest.param(41, marks=pytest.mark.slow)])
-def test_on_the_block_pure_force_slams_at_least_three_times_the_hybrids_peak(phases):
+@pytest.mark.slow
+def test_on_the_block_pure_force_slams_at_least_three_times_the_hybrids_peak():
     # Fig. 5 against Fig. 6, by the true force, at 23 N. The approach begins with an image of the pads, so opening
     # wider by up to 0.41 mm (41 ms at 10 mm/s) moves the contact through every phase of their clock.
+    phases = 41
     peak = {"hybrid": [], "force": []}
     for name, peaks_n in peak.items():
         controller = create("controller", name, probing_force_n=23.0)
         for k in range(phases):
             config = SimConfig(spread=False, open_gap_m=0.086 + k * 0.41e-3 / phases)
-            done = run_many(config, controller, ["block"], [0], compiled=phases > 10)[0]
+            done = run_many(config, controller, ["block"], [0], compiled=True)[0]
             assert done.outcome is Outcome.STEADY
             peaks_n.append(done.state.peak_n)
     # The worst hybrid grasp stands against the gentlest slam.
@@ -120,6 +120,7 @@ def features(scene, seeds=range(5), **config):
     return np.array([FEATURES.extract(one.trace).values for one in done])
 
 
+@pytest.mark.slow
 def test_the_states_of_a_bottle_lie_where_the_authors_tree_splits_them():
     # The tree learned on the robot (personalrobots-pkg, gripper_realtime_closed_loop.py): delta_t over 0.542 s is
     # full and open; p_steady at or under 49.578 mm is empty and open. These two the catalogue was fitted to.

@@ -133,7 +133,13 @@ def test_a_body_may_break_while_the_fingers_stand_still():
 
 
 @pytest.mark.parametrize(
-    "settings", [{"accuracy": 0.1}, {}, {"compile": "always"}, {"fidelity": "reference"}]
+    "settings",
+    [
+        {"accuracy": 0.1},
+        {},
+        {"fidelity": "reference"},
+        pytest.param({"compile": "always"}, marks=pytest.mark.slow),
+    ],
 )
 def test_an_egg_breaks_at_its_strength(settings):
     gripper = create("sensor-backend", "sim", sensor="ideal", spread=False, **settings)
@@ -209,6 +215,7 @@ def test_a_force_that_is_not_finite_ends_the_grasp_with_the_name_of_the_term(stu
     assert 4.0 < done.state.peak_n < 6.0
 
 
+@pytest.mark.slow
 def test_compiled_code_names_the_term_too(stuff):
     config, scene = SimConfig(spread=False, sensor="ideal"), stuff(not_a_number)
     plain, compiled = (
