@@ -23,7 +23,12 @@ from graspsense.experiments.paper.published import published
 from graspsense.inference import Prior
 from graspsense.plugin_api import Features, create
 from graspsense.sources.simulated import OBJECTS_PER_SEED, TRIALS_PER_SEED, Group, PlannedTrial
-from graspsense_c45.classifier import C45Classifier
+from graspsense_c45.fitting import fit
+from graspsense_c45.options import Options
+from graspsense_c45.prediction import distributions
+from graspsense_c45.schema import Attribute, Schema
+from graspsense_c45.table import make_table
+from graspsense_c45.tree import Tree
 from graspsense_sim_gripper.batch import run_many
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue, object_kinds
@@ -323,9 +328,23 @@ def matrix_of(features: Sequence[Features]) -> Any:
     return np.array([one.values for one in features])
 
 
-def tree_of(features: Any, labels: Sequence[str]) -> C45Classifier:
-    """Return a C4.5 tree of these trials, with J48's defaults."""
-    return C45Classifier(engine="fast").fit(features, np.array(labels))
+class StateTree(NamedTuple):
+    """A C4.5 tree with J48's defaults."""
+
+    classes: tuple[str, ...]
+    tree: Tree
+
+    def answers(self, features: Any) -> list[str]:
+        """Return the most probable label of each trial."""
+        return [self.classes[k] for k in distributions(self.tree, features).argmax(axis=1)]
+
+
+def tree_of(features: Any, labels: Sequence[str]) -> StateTree:
+    """Return the tree of these trials."""
+    classes = tuple(sorted(set(labels)))
+    schema = Schema(tuple(Attribute(f"x{k}") for k in range(features.shape[1])), classes)
+    table = make_table(schema, features, [classes.index(label) for label in labels])
+    return StateTree(classes, fit(table, Options(), engine="fast"))
 
 
 def answers(features: Sequence[Features], labels: Sequence[str], seed: int) -> list[str]:
@@ -339,7 +358,7 @@ def answers(features: Sequence[Features], labels: Sequence[str], seed: int) -> l
         if len(set(known[~test])) == 1:
             found[test] = known[~test][0]
             continue
-        found[test] = tree_of(values[~test], known[~test]).predict(values[test])
+        found[test] = tree_of(values[~test], known[~test].tolist()).answers(values[test])
     return [str(one) for one in found]
 
 
@@ -418,6 +437,16 @@ def observed() -> dict[str, Observed]:
     return found
 
 
+def gain(values: Values, seed: int) -> float:
+    """Return the rate of Table IV at 23 N minus that at 17 N, of one replicate."""
+    extract = create("feature-set", "chitta").extract
+    rates = []
+    for force_n in (FORCES_N[0], FORCES_N[-1]):
+        trials = squeeze({"odwalla": TABLE_IV}, values, seed, force_n, extract)
+        rates.append(rate(answers(trials.extracted, trials.labels, seed), trials.labels))
+    return rates[1] - rates[0]
+
+
 def table_4(values: Values, seed: int) -> dict[str, Any]:
     """Return the rates of Table IV, and the trials at 23 N with the squeezes as the authors' tree sees them."""
     both, one_pad = create("feature-set", "chitta"), create("feature-set", "chitta", force="left")
@@ -438,7 +467,7 @@ def table_4(values: Values, seed: int) -> dict[str, Any]:
 
 
 def predictions(values: Values, seed: int) -> dict[str, float]:
-    """Return one replicate of what the posterior predicts: Tables IV and V, section III.F, figures, the tree's splits."""
+    """Return one replicate of the predictions: Tables IV and V, section III.F, Figs. 4 to 6, the tree's splits."""
     table = table_4(values, seed)
     trials, squeezes = table.pop("trials"), table.pop("squeezes")
     states = [label.partition(":")[2] for label in trials.labels]
@@ -455,7 +484,9 @@ def predictions(values: Values, seed: int) -> dict[str, float]:
             lambda label, others=others: label.partition(":")[2] in others,  # type: ignore[misc]
         )
     times = [one.delta_t_s for one in squeezes]
-    medians = {s: np.nanmedian([t for t, of in zip(times, states, strict=True) if of == s]) for s in set(states)}
+    medians = {
+        s: np.nanmedian([t for t, of in zip(times, states, strict=True) if of == s]) for s in set(states)
+    }
     found["full_open_longest"] = float(max(medians, key=lambda s: medians[s]) == "full_open")
     eleven = rates_at_20_n(values, seed).trials.of("odwalla", "naked", "can")
     found["eleven_classes"] = rate(answers(eleven.extracted, eleven.labels, seed), eleven.labels)
@@ -464,7 +495,7 @@ def predictions(values: Values, seed: int) -> dict[str, float]:
     for name, kind in (("worn_bottles", "odwalla_worn"), ("other_new_bottles", "odwalla")):
         others = squeeze({kind: TABLE_IV}, values, seed, 23.0, extract, first_instance=500)
         true = [label.partition(":")[2] for label in others.labels]
-        found[name] = rate([str(one) for one in tree.predict(matrix_of(others.extracted))], true)
+        found[name] = rate(tree.answers(matrix_of(others.extracted)), true)
     return {**found, **_figures(values, seed)}
 
 
