@@ -137,9 +137,9 @@ PRIORS: Final = (
         name="offset_spread_m",
         unit="m",
         law="uniform",
-        args=(0.0, 0.006),
+        args=(0.0, 0.0045),
         origin="assumed",
-        reason="how well a person centres a container between the fingers",
+        reason="how well a person centres a container; with more, some would not fit between the open fingers",
     ),
     Prior(
         name="one_state",

@@ -14,7 +14,7 @@ from graspsense.core.errors import ConfigError
 from graspsense.core.features import Features, FeatureTable
 from graspsense.plugin_api import create
 
-ALL = ["c45", "svm", "mlp", "forest", "boosted", "ebm", "knn", "tree"]
+ALL = ["c45", "svm", "mlp", "backprop", "forest", "boosted", "ebm", "knn", "tree"]
 NAMES, UNITS = ("p_first", "f_steady", "noise"), ("m", "N", "")
 
 
@@ -205,3 +205,40 @@ assert ("sklearn" in sys.modules) is {name != "c45"}
 """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
     assert ran.returncode == 0, ran.stderr
+
+
+def test_a_machine_with_the_range_as_scale_does_not_depend_on_units_and_fits_less_than_with_deviations():
+    table, labels = trials(missing=0.1)
+    metres = fitted("svm", table, labels, scaling="range", kernel="linear", c=1.0)
+    millimetres = FeatureTable(names=NAMES, units=UNITS, values=table.values * (1e3, 1.0, 1.0))
+    same = fitted("svm", millimetres, labels, scaling="range", kernel="linear", c=1.0)
+
+    assert metres.probabilities(table) == pytest.approx(same.probabilities(millimetres), abs=1e-6)
+    ready = metres._fitted.ready(table.values)
+    assert (ready.min(axis=0), ready.max(axis=0)) == (pytest.approx(np.zeros(3)), pytest.approx(np.ones(3)))
+
+
+def test_the_network_takes_the_steps_of_the_published_rule():
+    from graspsense.plugins.classifiers.backprop_training import train
+
+    x, wanted = np.array([[0.5, 1.0], [-0.25, 1.0]]), np.array([[1.0, 0.0], [0.0, 1.0]])
+    hidden, output = np.array([[0.1, -0.2]]), np.array([[0.3, 0.1], [-0.1, 0.2]])
+
+    def loss(weights, i):
+        w1, w2 = weights[:2].reshape(1, 2), weights[2:].reshape(2, 2)
+        felt = np.append(1 / (1 + np.exp(-w1 @ x[i])), 1.0)
+        return 0.5 * np.sum((wanted[i] - 1 / (1 + np.exp(-w2 @ felt))) ** 2)
+
+    # The gradient by differences, a step for each trial, and a share of the step before.
+    weights, change = np.concatenate((hidden.ravel(), output.ravel())), np.zeros(6)
+    for i in (0, 1, 0, 1):
+        slope = [(loss(weights + d, i) - loss(weights - d, i)) / 2e-5 for d in 1e-5 * np.eye(6)]
+        change = -0.3 * np.array(slope) + 0.2 * change
+        weights = weights + change
+    found = train(x, wanted, hidden, output, (0.3, 0.2), 2)
+
+    assert np.concatenate([one.ravel() for one in found]) == pytest.approx(weights, abs=1e-9)
+
+
+def test_the_network_has_half_as_many_units_as_features_and_labels():
+    assert fitted("backprop", *trials())._fitted.estimator._hidden.shape == (3, 4)

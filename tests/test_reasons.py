@@ -101,7 +101,7 @@ def test_a_text_becomes_a_reason_and_json_has_what_a_reason_has():
     assert said.because == (Reason(words="nearest to the mean of can"),)
     assert said.as_json()["because"] == [{"words": "nearest to the mean of can"}]
 
-    for name in ("forest", "boosted", "ebm", "c45", "knn", "mlp", "svm", "tree"):
+    for name in ("forest", "boosted", "ebm", "c45", "knn", "mlp", "backprop", "svm", "tree"):
         listed = json.loads(json.dumps(fitted(name, *trials()).explain(MISSING).as_json()))["because"]
         assert all(one["words"] for one in listed)
         missing = [one for one in listed if "is missing" in one["words"]]

@@ -65,10 +65,11 @@ def graspsense_sensor_backends() -> Iterable[SensorBackendEntry]:
 
 @hookimpl
 def graspsense_classifiers() -> Iterable[ClassifierEntry]:
-    """Return classifiers of scikit-learn and interpret. C4.5, which the paper uses, is in another distribution."""
+    """Return the classifiers of this package. C4.5, which the paper uses, is in another distribution."""
     for name, cls, summary in (
-        ("svm", "Svm", "support vector machine with a radial kernel (scikit-learn)"),
+        ("svm", "Svm", "support vector machine (scikit-learn)"),
         ("mlp", "Mlp", "neural network with one hidden layer (scikit-learn)"),
+        ("backprop", "Backprop", "neural network trained trial by trial, as Weka's by default"),
         ("forest", "Forest", "random forest (scikit-learn)"),
         ("boosted", "Boosted", "gradient-boosted trees (scikit-learn)"),
         ("ebm", "Ebm", "explainable boosting: a sum of functions of the features (interpret)"),

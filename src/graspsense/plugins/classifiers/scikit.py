@@ -1,7 +1,8 @@
 """The common part of the classifiers of scikit-learn, which is imported when one is fitted or loaded.
 
 Missing features are filled with the median of the training trials (0 where no training trial had the feature),
-then every feature is brought to mean 0 and standard deviation 1 over the training trials. A model is kept as its
+then every feature is brought to mean 0 and standard deviation 1 over the training trials, unless the classifier says
+otherwise. A model is kept as its
 training trials, settings and seed, and made again from them when it is loaded, or as the fitted estimator itself
 through skops: nothing is unpickled, and with the same version of scikit-learn it is the same model.
 """
@@ -55,6 +56,7 @@ class FittedEstimator:
     seed: int
     fill: NDArray[np.float64]
     mean: NDArray[np.float64]
+    """The value of each feature that becomes 0, which is its mean unless the classifier scales it otherwise."""
     scale: NDArray[np.float64]
 
     def ready(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -102,6 +104,12 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
 
         return np.asarray(fitted.estimator.predict_proba(rows), dtype=np.float64)
 
+    def origin_and_scale(
+        self, values: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the value of each feature that becomes 0, and the difference that becomes 1."""
+        return values.mean(axis=0), values.std(axis=0)
+
     def fit(self, table: FeatureTable, labels: Sequence[str], seed: int) -> None:
         """Fill missing values, scale, and fit. Raises ValueError for fewer than two labels."""
         import warnings
@@ -115,7 +123,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             warnings.simplefilter("ignore", RuntimeWarning)  # by numpy, for a column without values
             fill = np.nan_to_num(np.nanmedian(table.values, axis=0), nan=0.0)
         filled = np.where(np.isnan(table.values), fill, table.values)
-        scale = filled.std(axis=0)
+        origin, scale = self.origin_and_scale(filled)
         # A feature that varies only by rounding is constant; scaling would amplify it to noise.
         constant = scale <= 1e-12 * np.maximum(np.abs(filled).max(axis=0), np.finfo(np.float64).tiny)
         fitted = FittedEstimator(
@@ -124,7 +132,7 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
             labels=tuple(labels),
             seed=seed,
             fill=fill,
-            mean=filled.mean(axis=0),
+            mean=origin,
             scale=np.where(constant, 1.0, scale),
         )
         # One thread: on small tables more threads cost time, and the order of sums would depend on the machine.

@@ -25,6 +25,11 @@ class SvmConfig(KeptConfig):
         meaning="Penalty of a training trial on the wrong side; a larger one fits the data more closely.",
     )
     kernel: Literal["rbf", "linear"] = setting(default="rbf", meaning="Radial or linear kernel.")
+    scaling: Literal["deviation", "range"] = setting(
+        default="deviation",
+        meaning="deviation: features have mean 0 and standard deviation 1 in training. range: they have the range 0 to "
+        "1, as in Weka's SMO.",
+    )
 
 
 class Svm(ScikitClassifier[SvmConfig]):
@@ -37,6 +42,15 @@ class Svm(ScikitClassifier[SvmConfig]):
         return SVC(
             C=self.config.c, kernel=self.config.kernel, decision_function_shape="ovr", random_state=seed
         )
+
+    def origin_and_scale(
+        self, values: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return mean and standard deviation, or the least value and the range."""
+        if self.config.scaling == "deviation":
+            return super().origin_and_scale(values)
+        low = values.min(axis=0)
+        return low, values.max(axis=0) - low
 
     def shares(self, fitted: FittedEstimator, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the softmax of the decision values."""

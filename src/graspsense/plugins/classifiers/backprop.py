@@ -1,0 +1,143 @@
+"""Neural network with one hidden layer, trained as Weka's MultilayerPerceptron is by default."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final, Self
+
+from attrs import frozen
+
+from graspsense.plugin_api import (
+    ClassifierConfig,
+    FeatureValue,
+    NotCompilable,
+    Reason,
+    compile_function,
+    first_call,
+    setting,
+)
+from graspsense.plugins.classifiers.scikit import FittedEstimator, ScikitClassifier, most_likely
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+WEIGHT: Final = 0.05
+"""The weights are uniformly distributed between minus and plus this number before the training."""
+
+
+@frozen(kw_only=True)
+class BackpropConfig(ClassifierConfig):
+    """Settings of the network; the defaults are Weka's."""
+
+    learning_rate: float = setting(
+        default=0.3, above=0.0, maximum=1.0, meaning="Step along the gradient of one training trial."
+    )
+    momentum: float = setting(
+        default=0.2,
+        minimum=0.0,
+        below=1.0,
+        meaning="Share of the previous change that is added to each change.",
+    )
+    epochs: int = setting(
+        default=500,
+        minimum=1,
+        plausible=(1, 100_000),
+        meaning="Number of passes over the training trials.",
+    )
+    hidden: int = setting(
+        default=0,
+        minimum=0,
+        plausible=(0, 10_000),
+        meaning="Neurons of the hidden layer; 0: half the sum of the numbers of features and of labels.",
+    )
+
+
+class Backprop(ScikitClassifier[BackpropConfig]):
+    """A network of sigmoid units, trained by gradient descent on the squared error of one trial at a time.
+
+    As in Weka, the features have the range -1 to 1 over the training trials, the trials are shuffled once, and all
+    epochs are run. The probabilities are the outputs divided by their sum.
+    """
+
+    def estimator(self, seed: int, trials: int) -> Any:
+        """Return the untrained network."""
+        return SigmoidNetwork(self.config, seed)
+
+    def reasons(
+        self,
+        fitted: FittedEstimator,
+        row: NDArray[np.float64],
+        given: Sequence[FeatureValue],
+        shares: Mapping[str, float],
+    ) -> Sequence[Reason]:
+        """Return the most probable labels."""
+        return (most_likely(shares, "outputs of the network"),)
+
+
+class SigmoidNetwork:
+    """The network with the methods of an estimator of scikit-learn."""
+
+    classes_: NDArray[np.str_]
+
+    def __init__(self, config: BackpropConfig, seed: int) -> None:
+        self._config, self._seed = config, seed
+
+    def fit(self, values: NDArray[np.float64], labels: NDArray[np.str_]) -> Self:
+        """Train on these trials, shape (trials, features)."""
+        import numpy as np
+
+        rng, config = np.random.default_rng(self._seed), self._config
+        self.classes_, numbers = np.unique(labels, return_inverse=True)
+        self._low = values.min(axis=0)
+        extent = values.max(axis=0) - self._low
+        self._half = np.where(extent > 0.0, extent / 2.0, 1.0)
+        order = rng.permutation(len(values))
+        inputs = self._inputs(values)[order]
+        wanted = np.eye(len(self.classes_))[numbers[order]]
+        units = config.hidden or (inputs.shape[1] - 1 + len(self.classes_)) // 2
+        start = [
+            rng.uniform(-WEIGHT, WEIGHT, shape)
+            for shape in ((units, inputs.shape[1]), (len(self.classes_), units + 1))
+        ]
+        rates = (config.learning_rate, config.momentum)
+        self._hidden, self._output = _training()(inputs, wanted, start[0], start[1], rates, config.epochs)
+        return self
+
+    def predict_proba(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the outputs divided by their sum, shape (trials, classes)."""
+        import numpy as np
+
+        hidden = _sigmoid(self._inputs(values) @ self._hidden.T)
+        outputs = _sigmoid(np.column_stack((hidden, np.ones(len(hidden)))) @ self._output.T)
+        return np.asarray(outputs / outputs.sum(axis=1, keepdims=True))
+
+    def _inputs(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the features in the range -1 to 1 of the training trials, and a column of ones for the bias."""
+        import numpy as np
+
+        return np.column_stack(((values - self._low) / self._half - 1.0, np.ones(len(values))))
+
+
+def _sigmoid(x: Any) -> Any:
+    import numpy as np
+
+    return 1.0 / (1.0 + np.exp(-x))
+
+
+@cache
+def _training() -> Callable[..., Any]:
+    """Return `_train`, compiled if numba is installed; the interpreter needs about two seconds for 200 trials."""
+    from graspsense.plugins.classifiers.backprop_training import train
+
+    try:
+        compiled = compile_function(train)
+    except NotCompilable:
+        return train
+
+    def run(*args: Any) -> Any:
+        with first_call():
+            return compiled(*args)
+
+    return run
