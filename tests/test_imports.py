@@ -29,6 +29,7 @@ MAY_KNOW = {
     "experiments": {"core", "recording", "sources", "evaluation", "report", "experiments"},
     "inference": set(),
     "cli": {
+        "inference",
         "core",
         "recording",
         "store",
