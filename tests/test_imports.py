@@ -27,7 +27,7 @@ MAY_KNOW = {
     "regression": {"core", "evaluation", "regression"},
     "report": {"core", "recording", "store", "evaluation", "report"},
     "experiments": {"core", "recording", "sources", "evaluation", "report", "experiments"},
-    "inference": set(),
+    "inference": {"core"},
     "cli": {
         "inference",
         "core",

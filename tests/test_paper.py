@@ -6,11 +6,13 @@ import json
 from importlib.resources import files
 
 import pytest
+from attrs import evolve, fields, frozen
 from hypothesis import given
 from hypothesis import strategies as st
 
 from graspsense.cli.main import main
 from graspsense.core.errors import ConfigError
+from graspsense.core.setting import declared, setting
 from graspsense.evaluation.over_seeds import OverSeeds
 from graspsense.experiments.executors.serial import Serial
 from graspsense.experiments.experiment import read_experiment, shipped
@@ -92,6 +94,37 @@ def test_whether_a_result_is_predicted_follows_from_the_origins_of_the_figures(e
     planned = read_experiment(experiment)
     summary = Summary(planned=planned, conditions=(), results={}, failed=(), missing=0, seconds=0.0)
     assert basis(summary, experiment, about) == expected
+
+
+def test_a_result_that_a_setting_of_the_gripper_was_fitted_to_is_not_predicted():
+    @frozen(kw_only=True)
+    class FittedConfig:
+        friction_n: float = setting(default=7.0, meaning="Friction.", origin="fitted to table_4_17")
+
+    planned = read_experiment("table_4")
+
+    def with_gripper(config):
+        settings = planned.cases[0].settings
+        settings = evolve(settings, gripper=evolve(settings.gripper, config=config))
+        cases = tuple(evolve(case, settings=settings) for case in planned.cases)
+        return Summary(
+            planned=evolve(planned, cases=cases), conditions=(), results={}, failed=(), missing=0, seconds=0.0
+        )
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("graspsense.experiments.paper.basis.simulated_objects", lambda _: ())
+        assert basis(with_gripper(FittedConfig()), "table_4", "table_4_17") == "fitted"
+        assert basis(with_gripper(FittedConfig(friction_n=6.0)), "table_4", "table_4_17") == "predicted"
+
+
+def test_every_number_of_the_model_of_the_gripper_has_an_origin():
+    config = type(read_experiment("table_4").cases[0].settings.gripper.config)
+    without = {
+        field.name
+        for field in fields(config)
+        if isinstance(field.default, float) and not declared(field).origin
+    }
+    assert without == {"accuracy"}
 
 
 def test_each_bottle_may_be_used_in_one_state_only():

@@ -8,17 +8,16 @@ rank of each true value within its posterior sample is then uniformly distribute
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from attrs import field, frozen
 from attrs.validators import in_, min_len
 
+from graspsense.core.figure_origins import ORIGINS
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
-
-ORIGINS: Final = ("measured", "datasheet", "published elsewhere", "assumed")
-"""The possible sources of a prior: nothing that the inference is conditioned on."""
 
 
 @frozen(kw_only=True)
@@ -35,6 +34,7 @@ class Prior:
     law: str
     args: tuple[float, ...]
     origin: str = field(validator=in_(ORIGINS))
+    """Where it comes from: nothing that the inference is conditioned on."""
     reason: str = field(validator=min_len(1))
 
     def distribution(self) -> Any:

@@ -21,6 +21,7 @@ from graspsense.core.entries import TactileArray as TactileArray
 from graspsense.core.setting import CHANGES_NO_RESULT as CHANGES_NO_RESULT
 from graspsense.core.setting import NAMES_INPUT as NAMES_INPUT
 from graspsense.core.setting import setting as setting
+from graspsense.core.figure_origins import fitted_results as fitted_results
 
 # Signals: what passes between a gripper and a controller
 from graspsense.core.signals import CHANNELS as CHANNELS

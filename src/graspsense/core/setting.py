@@ -21,6 +21,8 @@ from typing import Any, Final, Literal, cast, get_args, get_origin
 import attrs
 from attrs import frozen, validators
 
+from graspsense.core.figure_origins import fitted_results
+
 _DECLARATION: Final = "graspsense.setting"
 _EFFECT: Final = "graspsense.effect"
 _FOLLOWS: Final = "graspsense.follows"
@@ -60,6 +62,8 @@ class Declaration:
     unit: str = ""
     allowed: str = ""
     plausible: tuple[float, float] | None = None
+    origin: str = ""
+    """Where the default of a number of a model comes from, as in `figure_origins`; empty for other settings."""
 
     @property
     def plausible_words(self) -> str:
@@ -85,6 +89,7 @@ def setting(
     validator: Callable[[Any, Any, Any], None] | None = None,
     effect: Mapping[str, Any] | None = None,
     follows: str = "",
+    origin: str = "",
 ) -> Any:
     """Return the attrs field of a setting.
 
@@ -94,7 +99,7 @@ def setting(
     where it is the default. `validator` is a further validator of attrs. `effect` is `CHANGES_NO_RESULT` or
     `NAMES_INPUT`; a setting without either is part of the set-up: two grasps that differ in it are not comparable.
     `follows` names the setting that owns the value (`controller.contact_force_n`): where a pipeline does not give this
-    one, and has that one, their values are equal.
+    one, and has that one, their values are equal. `origin` is that of a number of a model (`fitted_results`).
 
     Raises TypeError if the declaration contradicts itself.
 
@@ -108,11 +113,9 @@ def setting(
     _refuse_two_limits(minimum, above, maximum, below)
     if plausible is not None and not plausible[0] < plausible[1]:
         raise TypeError(f"the plausible range {plausible} is empty: write (smallest, largest)")
-    number = (
-        bool(unit)
-        or plausible is not None
-        or (isinstance(default, int | float) and not isinstance(default, bool))
-    )
+    _check_origin(origin)
+    plain_number = isinstance(default, int | float) and not isinstance(default, bool)
+    number = bool(unit) or plausible is not None or plain_number
     checks = list(_limits(default, minimum, maximum, above, below, number=number))
     if validator is not None:
         checks.append(validator)
@@ -124,6 +127,7 @@ def setting(
         unit=unit,
         allowed=_allowed_words(minimum, maximum, above, below),
         plausible=plausible,
+        origin=origin,
     )
     if plausible is not None and implausible(declaration, default):
         raise TypeError(f"the default {default} is not in the plausible range {plausible}")
@@ -131,6 +135,15 @@ def setting(
     if factory is not None:
         return attrs.field(factory=factory, validator=check, metadata=metadata)
     return attrs.field(default=default, validator=check, metadata=metadata)
+
+
+def _check_origin(origin: str) -> None:
+    """Raise TypeError if the text is neither empty nor an origin."""
+    if origin:
+        try:
+            fitted_results(origin)
+        except ValueError as error:
+            raise TypeError(str(error)) from error
 
 
 def _refuse_two_limits(
@@ -173,6 +186,18 @@ def implausible(declaration: Declaration, value: Any) -> str:
         return ""
     shown = f"{value:g} {declaration.unit}".rstrip()
     return f"{shown} is not plausible: the plausible range is {declaration.plausible_words}"
+
+
+def fitted_defaults(config: Any) -> frozenset[str]:
+    """Return the ids of the published results to which defaults were fitted that this config still has."""
+    if not attrs.has(type(config)):
+        return frozenset()
+    return frozenset(
+        result
+        for field in attrs.fields(type(config))
+        if (origin := declared(field).origin) and getattr(config, field.name) == field.default
+        for result in fitted_results(origin)
+    )
 
 
 def settings_marked(config_class: type, effect: Mapping[str, Any]) -> frozenset[str]:

@@ -86,6 +86,7 @@ class SimConfig:
     )
     rate_hz: float = setting(
         default=1000.0,
+        origin="published elsewhere",
         unit="Hz",
         minimum=10.0,
         maximum=1e5,
@@ -93,11 +94,13 @@ class SimConfig:
     )
     transmission: Literal["pr2", "pr2_2009", "pr2_paper", "straight"] = setting(
         default="pr2",
+        origin="published elsewhere",
         meaning="A drive of drive_models: a published linkage of the PR2, or straight (jaws on a screw, constant "
         "mass).",
     )
     moving_mass_kg: float = setting(
         default=100.0,
+        origin="assumed",
         unit="kg",
         minimum=1e-6,
         maximum=1e6,
@@ -105,6 +108,7 @@ class SimConfig:
     )
     rotor_kg_m2: float = setting(
         default=4e-7,
+        origin="assumed",
         unit="kg m2",
         minimum=1e-12,
         maximum=1.0,
@@ -113,6 +117,7 @@ class SimConfig:
     )
     coulomb_n: float = setting(
         default=7.0,
+        origin="published elsewhere",
         unit="N",
         minimum=0.0,
         plausible=(0.0, 200.0),
@@ -120,6 +125,7 @@ class SimConfig:
     )
     coulomb_spread_n: float = setting(
         default=0.4,
+        origin="assumed",
         unit="N",
         minimum=0.0,
         plausible=(0.0, 50.0),
@@ -127,6 +133,7 @@ class SimConfig:
     )
     breakaway_n: float = setting(
         default=8.0,
+        origin="assumed",
         unit="N",
         minimum=0.0,
         plausible=(0.0, 200.0),
@@ -134,6 +141,7 @@ class SimConfig:
     )
     stribeck_m_s: float = setting(
         default=0.002,
+        origin="assumed",
         unit="m/s",
         above=0.0,
         plausible=(1e-7, 1.0),
@@ -141,12 +149,14 @@ class SimConfig:
     )
     load_friction_coefficient: float = setting(
         default=0.5,
+        origin="published elsewhere",
         minimum=0.0,
         plausible=(0.0, 20.0),
         meaning="Friction of the loaded screw per newton on the pads: gives about 20 N on a flat surface at 23 N.",
     )
     damping_n_s_m: float = setting(
         default=10.0,
+        origin="published elsewhere",
         unit="N s/m",
         minimum=0.0,
         plausible=(0.0, 1e6),
@@ -154,6 +164,7 @@ class SimConfig:
     )
     open_gap_m: float = setting(
         default=0.086,
+        origin="published elsewhere",
         unit="m",
         above=0.0,
         maximum=0.09,
@@ -161,6 +172,7 @@ class SimConfig:
     )
     pad_stiffness_n_m: float = setting(
         default=3e4,
+        origin="assumed",
         unit="N/m",
         above=0.0,
         maximum=math.inf,
@@ -169,18 +181,21 @@ class SimConfig:
     )
     pad_damping_n_s_m: float = setting(
         default=0.0,
+        origin="assumed",
         unit="N s/m",
         minimum=0.0,
         meaning="Damper parallel to the spring of the pad.",
     )
     pad_creep_n_m: float = setting(
         default=0.0,
+        origin="assumed",
         unit="N/m",
         minimum=0.0,
         meaning="Stiffness of a Maxwell branch parallel to the spring of the pad, which makes it creep.",
     )
     pad_creep_s: float = setting(
         default=0.3,
+        origin="assumed",
         unit="s",
         above=0.0,
         plausible=(1e-6, 1e4),
@@ -188,6 +203,7 @@ class SimConfig:
     )
     drive_lag_s: float = setting(
         default=0.0,
+        origin="assumed",
         unit="s",
         minimum=0.0,
         plausible=(0.0, 10.0),
@@ -205,6 +221,7 @@ class SimConfig:
     )
     noise_counts: float = setting(
         default=15.0,
+        origin="published elsewhere",
         unit="counts",
         minimum=0.0,
         plausible=(0.0, 1e4),
@@ -212,6 +229,7 @@ class SimConfig:
     )
     pad_period_s: float = setting(
         default=0.041,
+        origin="published elsewhere",
         unit="s",
         minimum=0.001,
         maximum=1.0,
@@ -220,12 +238,14 @@ class SimConfig:
     )
     pad_cells: int = setting(
         default=15,
+        origin="published elsewhere",
         minimum=1,
         maximum=15,
         meaning="Number of cells of the gripping face, the ones nearest to its middle; the others read no force.",
     )
     pad_delay_s: float = setting(
         default=0.0,
+        origin="assumed",
         unit="s",
         minimum=0.0,
         maximum=0.04,

@@ -1,10 +1,11 @@
-"""What a comparison with the paper rests on: derived from the origins of the figures of the simulated objects."""
+"""What a comparison with the paper rests on: derived from the origins of the figures of objects and gripper."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Final, Literal
 
+from graspsense.core.setting import fitted_defaults
 from graspsense.experiments.paper.cases import is_of
 from graspsense.experiments.summary import Summary
 from graspsense.sources.simulated import simulated_objects
@@ -15,7 +16,7 @@ BASES: Final[tuple[Basis, ...]] = ("predicted", "fitted", "built in")
 
 
 def basis(summary: Summary, experiment: str, *about: str) -> Basis:
-    """Return `fitted` if a figure of an object of this experiment was fitted to one of these results.
+    """Return `fitted` if a figure of an object or of the gripper of this experiment was fitted to one of these results.
 
     Otherwise it is `predicted`. A result that follows from the structure of the model is `built in`; claims state this.
     """
@@ -24,10 +25,14 @@ def basis(summary: Summary, experiment: str, *about: str) -> Basis:
 
 
 def _fitted_to(summary: Summary, experiment: str) -> Iterator[frozenset[str]]:
-    """Yield the results that each kind of object of an experiment was fitted to."""
+    """Yield the results that the settings of an experiment and each of its kinds of object were fitted to.
+
+    A setting that was changed from its default was not fitted.
+    """
     for case in summary.planned.cases:
         if not is_of(case, summary, experiment):
             continue
+        yield from (fitted_defaults(one.config) for one in case.settings.chosen)
         kinds = {kind.name: kind for kind in simulated_objects(case.settings)}
         for source in (case.data, case.test):
             if source is None or source.kind != SIMULATED:

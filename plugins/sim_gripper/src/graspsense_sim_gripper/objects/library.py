@@ -17,7 +17,7 @@ from typing import Final
 
 from attrs import fields_dict
 
-from graspsense.plugin_api import ConfigError, ObjectKind, UnknownName, suggestion
+from graspsense.plugin_api import ConfigError, ObjectKind, UnknownName, fitted_results, suggestion
 from graspsense_sim_gripper.objects.spec import (
     ObjectSpec,
     TomlTable,
@@ -31,9 +31,6 @@ CONTAINERS: Final = ("odwalla", "naked", "can", "water")
 """The containers of Chitta, Piccoli and Sturm (ICRA 2010), section III.E: trials are simulated with them by default."""
 SCENE_IN_MEMORY: Final = "scene in memory"
 """The name of an object that is given by the text of its scene."""
-ORIGINS: Final = ("measured", "datasheet", "published elsewhere", "assumed")
-"""The possible origins of a value of the catalogue, besides a fit."""
-FITTED_TO: Final = "fitted to "
 FITTED_RESULTS: Final = frozenset(("table_2", "table_3", "authors_tree", "section_3f", "fig_6_contact"))
 """The published results that values may be fitted to."""
 
@@ -218,12 +215,12 @@ def _fitted_to(where: str, origin: TomlValue) -> list[str]:
 
     Raises ConfigError if the text is not an origin.
     """
-    if origin in ORIGINS:
-        return []
-    results = str(origin).removeprefix(FITTED_TO).split(", ")
-    if not str(origin).startswith(FITTED_TO) or not set(results) <= FITTED_RESULTS:
+    try:
+        results = list(fitted_results(str(origin)))
+    except ValueError as error:
+        raise ConfigError(f"{where}: {error}") from error
+    if not set(results) <= FITTED_RESULTS:
         raise ConfigError(
-            f"{where}: {origin!r} is not an origin. Known: {', '.join(ORIGINS)}, or {FITTED_TO}one or several of "
-            f"{', '.join(sorted(FITTED_RESULTS))}"
+            f"{where}: {origin!r} names an unknown result. Known: {', '.join(sorted(FITTED_RESULTS))}"
         )
     return results
