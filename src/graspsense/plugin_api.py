@@ -79,6 +79,17 @@ _TABLE: Final[Table] = {
     "Sensor backends that do many grasps at once": {
         "roles": ("BatchBackend", "BatchOptions", "Grasped", "SimulationVariant"),
     },
+    "Sensor backends that identify an object from recorded squeezes": {
+        "identification": (
+            "CandidateScore",
+            "Identification",
+            "IdentifiedParameter",
+            "PredictiveCheck",
+            "RecordedSqueeze",
+            "SqueezeFit",
+            "Undetermined",
+        ),
+    },
     "Emulated devices": {
         "emulated": ("EmulatedDevice",),
     },

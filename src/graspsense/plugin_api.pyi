@@ -71,6 +71,15 @@ from graspsense.core.roles import BatchOptions as BatchOptions
 from graspsense.core.roles import Grasped as Grasped
 from graspsense.core.roles import SimulationVariant as SimulationVariant
 
+# Sensor backends that identify an object from recorded squeezes
+from graspsense.core.identification import CandidateScore as CandidateScore
+from graspsense.core.identification import Identification as Identification
+from graspsense.core.identification import IdentifiedParameter as IdentifiedParameter
+from graspsense.core.identification import PredictiveCheck as PredictiveCheck
+from graspsense.core.identification import RecordedSqueeze as RecordedSqueeze
+from graspsense.core.identification import SqueezeFit as SqueezeFit
+from graspsense.core.identification import Undetermined as Undetermined
+
 # Emulated devices
 from graspsense.core.emulated import EmulatedDevice as EmulatedDevice
 

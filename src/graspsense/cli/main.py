@@ -32,6 +32,7 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "trials": ("graspsense.cli.trials:trials", "List, relabel and set aside stored trials."),
     "export": ("graspsense.cli.export:export", "Export trials or a recording."),
     "import": ("graspsense.cli.import_:import_", "Import recordings of other programs."),
+    "identify": ("graspsense.cli.identify:identify", "Identify an object from recorded squeezes."),
     "features": ("graspsense.cli.features:features", "Extract the features of a store again."),
     "train": ("graspsense.cli.train:train", "Train a model on labelled trials."),
     "predict": ("graspsense.cli.predict:predict", "Predict the labels of trials."),

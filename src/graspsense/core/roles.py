@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from graspsense.core.entries import Channel, Feature
     from graspsense.core.features import Features, FeatureTable, Prediction
+    from graspsense.core.identification import Identification, Progress, RecordedSqueeze
     from graspsense.core.run_config import RunConfig
     from graspsense.core.trace import Trace
     from graspsense.core.tree import TreeNode
@@ -255,6 +256,14 @@ class BatchBackend(SensorBackend[ConfigT]):
     def variants(self) -> Sequence[SimulationVariant]:
         """Return the variants that trade accuracy for time; empty if there are none."""
         return ()
+
+    def identify(self, squeezes: Sequence[RecordedSqueeze], progress: Progress) -> Identification:
+        """Return the object that recorded squeezes are of, as a scene of this simulator.
+
+        Raises ConfigError if the simulator cannot identify objects, or if the squeezes determine none.
+        """
+        del squeezes, progress
+        raise ConfigError(f"{type(self).__name__} cannot identify an object from recordings. --gripper sim can")
 
     @abstractmethod
     def run_many(

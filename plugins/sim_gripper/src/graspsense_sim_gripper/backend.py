@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Unpack
 
 from attrs import evolve
@@ -16,9 +16,11 @@ from graspsense.plugin_api import (
     DeviceInfo,
     Frame,
     Grasped,
+    Identification,
     ObjectKind,
     Pads,
     Reading,
+    RecordedSqueeze,
     RunConfig,
     SimulationVariant,
     create,
@@ -50,6 +52,8 @@ SIDES: Final = ("left", "right")
 
 NOISE_TICKS: Final = 512
 """Ticks for which the noise of the palm is drawn at once."""
+
+Progress = Callable[[str, int, int], None]
 
 _sense = bind_reachable(sense, {}, INTERPRETED)
 _reading = maker(Reading)
@@ -232,6 +236,13 @@ class SimBackend(BatchBackend[SimConfig]):
         from graspsense_sim_gripper.variants import variants
 
         return variants()
+
+    def identify(self, squeezes: Sequence[RecordedSqueeze], progress: Progress) -> Identification:
+        """Return the object that recorded squeezes are of. Raises ConfigError."""
+        # Imported here, since only this needs the optimiser.
+        from graspsense_sim_gripper.identify.run import identify
+
+        return identify(self.config, squeezes, progress)
 
     def run_many(
         self,

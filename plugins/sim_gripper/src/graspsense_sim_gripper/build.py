@@ -242,6 +242,12 @@ def _gripper(config: SimConfig) -> _Gripper:
     return _Gripper(drive, pads, Steps(step_tolerance(config.accuracy)), motion)
 
 
+def drive_and_pads(config: SimConfig) -> tuple[Drive, PadCompliance]:
+    """Return the drive and the fingertips of these settings."""
+    gripper = _gripper(config)
+    return gripper.drive, gripper.pads
+
+
 def _linkage(config: SimConfig) -> ScrewLinkage:
     return LINKAGES[config.transmission]
 

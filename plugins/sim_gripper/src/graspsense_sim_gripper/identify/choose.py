@@ -1,0 +1,179 @@
+"""Choosing the terms: every candidate is fitted, and judged by squeezes or stretches that it was not fitted to.
+
+The simplest candidate is chosen whose error on held-out data is not larger than the least one by more than a standard
+error of their paired difference.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import CandidateScore
+from graspsense_sim_gripper.identify.fit import Fitted, Mask, fit, held_out_rms
+from graspsense_sim_gripper.identify.forward import ForwardModel
+from graspsense_sim_gripper.identify.laws import Candidate, DataScale, memories, static_candidates
+from graspsense_sim_gripper.identify.prepare import Squeeze
+
+MAX_FOLDS: Final = 5
+STRETCHES: Final = 9
+STRETCH_FOLDS: Final = 3
+STATIC_KEPT: Final = 2
+"""Static laws that are tried with every memory."""
+WORTH_TRYING: Final = 3.0
+"""A candidate whose fit is worse than the best by this factor is not judged by held-out data."""
+LEAST_GAIN: Final = 0.03
+"""A term more has to reduce the error on held-out data by at least this share."""
+
+
+@frozen(kw_only=True, eq=False)
+class Choice:
+    """The chosen fit, and the scores of all candidates."""
+
+    fitted: Fitted
+    scores: tuple[CandidateScore, ...]
+
+
+@frozen(kw_only=True, eq=False)
+class _Judged:
+    fitted: Fitted
+    errors: NDArray[np.float64]
+    """The rms residual over the peak in each held-out part."""
+
+
+def choose(
+    model: ForwardModel,
+    squeezes: Sequence[Squeeze],
+    scale: DataScale,
+    *,
+    has_memory: bool,
+    progress: Callable[[int, int], None],
+) -> Choice:
+    """Return the chosen fit. `has_memory`: whether the squeezes can determine a term with a memory."""
+    direct = evolve(model, direct=True)
+    statics = static_candidates(scale)
+    with_memory = memories(scale) if has_memory else []
+    total = 2 * len(statics) + STATIC_KEPT * len(with_memory)
+    rough: list[Fitted] = []
+    for candidate in statics:
+        first = candidate.joined(with_memory[1]) if with_memory else candidate
+        rough.append(fit(direct, first, squeezes))
+        progress(len(rough), total)
+    order = np.argsort([one.cost for one in rough], kind="stable")[:STATIC_KEPT].tolist()
+    # The simplest law stays among the candidates, so that the table shows what it costs to leave the others out.
+    kept = sorted({0, *(int(k) for k in order)})
+    candidates = [
+        joined.starting_at(_values(rough[k]))
+        for k in kept
+        for joined in (statics[k], *(statics[k].joined(one) for one in with_memory))
+    ]
+    fits = []
+    for done, candidate in enumerate(candidates):
+        fits.append(fit(model, candidate, squeezes))
+        progress(len(statics) + done, total + len(candidates))
+    least = min(one.rms for one in fits)
+    judged = [
+        _judged(model, one, squeezes) for one in fits if one.rms <= WORTH_TRYING * least
+    ]
+    best = _simplest(judged)
+    scores = [_score(one, best, judged) for one in sorted(fits, key=lambda one: one.rms)]
+    dropped = [
+        CandidateScore(
+            terms=one.candidate.name,
+            parameters=len(one.values),
+            error=math.nan,
+            fit_error=one.rms,
+            verdict="fitted directly only",
+        )
+        for k, one in enumerate(rough)
+        if k not in kept
+    ]
+    return Choice(fitted=best.fitted, scores=(*scores, *dropped))
+
+
+def _values(fitted: Fitted) -> dict[str, float]:
+    return {one.label: value for one, value in zip(fitted.candidate.free, fitted.values, strict=True)}
+
+
+def _judged(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> _Judged:
+    """Return the errors of a candidate on data that it was not fitted to."""
+    n = len(squeezes)
+    errors: list[float] = []
+    if n == 1:
+        for mask in _stretch_masks(squeezes[0]):
+            part = fit(model, fitted.candidate, squeezes, [~mask], start=fitted)
+            everywhere = fit_residuals(model, part, squeezes[0])
+            errors.append(float(np.sqrt(np.mean(everywhere[mask] ** 2))))
+        return _Judged(fitted=fitted, errors=np.array(errors))
+    folds = min(n, MAX_FOLDS)
+    for k in range(folds):
+        train = [i for i in range(n) if i % folds != k]
+        part = fit(
+            model,
+            fitted.candidate,
+            [squeezes[i] for i in train],
+            start=evolve(
+                fitted,
+                widths_m=tuple(fitted.widths_m[i] for i in train),
+                factors=tuple(fitted.factors[i] for i in train),
+            ),
+        )
+        errors += [
+            held_out_rms(model, part, squeezes[i], fitted.widths_m[i]) for i in range(n) if i % folds == k
+        ]
+    return _Judged(fitted=fitted, errors=np.array(errors))
+
+
+def fit_residuals(model: ForwardModel, fitted: Fitted, squeeze: Squeeze) -> NDArray[np.float64]:
+    """Return the residuals of a fit to one squeeze at all of its samples, relative to the peak."""
+    forces = model.forces(
+        squeeze, fitted.candidate, fitted.values, fitted.widths_m[0], fitted.factors[0]
+    )
+    return (forces - squeeze.force_n) / squeeze.peak_n
+
+
+def _stretch_masks(squeeze: Squeeze) -> list[Mask]:
+    """Return the samples that are held out in each fold: every third of nine stretches."""
+    number = np.minimum(np.arange(len(squeeze.force_n)) * STRETCHES // len(squeeze.force_n), STRETCHES - 1)
+    return [number % STRETCH_FOLDS == k for k in range(STRETCH_FOLDS)]
+
+
+def _simplest(judged: Sequence[_Judged]) -> _Judged:
+    """Return the simplest candidate that is not worse than the best."""
+    best = min(judged, key=lambda one: float(np.mean(np.log(one.errors + 1e-12))))
+    for one in sorted(judged, key=lambda one: len(one.fitted.values)):
+        difference = np.log(one.errors + 1e-12) - np.log(best.errors + 1e-12)
+        spread = float(np.std(difference, ddof=1)) if len(difference) > 1 else 0.0
+        error = spread / math.sqrt(len(difference))
+        if float(np.mean(difference)) <= max(error, LEAST_GAIN):
+            return one
+    return best
+
+
+def _score(fitted: Fitted, best: _Judged, judged: Sequence[_Judged]) -> CandidateScore:
+    own = next((one for one in judged if one.fitted is fitted), None)
+    error = math.nan if own is None else float(np.sqrt(np.mean(own.errors**2)))
+    least = float(np.sqrt(np.mean(best.errors**2)))
+    if own is best:
+        verdict = "chosen"
+    elif own is None:
+        verdict = f"its fit is {fitted.rms / best.fitted.rms:.1f} times worse"
+    elif len(fitted.values) > len(best.fitted.values):
+        verdict = f"more parameters, error {100.0 * (error / least - 1.0):+.0f} %"
+    else:
+        verdict = f"error {100.0 * (error / least - 1.0):+.0f} %"
+    return CandidateScore(
+        terms=fitted.candidate.name,
+        parameters=len(fitted.values),
+        error=error,
+        fit_error=fitted.rms,
+        verdict=verdict,
+        chosen=own is best,
+    )
+
+

@@ -1,0 +1,197 @@
+"""The candidates: which terms an object may have, which of their parameters are free, and where a fit starts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import Any, Final, NamedTuple
+
+from attrs import evolve, field, frozen
+
+from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
+from graspsense_sim_gripper.terms.registry import find_term
+from graspsense_sim_gripper.terms.switchable import Switchable
+
+SLOTS: Final = ("elastic", "rigid", "maxwell", "maxwell", "loss", "foam", "snap")
+"""The terms of the compiled law, of which a candidate switches some on. All candidates share its code."""
+ELASTIC, RIGID, MAXWELL, SECOND, LOSS, FOAM, SNAP = range(len(SLOTS))
+NOT_TRIED: Final = ("gas", "liquid", "slosh", "surface", "worn")
+"""The terms whose parameters a force beside a gap does not separate."""
+MAX_STARTS: Final = 16
+
+
+class DataScale(NamedTuple):
+    """The size of the recorded squeezes, from which ranges and starts follow."""
+
+    force_n: float
+    depth_m: float
+    load_s: float
+    memory_s: float
+    """The longest time over which a memory of the object shows: the compression and the hold."""
+    sample_s: float
+    """Time between samples of the force."""
+
+
+@frozen(kw_only=True)
+class FreeParameter:
+    """A parameter that is fitted, by its logarithm: its slot, its name, its range, and values to start from."""
+
+    slot: int
+    name: str
+    low: float
+    high: float
+    starts: tuple[float, ...]
+
+    @property
+    def term(self) -> str:
+        """The term, with its number where a candidate may have two of the kind."""
+        return f"{SLOTS[self.slot]} 2" if self.slot == SECOND else SLOTS[self.slot]
+
+    @property
+    def label(self) -> str:
+        """The name with that of its term."""
+        return f"{self.term}.{self.name}"
+
+    @property
+    def is_stiffness(self) -> bool:
+        """Whether it grows with the stiffness of an instance."""
+        return self.name in find_term(SLOTS[self.slot])[1].stiffnesses
+
+
+@frozen(kw_only=True)
+class Candidate:
+    """Terms with free and fixed parameters."""
+
+    free: tuple[FreeParameter, ...]
+    fixed: Mapping[tuple[int, str], float] = field(factory=dict)
+
+    @property
+    def slots(self) -> tuple[int, ...]:
+        """The slots of its terms."""
+        return tuple(sorted({parameter.slot for parameter in self.free}))
+
+    @property
+    def name(self) -> str:
+        """Its terms in words; an elastic term without a cubic part is a spring."""
+        words = []
+        for slot in self.slots:
+            is_spring = slot == ELASTIC and all(parameter.name != "k3_n_m3" for parameter in self.free)
+            words.append("elastic (k1)" if is_spring else SLOTS[slot])
+        return " + ".join(words)
+
+    def joined(self, other: Candidate) -> Candidate:
+        """Return the candidate with the terms of both."""
+        return Candidate(free=self.free + other.free, fixed={**self.fixed, **other.fixed})
+
+    def parameters(self, values: Sequence[float]) -> dict[int, dict[str, float]]:
+        """Return the parameters of each of its terms, by slot, for these values of the free ones."""
+        of_slot: dict[int, dict[str, float]] = {slot: {} for slot in self.slots}
+        for (slot, name), value in self.fixed.items():
+            of_slot[slot][name] = value
+        for parameter, value in zip(self.free, values, strict=True):
+            of_slot[parameter.slot][parameter.name] = float(value)
+        return of_slot
+
+    def terms(self, values: Sequence[float], factor: float = 1.0) -> tuple[Switchable, ...]:
+        """Return the parameters as the compiled law takes them, with every stiffness times `factor`."""
+        given = self.parameters(values)
+        terms: list[Switchable] = [_NOTHING_LUMPED]
+        for slot, kind in enumerate(SLOTS):
+            term = find_term(kind)[1]
+            if slot not in given:
+                terms.append(_FILLERS[kind])
+                continue
+            numbers = [
+                float(value) * (factor if name in term.stiffnesses else 1.0)
+                for name, value in term.params(**given[slot])._asdict().items()
+            ]
+            terms.append(Switchable(1, term.params._make(numbers)))
+        return tuple(terms)
+
+    def starts(self) -> list[tuple[float, ...]]:
+        """Return combinations of the values to start from."""
+        return list(product(*(parameter.starts for parameter in self.free)))[:MAX_STARTS]
+
+    def starting_at(self, values: Mapping[str, float]) -> Candidate:
+        """Return the candidate that starts at these values, by label, where it has the parameter."""
+        free = tuple(
+            evolve(one, starts=(min(max(values[one.label], one.low), one.high),))
+            if one.label in values
+            else one
+            for one in self.free
+        )
+        return evolve(self, free=free)
+
+
+def _filler(kind: str) -> Switchable:
+    """Return the parameters of a term that is switched off; compiled code distinguishes types, so they are floats."""
+    params: Any = find_term(kind)[1].params
+    return Switchable(0, params(*(1.0 for _ in params._fields)))
+
+
+_FILLERS: Final = {kind: _filler(kind) for kind in SLOTS}
+_NOTHING_LUMPED: Final = Switchable(0, LumpedSpringDamper(0.0, 0.0))
+
+
+def static_candidates(scale: DataScale) -> list[Candidate]:
+    """Return the candidates without memory, the simplest first."""
+    force, depth = scale.force_n, scale.depth_m
+    k = force / depth
+    cubic = force / depth**3
+    power = force / depth**1.5
+    k1 = FreeParameter(slot=ELASTIC, name="k1_n_m", low=1e-4 * k, high=100.0 * k, starts=(k, 0.4 * k))
+    k3 = FreeParameter(
+        slot=ELASTIC, name="k3_n_m3", low=1e-4 * cubic, high=100.0 * cubic, starts=(0.5 * cubic, 0.05 * cubic)
+    )
+    hertz = FreeParameter(
+        slot=RIGID, name="hertz_n_m15", low=1e-3 * power, high=1e4 * power, starts=(power, 3.0 * power)
+    )
+    foam = (
+        FreeParameter(slot=FOAM, name="force_n", low=1e-3 * force, high=100.0 * force, starts=(force, 0.5 * force)),
+        FreeParameter(slot=FOAM, name="exponent", low=0.3, high=6.0, starts=(1.2, 2.0)),
+    )
+    snap = (
+        FreeParameter(slot=SNAP, name="k1_n_m", low=0.05 * k, high=100.0 * k, starts=(2.0 * k,)),
+        FreeParameter(
+            slot=SNAP, name="critical_m", low=0.03 * depth, high=depth, starts=(0.3 * depth, 0.5 * depth, 0.8 * depth)
+        ),
+        FreeParameter(slot=SNAP, name="drop_n", low=0.01 * force, high=3.0 * force, starts=(0.2 * force,)),
+        FreeParameter(slot=SNAP, name="fall_m", low=0.01 * depth, high=2.0 * depth, starts=(0.1 * depth, 0.3 * depth)),
+        FreeParameter(slot=SNAP, name="k2_n_m", low=0.01 * k, high=100.0 * k, starts=(k,)),
+    )
+    return [
+        Candidate(free=(k1,)),
+        Candidate(free=(hertz,)),
+        Candidate(free=(k1, k3)),
+        Candidate(free=foam, fixed={(FOAM, "at_m"): float(f"{depth:.2g}")}),
+        Candidate(free=snap),
+    ]
+
+
+def memories(scale: DataScale) -> list[Candidate]:
+    """Return the terms with a memory that a candidate may have beside the others, the simplest first."""
+    k = scale.force_n / scale.depth_m
+    shortest, longest = 0.3 * scale.sample_s, 5.0 * scale.memory_s
+    rate = scale.depth_m / max(scale.load_s, 1e-3)
+
+    def branch(slot: int, share: float, starts_s: tuple[float, ...]) -> Candidate:
+        inside = tuple(min(max(tau, 1.5 * shortest), 0.5 * longest) for tau in starts_s)
+        return Candidate(
+            free=(
+                FreeParameter(slot=slot, name="k_n_m", low=1e-3 * k, high=100.0 * k, starts=(share * k, 2.0 * share * k)),
+                FreeParameter(slot=slot, name="tau_s", low=shortest, high=longest, starts=inside),
+            )
+        )
+
+    damper = scale.force_n / rate
+    one = branch(MAXWELL, 0.3, (0.2 * scale.memory_s, 0.03 * scale.memory_s))
+    loss = Candidate(
+        free=(
+            FreeParameter(
+                slot=LOSS, name="damping_n_s_m", low=1e-4 * damper, high=10.0 * damper, starts=(0.1 * damper,)
+            ),
+        )
+    )
+    fast = branch(MAXWELL, 0.2, (0.04 * scale.memory_s,))
+    slow = branch(SECOND, 0.2, (0.4 * scale.memory_s,))
+    return [loss, one, fast.joined(slow)]

@@ -1,0 +1,133 @@
+"""What the recordings do not determine, and what would determine it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from graspsense.plugin_api import Undetermined
+from graspsense_sim_gripper.identify.fit import Fitted
+from graspsense_sim_gripper.identify.laws import NOT_TRIED
+from graspsense_sim_gripper.identify.prepare import Squeeze
+from graspsense_sim_gripper.identify.spread import LEAST_INSTANCES, Uncertainty
+
+LEAST_HOLD_S: Final = 0.2
+"""A shorter hold shows no relaxation."""
+SPEED_RATIO: Final = 2.0
+"""Squeezes whose speeds differ by this factor show a memory without a hold."""
+WIDE: Final = 4.0
+"""A parameter whose interval spans this factor is not determined."""
+HOLD_TIMES: Final = 5.0
+"""A hold of this many relaxation times determines one."""
+
+_REMEDIES: Final = {
+    "k3_n_m3": "squeeze deeper",
+    "exponent": "squeeze deeper",
+    "critical_m": "squeeze beyond the drop of the force",
+    "drop_n": "squeeze beyond the drop of the force",
+    "fall_m": "squeeze beyond the drop of the force, more slowly",
+    "k2_n_m": "squeeze deeper beyond the drop of the force",
+    "damping_n_s_m": "squeeze at two speeds that differ by a factor of two or more",
+}
+
+
+def shows_memory(squeezes: Sequence[Squeeze]) -> bool:
+    """Return whether the squeezes can determine a term with a memory: by a hold, or by different speeds."""
+    if any(one.stretches.hold_s >= LEAST_HOLD_S for one in squeezes):
+        return True
+    speeds = [one.stretches.speed_m_s for one in squeezes if one.stretches.speed_m_s > 0.0]
+    return bool(speeds) and max(speeds) >= SPEED_RATIO * min(speeds)
+
+
+def undetermined(
+    fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze], shares: Sequence[float], cells: bool
+) -> list[Undetermined]:
+    """Return what these squeezes leave open. `shares`: those of each squeeze, `cells`: whether cells measured them."""
+    open_ = _memory(fitted, squeezes) if not shows_memory(squeezes) else []
+    open_ += _parameters(fitted, found, squeezes)
+    open_ += _spreads(found, squeezes)
+    if cells and not any(math.isfinite(share) for share in shares):
+        open_.append(
+            Undetermined(
+                what="share",
+                reason="the cells measure a share of the force, and the effort of the drive is not recorded",
+                remedy="record the effort, or weigh the object's contact with a force gauge",
+            )
+        )
+    if not all(one.stretches.has_approach for one in squeezes):
+        open_.append(
+            Undetermined(
+                what="width_m",
+                reason="a recording begins in contact: where the contact was follows from the law alone",
+                remedy="record from before the contact",
+            )
+        )
+    open_.append(
+        Undetermined(
+            what=", ".join(NOT_TRIED),
+            reason="a force beside a gap shows the sum of shell and contents, not their areas, volumes and masses",
+            remedy="write the term by hand, with its volume, pressure or mass measured",
+        )
+    )
+    return open_
+
+
+def _memory(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+    load_s = max(one.stretches.load_s for one in squeezes)
+    return [
+        Undetermined(
+            what="relaxation (maxwell, loss)",
+            reason=f"a ramp only, of {load_s:.2g} s at one speed, shows no relaxation time",
+            remedy="hold for 5 s, or squeeze at two speeds that differ by a factor of two or more",
+        )
+    ]
+
+
+def _parameters(fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+    hold_s = max(one.stretches.hold_s for one in squeezes)
+    depth_mm = 1e3 * max(one.depth_m for one in squeezes)
+    open_ = []
+    for i, parameter in enumerate(fitted.candidate.free):
+        at_bound = fitted.at_bound(i)
+        if not at_bound and found.high[i] <= WIDE * found.low[i]:
+            continue
+        interval = f"its 90 % interval is {found.low[i]:.3g} to {found.high[i]:.3g}"
+        reason = "the fit is at the end of the range" if at_bound else interval
+        if parameter.name == "tau_s" or parameter.term.startswith("maxwell"):
+            tau = next(
+                value
+                for other, value in zip(fitted.candidate.free, fitted.values, strict=True)
+                if other.slot == parameter.slot and other.name == "tau_s"
+            )
+            needed = max(HOLD_TIMES * tau, 2.0 * hold_s)
+            remedy = f"hold for {needed:.2g} s (the longest hold is {hold_s:.2g} s)"
+        else:
+            remedy = _REMEDIES.get(parameter.name, "record more squeezes")
+            if "deeper" in remedy:
+                remedy += f" (the deepest is {depth_mm:.2g} mm)"
+        open_.append(Undetermined(what=parameter.label, reason=reason, remedy=remedy))
+    return open_
+
+
+def _spreads(found: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+    open_ = []
+    if math.isnan(found.between_objects):
+        names = {one.instance for one in squeezes if one.instance}
+        count = "one object" if len(names) == 1 else f"{len(names)} objects" if names else "objects without numbers"
+        open_.append(
+            Undetermined(
+                what="spread between objects",
+                reason=f"the recordings are of {count}",
+                remedy=f"record {LEAST_INSTANCES} objects or more, labelled cup#1, cup#2, cup#3",
+            )
+        )
+    if len(squeezes) == 1:
+        open_.append(
+            Undetermined(
+                what="spread between squeezes",
+                reason="there is a single squeeze; its intervals hold for it alone",
+                remedy="record the same object three times or more, and put it down anew each time",
+            )
+        )
+    return open_

@@ -1,0 +1,196 @@
+"""Identifying an object: prepare, choose, refine, intervals, what stays open, and the scene."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+import numpy as np
+from attrs import evolve, fields_dict
+
+from graspsense.plugin_api import (
+    ConfigError,
+    Identification,
+    IdentifiedParameter,
+    RecordedSqueeze,
+    SqueezeFit,
+)
+from graspsense_sim_gripper.build import drive_and_pads
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.drive import Drive
+from graspsense_sim_gripper.fingertip import CELLS
+from graspsense_sim_gripper.identify.choose import choose
+from graspsense_sim_gripper.identify.fit import Fitted
+from graspsense_sim_gripper.identify.forward import ForwardModel
+from graspsense_sim_gripper.identify.laws import DataScale
+from graspsense_sim_gripper.identify.prepare import Squeeze, prepared
+from graspsense_sim_gripper.identify.refuse import shows_memory, undetermined
+from graspsense_sim_gripper.identify.share import measured_share
+from graspsense_sim_gripper.identify.spread import Uncertainty, uncertainty
+from graspsense_sim_gripper.identify.write import scene_text
+
+Progress = Callable[[str, int, int], None]
+
+UNITS: Final = {"n_m": "N/m", "n_m3": "N/m3", "n_m15": "N/m1.5", "n": "N", "m": "m", "s": "s", "n_s_m": "N s/m"}
+"""The units by the ends of names."""
+OF_FINGERTIPS: Final = ("pad_stiffness_n_m", "pad_damping_n_s_m", "pad_creep_n_m", "pad_creep_s")
+"""The settings of the gripper with which an object is identified, and has to be simulated."""
+
+
+def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: Progress) -> Identification:
+    """Return the object of these squeezes; `config` is that of a gripper whose recordings say nothing of their own.
+
+    Raises ConfigError if a squeeze has no contact, or too few measurements of the force.
+    """
+    begin = time.monotonic()
+    config, notes = _own_settings(config, squeezes)
+    drive, pads = drive_and_pads(config)
+    model = ForwardModel(pads=pads)
+    ready = [prepared(one, config.pad_delay_s) for one in squeezes]
+    cells = _has_cells(config, squeezes)
+    shares = [measured_share(one.trace, two, drive) if cells else 1.0 for one, two in zip(squeezes, ready, strict=True)]
+    share = _share(shares) if cells else 1.0
+    ready = [_with_share(one, share) for one in ready]
+    choice = choose(
+        model,
+        ready,
+        _scale(ready),
+        has_memory=shows_memory(ready),
+        progress=lambda done, total: progress("fitting candidates", done, total),
+    )
+    found = uncertainty(
+        model, choice.fitted, ready, lambda done, total: progress("computing intervals", done, total)
+    )
+    open_ = undetermined(choice.fitted, found, ready, shares, cells)
+    values, parameters = _values(choice.fitted, found, share, shares, cells)
+    label = next((one.label for one in squeezes if one.label), "")
+    gripper = {name: float(getattr(config, name)) for name in OF_FINGERTIPS}
+    text = scene_text(label, choice.fitted, parameters, values, gripper, ready, choice.scores, open_)
+    return Identification(
+        label=label,
+        scene=text,
+        parameters=tuple(parameters),
+        candidates=choice.scores,
+        undetermined=tuple(open_),
+        fits=tuple(_fits(model, choice.fitted, ready, share)),
+        draws=found.draws,
+        notes=tuple(notes),
+        seconds=time.monotonic() - begin,
+    )
+
+
+def _own_settings(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> tuple[SimConfig, list[str]]:
+    """Return the settings of the gripper of the recordings: their own, or those given. Raises ConfigError."""
+    known = fields_dict(SimConfig).keys() - {"object", "explain", "compile"}
+    own: list[dict[str, Any]] = [
+        {key: value for key, value in one.gripper.items() if key in known} for one in squeezes if one.gripper
+    ]
+    if own and any(one != own[0] for one in own):
+        raise ConfigError(
+            "the recordings were made with different settings of the gripper: identify those of one setting together"
+        )
+    if own and len(own) == len(squeezes):
+        return evolve(config, **own[0]), []
+    stiffness = config.pad_stiffness_n_m
+    return config, [
+        f"the fingertips are taken as {stiffness:.3g} N/m each: -o gripper.pad_stiffness_n_m=VALUE (inf: rigid). "
+        "The scene is of the object behind these fingertips"
+    ]
+
+
+def _has_cells(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> bool:
+    """Whether the force was measured by the cells of PR2 fingertips, on which a part of the force lands."""
+    if squeezes[0].gripper:
+        return config.sensor == "pads"
+    return all(one.trace.pad_left.ndim == 2 and one.trace.pad_left.shape[1] == CELLS for one in squeezes)
+
+
+def _share(shares: Sequence[float]) -> float:
+    known = [one for one in shares if math.isfinite(one)]
+    return min(float(np.median(known)), 1.0) if known else 1.0
+
+
+def _with_share(squeeze: Squeeze, share: float) -> Squeeze:
+    """Return the squeeze with the whole force in place of the measured share."""
+    return evolve(squeeze, force_n=squeeze.force_n / share, noise_n=squeeze.noise_n / share, share=share)
+
+
+def _scale(squeezes: Sequence[Squeeze]) -> DataScale:
+    times = [one.stretches for one in squeezes]
+    return DataScale(
+        force_n=float(np.median([one.peak_n for one in squeezes])),
+        depth_m=float(np.median([one.depth_m for one in squeezes])),
+        load_s=float(np.median([one.load_s for one in times])),
+        memory_s=max(one.load_s + one.hold_s for one in times),
+        sample_s=float(np.median([np.median(np.diff(one.t_s[one.sample])) for one in squeezes])),
+    )
+
+
+def _values(
+    fitted: Fitted, found: Uncertainty, share: float, shares: Sequence[float], cells: bool
+) -> tuple[dict[str, float], list[IdentifiedParameter]]:
+    """Return the keys of the scene's object, and every identified parameter."""
+    widths = np.array(fitted.widths_m)
+    known = np.array([one for one in shares if math.isfinite(one)])
+    parameters = [_mean("width_m", "m", widths)]
+    values = {"width_m": float(widths.mean())}
+    width_spread = found.width_objects_m if math.isfinite(found.width_objects_m) else found.width_squeezes_m
+    if math.isfinite(width_spread) and width_spread > 0.0:
+        values["width_spread_m"] = width_spread
+    # Without numbers of the objects, the spread is that between squeezes, whatever it comes from.
+    between = found.between_objects if math.isfinite(found.between_objects) else found.between_squeezes
+    if math.isfinite(between) and between > 0.0:
+        values["stiffness_spread"] = between
+    if cells and len(known):
+        values["share"] = share
+        parameters.append(_mean("share", "", known))
+        if len(known) > 1:
+            values["share_spread"] = float(np.std(known, ddof=1))
+    for i, one in enumerate(fitted.candidate.free):
+        parameters.append(
+            IdentifiedParameter(
+                name=one.label,
+                unit=_unit(one.name),
+                value=fitted.values[i],
+                low=found.low[i],
+                high=found.high[i],
+                basis=found.basis,
+            )
+        )
+    return values, parameters
+
+
+def _mean(name: str, unit: str, values: Any) -> IdentifiedParameter:
+    """Return the mean of a quantity of each squeeze, with the interval of Student's t; a single one has none."""
+    from scipy.stats import t
+
+    n, mean = len(values), float(np.mean(values))
+    half = float(t.ppf(0.95, n - 1) * np.std(values, ddof=1) / math.sqrt(n)) if n > 1 else math.nan
+    basis = f"between {n} squeezes" if n > 1 else "one squeeze: no interval"
+    return IdentifiedParameter(name=name, unit=unit, value=mean, low=mean - half, high=mean + half, basis=basis)
+
+
+def _unit(name: str) -> str:
+    ends = sorted((end for end in UNITS if name.endswith(f"_{end}")), key=len)
+    return UNITS[ends[-1]] if ends else ""
+
+
+def _fits(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], share: float) -> list[SqueezeFit]:
+    result = []
+    for squeeze, width, factor in zip(squeezes, fitted.widths_m, fitted.factors, strict=True):
+        forces = model.forces(squeeze, fitted.candidate, fitted.values, width, factor)
+        closure = width - squeeze.gap_m[squeeze.sample]
+        result.append(
+            SqueezeFit(
+                name=squeeze.name,
+                t_s=squeeze.t_s[squeeze.sample],
+                compression_m=closure - forces / model.pads.stiffness_n_m,
+                measured_n=squeeze.force_n,
+                fitted_n=forces,
+                rms_n=float(np.sqrt(np.mean((forces - squeeze.force_n) ** 2))),
+                peak_n=squeeze.peak_n,
+            )
+        )
+    return result

@@ -1,0 +1,179 @@
+"""Uncertainty: from squeeze to squeeze and from object to object by leaving them out in turn, within one by bootstrap.
+
+With three or more squeezes the interval is that of the delete-a-group jackknife (Shao and Tu, The Jackknife and
+Bootstrap, 1995, section 2.3) with Student's t, on the logarithms. A group is an object if there are three of them,
+otherwise a squeeze. The scatter between groups is many times the standard deviation that one fit gives itself. One
+squeeze shows no such scatter: blocks of its residuals are drawn again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+from attrs import evolve, frozen
+from numpy.typing import NDArray
+
+from graspsense_sim_gripper.identify.choose import fit_residuals
+from graspsense_sim_gripper.identify.fit import Fitted, fit
+from graspsense_sim_gripper.identify.forward import ForwardModel
+from graspsense_sim_gripper.identify.prepare import Squeeze
+
+Floats = NDArray[np.float64]
+
+LEVEL: Final = 0.90
+MAX_GROUPS: Final = 10
+LEAST_INSTANCES: Final = 3
+BOOTSTRAPS: Final = 24
+BLOCKS: Final = 12
+"""Blocks of neighbouring residuals of a squeeze, which are drawn again together."""
+DRAWS: Final = 200
+
+
+@frozen(kw_only=True, eq=False)
+class Uncertainty:
+    """The intervals of the parameters, draws of them, and the spreads between objects and between squeezes."""
+
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    basis: str
+    draws: Floats
+    """(draws, parameters)"""
+    between_objects: float
+    """Standard deviation of the logarithm of the stiffness; NaN with fewer than three objects."""
+    between_squeezes: float
+    """The same between squeezes of one object; NaN with a single squeeze of each."""
+    width_objects_m: float
+    width_squeezes_m: float
+
+
+def uncertainty(
+    model: ForwardModel,
+    fitted: Fitted,
+    squeezes: Sequence[Squeeze],
+    progress: Callable[[int, int], None],
+    seed: int = 0,
+) -> Uncertainty:
+    """Return the uncertainty of a fit."""
+    rng = np.random.default_rng(seed)
+    groups = _groups(squeezes)
+    at = np.log(fitted.values)
+    if len(groups) < 2:
+        refits = _bootstrapped(model, fitted, squeezes[0], rng, progress)
+        covariance = np.cov(refits, rowvar=False, ddof=1).reshape(len(at), len(at))
+        centre, factor, basis = at, _normal(), "within one squeeze; not between squeezes"
+    else:
+        left_out = []
+        for k, group in enumerate(groups):
+            kept = [i for i in range(len(squeezes)) if i not in group]
+            left_out.append(np.log(_refit(model, fitted, squeezes, kept).values))
+            progress(k + 1, len(groups))
+        table = np.array(left_out)
+        g = len(groups)
+        deviations = table - table.mean(axis=0)
+        covariance = (g - 1) / g * deviations.T @ deviations
+        what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
+        centre, factor, basis = at, _student(g - 1), f"between {g} {what if g == len(groups) else 'groups'}"
+    spread = np.sqrt(np.diag(covariance))
+    low, high = np.exp(centre - factor * spread), np.exp(centre + factor * spread)
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    widening = factor / _normal()
+    draws = np.exp(centre + widening * rng.standard_normal((DRAWS, len(at))) @ root.T)
+    return Uncertainty(
+        low=tuple(low.tolist()),
+        high=tuple(high.tolist()),
+        basis=basis,
+        draws=draws,
+        **_spreads(fitted, squeezes),
+    )
+
+
+def _normal() -> float:
+    from scipy.stats import norm
+
+    return float(norm.ppf(0.5 + 0.5 * LEVEL))
+
+
+def _student(degrees: int) -> float:
+    from scipy.stats import t
+
+    return float(t.ppf(0.5 + 0.5 * LEVEL, degrees))
+
+
+def _instances(squeezes: Sequence[Squeeze]) -> int:
+    return len({one.instance for one in squeezes if one.instance})
+
+
+def _groups(squeezes: Sequence[Squeeze]) -> list[list[int]]:
+    """Return the squeezes that are left out together: those of an object, or each alone."""
+    n = len(squeezes)
+    if _instances(squeezes) >= LEAST_INSTANCES and all(one.instance for one in squeezes):
+        names = sorted({one.instance for one in squeezes})
+        groups = [[i for i, one in enumerate(squeezes) if one.instance == name] for name in names]
+    else:
+        groups = [[i] for i in range(n)]
+    if len(groups) > MAX_GROUPS:
+        groups = [sum(groups[k::MAX_GROUPS], []) for k in range(MAX_GROUPS)]
+    return groups
+
+
+def _refit(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], kept: Sequence[int]) -> Fitted:
+    """Return the fit without some squeezes, whose stiffness is that of the mean of the others."""
+    start = evolve(
+        fitted,
+        widths_m=tuple(fitted.widths_m[i] for i in kept),
+        factors=tuple(fitted.factors[i] for i in kept),
+    )
+    return fit(model, fitted.candidate, [squeezes[i] for i in kept], start=start)
+
+
+def _bootstrapped(
+    model: ForwardModel,
+    fitted: Fitted,
+    squeeze: Squeeze,
+    rng: np.random.Generator,
+    progress: Callable[[int, int], None],
+) -> Floats:
+    """Return the logarithms of the values of refits to the fitted force with blocks of residuals drawn again."""
+    residuals = fit_residuals(model, fitted, squeeze) * squeeze.peak_n
+    clean = squeeze.force_n + residuals
+    length = max(len(residuals) // BLOCKS, 1)
+    refits = []
+    for k in range(BOOTSTRAPS):
+        starts = rng.integers(0, max(len(residuals) - length, 1), size=-(-len(residuals) // length))
+        drawn = np.concatenate([residuals[s : s + length] for s in starts])[: len(residuals)]
+        again = evolve(squeeze, force_n=clean - drawn * rng.choice((-1.0, 1.0)))
+        refits.append(np.log(fit(model, fitted.candidate, [again], start=fitted).values))
+        progress(k + 1, BOOTSTRAPS)
+    return np.array(refits)
+
+
+def _spreads(fitted: Fitted, squeezes: Sequence[Squeeze]) -> dict[str, float]:
+    """Return the spreads between objects and between squeezes of an object, of stiffness and width."""
+    names = [one.instance or "" for one in squeezes]
+    stiffness = _components(np.log(fitted.factors), names)
+    width = _components(np.array(fitted.widths_m), names)
+    return {
+        "between_objects": stiffness[0],
+        "between_squeezes": stiffness[1],
+        "width_objects_m": width[0],
+        "width_squeezes_m": width[1],
+    }
+
+
+def _components(values: Floats, names: Sequence[str]) -> tuple[float, float]:
+    """Return the standard deviations between and within groups of these names (analysis of variance)."""
+    groups = [values[[i for i, one in enumerate(names) if one == name]] for name in sorted(set(names))]
+    degrees = sum(len(one) - 1 for one in groups)
+    within = math.nan
+    if degrees > 0:
+        within = math.sqrt(sum(float(np.sum((one - one.mean()) ** 2)) for one in groups) / degrees)
+    if len(groups) < LEAST_INSTANCES:
+        return math.nan, within
+    means = np.array([one.mean() for one in groups])
+    size = len(values) / len(groups)
+    inside = 0.0 if math.isnan(within) else within * within / size
+    return math.sqrt(max(float(np.var(means, ddof=1)) - inside, 0.0)), within

@@ -1,0 +1,167 @@
+"""`graspsense identify`: a scene of the simulator from recorded squeezes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from graspsense.cli.options import force_option
+from graspsense.cli.output import echo_json, file_to_write, refuse_existing
+from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from graspsense.core.identification import Identification, IdentifiedParameter
+
+
+@click.command(short_help="Identify an object from recorded squeezes, as a scene of the simulator.")
+@click.argument("sources", nargs=-1, required=True, metavar="RECORDING|store:DIR...")
+@click.option(
+    "--out", metavar="FILE.toml", callback=file_to_write, required=True, help="File of the scene (.toml)."
+)
+@click.option("--class", "name", metavar="NAME", help="Use only the recordings with this label, or of this class.")
+@click.option("--page", metavar="FILE.html", callback=file_to_write, help="Write the report page.")
+@click.option("--overwrite", is_flag=True, help="Replace the files of --out and --page if they exist.")
+@click.option(
+    "--pipeline",
+    metavar="NAME|FILE",
+    default="default",
+    help="Pipeline with the simulated gripper.  [default: default]",
+)
+@click.option("--gripper", metavar="NAME", help="Another simulated gripper. (gripper.type)")
+@click.option(
+    "-o",
+    "options",
+    metavar="TABLE.KEY=VALUE",
+    multiple=True,
+    help="Set a key: -o gripper.pad_stiffness_n_m=inf for rigid fingertips. Can be repeated.",
+)
+@force_option
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def identify(
+    sources: tuple[str, ...],
+    out: str,
+    name: str | None,
+    page: str | None,
+    overwrite: bool,
+    pipeline: str,
+    gripper: str | None,
+    options: tuple[str, ...],
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Identify the object that recorded squeezes are of, and write it as a scene.
+
+    \b
+    RECORDING is a FILE.mcap, or what `graspsense import` reads: a manifest
+    FILE.toml, or KIND:FILE. store:DIR are the trials of a store.
+
+    `graspsense run --object FILE.toml` grasps the object in simulation.
+    """
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.core.config import Flag, resolve
+    from graspsense.core.errors import ConfigError
+    from graspsense.core.roles import BatchBackend
+    from graspsense.recording.atomic_file import write_or_replace
+    from graspsense.sources.squeezes import recorded_squeezes
+
+    if not out.endswith(".toml"):
+        raise ConfigError(f"--out {out}: a scene is a .toml file: name it so")
+    if not overwrite:
+        refuse_existing(out, page)
+    flags = [Flag("--gripper", "gripper.type", gripper)] if gripper else []
+    settings = resolve(pipeline, options=options, flags=flags, force=force)
+    backend = settings.gripper.create()
+    if not isinstance(backend, BatchBackend):
+        raise ConfigError(
+            f"gripper {settings.gripper.component.qualified} is not a simulator, so it has no scenes: --gripper sim"
+        )
+    squeezes = recorded_squeezes(sources, name)
+    with ProgressLine() as progress:
+        result = backend.identify(squeezes, progress)
+    write_or_replace(Path(out), result.scene.encode())
+    if page:
+        from graspsense.report.identification import identification_page
+        from graspsense.report.write import write_html
+
+        write_html(Path(page), identification_page(result, Path(out).name))
+    for note in result.notes:
+        talk(f"note: {note}")
+    if as_json:
+        echo_json(_as_values(out, result))
+    else:
+        _print(out, result)
+        if page:
+            echo_entry("page", page)
+
+
+def _print(out: str, result: Identification) -> None:
+    """Print the identified object, the candidates, and what is not determined."""
+    rms = [fit.rms_n for fit in result.fits]
+    relative = [fit.rms_n / fit.peak_n for fit in result.fits]
+    echo_entry("object", result.label or "without a label")
+    echo_entry("squeezes", f"{len(result.fits)}, in {result.seconds:.1f} s")
+    worst, mean = max(relative), sum(relative) / len(relative)
+    echo_entry(
+        "residual",
+        f"{1e3 * sum(rms) / len(rms):.0f} mN rms, {100.0 * mean:.2f} % of the peak (largest {100.0 * worst:.2f} %)",
+    )
+    echo()
+    echo_table(
+        ("PARAMETER", "VALUE", "UNIT", "90 % INTERVAL", "BASIS"),
+        [
+            (one.name, f"{one.value:.4g}", one.unit, _interval(one), one.basis)
+            for one in result.parameters
+        ],
+    )
+    echo()
+    echo_table(
+        ("CANDIDATE", "PARAMETERS", "HELD OUT", "FIT", "VERDICT"),
+        [
+            (one.terms, str(one.parameters), _percent(one.error), _percent(one.fit_error), one.verdict)
+            for one in result.candidates
+        ],
+        {"VERDICT": lambda cell: Style.GOOD if cell == "chosen" else None},
+    )
+    echo()
+    echo("not determined by these recordings:")
+    echo_table(
+        ("WHAT", "WHY", "WHAT WOULD DETERMINE IT"),
+        [(one.what, one.reason, one.remedy) for one in result.undetermined],
+    )
+    echo()
+    echo_entry("scene", out)
+    echo_entry("use it", f"graspsense run --object {out}")
+
+
+def _interval(parameter: IdentifiedParameter) -> str:
+    if math.isnan(parameter.low):
+        return "-"
+    return f"{parameter.low:.4g} to {parameter.high:.4g}"
+
+
+def _percent(share: float) -> str:
+    return "-" if math.isnan(share) else f"{100.0 * share:.2f} %"
+
+
+def _as_values(out: str, result: Identification) -> dict[str, Any]:
+    from attrs import asdict
+
+    def values(items: Sequence[Any]) -> list[dict[str, Any]]:
+        return [asdict(one) for one in items]
+
+    return {
+        "scene": out,
+        "label": result.label,
+        "seconds": result.seconds,
+        "parameters": values(result.parameters),
+        "candidates": values(result.candidates),
+        "undetermined": values(result.undetermined),
+        "fits": [{"name": one.name, "rms_n": one.rms_n, "peak_n": one.peak_n} for one in result.fits],
+        "checks": [{"statistic": one.statistic, "p": one.p} for one in result.checks],
+        "notes": list(result.notes),
+    }

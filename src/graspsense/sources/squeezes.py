@@ -1,0 +1,118 @@
+"""The recorded squeezes that a user names for `graspsense identify`: recordings, imported files, and stores."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from graspsense.core.errors import ConfigError, suggestion
+from graspsense.core.identification import RecordedSqueeze
+from graspsense.core.labelled import class_of
+
+if TYPE_CHECKING:
+    from graspsense.recording.reader import RecordedGrasp
+
+STORE: Final = "store:"
+
+
+def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[RecordedSqueeze, ...]:
+    """Return the squeezes of these sources; `name`: those with this label or of this class only.
+
+    A source is a FILE.mcap, `store:DIR`, or whatever `graspsense import` reads. Raises ConfigError if there are none,
+    if they are of several objects, or if a channel is not in SI units; DataDamaged.
+    """
+    squeezes = [squeeze for source in sources for squeeze in _of_source(source)]
+    if not squeezes:
+        raise ConfigError(f"{', '.join(sources)}: there are no recordings")
+    labels = sorted({squeeze.label for squeeze in squeezes if squeeze.label})
+    if name is not None:
+        known = sorted({*labels, *map(class_of, labels)})
+        squeezes = [one for one in squeezes if one.label and name in (one.label, class_of(one.label))]
+        if not squeezes:
+            raise ConfigError(
+                f"no recording has the label or the class {name!r}. Known: {', '.join(known) or 'none has a label'}."
+                + suggestion(name, known)
+            )
+        labels = sorted({one.label for one in squeezes})
+    if len(labels) > 1:
+        raise ConfigError(
+            f"the recordings are of {len(labels)} objects, and a scene describes one. Name it: --class "
+            f"{labels[0]} (there are {', '.join(labels)})"
+        )
+    for squeeze in squeezes:
+        _refuse_other_units(squeeze)
+    return tuple(squeezes)
+
+
+def _of_source(source: str) -> Iterator[RecordedSqueeze]:
+    if source.startswith(STORE) and "#" not in source:
+        yield from _of_store(source.removeprefix(STORE))
+    elif source.endswith(".mcap"):
+        from graspsense.recording.reader import read_recorded
+
+        path = Path(source).expanduser()
+        grasp = read_recorded(path)
+        yield _of_grasp(grasp, path.name, hashlib.sha256(path.read_bytes()).hexdigest())
+    else:
+        yield from _of_import(source)
+
+
+def _of_store(folder: str) -> Iterator[RecordedSqueeze]:
+    """Yield the trials of a store that were not set aside, oldest first."""
+    from graspsense.recording.reader import read_recorded
+    from graspsense.store.store import Store
+
+    with Store.read(folder) as store:
+        numbers = [one.id for one in store.page(limit=1_000_000) if one.complete]
+        for number in reversed(numbers):
+            trial = store.trial(number)
+            yield _of_grasp(read_recorded(trial.recording), f"{folder}#{number}", trial.recording_sha256)
+
+
+def _of_grasp(grasp: RecordedGrasp, name: str, sha256: str) -> RecordedSqueeze:
+    record = grasp.record()
+    labels = record.labels
+    gripper = dict(record.settings.get("gripper", {})) if record.simulated else {}
+    return RecordedSqueeze(
+        name=name,
+        sha256=sha256,
+        trace=grasp.trace(),
+        label=labels.get("label", ""),
+        instance=labels.get("instance", ""),
+        gripper=gripper,
+        simulated=record.simulated,
+    )
+
+
+def _of_import(source: str) -> Iterator[RecordedSqueeze]:
+    from graspsense.recording.replayable import content_sha256
+    from graspsense.sources.import_sources import recordings_to_import
+    from graspsense.sources.labelled_recordings import trace_of_recording
+
+    for imported in recordings_to_import(source, {}, None):
+        labelled = imported.labelled
+        instance = f"{class_of(labelled.label)}#{labelled.instance}" if labelled.instance else ""
+        yield RecordedSqueeze(
+            name=imported.name,
+            sha256=content_sha256(labelled.recording),
+            trace=trace_of_recording(labelled.recording),
+            label=labelled.label,
+            instance=instance,
+        )
+
+
+def _refuse_other_units(squeeze: RecordedSqueeze) -> None:
+    """Raise ConfigError for a recording whose time, gap or force is not in SI units."""
+    units = squeeze.trace.units
+    wrong = [
+        f"{channel} in {units[channel]}"
+        for channel, unit in (("t", "s"), ("gap", "m"), ("force_left", "N"), ("force_right", "N"))
+        if units.get(channel, unit) != unit
+    ]
+    if wrong:
+        raise ConfigError(
+            f"{squeeze.name}: {', '.join(wrong)}. A scene is in SI units: convert the columns in the manifest "
+            '(such as force = "F * 0.012 [N]")'
+        )
