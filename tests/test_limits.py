@@ -30,6 +30,7 @@ MANY_PARAMETERS = {
     "graspsense/cli/emulate.py:emulate": OPTIONS,
     "graspsense/cli/evaluate.py:evaluate": OPTIONS,
     "graspsense/cli/experiment.py:experiment": OPTIONS,
+    "graspsense/cli/identify.py:identify": OPTIONS,
     "graspsense/cli/import_.py:import_": OPTIONS,
     "graspsense/cli/report.py:report": OPTIONS,
     "graspsense/cli/run.py:run": OPTIONS,

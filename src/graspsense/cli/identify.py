@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 @click.option(
     "--out", metavar="FILE.toml", callback=file_to_write, required=True, help="File of the scene (.toml)."
 )
-@click.option("--class", "name", metavar="NAME", help="Use only the recordings with this label, or of this class.")
+@click.option(
+    "--class", "name", metavar="NAME", help="Use only the recordings with this label, or of this class."
+)
 @click.option("--page", metavar="FILE.html", callback=file_to_write, help="Write the report page.")
 @click.option("--overwrite", is_flag=True, help="Replace the files of --out and --page if they exist.")
 @click.option(
@@ -113,10 +115,7 @@ def _print(out: str, result: Identification) -> None:
     echo()
     echo_table(
         ("PARAMETER", "VALUE", "UNIT", "90 % INTERVAL", "BASIS"),
-        [
-            (one.name, f"{one.value:.4g}", one.unit, _interval(one), one.basis)
-            for one in result.parameters
-        ],
+        [(one.name, f"{one.value:.4g}", one.unit, _interval(one), one.basis) for one in result.parameters],
     )
     echo()
     echo_table(

@@ -1,4 +1,4 @@
-"""What `graspsense identify` passes to a simulator, and what comes back: an object, and what the recordings say of it."""
+"""What `graspsense identify` passes to a simulator, and what comes back: an object, and what is known of it."""
 
 from __future__ import annotations
 

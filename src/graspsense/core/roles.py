@@ -263,7 +263,9 @@ class BatchBackend(SensorBackend[ConfigT]):
         Raises ConfigError if the simulator cannot identify objects, or if the squeezes determine none.
         """
         del squeezes, progress
-        raise ConfigError(f"{type(self).__name__} cannot identify an object from recordings. --gripper sim can")
+        raise ConfigError(
+            f"{type(self).__name__} cannot identify an object from recordings. --gripper sim can"
+        )
 
     @abstractmethod
     def run_many(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from graspsense.plugin_api import CandidateScore
 from graspsense_sim_gripper.identify.fit import Fitted, Mask, fit, held_out_rms
 from graspsense_sim_gripper.identify.forward import ForwardModel
-from graspsense_sim_gripper.identify.laws import Candidate, DataScale, memories, static_candidates
+from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import Squeeze
 
 MAX_FOLDS: Final = 5
@@ -77,9 +77,7 @@ def choose(
         fits.append(fit(model, candidate, squeezes))
         progress(len(statics) + done, total + len(candidates))
     least = min(one.rms for one in fits)
-    judged = [
-        _judged(model, one, squeezes) for one in fits if one.rms <= WORTH_TRYING * least
-    ]
+    judged = [_judged(model, one, squeezes) for one in fits if one.rms <= WORTH_TRYING * least]
     best = _simplest(judged)
     scores = [_score(one, best, judged) for one in sorted(fits, key=lambda one: one.rms)]
     dropped = [
@@ -131,9 +129,7 @@ def _judged(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) ->
 
 def fit_residuals(model: ForwardModel, fitted: Fitted, squeeze: Squeeze) -> NDArray[np.float64]:
     """Return the residuals of a fit to one squeeze at all of its samples, relative to the peak."""
-    forces = model.forces(
-        squeeze, fitted.candidate, fitted.values, fitted.widths_m[0], fitted.factors[0]
-    )
+    forces = model.forces(squeeze, fitted.candidate, fitted.values, fitted.widths_m[0], fitted.factors[0])
     return (forces - squeeze.force_n) / squeeze.peak_n
 
 
@@ -175,5 +171,3 @@ def _score(fitted: Fitted, best: _Judged, judged: Sequence[_Judged]) -> Candidat
         verdict=verdict,
         chosen=own is best,
     )
-
-

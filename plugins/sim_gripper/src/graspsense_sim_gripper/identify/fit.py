@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -80,7 +81,7 @@ class _Problem:
         self.p, self.n = len(candidate.free), len(squeezes)
         self.has_factors = self.n > 1
         edges = np.cumsum([0, *(int(mask.sum()) for mask in masks)])
-        self.rows = [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        self.rows = [slice(int(a), int(b)) for a, b in pairwise(edges)]
         self.size = int(edges[-1])
 
     def bounds(self) -> tuple[Floats, Floats]:
@@ -96,7 +97,9 @@ class _Problem:
     def split(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         p, n = self.p, self.n
         shares = x[p : p + n]
-        widths = np.array([one.width_m + share * one.depth_m for one, share in zip(self.squeezes, shares, strict=True)])
+        widths = np.array(
+            [one.width_m + share * one.depth_m for one, share in zip(self.squeezes, shares, strict=True)]
+        )
         factors = np.exp(x[p + n :]) if self.has_factors else np.ones(n)
         return np.exp(x[:p]), widths, factors
 
@@ -104,7 +107,7 @@ class _Problem:
         values, widths, factors = self.split(x)
         out = np.empty(self.size)
         for i, squeeze in enumerate(self.squeezes):
-            forces = self.model.forces(squeeze, self.candidate, values, widths[i], float(factors[i]))
+            forces = self.model.forces(squeeze, self.candidate, values.tolist(), widths[i], float(factors[i]))
             out[self.rows[i]] = ((forces - squeeze.force_n) / squeeze.peak_n)[self.masks[i]]
         return np.nan_to_num(out, nan=NO_FORCE, posinf=NO_FORCE, neginf=-NO_FORCE)
 
@@ -196,7 +199,7 @@ def held_out_rms(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, width_m:
 
     limits = np.array([WIDTH_RANGE, FACTOR_RANGE])
     found = least_squares(
-        residuals, np.zeros(2), bounds=(-limits, limits), max_nfev=15, diff_step=STEP, ftol=TOLERANCE
+        residuals, np.zeros(2), bounds=(-limits, limits), max_nfev=15, diff_step=[STEP, STEP], ftol=TOLERANCE
     )
     return float(np.sqrt(np.mean(found.fun**2)))
 

@@ -100,7 +100,9 @@ class ForwardModel:
         run, compiled = path_forces()
         closure, speed, pads = width_m - squeeze.gap_m, squeeze.speed_m_s, self.pads
         if self.direct and math.isfinite(pads.stiffness_n_m):
-            yielded = np.interp(squeeze.t_s, squeeze.t_s[squeeze.sample], squeeze.force_n) / pads.stiffness_n_m
+            yielded = (
+                np.interp(squeeze.t_s, squeeze.t_s[squeeze.sample], squeeze.force_n) / pads.stiffness_n_m
+            )
             closure = closure - yielded
             speed = speed - np.gradient(yielded, squeeze.t_s)
             pads = RIGID_PADS
@@ -113,7 +115,9 @@ class ForwardModel:
                 run(model, uncompressed(SLOTS), closure, speed, squeeze.step_s, out)
             else:
                 out = out.tolist()
-                run(model, uncompressed(SLOTS), closure.tolist(), speed.tolist(), squeeze.step_s.tolist(), out)
+                run(
+                    model, uncompressed(SLOTS), closure.tolist(), speed.tolist(), squeeze.step_s.tolist(), out
+                )
                 out = np.array(out)
         except LAW_ERRORS:
             out = np.full(len(closure), math.nan)

@@ -147,16 +147,24 @@ def static_candidates(scale: DataScale) -> list[Candidate]:
         slot=RIGID, name="hertz_n_m15", low=1e-3 * power, high=1e4 * power, starts=(power, 3.0 * power)
     )
     foam = (
-        FreeParameter(slot=FOAM, name="force_n", low=1e-3 * force, high=100.0 * force, starts=(force, 0.5 * force)),
+        FreeParameter(
+            slot=FOAM, name="force_n", low=1e-3 * force, high=100.0 * force, starts=(force, 0.5 * force)
+        ),
         FreeParameter(slot=FOAM, name="exponent", low=0.3, high=6.0, starts=(1.2, 2.0)),
     )
     snap = (
         FreeParameter(slot=SNAP, name="k1_n_m", low=0.05 * k, high=100.0 * k, starts=(2.0 * k,)),
         FreeParameter(
-            slot=SNAP, name="critical_m", low=0.03 * depth, high=depth, starts=(0.3 * depth, 0.5 * depth, 0.8 * depth)
+            slot=SNAP,
+            name="critical_m",
+            low=0.03 * depth,
+            high=depth,
+            starts=(0.3 * depth, 0.5 * depth, 0.8 * depth),
         ),
         FreeParameter(slot=SNAP, name="drop_n", low=0.01 * force, high=3.0 * force, starts=(0.2 * force,)),
-        FreeParameter(slot=SNAP, name="fall_m", low=0.01 * depth, high=2.0 * depth, starts=(0.1 * depth, 0.3 * depth)),
+        FreeParameter(
+            slot=SNAP, name="fall_m", low=0.01 * depth, high=2.0 * depth, starts=(0.1 * depth, 0.3 * depth)
+        ),
         FreeParameter(slot=SNAP, name="k2_n_m", low=0.01 * k, high=100.0 * k, starts=(k,)),
     )
     return [
@@ -178,7 +186,9 @@ def memories(scale: DataScale) -> list[Candidate]:
         inside = tuple(min(max(tau, 1.5 * shortest), 0.5 * longest) for tau in starts_s)
         return Candidate(
             free=(
-                FreeParameter(slot=slot, name="k_n_m", low=1e-3 * k, high=100.0 * k, starts=(share * k, 2.0 * share * k)),
+                FreeParameter(
+                    slot=slot, name="k_n_m", low=1e-3 * k, high=100.0 * k, starts=(share * k, 2.0 * share * k)
+                ),
                 FreeParameter(slot=slot, name="tau_s", low=shortest, high=longest, starts=inside),
             )
         )

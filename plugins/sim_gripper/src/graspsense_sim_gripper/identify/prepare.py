@@ -140,8 +140,8 @@ def _samples(name: str, trace: Trace, delay_s: float) -> tuple[Floats, Floats]:
         at = np.searchsorted(times, images + delay_s - 1e-9)
         known = at < len(times)
         times, force = images[known], force[at[known]]
-    elif len(changed) < 0.6 * len(times):
-        # A force of a lower rate than the ticks, repeated between its samples.
+    elif len(changed) > MIN_SAMPLES and np.median(np.diff(changed)) > 1.5:
+        # A force of a lower rate than the ticks, repeated between its samples. In a hold it may not change for long.
         times, force = times[changed], force[changed]
     finite = np.isfinite(force) & np.isfinite(times)
     return times[finite], force[finite]
@@ -173,7 +173,9 @@ def _stretches(t_s: Floats, gap: Floats, width: float, *, has_approach: bool) ->
     depth = max(width - float(gap[least]), 1e-9)
     closing = np.flatnonzero((gap < width) & (gap > width - 0.95 * depth) & (np.arange(len(gap)) <= least))
     load_s = float(t_s[closing[-1]] - t_s[closing[0]]) if len(closing) > 1 else 0.0
-    held = np.abs(gap - float(np.median(gap[gap < width - (1.0 - 5 * HOLD_SHARE) * depth]))) < HOLD_SHARE * depth
+    held = (
+        np.abs(gap - float(np.median(gap[gap < width - (1.0 - 5 * HOLD_SHARE) * depth]))) < HOLD_SHARE * depth
+    )
     longest, begin = 0.0, math.nan
     for i, is_held in enumerate(held):
         if is_held and math.isnan(begin):

@@ -114,7 +114,13 @@ def _spreads(found: Uncertainty, squeezes: Sequence[Squeeze]) -> list[Undetermin
     open_ = []
     if math.isnan(found.between_objects):
         names = {one.instance for one in squeezes if one.instance}
-        count = "one object" if len(names) == 1 else f"{len(names)} objects" if names else "objects without numbers"
+        count = (
+            "one object"
+            if len(names) == 1
+            else f"{len(names)} objects"
+            if names
+            else "objects without numbers"
+        )
         open_.append(
             Undetermined(
                 what="spread between objects",

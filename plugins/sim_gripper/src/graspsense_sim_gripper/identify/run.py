@@ -19,8 +19,8 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.build import drive_and_pads
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.drive import Drive
 from graspsense_sim_gripper.fingertip import CELLS
+from graspsense_sim_gripper.identify.check import predictive_checks
 from graspsense_sim_gripper.identify.choose import choose
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel
@@ -29,11 +29,19 @@ from graspsense_sim_gripper.identify.prepare import Squeeze, prepared
 from graspsense_sim_gripper.identify.refuse import shows_memory, undetermined
 from graspsense_sim_gripper.identify.share import measured_share
 from graspsense_sim_gripper.identify.spread import Uncertainty, uncertainty
-from graspsense_sim_gripper.identify.write import scene_text
+from graspsense_sim_gripper.identify.write import SceneFacts, scene_text
 
 Progress = Callable[[str, int, int], None]
 
-UNITS: Final = {"n_m": "N/m", "n_m3": "N/m3", "n_m15": "N/m1.5", "n": "N", "m": "m", "s": "s", "n_s_m": "N s/m"}
+UNITS: Final = {
+    "n_m": "N/m",
+    "n_m3": "N/m3",
+    "n_m15": "N/m1.5",
+    "n": "N",
+    "m": "m",
+    "s": "s",
+    "n_s_m": "N s/m",
+}
 """The units by the ends of names."""
 OF_FINGERTIPS: Final = ("pad_stiffness_n_m", "pad_damping_n_s_m", "pad_creep_n_m", "pad_creep_s")
 """The settings of the gripper with which an object is identified, and has to be simulated."""
@@ -50,7 +58,10 @@ def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: P
     model = ForwardModel(pads=pads)
     ready = [prepared(one, config.pad_delay_s) for one in squeezes]
     cells = _has_cells(config, squeezes)
-    shares = [measured_share(one.trace, two, drive) if cells else 1.0 for one, two in zip(squeezes, ready, strict=True)]
+    shares = [
+        measured_share(one.trace, two, drive) if cells else 1.0
+        for one, two in zip(squeezes, ready, strict=True)
+    ]
     share = _share(shares) if cells else 1.0
     ready = [_with_share(one, share) for one in ready]
     choice = choose(
@@ -66,15 +77,24 @@ def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: P
     open_ = undetermined(choice.fitted, found, ready, shares, cells)
     values, parameters = _values(choice.fitted, found, share, shares, cells)
     label = next((one.label for one in squeezes if one.label), "")
-    gripper = {name: float(getattr(config, name)) for name in OF_FINGERTIPS}
-    text = scene_text(label, choice.fitted, parameters, values, gripper, ready, choice.scores, open_)
+    facts = SceneFacts(
+        label=label,
+        fitted=choice.fitted,
+        parameters=parameters,
+        values=values,
+        gripper={name: float(getattr(config, name)) for name in OF_FINGERTIPS},
+        squeezes=ready,
+        candidates=choice.scores,
+        undetermined=open_,
+    )
     return Identification(
         label=label,
-        scene=text,
+        scene=scene_text(facts),
         parameters=tuple(parameters),
         candidates=choice.scores,
         undetermined=tuple(open_),
-        fits=tuple(_fits(model, choice.fitted, ready, share)),
+        fits=tuple(_fits(model, choice.fitted, ready)),
+        checks=predictive_checks(model, choice.fitted, found, ready),
         draws=found.draws,
         notes=tuple(notes),
         seconds=time.monotonic() - begin,
@@ -169,7 +189,9 @@ def _mean(name: str, unit: str, values: Any) -> IdentifiedParameter:
     n, mean = len(values), float(np.mean(values))
     half = float(t.ppf(0.95, n - 1) * np.std(values, ddof=1) / math.sqrt(n)) if n > 1 else math.nan
     basis = f"between {n} squeezes" if n > 1 else "one squeeze: no interval"
-    return IdentifiedParameter(name=name, unit=unit, value=mean, low=mean - half, high=mean + half, basis=basis)
+    return IdentifiedParameter(
+        name=name, unit=unit, value=mean, low=mean - half, high=mean + half, basis=basis
+    )
 
 
 def _unit(name: str) -> str:
@@ -177,7 +199,7 @@ def _unit(name: str) -> str:
     return UNITS[ends[-1]] if ends else ""
 
 
-def _fits(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], share: float) -> list[SqueezeFit]:
+def _fits(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[SqueezeFit]:
     result = []
     for squeeze, width, factor in zip(squeezes, fitted.widths_m, fitted.factors, strict=True):
         forces = model.forces(squeeze, fitted.candidate, fitted.values, width, factor)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import chain
 from typing import Final
 
 import numpy as np
@@ -116,7 +117,7 @@ def _groups(squeezes: Sequence[Squeeze]) -> list[list[int]]:
     else:
         groups = [[i] for i in range(n)]
     if len(groups) > MAX_GROUPS:
-        groups = [sum(groups[k::MAX_GROUPS], []) for k in range(MAX_GROUPS)]
+        groups = [list(chain.from_iterable(groups[k::MAX_GROUPS])) for k in range(MAX_GROUPS)]
     return groups
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+
+from attrs import frozen
 
 from graspsense.plugin_api import CandidateScore, IdentifiedParameter, Undetermined
 from graspsense_sim_gripper.identify.fit import Fitted
@@ -12,77 +14,82 @@ from graspsense_sim_gripper.identify.laws import SLOTS
 from graspsense_sim_gripper.identify.prepare import Squeeze
 
 
-def number(value: float) -> str:
-    """Return a number for TOML, with six digits."""
-    text = f"{value:.6g}"
-    return text if any(mark in text for mark in ".en") else f"{text}.0"
+@frozen(kw_only=True, eq=False)
+class SceneFacts:
+    """What is written to a scene file."""
+
+    label: str
+    fitted: Fitted
+    parameters: Sequence[IdentifiedParameter]
+    values: Mapping[str, float]
+    """The keys of the object."""
+    gripper: Mapping[str, float]
+    """The settings of the fingertips."""
+    squeezes: Sequence[Squeeze]
+    candidates: Sequence[CandidateScore]
+    undetermined: Sequence[Undetermined]
 
 
-def scene_text(
-    label: str,
-    fitted: Fitted,
-    parameters: Sequence[IdentifiedParameter],
-    values: dict[str, float],
-    gripper: dict[str, float],
-    squeezes: Sequence[Squeeze],
-    candidates: Sequence[CandidateScore],
-    open_: Sequence[Undetermined],
-) -> str:
-    """Return the text of the scene file. `values` are the keys of the object, `gripper` settings of the fingertips."""
-    what = f"{label or 'object'}, identified from {len(squeezes)} squeeze{'s' if len(squeezes) > 1 else ''}"
-    lines = ["# Written by `graspsense identify`. Numbers in brackets are 90 % intervals.", f"summary = {json.dumps(what)}"]
-    intervals = {one.name: one for one in parameters}
-    for key, value in values.items():
+def scene_text(facts: SceneFacts) -> str:
+    """Return the text of the scene file."""
+    n = len(facts.squeezes)
+    what = f"{facts.label or 'object'}, identified from {n} squeeze{'s' if n > 1 else ''}"
+    lines = [
+        "# Written by `graspsense identify`. Numbers in brackets are 90 % intervals.",
+        f"summary = {json.dumps(what)}",
+    ]
+    intervals = {one.name: one for one in facts.parameters}
+    for key, value in facts.values.items():
         interval = intervals.get(key)
-        comment = "" if interval is None else f"  # {_interval(interval)}"
-        lines.append(f"{key} = {number(value)}{comment}")
-    for slot, given in fitted.candidate.parameters(fitted.values).items():
+        lines.append(f"{key} = {_number(value)}" + ("" if interval is None else f"  # {_interval(interval)}"))
+    for slot, given in facts.fitted.candidate.parameters(facts.fitted.values).items():
         lines += ["", "[[terms]]", f'type = "{SLOTS[slot]}"']
-        labels = {one.name: one.label for one in fitted.candidate.free if one.slot == slot}
+        labels = {one.name: one.label for one in facts.fitted.candidate.free if one.slot == slot}
         for name, value in given.items():
             interval = intervals.get(labels.get(name, ""))
-            comment = "  # not fitted" if interval is None else f"  # {_interval(interval)}"
-            lines.append(f"{name} = {number(value)}{comment}")
-    return "\n".join([*lines, "", *_identified(label, parameters, gripper, squeezes, candidates, open_)]) + "\n"
+            comment = "not fitted" if interval is None else _interval(interval)
+            lines.append(f"{name} = {_number(value)}  # {comment}")
+    return "\n".join([*lines, "", *_identified(facts)]) + "\n"
 
 
-def _interval(parameter: IdentifiedParameter) -> str:
-    return f"[{parameter.low:.4g}, {parameter.high:.4g}] {parameter.unit}".rstrip()
-
-
-def _identified(
-    label: str,
-    parameters: Sequence[IdentifiedParameter],
-    gripper: dict[str, float],
-    squeezes: Sequence[Squeeze],
-    candidates: Sequence[CandidateScore],
-    open_: Sequence[Undetermined],
-) -> list[str]:
-    rows = [
-        "# What the scene was identified from. The simulator reads this table and does not use it.",
+def _identified(facts: SceneFacts) -> list[str]:
+    intervals = [one for one in facts.parameters if not math.isnan(one.low)]
+    return [
+        "# What the scene was identified from. The simulator checks this table and does not use it.",
         "[identified]",
-        f"label = {json.dumps(label)}",
+        f"label = {json.dumps(facts.label)}",
         "",
         "[identified.gripper]",
-        *(f"{key} = {number(value)}" for key, value in gripper.items()),
+        *(f"{key} = {_number(value)}" for key, value in facts.gripper.items()),
         "",
         "[identified.intervals]",
         *(
-            f"{json.dumps(one.name)} = [{number(one.low)}, {number(one.high)}]  # {one.basis}"
-            for one in parameters
+            f"{json.dumps(one.name)} = [{_number(one.low)}, {_number(one.high)}]  # {one.basis}"
+            for one in intervals
         ),
         "",
         "[identified.recordings]",
-        *(f"{json.dumps(one.name)} = {json.dumps(one.sha256)}" for one in squeezes),
+        *(f"{json.dumps(one.name)} = {json.dumps(one.sha256)}" for one in facts.squeezes),
         "",
+        "# The error on held-out data over the peak force; nan where it was not computed.",
         "[identified.candidates]",
-        *(f"{json.dumps(one.terms)} = {_error(one)}  # {one.verdict}" for one in candidates),
+        *(f"{json.dumps(one.terms)} = {_number(one.error)}  # {one.verdict}" for one in facts.candidates),
         "",
         "[identified.undetermined]",
-        *(f"{json.dumps(one.what)} = {json.dumps(f'{one.reason}. {one.remedy}')}" for one in open_),
+        *(
+            f"{json.dumps(one.what)} = {json.dumps(f'{one.reason}; {one.remedy}')}"
+            for one in facts.undetermined
+        ),
     ]
-    return rows
 
 
-def _error(candidate: CandidateScore) -> str:
-    return "nan" if math.isnan(candidate.error) else number(candidate.error)
+def _interval(parameter: IdentifiedParameter) -> str:
+    if math.isnan(parameter.low):
+        return parameter.basis
+    return f"[{parameter.low:.4g}, {parameter.high:.4g}] {parameter.unit}".rstrip()
+
+
+def _number(value: float) -> str:
+    """Return a number for TOML, with six digits."""
+    text = f"{value:.6g}"
+    return text if any(mark in text for mark in ".en") else f"{text}.0"

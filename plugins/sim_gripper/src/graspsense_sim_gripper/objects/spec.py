@@ -15,6 +15,7 @@ from attrs import field, fields_dict, frozen
 from attrs.validators import ge, gt, in_, le
 
 from graspsense.plugin_api import ConfigError, UnknownName, suggestion
+from graspsense_sim_gripper.objects.identified import check_identified
 from graspsense_sim_gripper.terms.registry import find_term, in_order
 
 PATCHES: Final = ("line", "face", "point")
@@ -162,7 +163,9 @@ def _scene_values(table: TomlTable, problems: list[str]) -> dict[str, TomlValue]
     known = fields_dict(ObjectSpec).keys() - {"name", "reasons", "fitted_to", "file", "spreads"}
     values: dict[str, TomlValue] = {}
     for key, entry in table.items():
-        if key not in known:
+        if key == "identified":
+            check_identified(entry, problems)
+        elif key not in known:
             problems.append(f"{key}: no such key. Known: {', '.join(sorted(known))}.{suggestion(key, known)}")
         elif key in ("summary", "patch", "held"):
             expected = bool if key == "held" else str

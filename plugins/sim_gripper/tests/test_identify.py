@@ -1,0 +1,133 @@
+"""Identifying an object: a law that made the forces is found again, and what a recording cannot show is refused."""
+
+from __future__ import annotations
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from graspsense.plugin_api import ConfigError, RecordedSqueeze, Trace
+from graspsense_sim_gripper.dynamics.contact import PadCompliance
+from graspsense_sim_gripper.identify.choose import choose
+from graspsense_sim_gripper.identify.fit import fit
+from graspsense_sim_gripper.identify.forward import ForwardModel
+from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
+from graspsense_sim_gripper.identify.prepare import prepared
+from graspsense_sim_gripper.identify.refuse import shows_memory
+from graspsense_sim_gripper.objects.spec import parse_scene
+
+PADS = PadCompliance(15000.0, 0.0, 0.0, 1.0)
+WIDTH_M = 0.05
+DEPTH_M = 0.008
+
+
+def recorded(force_of=None, *, hold_s=1.0, speed_m_s=0.02, period_s=0.0) -> RecordedSqueeze:
+    """Return a squeeze at constant speed with a hold, whose force is `force_of(closure)`."""
+    load_s = DEPTH_M / speed_m_s
+    t = np.arange(0.0, 0.3 + load_s + hold_s, 0.002)
+    gap = WIDTH_M + 0.3 * speed_m_s - speed_m_s * np.minimum(t, 0.3 + load_s)
+    force = (force_of or (lambda closure: 1000.0 * closure))(np.maximum(WIDTH_M - gap, 0.0))
+    images = np.arange(0.001, t[-1], period_s) if period_s else np.empty(0)
+    if period_s:
+        force = force[np.searchsorted(t, images)][np.maximum(np.searchsorted(images, t, side="right") - 1, 0)]
+    nothing = np.full(len(t), np.nan)
+    trace = Trace(
+        t_s=t,
+        gap_m=gap,
+        velocity_m_s=nothing,
+        effort_n=nothing,
+        force_left_n=force,
+        force_right_n=force,
+        edge_left_n=nothing,
+        edge_right_n=nothing,
+        status=np.zeros(len(t), np.int64),
+        phase=np.zeros(len(t), np.int64),
+        command=nothing,
+        pad_t_s=images,
+        pad_left=np.empty((len(images), 0)),
+        pad_right=np.empty((len(images), 0)),
+    )
+    return RecordedSqueeze(name="one", sha256="0" * 64, trace=trace)
+
+
+def scale_of(squeeze) -> DataScale:
+    hold = squeeze.stretches
+    return DataScale(squeeze.peak_n, squeeze.depth_m, hold.load_s, hold.load_s + hold.hold_s, 0.01)
+
+
+def with_forces(squeeze, forces):
+    from attrs import evolve
+
+    return evolve(squeeze, force_n=forces)
+
+
+def test_contact_hold_and_speed_are_found_in_a_recording():
+    squeeze = prepared(recorded(), 0.0)
+    # The force exceeds 3 % of its peak 0.24 mm behind the contact.
+    assert squeeze.width_m == pytest.approx(WIDTH_M, abs=3e-4)
+    assert squeeze.stretches.hold_s == pytest.approx(1.0, abs=0.05)
+    assert squeeze.stretches.speed_m_s == pytest.approx(0.02, rel=0.1)
+
+
+def test_a_force_of_the_pads_is_taken_at_the_time_of_its_image():
+    squeeze = prepared(recorded(period_s=0.041), 0.0)
+    loading = squeeze.gap_m[squeeze.sample] > WIDTH_M - 0.9 * DEPTH_M
+    closure = np.maximum(WIDTH_M - squeeze.gap_m[squeeze.sample][loading], 0.0)
+    # Taken at the ticks that repeat it, it would lag by 20 ms on average, which is 0.4 N here.
+    assert np.abs(squeeze.force_n[loading] - 1000.0 * closure).max() < 0.1
+
+
+def test_a_recording_without_contact_is_refused():
+    with pytest.raises(ConfigError, match="nothing was touched"):
+        prepared(recorded(lambda closure: 0.0 * closure), 0.0)
+
+
+def test_a_ramp_at_one_speed_shows_no_memory_and_a_hold_does():
+    ramp = prepared(recorded(hold_s=0.0), 0.0)
+    faster = prepared(recorded(hold_s=0.0, speed_m_s=0.05), 0.0)
+    held = prepared(recorded(), 0.0)
+    assert not shows_memory([ramp, ramp])
+    assert shows_memory([ramp, faster])
+    assert shows_memory([held])
+
+
+@pytest.mark.slow
+def test_the_law_that_made_the_forces_is_chosen_with_its_numbers():
+    squeeze = prepared(recorded(), 0.0)
+    scale, model = scale_of(squeeze), ForwardModel(pads=PADS)
+    true = static_candidates(scale)[2].joined(memories(scale)[1])
+    values = (900.0, 1.5e7, 300.0, 0.15)
+    rng = np.random.default_rng(0)
+    clean = model.forces(squeeze, true, values, WIDTH_M, 1.0)
+    noisy = with_forces(squeeze, clean + 0.01 * rng.standard_normal(len(clean)))
+    found = fit(model, true, [noisy])
+    assert found.values == pytest.approx(values, rel=0.1)
+    chosen = choose(model, [noisy], scale, has_memory=True, progress=lambda done, total: None)
+    assert chosen.fitted.candidate.name == "elastic + maxwell"
+
+
+@pytest.mark.slow
+def test_a_hold_through_compliant_pads_is_not_biased_as_a_direct_fit_is():
+    squeeze = prepared(recorded(period_s=0.041), 0.0)
+    scale, model = scale_of(squeeze), ForwardModel(pads=PADS)
+    true = static_candidates(scale)[0].joined(memories(scale)[1])
+    values = (1000.0, 800.0, 0.06)
+    forces = model.forces(squeeze, true, values, WIDTH_M, 1.0)
+    found = fit(model, true, [with_forces(squeeze, forces)])
+    assert found.values == pytest.approx(values, rel=0.02)
+
+
+def test_the_table_identified_of_a_scene_is_checked():
+    good = (
+        'width_m = 0.05\n[identified]\nlabel = "cup"\n[identified.intervals]\n"elastic.k1_n_m" = [1.0, 2.0]\n'
+    )
+    assert parse_scene(good, "cup", "cup.toml").width_m == 0.05
+    assert tomllib.loads(good)["identified"]["label"] == "cup"
+    for bad, message in (
+        ("[identified]\nlabl = 1\n", "identified.labl: no such key"),
+        ("[identified.intervals]\nk = [1.0]\n", "identified.intervals.k: .* is not two numbers"),
+        ("[identified.recordings]\na = 3\n", "is not the hash of a recording"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            parse_scene("width_m = 0.05\n" + bad, "cup", "cup.toml")

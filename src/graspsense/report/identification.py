@@ -1,0 +1,189 @@
+"""The page of an identified object: data and fit, candidates, pairs of parameters, and the predictive check."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from graspsense.report.html import Page, Section, bullets, figure, panels, paragraph, table
+from graspsense.report.svg import INKS, QUIET, WIDTH, AxisScale, Picture, reaching
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.core.identification import (
+        Identification,
+        IdentifiedParameter,
+        PredictiveCheck,
+        SqueezeFit,
+    )
+
+MAX_FITS: Final = 12
+MAX_PAIRS: Final = 6
+MAX_SHOWN: Final = 300
+LEFT: Final = 46.0
+RIGHT: Final = WIDTH - 8.0
+BINS: Final = 24
+
+
+def identification_page(result: Identification, scene: str) -> Page:
+    """Return the page of an identification; `scene` is the name of the scene file."""
+    relative = [one.rms_n / one.peak_n for one in result.fits]
+    chosen = next(one.terms for one in result.candidates if one.chosen)
+    what = result.label or "the object"
+    return Page(
+        kind="Identified object",
+        title=what,
+        question="Which terms and numbers describe the recorded squeezes?",
+        headline=f"{what}: {chosen}",
+        answer=(
+            f"{len(result.fits)} squeezes, fitted to {100.0 * float(np.mean(relative)):.2g} % of the peak force (rms). "
+            f"The scene is {scene}."
+        ),
+        beside=bullets(result.notes),
+        sections=(
+            Section(id="parameters", title="Parameters", body=_parameters(result.parameters)),
+            Section(id="open", title="Not determined", body=_undetermined(result)),
+            Section(id="fits", title="Data and fit", body=_fits(result.fits)),
+            Section(id="candidates", title="Candidates", body=_candidates(result)),
+            Section(id="pairs", title="Pairs of parameters", body=_pairs(result)),
+            Section(id="check", title="Simulated beside recorded squeezes", body=_checks(result.checks)),
+        ),
+    )
+
+
+def _parameters(parameters: Sequence[IdentifiedParameter]) -> str:
+    rows = [
+        (one.name, f"{one.value:.4g}", _number(one.low), _number(one.high), one.unit, one.basis)
+        for one in parameters
+    ]
+    return table(
+        "Values with 90 % intervals", ("parameter", "value", "from", "to", "unit", "the interval is"), rows, 1
+    )
+
+
+def _undetermined(result: Identification) -> str:
+    rows = [(one.what, one.reason, one.remedy) for one in result.undetermined]
+    return table("What these recordings leave open", ("what", "why", "what would determine it"), rows)
+
+
+def _candidates(result: Identification) -> str:
+    rows = [
+        (one.terms, str(one.parameters), _percent(one.error), _percent(one.fit_error), one.verdict)
+        for one in result.candidates
+    ]
+    note = paragraph(
+        "The error is the rms residual over the peak force. The simplest candidate is chosen whose error on held-out "
+        "data is not larger than the least by more than a standard error of the difference."
+    )
+    header = ("candidate", "parameters", "error, held out", "error, fitted", "verdict")
+    return note + table("Candidates", header, rows, 1)
+
+
+def _fits(fits: Sequence[SqueezeFit]) -> str:
+    figures = [
+        figure(_fit_picture(one), f"{one.name}: rms {1e3 * one.rms_n:.0f} mN") for one in fits[:MAX_FITS]
+    ]
+    left = len(fits) - MAX_FITS
+    rest = paragraph(f"{left} more squeezes are not drawn.") if left > 0 else ""
+    return panels(figures) + rest
+
+
+def _fit_picture(fit: SqueezeFit) -> str:
+    """Return force over time, measured and fitted, above the residual."""
+    picture = Picture(height=250.0)
+    t = fit.t_s - fit.t_s[0]
+    residual = fit.measured_n - fit.fitted_n
+    x = reaching(t.tolist(), LEFT, RIGHT)
+    y = reaching([*fit.measured_n.tolist(), *fit.fitted_n.tolist()], 140.0, 22.0, zero=True)
+    below = reaching([*residual.tolist(), 0.0], 215.0, 178.0)
+    with picture.plot(x, y, 22.0, 140.0):
+        picture.y_axis(y, LEFT, RIGHT, "force, N")
+        picture.x_axis(x, 22.0, 140.0, "")
+        picture.dots(_points(x, y, t, fit.measured_n), INKS[0], "measured")
+        picture.line(_points(x, y, t, fit.fitted_n), INKS[1], name="fitted")
+    with picture.plot(x, below, 178.0, 215.0):
+        picture.y_axis(below, LEFT, RIGHT, "measured − fitted, N")
+        picture.x_axis(x, 178.0, 215.0, "time, s")
+        picture.dots(_points(x, below, t, residual), INKS[0], "residual")
+    picture.text(RIGHT, 34.0, "● measured", at="end", ink=INKS[0])
+    picture.text(RIGHT, 48.0, "— fitted", at="end", ink=INKS[1])
+    return picture.svg(f"Force over time of {fit.name}, measured and fitted, and the residual", "s")
+
+
+def _points(
+    x: AxisScale, y: AxisScale, xs: NDArray[np.float64], ys: NDArray[np.float64]
+) -> list[tuple[float, float]]:
+    return [(x(float(a)), y(float(b))) for a, b in zip(xs, ys, strict=True)]
+
+
+def _pairs(result: Identification) -> str:
+    names = [one.name for one in result.parameters if "." in one.name]
+    draws = result.draws
+    if draws is None or len(names) < 2 or draws.shape[1] != len(names):
+        return paragraph("There is one free parameter, so there are no pairs.")
+    correlation = np.corrcoef(np.log(draws), rowvar=False)
+    order = sorted(combinations(range(len(names)), 2), key=lambda pair: -abs(correlation[pair]))
+    figures = []
+    for a, b in order[:MAX_PAIRS]:
+        picture = Picture(height=210.0)
+        x = reaching(draws[:, a].tolist(), LEFT, RIGHT)
+        y = reaching(draws[:, b].tolist(), 170.0, 22.0)
+        with picture.plot(x, y, 22.0, 170.0):
+            picture.x_axis(x, 22.0, 170.0, names[a])
+            picture.y_axis(y, LEFT, RIGHT, names[b])
+            picture.dots(_points(x, y, draws[:MAX_SHOWN, a], draws[:MAX_SHOWN, b]), INKS[0], "draw")
+        words = f"{names[a]} and {names[b]}: correlation {correlation[a, b]:+.2f}"
+        figures.append(figure(picture.svg(words), words))
+    return paragraph("Draws of the identified values, the most correlated pairs first.") + panels(figures)
+
+
+def _checks(checks: Sequence[PredictiveCheck]) -> str:
+    if not checks:
+        return paragraph("No squeezes were simulated.")
+    rows = [
+        (
+            f"{one.statistic}{f', {one.unit}' if one.unit else ''}",
+            f"{np.mean(one.recorded):.4g}",
+            f"{np.quantile(one.simulated, 0.05):.4g} to {np.quantile(one.simulated, 0.95):.4g}",
+            f"{one.p:.2f}",
+        )
+        for one in checks
+    ]
+    note = paragraph(
+        "New squeezes were simulated on the recorded paths of the gap, of objects drawn from the identified values and "
+        "spreads. p is the share of simulated sets whose mean is at least the recorded one: near 0 or 1, the scene "
+        "does not describe the recordings."
+    )
+    header = ("statistic", "recorded, mean", "simulated, 90 %", "p")
+    return note + table("Predictive check", header, rows, 1) + panels([_histogram(one) for one in checks])
+
+
+def _histogram(check: PredictiveCheck) -> str:
+    values = np.array(check.simulated)
+    counts, edges = np.histogram(values[np.isfinite(values)], BINS)
+    picture = Picture(height=170.0)
+    x = reaching([*edges.tolist(), *check.recorded], LEFT, RIGHT)
+    y = reaching([0.0, *counts.tolist()], 128.0, 22.0, zero=True)
+    with picture.plot(x, y, 22.0, 128.0):
+        picture.x_axis(x, 22.0, 128.0, f"{check.statistic}{f', {check.unit}' if check.unit else ''}")
+        picture.y_axis(y, LEFT, RIGHT, "simulated squeezes")
+        for k, count in enumerate(counts.tolist()):
+            left, right = x(float(edges[k])), x(float(edges[k + 1]))
+            picture.box(left, y(count), right - left, y(0.0) - y(count), INKS[0], QUIET)
+        for value in check.recorded:
+            picture.mark(x(value), y(0.0) - 4.0, INKS[1], 2, words=f"recorded {value:.4g}")
+    words = f"{check.statistic}: bars are simulated squeezes, marks recorded ones; p = {check.p:.2f}"
+    return figure(picture.svg(words), words)
+
+
+def _number(value: float) -> str:
+    return "–" if math.isnan(value) else f"{value:.4g}"
+
+
+def _percent(share: float) -> str:
+    return "–" if math.isnan(share) else f"{100.0 * share:.2f} %"
