@@ -137,6 +137,17 @@ def has_event(before: Contact, after: Contact) -> bool:
     ) != object_phase(after.right.states)
 
 
+def is_touched(contact: Contact, gap_m: float, reach_m: float) -> int:
+    """Return 1, or 0 for a released object that has recovered its shape: it is in the state before the first contact.
+
+    `reach_m`: the gap at which the nearer finger touches the object.
+    """
+    left, right = contact.left, contact.right
+    shape = abs(left.compression_m) + abs(left.pad_m) + abs(right.compression_m)
+    separated = gap_m > reach_m and contact.left_n + contact.right_n == 0.0
+    return 0 if separated and shape <= RECOVERED_M else 1
+
+
 def restarted(contact: Contact) -> Contact:
     """Return the contact after an event of a term: the rate of compression before it says nothing any more."""
     left_n, right_n, offset, touched, left, right, pending, unbalanced = contact

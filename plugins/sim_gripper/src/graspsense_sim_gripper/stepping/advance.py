@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from graspsense.plugin_api import gap_and_rate
-from graspsense_sim_gripper.dynamics.contact import RECOVERED_M, has_event, restarted
+from graspsense_sim_gripper.dynamics.contact import has_event, is_touched, restarted
 from graspsense_sim_gripper.dynamics.drive import Drive, is_held
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState
 from graspsense_sim_gripper.stepping.coast import coast
@@ -182,10 +182,7 @@ def _completed(
     revolutions, speed, gap, _ = motion
     left, right, touched = contact.left, contact.right, contact.touched
     if touched == 1 or gap <= start.reach_m:
-        # A released object that has recovered its shape is in the state before the first contact.
-        shape = abs(left.compression_m) + abs(left.pad_m) + abs(right.compression_m)
-        separated = gap > start.reach_m and contact.left_n + contact.right_n == 0.0
-        touched = 0 if separated and shape <= RECOVERED_M else 1
+        touched = is_touched(contact, gap, start.reach_m)
         peak = max(peak, contact.left_n, contact.right_n)
     if touched != contact.touched:
         left_n, right_n, offset, _, _, _, pending, unbalanced = contact
