@@ -145,7 +145,10 @@ def good():
         (lambda t: t["width_m"].update(value=0.0), "'width_m' must be > 0"),
         (lambda t: t["width_m"].pop("reason"), "write { value = NUMBER, origin = ORIGIN, reason = TEXT }"),
         (lambda t: t["width_m"].update(origin="guessed"), "'guessed' is not an origin. Known: measured"),
-        (lambda t: t["width_m"].update(origin="fitted to table_9"), "'fitted to table_9' names an unknown result"),
+        (
+            lambda t: t["width_m"].update(origin="fitted to table_9"),
+            "'fitted to table_9' names an unknown result",
+        ),
         (lambda t: t.update(patch="round"), "patch"),
         (lambda t: t["terms"][0].update(type="spring"), "no term 'spring'. Known: elastic"),
         (lambda t: t["terms"][0].pop("damping_n_s_m"), "missing damping_n_s_m"),
