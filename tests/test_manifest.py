@@ -14,7 +14,7 @@ from scipy.io import savemat
 from graspsense.cli.main import main
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.recording.reader import read_recorded
-from graspsense.sources.manifest.reader import read_recordings
+from graspsense.sources.dataset_recordings import recordings_of
 from graspsense.store.store import Store
 
 RATE_HZ = 100.0
@@ -37,7 +37,7 @@ def manifest(folder, text):
 
 
 def recordings(folder, text):
-    return list(read_recordings(str(manifest(folder, text))))
+    return list(recordings_of("manifest", str(manifest(folder, text))))
 
 
 def column(one, name):
@@ -508,3 +508,41 @@ def test_check_says_what_it_understood_and_draws_a_grasp_without_storing(tmp_pat
     assert not (tmp_path / "store").exists()
     code, _, err = run(capsys, "import", described)
     assert (code, "--save DIR. Or look at the recordings first: --check" in err) == (2, True)
+
+
+def test_a_bad_file_does_not_stop_an_import_and_a_second_run_takes_only_what_is_missing(tmp_path, capsys):
+    for k in range(4):
+        gap, force = squeezing(stiffness_n_m=1000.0 + 100.0 * k)
+        pandas_csv(tmp_path / f"jar_{k}.csv", {"t": T_S, "gap": gap * 1e3, "F": force})
+    whole = (tmp_path / "jar_2.csv").read_text()
+    lines = whole.splitlines()
+    (tmp_path / "jar_2.csv").write_text("\n".join([*lines[:100], "3,1.0"]) + "\n")
+    described = manifest(tmp_path, PLAIN.replace("{label}.csv", "{label}_{order:d}.csv"))
+    command = ("import", described, "--save", tmp_path / "trials", "-o", "classifier.type=none")
+
+    code, out, err = run(capsys, *command)
+    assert code == 5
+    assert re.search(r"trial 3", out)
+    (line,) = [line for line in err.splitlines() if "jar_2.csv" in line]
+    assert re.search(r"jar_2\.csv, line 101: 2 values, but there are 4 columns", line)
+    assert "The same command then imports only what the store does not have" in " ".join(err.split())
+    # The number of a grasp in the manifest does not depend on which files can be read.
+    code, _, err = run(capsys, "replay", f"manifest:{described}#3")
+    assert (code, "line 101" in err) == (5, True)
+
+    (tmp_path / "jar_2.csv").write_text(whole)
+    code, out, _ = run(capsys, *command, "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert [one["source"] for one in found["trials"]] == ["jar_2.csv"]
+    assert (len(found["refused"]), found["unreadable"]) == (3, [])
+
+
+def test_where_no_file_can_be_read_the_first_error_is_told(tmp_path, capsys):
+    for k in range(3):
+        (tmp_path / f"jar_{k}.csv").write_text("t,gap\n0,1\n")
+    described = manifest(tmp_path, PLAIN.replace("{label}.csv", "{label}_{order:d}.csv"))
+    code, _, err = run(capsys, "import", described, "--check")
+    assert code == 2
+    assert "none of 3 recordings can be read. The first: " in " ".join(err.split())
+    assert not list(tmp_path.glob("*.png"))

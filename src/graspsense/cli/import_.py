@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
+from attrs import frozen
 
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
@@ -14,8 +16,14 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from graspsense.core.config import Settings
+    from graspsense.recording.labelled_recording import UnreadableRecording
     from graspsense.sources.import_sources import ImportedRecording
     from graspsense.sources.import_summary import ImportSummary
+
+LISTED: Final = 20
+"""Largest number of unreadable recordings whose errors are printed; `--json` lists all."""
+FEW: Final = 3
+"""Largest number of recordings that are printed one by one."""
 
 
 @click.command("import", short_help="Import recordings of other programs.")
@@ -71,7 +79,7 @@ def import_(
     MANIFEST.toml names the files, their labels and their columns (docs/import.md). A FILE.csv is one grasp and needs
     --time, --gap and --force. KIND:NAME is a file of another reader, or the folder of a data set.
     """
-    from graspsense.core.errors import ConfigError
+    from graspsense.core.errors import ConfigError, DataDamaged
     from graspsense.sources.import_sources import is_csv, recordings_to_import
     from graspsense.store.labels import labels_of
 
@@ -88,14 +96,17 @@ def import_(
     if label is not None:
         labels_of(label)  # what is not a label is refused as such, before any file is read
     chosen = _Chosen(pipeline, options)
-    recordings = [one for source in sources for one in recordings_to_import(source, given, label)]
+    recordings, unreadable = recordings_to_import(sources, given, label)
     if not recordings:
         raise ConfigError(f"{', '.join(sources)}: no recordings")
     chosen.fit(recordings)
     if save is None or check:
-        _show(recordings, chosen, Path(plot or "import-check.png"), as_json)
+        _show(recordings, unreadable, chosen, Path(plot or "import-check.png"), as_json)
     else:
-        _import(save, recordings, chosen, as_json)
+        _import(save, recordings, unreadable, chosen, as_json)
+    if unreadable:
+        _echo_unreadable(unreadable)
+        click.get_current_context().exit(DataDamaged.exit_code)
 
 
 def _columns(named: Mapping[str, str | None], forces: Sequence[str]) -> dict[str, list[str]]:
@@ -145,55 +156,119 @@ class _Chosen:
             raise ConfigError(str(error)) from None
 
 
-def _import(save: str, recordings: Sequence[ImportedRecording], chosen: _Chosen, as_json: bool) -> None:
-    """Import the recordings and print what became of each."""
-    from graspsense.cli.progress import ProgressLine
+@frozen
+class _Stored:
+    """What became of the recordings of an import."""
+
+    kept: list[dict[str, Any]]
+    """Source, number of the trial, and outcome of each recording that was stored."""
+    refused: list[str]
+    """Why a recording was left out, although it can be read."""
+    notes: list[tuple[str, ...]]
+    """What the gripper of each trial notes."""
+
+
+def _import(
+    save: str,
+    recordings: Sequence[ImportedRecording],
+    unreadable: list[UnreadableRecording],
+    chosen: _Chosen,
+    as_json: bool,
+) -> None:
+    """Import the recordings and print what became of each; those that cannot be replayed join `unreadable`."""
     from graspsense.core.errors import ConfigError
+
+    stored = _store(save, recordings, unreadable, chosen)
+    if not stored.kept and not unreadable:
+        raise ConfigError(stored.refused[0])
+    if not stored.kept:
+        echo(f"no new trial for {save}", err=as_json)
+    elif len(recordings) <= FEW:
+        for one, notes in zip(stored.kept, stored.notes, strict=True):
+            echo(f"{one['source']}: trial {one['trial']}, {one['outcome']}", indent=2, err=as_json)
+            for note in notes:
+                echo(f"  {note}", Style.CAUTION, err=as_json)
+    else:
+        outcomes = Counter(one["outcome"] for one in stored.kept)
+        words = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
+        echo(f"{len(stored.kept)} trials imported into {save}: {words}", err=as_json)
+        for note in recordings[0].labelled.recording.notes[1:]:
+            echo(f"  {note}", err=as_json)
+    if stored.kept:
+        echo(f"  {chosen.words}", err=as_json)
+        _echo_notices(_summary(recordings), err=as_json)
+    if stored.refused:
+        word = "recording" if len(stored.refused) == 1 else "recordings"
+        echo(f"  {len(stored.refused)} {word} left out: {stored.refused[0]}", Style.CAUTION, err=as_json)
+    if as_json:
+        failed = [one.line for one in unreadable]
+        echo_json(
+            {
+                "store": save,
+                "trials": stored.kept,
+                "refused": stored.refused,
+                "unreadable": failed,
+                "thresholds": chosen.words,
+            }
+        )
+
+
+def _store(
+    save: str, recordings: Sequence[ImportedRecording], unreadable: list[UnreadableRecording], chosen: _Chosen
+) -> _Stored:
+    """Store the recordings that the store does not have. Raises ConfigError, SaveFailed."""
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.core.errors import DataDamaged
     from graspsense.core.plugins import installed
+    from graspsense.recording.labelled_recording import UnreadableRecording
     from graspsense.sources.dataset_recordings import handed_over
     from graspsense.sources.importing import import_recording
     from graspsense.store.imported_contents import AlreadyImported, ImportedContents
     from graspsense.store.store import Store
 
-    kept: list[dict[str, Any]] = []
-    refused: list[str] = []
-    outcomes: dict[str, int] = {}
-    few = len(recordings) <= 3
+    stored = _Stored([], [], [])
     with Store.open(save) as store, ProgressLine() as progress:
         contents = ImportedContents(store)
         for done, one in enumerate(recordings):
+            source = one.labelled.source
             with handed_over(one.name, one.labelled.recording):
                 try:
                     settings = chosen.settings(one)
                     trial, number = import_recording(store, settings, installed(), one.labelled, contents)
                 except AlreadyImported as error:
-                    refused.append(str(error))
+                    stored.refused.append(str(error))
                     continue
-            outcomes[trial.outcome.words] = outcomes.get(trial.outcome.words, 0) + 1
-            source = one.labelled.source
-            kept.append({"source": source, "trial": number, "outcome": trial.outcome.words})
-            if few:
-                echo(f"{source}: trial {number}, {trial.outcome.words}", indent=2, err=as_json)
-                for note in trial.device.notes:
-                    echo(f"  {note}", Style.CAUTION, err=as_json)
+                except DataDamaged as error:
+                    unreadable.append(UnreadableRecording(source=source, error=error))
+                    continue
+            stored.kept.append({"source": source, "trial": number, "outcome": trial.outcome.words})
+            stored.notes.append(trial.device.notes)
             progress("grasps imported", done + 1, len(recordings))
-    if not kept:
-        raise ConfigError(refused[0])
-    if not few:
-        words = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items())
-        echo(f"{len(kept)} trials imported into {save}: {words}", err=as_json)
-        for note in recordings[0].labelled.recording.notes[1:]:
-            echo(f"  {note}", err=as_json)
-    echo(f"  {chosen.words}", err=as_json)
-    _echo_notices(_summary(recordings), err=as_json)
-    if refused:
-        word = "recording" if len(refused) == 1 else "recordings"
-        echo(f"  {len(refused)} {word} left out: {refused[0]}", Style.CAUTION, err=as_json)
-    if as_json:
-        echo_json({"store": save, "trials": kept, "refused": refused, "thresholds": chosen.words})
+    return stored
 
 
-def _show(recordings: Sequence[ImportedRecording], chosen: _Chosen, picture: Path, as_json: bool) -> None:
+def _echo_unreadable(unreadable: Sequence[UnreadableRecording]) -> None:
+    """Print why each recording cannot be read, in one line each, and what to do."""
+    word = "recording" if len(unreadable) == 1 else "recordings"
+    echo(f"{len(unreadable)} {word} cannot be read:", Style.CAUTION, err=True)
+    for one in unreadable[:LISTED]:
+        click.echo(f"  {one.line}", err=True)  # not wrapped, so that a program can take it line by line
+    if len(unreadable) > LISTED:
+        echo(f"and {len(unreadable) - LISTED} more; --json lists all", indent=2, err=True)
+    echo(
+        "Correct these files, or leave them out of `files` in the manifest. The same command then imports only what "
+        "the store does not have.",
+        err=True,
+    )
+
+
+def _show(
+    recordings: Sequence[ImportedRecording],
+    unreadable: Sequence[UnreadableRecording],
+    chosen: _Chosen,
+    picture: Path,
+    as_json: bool,
+) -> None:
     """Print what was understood of the recordings, and draw one of them."""
     from attrs import asdict
 
@@ -205,7 +280,8 @@ def _show(recordings: Sequence[ImportedRecording], chosen: _Chosen, picture: Pat
 
     summary = _summary(recordings)
     if as_json:
-        echo_json({**asdict(summary), "thresholds": chosen.words})
+        failed = [one.line for one in unreadable]
+        echo_json({**asdict(summary), "unreadable": failed, "thresholds": chosen.words})
     else:
         _echo_summary(summary)
         echo_entry("thresholds", chosen.words.partition(": ")[2])

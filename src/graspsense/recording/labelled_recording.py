@@ -1,4 +1,4 @@
-"""A recorded grasp of a data set with its label: what a reader of a data set yields for `import` and `replay`."""
+"""A recorded grasp of a data set with its label, and a recording that cannot be read: what a data set consists of."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from attrs import field, frozen
 
+from graspsense.core.errors import GraspsenseError
 from graspsense.recording.replayable import Recording
 
 
@@ -28,3 +29,20 @@ class LabelledRecording:
     order: float | None = None
     values: Mapping[str, float] = field(factory=dict)
     notices: tuple[str, ...] = ()
+
+
+@frozen(kw_only=True, eq=False)
+class UnreadableRecording:
+    """A file, or a part of it, that cannot be read, although the others of its data set can.
+
+    `source` names it for people; `error` says what is wrong.
+    """
+
+    source: str
+    error: GraspsenseError
+
+    @property
+    def line(self) -> str:
+        """What is wrong, in one line that begins with the name of the file."""
+        text = " ".join(str(self.error).split())
+        return text if self.source in text else f"{self.source}: {text}"

@@ -9,7 +9,7 @@ from typing import Final
 
 from graspsense.core.errors import ComponentFailed, ConfigError, GraspsenseError, PluginUnavailable, named
 from graspsense.core.plugins import installed
-from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.recording.replayable import Recording
 
 _NUMBERED: Final = re.compile(r"(?P<place>.+)#(?P<number>[1-9]\d{0,8})", re.DOTALL)
@@ -28,12 +28,23 @@ def is_recording_number(kind: str, name: str) -> bool:
 
 
 def recordings_of(kind: str, place: str) -> Iterator[LabelledRecording]:
-    """Yield every recording of a data set. Raises UnknownName, PluginUnavailable, ConfigError, DataDamaged."""
+    """Yield every recording of a data set.
+
+    Raises UnknownName, PluginUnavailable, ConfigError, DataDamaged, also for the first one that cannot be read.
+    """
+    for one in readable_or_not(kind, place):
+        if isinstance(one, UnreadableRecording):
+            raise one.error
+        yield one
+
+
+def readable_or_not(kind: str, place: str) -> Iterator[LabelledRecording | UnreadableRecording]:
+    """Yield every recording of a data set, also those that cannot be read. Raises as `recordings_of`."""
     dataset = installed().dataset(kind)
     read = dataset.recordings()
     try:
         for one in read(place):
-            if not isinstance(one, LabelledRecording):
+            if not isinstance(one, LabelledRecording | UnreadableRecording):
                 raise PluginUnavailable(
                     f"data set {dataset.qualified} cannot be used here: its reader gave {type(one).__name__}, not "
                     "LabelledRecording"
@@ -54,7 +65,9 @@ def numbered_recording(kind: str, name: str) -> LabelledRecording:
             f"{kind}:{name}#1"
         )
     number = int(match["number"])
-    found = next(islice(recordings_of(kind, match["place"]), number - 1, None), None)
+    found = next(islice(readable_or_not(kind, match["place"]), number - 1, None), None)
+    if isinstance(found, UnreadableRecording):
+        raise found.error
     if found is None:
         raise ConfigError(f"{kind}:{match['place']} has fewer than {number} recordings")
     return found

@@ -7,13 +7,13 @@ from pathlib import Path
 
 from attrs import evolve, frozen
 
-from graspsense.core.errors import ConfigError
-from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.sources.dataset_recordings import (
     datasets_with_recordings,
     is_recording_number,
     numbered_recording,
-    recordings_of,
+    readable_or_not,
 )
 from graspsense.sources.grasp_csv import named
 from graspsense.sources.replay import KINDS, kind_and_name, read_named
@@ -37,19 +37,49 @@ def is_csv(source: str) -> bool:
 
 
 def recordings_to_import(
-    source: str, columns: Mapping[str, Sequence[str]], label: str | None
-) -> Iterator[ImportedRecording]:
-    """Yield every recording that a source names; `columns` are those of a CSV, `label` is that of all recordings.
+    sources: Sequence[str], columns: Mapping[str, Sequence[str]], label: str | None
+) -> tuple[list[ImportedRecording], list[UnreadableRecording]]:
+    """Return the recordings that these sources name, and those that cannot be read.
 
-    Raises ConfigError, DataDamaged.
+    `columns` are those of a CSV, `label` is that of all recordings. Raises the first ConfigError or DataDamaged if none
+    can be read.
     """
+    good: list[ImportedRecording] = []
+    bad: list[UnreadableRecording] = []
+    for source in sources:
+        try:
+            for one in _named_by(source, columns, label):
+                if isinstance(one, UnreadableRecording):
+                    bad.append(one)
+                else:
+                    good.append(one)
+        except (ConfigError, DataDamaged) as error:
+            bad.append(UnreadableRecording(source=source, error=error))
+    if bad and not good:
+        first = bad[0].error
+        if len(bad) > 1:
+            raise type(first)(f"none of {len(bad)} recordings can be read. The first: {first}")
+        raise first
+    return good, bad
+
+
+def _named_by(
+    source: str, columns: Mapping[str, Sequence[str]], label: str | None
+) -> Iterator[ImportedRecording | UnreadableRecording]:
+    """Yield every recording that a source names. Raises ConfigError, DataDamaged."""
     dataset = _dataset(source)
     if dataset is not None:
         kind, place = dataset
-        for number, labelled in enumerate(recordings_of(kind, place), 1):
-            yield ImportedRecording(
-                source=source, name=f"{kind}:{place}#{number}", labelled=_relabelled(labelled, label)
-            )
+        for number, labelled in enumerate(readable_or_not(kind, place), 1):
+            if isinstance(labelled, UnreadableRecording):
+                yield labelled
+                continue
+            try:
+                known = _relabelled(labelled, label)
+            except ConfigError as error:
+                yield UnreadableRecording(source=labelled.source, error=error)
+                continue
+            yield ImportedRecording(source=source, name=f"{kind}:{place}#{number}", labelled=known)
         return
     name = f"csv:{named(source, columns)}" if is_csv(source) else source
     kind, file = kind_and_name(name)

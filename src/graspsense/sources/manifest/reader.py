@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.recording.labelled_recording import LabelledRecording
+from graspsense.recording.labelled_recording import LabelledRecording, UnreadableRecording
 from graspsense.sources.grasp_columns import checked_recording
 from graspsense.sources.manifest.description import ReadManifest, read_manifest
 from graspsense.sources.manifest.facts import instance_of, label_of, order_of, recorded_at_of, values_of
@@ -21,12 +21,24 @@ from graspsense.sources.manifest.steps import cut_at, resampled, squeezes
 from graspsense.sources.manifest.table import ColumnTable
 
 
-def read_recordings(place: str) -> Iterator[LabelledRecording]:
-    """Yield every grasp of a manifest with its label. Raises ConfigError, DataDamaged."""
+def read_recordings(place: str) -> Iterator[LabelledRecording | UnreadableRecording]:
+    """Yield every grasp of a manifest with its label, or why a file or a part of it cannot be read.
+
+    Raises ConfigError if the manifest itself cannot be used.
+    """
     manifest = read_manifest(Path(place).expanduser())
     for file in files_of(manifest):
-        for table in tables_of(manifest, file):
-            yield from grasps_in(manifest, file, table)
+        name = file.path.relative_to(manifest.base).as_posix()
+        try:
+            tables = tables_of(manifest, file)
+        except (ConfigError, DataDamaged) as error:
+            yield UnreadableRecording(source=name, error=error)
+            continue
+        for table in tables:
+            try:
+                yield from grasps_in(manifest, file, table)
+            except (ConfigError, DataDamaged) as error:
+                yield UnreadableRecording(source=table.source, error=error)
 
 
 def tables_of(manifest: ReadManifest, file: NamedFile) -> list[ColumnTable]:
