@@ -25,7 +25,7 @@ MAY_KNOW = {
     "sources": {"core", "recording", "store", "sources"},
     "evaluation": {"core", "evaluation"},
     "regression": {"core", "evaluation", "regression"},
-    "report": {"core", "recording", "store", "evaluation", "report"},
+    "report": {"core", "recording", "store", "evaluation", "regression", "report"},
     "experiments": {"core", "recording", "sources", "evaluation", "report", "experiments"},
     "inference": {"core"},
     "cli": {

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import sqlite3
 import subprocess
@@ -278,3 +279,75 @@ def test_a_store_that_is_rebuilt_from_its_recordings_says_that_its_changes_are_l
     with Store.read(store.folder) as rebuilt:
         assert labels(rebuilt) == [(1, "toy", None), (2, "toy", None)]
     assert "as recorded" not in run("recover", store.folder)[2]
+
+
+def test_a_number_is_changed_given_and_restored(store, run):
+    for cell in ("200", "210"):
+        keep(store, device=REAL, labels={"fill [ml]": cell})
+    keep(store, device=REAL)
+    folder = str(store.folder)
+
+    code, out, _ = run(
+        "trials", "value", f"{folder}#1", f"{folder}#3", "--value", "fill [ml]=250", "--why", "scale"
+    )
+
+    assert code == 0
+    assert "trial 1: number changed from fill [ml]=200 to fill [ml]=250 (scale)" in out
+    assert "trial 3: number changed from none to fill [ml]=250 (scale)" in out
+    trials = labelled_store(folder, value="fill")
+    assert (trials.value.unit, trials.value.values) == ("ml", (250.0, 210.0, 250.0))
+    assert any("numbers of 2 trials were changed after recording" in note for note in trials.notes)
+    assert trial_table(folder).further.values[:, -1].tolist() == [250.0, 210.0, 250.0]
+    assert verify_store(store.folder).problems == ()
+    # What was recorded stays, and comes back.
+    assert store.trial(1).record.labels["fill [ml]"] == "200"
+    assert run("trials", "value", f"{folder}#1", f"{folder}#3", "--as-recorded", "fill")[0] == 0
+    assert labelled_store(folder, value="fill").value.values == (200.0, 210.0)
+    assert [one.action for one in changes.history(store)] == ["value"] * 4
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        (
+            ("--value", "fill [l]=0.2"),
+            r"fill of other trials is in ml, so fill \[l\]=0\.2 .* write fill \[ml\]=NUMBER",
+        ),
+        (("--value", "fill [ml]=200"), r"trial 1 has fill \[ml\]=200 already"),
+        (("--value", "fill [ml]"), r"write NAME \[UNIT\]=NUMBER"),
+        (("--as-recorded", "weight"), "trial 1 has no weight already"),
+        ((), "give either --value"),
+    ],
+)
+def test_a_number_that_cannot_be_changed_is_refused(store, run, given, says):
+    for _ in range(2):
+        keep(store, device=REAL, labels={"fill [ml]": "200"})
+    code, _, err = run("trials", "value", f"{store.folder}#1", *given)
+    assert code == 2
+    assert re.search(says, " ".join(err.split()))
+    assert changes.history(store) == []
+
+
+def test_the_page_of_a_store_has_a_section_for_a_number(store, run, tmp_path):
+    for k in range(24):
+        fill = 100.0 + 5.0 * k
+        keep(store, "can:full_open", f"can#{k % 12}", device=REAL, ticks=3, values=(0.066, fill / 20.0),
+             labels={"fill [ml]": repr(fill)})  # fmt: skip
+
+    code, out, _ = run(
+        "report", store.folder, "--out", tmp_path / "page", "--target-value", "fill", "--folds", "3"
+    )
+
+    assert code == 0, out
+    page = (tmp_path / "page" / "report.html").read_text()
+    assert "Predicted number: fill" in page
+    assert "mean absolute error of" in page
+    assert page.count("predicted ") >= 24  # a mark with its words for each trial
+    for control in ("mean only", "width only", "shuffled values"):
+        assert control in page
+    code, _, err = run("report", store.folder, "--out", tmp_path / "page", "--target-value", "weight")
+    assert (code, "no trial of the store" in err, "There are: fill" in " ".join(err.split())) == (
+        2,
+        True,
+        True,
+    )

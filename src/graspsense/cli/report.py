@@ -28,6 +28,13 @@ from graspsense.cli.terminal import Style, echo
 @click.option(
     "--grasp", type=int, metavar="NUMBER", help="Store: trial to plot over time.  [default: the newest]"
 )
+@click.option(
+    "--target-value",
+    "values",
+    metavar="NAME",
+    multiple=True,
+    help="Store: a number to predict, which gets a section. Can be repeated.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the path of the page as JSON.")
 def report(
     folder: str,
@@ -37,6 +44,7 @@ def report(
     folds: int,
     seed: int,
     grasp: int | None,
+    values: tuple[str, ...],
     as_json: bool,
 ) -> None:
     """Write report.html for the store or the experiment in DIR.
@@ -46,6 +54,7 @@ def report(
     from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.page import NAME, experiment_page
     from graspsense.experiments.results import EXPERIMENT, Results
+    from graspsense.report.number_section import number_sections, with_numbers
     from graspsense.report.store_page import store_page
     from graspsense.report.write import write_html
 
@@ -53,10 +62,13 @@ def report(
     if (Path(folder) / EXPERIMENT).is_file():
         from graspsense.experiments.summary import summary_of
 
+        if values:
+            raise click.UsageError("--target-value is for the page of a store; this folder has an experiment")
         results = Results(Path(folder))
         page = experiment_page(summary_of(results), results)
     else:
         with ProgressLine() as progress:
+            numbers = number_sections(folder, values, folds, seed, progress)
             page = store_page(
                 folder,
                 classifier=classifier,
@@ -66,6 +78,7 @@ def report(
                 grasp=grasp,
                 progress=progress,
             )
+        page = with_numbers(page, numbers)
     write_html(path, page)
     if as_json:
         echo_json({"page": str(path), "answer": page.answer})

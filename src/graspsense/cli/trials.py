@@ -1,4 +1,4 @@
-"""`graspsense trials`: the trials of a store, their labels, and which of them are set aside."""
+"""`graspsense trials`: the trials of a store, their labels and numbers, and which of them are set aside."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _JSON = click.option("--json", "as_json", is_flag=True, help="Print the result a
 
 @click.group()
 def trials() -> None:
-    """List, relabel and set aside the trials of a store.
+    """List, relabel and set aside the trials of a store, and change their numbers.
 
     Nothing is deleted: every change is kept in the store (`history`), and can be reversed.
     """
@@ -90,6 +90,30 @@ def relabel(refs: Sequence[str], label: str | None, as_recorded: bool, why: str,
         changes.relabel(store, numbers, labels, why)
 
     _change(refs, change, as_json)
+
+
+@trials.command("value")
+@_REFS
+@click.option("--value", metavar="NAME[UNIT]=NUMBER", help='The new number: "fill [ml]=250".')
+@click.option(
+    "--as-recorded", metavar="NAME", help="Restore the number that the trial was recorded with, or none."
+)
+@click.option("--why", metavar="TEXT", default="", help="Reason, kept in the history.")
+@_JSON
+def change_value(
+    refs: Sequence[str], value: str | None, as_recorded: str | None, why: str, as_json: bool
+) -> None:
+    """Change a number to predict of trials, or give them one; `history` shows the one before.
+
+    `train`, `evaluate` and `report` use these numbers with --target-value.
+    """
+    from graspsense.core.target_value import value_label
+    from graspsense.store import changes
+
+    if (value is None) == (as_recorded is None):
+        raise click.UsageError('give either --value "NAME [UNIT]=NUMBER" or --as-recorded NAME')
+    heading, cell = (as_recorded or "", None) if value is None else value_label(value)
+    _change(refs, lambda store, numbers: changes.set_number(store, numbers, heading, cell, why), as_json)
 
 
 @trials.command()

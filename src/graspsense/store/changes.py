@@ -1,7 +1,8 @@
-"""Changes of stored trials: their labels, and which of them are set aside. Every change is kept, and can be reversed.
+"""Changes of stored trials: labels, numbers to predict, and which are set aside. All are kept, and can be reversed.
 
 A change and the trial that it changes are written in one transaction. The label as it was recorded stays in the
-recording and in the column `labels` of the table `detail`.
+recording and in the column `labels` of the table `detail`. So does a number to predict: its changes are applied when
+trials are read, by `with_changed_numbers`.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from attrs import asdict, evolve, fields_dict, frozen
 
 from graspsense.core.errors import ConfigError
+from graspsense.core.target_value import name_and_unit
 from graspsense.store.labels import word_of
-from graspsense.store.opening import damaged
+from graspsense.store.opening import damaged, decoded
 
 if TYPE_CHECKING:
     import sqlite3
@@ -23,13 +25,15 @@ if TYPE_CHECKING:
     from graspsense.store.rows import EncodedRow, TrialSummary
     from graspsense.store.store import Store
 
-Action = Literal["relabel", "aside", "restore"]
+Action = Literal["relabel", "value", "aside", "restore"]
 
 
 @frozen(kw_only=True)
 class Change:
-    """One change of a trial. `before` and `after` are labels as they are typed (`can:full_open#2`), None for no label.
+    """One change of a trial.
 
+    `before` and `after` are labels as they are typed (`can:full_open#2`), or numbers to predict (`fill [ml]=250`), None
+    where there is none.
     `made_at` is empty for a trial that an earlier version of graspsense set aside.
     """
 
@@ -46,6 +50,8 @@ class Change:
         """The change in words."""
         if self.action == "relabel":
             return f"relabelled from {self.before or 'no label'} to {self.after or 'no label'}"
+        if self.action == "value":
+            return f"number changed from {self.before or 'none'} to {self.after or 'none'}"
         return "set aside" if self.action == "aside" else "brought back"
 
     def as_json(self) -> dict[str, Any]:
@@ -122,6 +128,69 @@ def relabel(store: Store, numbers: Sequence[int], labels: Mapping[str, str] | No
     _for_each(store, numbers, change)
 
 
+def set_number(store: Store, numbers: Sequence[int], heading: str, cell: str | None, why: str) -> None:
+    """Give trials this number to predict; `heading` is its name with its unit, `cell` the number as text.
+
+    With None as `cell`, each trial gets the number of this name back that it was recorded with, or none. Raises
+    ConfigError, before anything is changed, if a trial does not exist, has this number already, or if other trials have
+    it in another unit; SaveFailed, DataDamaged.
+    """
+    name, unit = name_and_unit(heading)
+    chosen = set(numbers)
+    rows = store.query("SELECT trial, labels FROM detail ORDER BY trial")
+    recorded = {number: decoded(store.folder, text) for number, text in rows}
+    current = dict(
+        zip(recorded, with_changed_numbers(store, list(recorded), list(recorded.values())), strict=True)
+    )
+    units = {
+        name_and_unit(other)[1]
+        for number, labels in current.items()
+        for other in labels
+        if number not in chosen and name_and_unit(other)[0] == name
+    }
+    if cell is not None and units and unit not in units:
+        (first, *_) = sorted(units)
+        raise ConfigError(
+            f"{name} of other trials is in {first or 'no unit'}, so {heading}={cell} cannot be compared with them: "
+            f"write {name} [{first}]=NUMBER, or change all of them"
+        )
+
+    def change(connection: sqlite3.Connection, trial: TrialSummary) -> None:
+        before = _number_named(current[trial.id], name)
+        after = _number_named(recorded[trial.id], name) if cell is None else f"{heading}={cell}"
+        if before == after:
+            raise ConfigError(f"trial {trial.id} has {after or f'no {name}'} already")
+        _keep(connection, trial.id, "value", before, after, why)
+
+    _for_each(store, numbers, change)
+
+
+def with_changed_numbers(
+    store: Store, trials: Sequence[int], labels: Sequence[Mapping[str, str]]
+) -> list[Mapping[str, str]]:
+    """Return the labels of these trials with the numbers to predict that were changed after recording."""
+    changed: dict[int, list[tuple[str | None, str | None]]] = {}
+    rows = store.query("""SELECT trial, "before", "after" FROM change WHERE "action" = 'value' ORDER BY id""")
+    for trial, before, after in rows:
+        changed.setdefault(trial, []).append((before, after))
+    current: list[Mapping[str, str]] = []
+    for trial, one in zip(trials, labels, strict=True):
+        values = dict(one)
+        for before, after in changed.get(trial, ()):
+            if before is not None:
+                values.pop(before.rpartition("=")[0], None)
+            if after is not None:
+                heading, _, cell = after.rpartition("=")
+                values[heading] = cell
+        current.append(values)
+    return current
+
+
+def _number_named(labels: Mapping[str, str], name: str) -> str | None:
+    """Return the number of this name as it is typed, None if the trial has none."""
+    return next((f"{one}={cell}" for one, cell in labels.items() if name_and_unit(one)[0] == name), None)
+
+
 def inconsistencies(store: Store) -> dict[int, str]:
     """Return the trials whose label or state does not follow from their recording and their changes, and why."""
     labels: dict[int, str | None] = {}
@@ -129,7 +198,7 @@ def inconsistencies(store: Store) -> dict[int, str]:
     for one in history(store):
         if one.action == "relabel":
             labels[one.trial] = one.after
-        else:
+        elif one.action != "value":
             aside[one.trial] = one.action == "aside"
     problems = {}
     rows = store.query(

@@ -24,6 +24,7 @@ from graspsense.core.target_value import TargetValue, values_of_labels
 from graspsense.recording.controls import controls
 from graspsense.recording.provenance import recipe
 from graspsense.recording.trial_record import FeatureValues
+from graspsense.store.changes import with_changed_numbers
 from graspsense.store.extract_again import ExtractedAgain, ExtractedTrials, extract_again
 from graspsense.store.first_line import first_lines
 from graspsense.store.opening import decoded
@@ -108,7 +109,7 @@ def labelled_store(
         rows = _read_rows(store, wanted, None if changed else feature_set)
         target, notes = None, [] if changed else _of_recording(store, wanted, len(rows))
         if value is not None:
-            rows, target = _with_value(rows, value, folder, notes)
+            rows, target = _with_value(store, rows, value, notes)
         settings, components = newest.recipe, newest.record.provenance.get("components", {})
         if changed:
             extracted = extract_again(
@@ -198,10 +199,14 @@ def _read_rows(store: Store, wanted: str, feature_set: int | None) -> _Rows:
     return _Rows(**dict(zip(_COLUMNS, zip(*rows, strict=True), strict=True)))
 
 
-def _with_value(rows: _Rows, name: str, folder: str, notes: list[str]) -> tuple[_Rows, TargetValue]:
+def _with_value(store: Store, rows: _Rows, name: str, notes: list[str]) -> tuple[_Rows, TargetValue]:
     """Return the rows that have this number among their labels, and the numbers."""
-    labels = [decoded(folder, text) for text in rows.labels]
-    unit, values = values_of_labels(name, labels, f"the store in {folder}")
+    recorded = [decoded(store.folder, text) for text in rows.labels]
+    labels = with_changed_numbers(store, rows.id, recorded)
+    unit, values = values_of_labels(name, labels, f"the store in {store.folder}")
+    changed = sum(a != b for a, b in zip(labels, recorded, strict=True))
+    if changed:
+        notes.append(f"numbers of {changed} trials were changed after recording: graspsense trials history")
     having = [i for i, number in enumerate(values) if number == number]
     if len(having) < len(values):
         notes.append(f"{len(values) - len(having)} trials are left out: they have no {name}")

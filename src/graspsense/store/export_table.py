@@ -18,6 +18,7 @@ from graspsense.core.features import FeatureTable
 from graspsense.core.target_value import RESERVED, name_and_unit, number_of
 from graspsense.recording.atomic_file import write_new
 from graspsense.recording.parquet import parquet
+from graspsense.store.changes import with_changed_numbers
 from graspsense.store.dataset import feature_table
 from graspsense.store.first_line import first_lines
 from graspsense.store.opening import decoded
@@ -91,13 +92,14 @@ def trial_table(folder: str | Path) -> TrialTable:
         columns = dict(zip(_SELECTED, zip(*rows, strict=True), strict=True)) if rows else {}
         first_line = first_lines(store, columns["recording"], columns["origin"]) if rows else None
         ((set_aside,),) = store.query("SELECT count(*) FROM trial WHERE set_aside IS NOT NULL")
+        labels = [decoded(folder, text) for text in columns["labels"]] if rows else []
+        numbers = with_changed_numbers(store, columns["trial"], labels) if rows else []
     if not rows:
         aside = f" that is not set aside ({set_aside} are)" if set_aside else ""
         raise ConfigError(f"the store in {folder} has no trial to export{aside}")
-    labels = [decoded(folder, text) for text in columns["labels"]]
     columns |= {name: tuple(one.get(name) for one in labels) for name in (RECORDED_AT, ORDER)}
     before = _unpacked(folder, sets, columns["before_set"], columns["before_contact"])
-    parts = [(BEFORE, before), (FIRST, first_line), (VALUE, _numbers_to_predict(labels))]
+    parts = [(BEFORE, before), (FIRST, first_line), (VALUE, _numbers_to_predict(numbers))]
     return TrialTable(
         about={name: list(columns[name]) for name in ABOUT},
         features=_unpacked(folder, sets, columns["feature_set"], columns["values"]),

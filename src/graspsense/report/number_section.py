@@ -1,0 +1,116 @@
+"""The section of a page about a number that is predicted for each trial, such as a fill level."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Final
+
+from attrs import evolve
+
+from graspsense.regression.estimators import DEFAULT_ESTIMATOR
+from graspsense.regression.evaluate import evaluate_regression
+from graspsense.report.html import Page, Section, bullets, figure, pair, paragraph, table
+from graspsense.report.svg import INKS, QUIET, Picture, number, reaching
+from graspsense.store.dataset import labelled_store
+
+if TYPE_CHECKING:
+    from graspsense.regression.results import RegressionEvaluation, RegressionMeasurement
+
+MEASUREMENTS: Final = "grasp"
+"""The section of the page of a store before which numbers stand."""
+
+
+def number_sections(
+    folder: str,
+    names: Sequence[str],
+    folds: int,
+    seed: int,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> list[Section]:
+    """Return a section for each of these numbers of the trials of a store.
+
+    Raises ConfigError if no trial has such a number, or if there are too few trials; DataDamaged.
+    """
+    return [
+        number_section(
+            evaluate_regression(
+                DEFAULT_ESTIMATOR,
+                labelled_store(folder, value=name),
+                folds=folds,
+                seed=seed,
+                progress=progress,
+            )
+        )
+        for name in dict.fromkeys(names)
+    ]
+
+
+def with_numbers(page: Page, numbers: Sequence[Section]) -> Page:
+    """Return the page of a store with the sections of its numbers, before its measurements."""
+    at = next(k for k, section in enumerate(page.sections) if section.id == MEASUREMENTS)
+    return evolve(page, sections=(*page.sections[:at], *numbers, *page.sections[at:]))
+
+
+def number_section(found: RegressionEvaluation) -> Section:
+    """Return the section with the error of a predicted number, its controls, and each prediction beside the truth."""
+    name, unit = found.target_value, found.unit
+    objects = (
+        "objects of which no grasp was used for training"
+        if found.protocol == "instance_held_out"
+        else "grasps of which others of the same object may have been used for training"
+    )
+    error = found.headline.words(unit)
+    text = f"{found.estimator} predicts {name} with a mean absolute error of {error}, on {objects}."
+    if found.explained is not None:
+        text += f" R² is {found.explained:.2f}: 1 is perfect, 0 no better than always predicting the mean."
+    intervals = found.intervals
+    if intervals.covered is None or intervals.mean_half_width is None:
+        text += f" Prediction intervals are not measured: {intervals.reason}."
+    else:
+        text += (
+            f" Prediction intervals of {100 * intervals.asked:.0f} % contain the true number in "
+            f"{intervals.covered.words}; they are plus or minus "
+            f"{_with_unit(number(intervals.mean_half_width), unit)} on average."
+        )
+    measured = {**found.protocols, **found.controls}
+    rows = [_row(key, one) for key, one in measured.items() if one.error is not None]
+    missing = [f"{key}: not measured ({one.reason})" for key, one in measured.items() if one.error is None]
+    header = ("protocol or control", _with_unit("error", unit and f"[{unit}]"), "95 %", "trials", "what")
+    caption = f"Errors of {name}: other protocols, and controls"
+    body = (
+        paragraph(text)
+        + bullets(found.warnings, "warning")
+        + pair(_scatter(found), table(caption, header, rows, 1) + bullets(missing))
+    )
+    return Section(id=f"number-{_identifier(name)}", title=f"Predicted number: {name}", body=body)
+
+
+def _row(key: str, one: RegressionMeasurement) -> tuple[str, ...]:
+    assert one.error is not None
+    interval = one.error.interval
+    span = "none" if interval is None else f"{number(interval[0])} to {number(interval[1])}"
+    return (key.replace("_", " "), number(one.error.mean_absolute), span, str(one.error.n), one.what)
+
+
+def _scatter(found: RegressionEvaluation) -> str:
+    """Return each prediction over the true number, beside the line on which they are equal."""
+    values = [value for pair_ in found.predictions for value in pair_]
+    picture = Picture(330)
+    x, y = reaching(values, 50.0, picture.width - 16), reaching(values, 280.0, 24.0)
+    picture.x_axis(x, 24, 280, _with_unit(f"true {found.target_value}", found.unit and f"in {found.unit}"))
+    picture.y_axis(y, 50.0, picture.width - 16, _with_unit("predicted", found.unit and f"in {found.unit}"))
+    with picture.plot(x, y, 24, 280):
+        picture.line([(x(one), y(one)) for one in (x.low, x.high)], QUIET)
+        for truth, predicted in found.predictions:
+            words = f"{number(truth)}, predicted {number(predicted)}"
+            picture.mark(x(truth), y(predicted), INKS[0], words=words)
+    caption = "Each mark is a grasp that was held out from training. The line is where both are equal."
+    return figure(picture.svg(f"Predicted and true {found.target_value}. {caption}"), caption)
+
+
+def _with_unit(text: str, unit: str) -> str:
+    return f"{text} {unit}".rstrip()
+
+
+def _identifier(name: str) -> str:
+    return "".join(one if one.isalnum() and one.isascii() else "-" for one in name.lower())
