@@ -5,8 +5,11 @@
 The tick is what the runner does from the moment a report's bytes are in the process to the moment the command's are
 handed to the wire: decode, count, convert, the hybrid controller's step, the guard, encode. The reports are those of
 an emulated grasp, recorded first and played back, so that neither the emulated board nor the simulator is in the
-figure. The wake-up is measured apart, against a board that runs by the clock in a thread of the same process: how
-long after the report with the shortest delay, in device time, a report was in the driver's hands.
+figure. The reports are played back twice more by the clock, without and with the predictions of the default model at
+its checkpoints, in turn: *paced* is the time from when a report is due to its command, in the squeeze, and *predicting*
+the same in the ticks during which the thread beside the loop computes. The wake-up is measured apart, against a board
+that runs by the clock in a thread of the same process: how long after the report with the shortest delay, in device
+time, a report was in the driver's hands.
 """
 
 from __future__ import annotations
@@ -22,9 +25,13 @@ from datetime import date
 from importlib.metadata import version
 from typing import Any
 
+from graspsense.core.anytime import Anytime, anytime_of
+from graspsense.core.config import resolve
+from graspsense.core.model import model_for
+from graspsense.core.plugins import installed
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
-from graspsense.plugin_api import create
+from graspsense.plugin_api import SQUEEZE, create
 from graspsense_pr2_gripper import backend as driver
 from graspsense_pr2_gripper import emulation, opening
 from graspsense_pr2_gripper.backend import Pr2Backend
@@ -56,11 +63,15 @@ recordings: list[Recorded] = []
 
 
 class Playback(Transport):
-    """Hands over recorded reports, and notes when it did and when a command came back."""
+    """Hands over recorded reports, and notes when it did and when a command came back.
 
-    def __init__(self, reports: Sequence[bytes], feature: bytes) -> None:
+    With `period_s` each report is handed over when it is due, and the time of a tick counts from there.
+    """
+
+    def __init__(self, reports: Sequence[bytes], feature: bytes, period_s: float = 0.0) -> None:
         self._reports, self._feature, self._next = reports, feature, 0
-        self._read_ns = 0
+        self._period_ns = round(period_s * 1e9)
+        self._due_ns = self._read_ns = 0
         self.ticks_ns: list[int] = []
 
     def read(self, timeout_s: float) -> bytes:
@@ -71,6 +82,11 @@ class Playback(Transport):
         self._next += 1
         data = self._reports[self._next - 1]
         self._read_ns = time.perf_counter_ns()
+        if self._period_ns:
+            # A report that is late delays the ones after it, as on the wire of a board that waits for its command.
+            self._due_ns = max(self._due_ns + self._period_ns, self._read_ns - self._period_ns)
+            time.sleep(max(self._due_ns - self._read_ns, 0) * 1e-9)
+            self._read_ns = self._due_ns
         return data
 
     def write(self, report: bytes) -> None:
@@ -85,23 +101,75 @@ class Playback(Transport):
         pass
 
 
-def ticks_us(grasps: int) -> list[float]:
-    controller = create("controller", "hybrid")
+class Watched:
+    """Passes every tick on to the predictions, and notes in which ticks of a squeeze one is computed."""
+
+    def __init__(self, inner: Anytime | None, wire: Playback) -> None:
+        self._inner, self._wire = inner, wire
+        self.squeeze: list[int] = []
+        self.predicting: list[int] = []
+
+    def begin(self, recorder: Any, info: Any, tell: Any) -> None:
+        if self._inner is not None:
+            self._inner.begin(recorder, info, tell)
+
+    def watch(self, frame: Any, phase: int) -> str:
+        computing = self._inner is not None and self._inner.computing
+        reason = "" if self._inner is None else self._inner.watch(frame, phase)
+        if phase >= SQUEEZE:
+            tick = len(self._wire.ticks_ns) - 1
+            self.squeeze.append(tick)
+            if computing:
+                self.predicting.append(tick)
+        return reason
+
+
+def recorded() -> tuple[Sequence[bytes], bytes]:
+    """Return the reports of an emulated grasp, and the description of the board."""
     emulation.Wire = Recorded  # type: ignore[misc]
-    run_grasp(Pr2Backend(EMULATED), controller, RunConfig())
+    run_grasp(Pr2Backend(EMULATED), create("controller", "hybrid"), RunConfig())
     emulation.Wire = Wire  # type: ignore[misc]
-    sent = recordings[0].sent
-    feature = recordings[0].firmware.feature()
+    return recordings[0].sent, recordings[0].firmware.feature()
+
+
+def played(wire: Playback, feature: bytes, watcher: Watched | None = None) -> None:
+    """Run a grasp on recorded reports."""
     identity = decode_identity(feature)
+    link = LockStepLink(wire, 1.0 / identity.report_rate_hz)
+    driver.open_board = lambda *_: opening.Opened(link, identity, None)  # type: ignore[assignment]
+    grasp = run_grasp(Pr2Backend(EMULATED), create("controller", "hybrid"), RunConfig(), watcher=watcher)
+    driver.open_board = opening.open_board
+    assert grasp.outcome.words == "steady", grasp.reason
+
+
+def ticks_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> list[float]:
     found: list[float] = []
     for _ in range(grasps):
         wire = Playback(sent, feature)
-        link = LockStepLink(wire, 1.0 / identity.report_rate_hz)
-        driver.open_board = lambda *_, link=link: opening.Opened(link, identity, None)  # type: ignore[assignment]
-        grasp = run_grasp(Pr2Backend(EMULATED), controller, RunConfig())
-        assert grasp.outcome.words == "steady", grasp.reason
+        played(wire, feature)
         found += [ns / 1e3 for ns in wire.ticks_ns]
-    driver.open_board = opening.open_board
+    return found
+
+
+def paced_us(grasps: int, sent: Sequence[bytes], feature: bytes) -> dict[str, list[float]]:
+    """Return the times of the ticks of a squeeze, in turn without and with predictions at checkpoints."""
+    settings = resolve("default")
+    model = model_for(settings, installed())
+    period_s = 1.0 / decode_identity(feature).report_rate_hz
+    found: dict[str, list[float]] = {"paced": [], "paced_with_predictions": [], "predicting": []}
+    for _ in range(grasps):
+        for predicts in (False, True):
+            wire = Playback(sent, feature, period_s)
+            anytime = anytime_of(model, settings.features.create(), settings) if predicts else None
+            watched = Watched(anytime, wire)
+            try:
+                played(wire, feature, watched)
+            finally:
+                if anytime is not None:
+                    anytime.end()
+            us = [ns / 1e3 for ns in wire.ticks_ns]
+            found["paced_with_predictions" if predicts else "paced"] += [us[k] for k in watched.squeeze]
+            found["predicting"] += [us[k] for k in watched.predicting]
     return found
 
 
@@ -153,6 +221,8 @@ def main() -> None:
     asked = parser.parse_args()
     if asked.short:
         asked.grasps, asked.seconds = 1, 0.5
+    sent, feature = recorded()
+    paced = paced_us(asked.grasps, sent, feature)
     result = {
         "date": date.today().isoformat(),
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}",
@@ -160,7 +230,8 @@ def main() -> None:
         "scheduler": SCHEDULERS.get(os.sched_getscheduler(0), "other"),
         "python": platform.python_version(),
         "graspsense-pr2-gripper": version("graspsense-pr2-gripper"),
-        **distribution("tick", ticks_us(asked.grasps)),
+        **distribution("tick", ticks_us(asked.grasps, sent, feature)),
+        **{key: value for name, us in paced.items() if us for key, value in distribution(name, us).items()},
         **distribution("wake_up", wake_ups_us(asked.seconds)),
     }
     if asked.json:

@@ -12,7 +12,7 @@ from test_evaluate import learner
 
 from graspsense.cli.main import main
 from graspsense.evaluation.intervals import difference
-from graspsense.evaluation.ranking import rank
+from graspsense.evaluation.ranking import OutsideAnswers, rank
 
 
 def crossed(**other):
@@ -75,3 +75,55 @@ def test_features_from_before_the_contact_are_a_control_and_not_compared():
     assert [one.standing for one in found.candidates] == ["best", "control"]
     assert found.candidates[1].loss is None
     assert "From before the contact alone, tree recognises" in found.verdict
+
+
+def test_answers_from_outside_are_compared_like_any_other():
+    trials = bottles(30, spread=0.3)
+    perfect = OutsideAnswers(predicted={"instance_held_out": trials.labels}, training_s=1.0)
+    found = rank({"knn": learner("knn")}, {"force": trials}, outside={("oracle", "all"): perfect})
+
+    assert [one.name for one in found.candidates] == ["oracle with all", "knn with force"]
+    assert found.candidates[0].rates["instance_held_out"].rate == 1.0
+    assert found.candidates[0].sets is None
+    assert found.candidates[1].loss.value > 0.0
+
+
+def test_the_sets_of_every_candidate_are_measured_on_the_same_folds():
+    found = crossed()
+
+    for one in found.candidates:
+        assert one.sets.covered.n == 180
+        assert 0.8 < one.sets.covered.rate <= 1.0
+
+
+def test_an_unknown_name_is_refused_by_the_option_that_was_typed_before_any_grasp(capsys):
+    for option, name, role in (
+        ("--feature-sets", "nope", "feature set"),
+        ("--classifiers", "svn", "classifier"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main(["compare", "simulated", option, name])
+        said = capsys.readouterr()
+        assert ended.value.code == 2
+        assert f"{option} {name}: no {role} named" in said.err
+        assert "grasping" not in said.err
+
+
+def test_the_page_has_verdict_rates_losses_sets_and_the_command(tmp_path, capsys):
+    trials = bottles(12)
+    lines = ["label,bottle,force [N],noise"]
+    for label, name, row in zip(trials.labels, trials.instances, trials.table.values.tolist(), strict=True):
+        lines.append(",".join((label, name, *map(repr, row))))
+    (tmp_path / "t.csv").write_text("\n".join(lines))
+    page = tmp_path / "page.html"
+    arguments = ("compare", str(tmp_path / "t.csv"), "--label", "label", "--instance", "bottle")
+
+    shown = called(capsys, *arguments, "--classifiers", "tree,knn", "--out", str(page))
+
+    text = page.read_text(encoding="utf-8")
+    assert str(page) in "".join(shown.split())
+    assert "recognises most: " in text
+    for heading in ("Recognition rates", "Differences from the best", "Prediction sets", "Provenance"):
+        assert f"{heading}</h2>" in text
+    assert "--classifiers tree,knn" in text
+    assert "http" not in text.replace("http-equiv", "").replace("http://www.w3.org/2000/svg", "")

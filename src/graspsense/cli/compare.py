@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import echo_json
-from graspsense.cli.sources import SOURCES, is_csv, learner_of, source_options, trials_of
+from graspsense.cli.output import echo_json, file_to_write
+from graspsense.cli.sources import SOURCES, command_line, is_csv, learner_of, source_options, trials_of
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
-    from graspsense.evaluation.ranking import Ranking
+    from graspsense.evaluation.ranking import Candidate, Ranking
 
 
 @click.command(
@@ -34,12 +34,21 @@ if TYPE_CHECKING:
 )
 @click.option("--feature-sets", metavar="NAMES", help="Comma-separated feature sets; not for a CSV. [chitta]")
 @click.option("--folds", type=int, default=10, show_default=True, help="Number of folds.")
+@click.option("--out", metavar="FILE", callback=file_to_write, help="Write a page (.html) as well.")
 @source_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def compare(
-    source: str, classifiers: str, feature_sets: str | None, folds: int, as_json: bool, **given: Any
+    source: str,
+    classifiers: str,
+    feature_sets: str | None,
+    folds: int,
+    out: str | None,
+    as_json: bool,
+    **given: Any,
 ) -> None:
-    """Measure and print."""
+    """Measure, print, and write the page."""
+    from pathlib import Path
+
     from graspsense.cli.progress import ProgressLine
     from graspsense.evaluation.json_codec import to_json
     from graspsense.evaluation.ranking import rank
@@ -50,7 +59,8 @@ def compare(
         raise click.UsageError(
             "compare is for classifiers; --target-value is for train, predict and evaluate"
         )
-    names = _names(classifiers, "--classifiers")
+    names = _names(classifiers, "--classifiers", "classifier")
+    sets = () if is_csv(source) else _names(feature_sets or "chitta", "--feature-sets", "feature-set")
     learners = {name: learner_of(source, name, given) for name in names}
     with ProgressLine() as progress:
         if is_csv(source):
@@ -60,13 +70,21 @@ def compare(
                 name: trials_of(
                     source, progress, {**given, "options": (*given["options"], f"features.type={name}")}
                 )
-                for name in _names(feature_sets or "chitta", "--feature-sets")
+                for name in sets
             }
         found = rank(learners, trials, folds=folds, seed=given["seed"], progress=progress)
+    if out is not None:
+        from graspsense.report.ranking_page import ranking_page
+        from graspsense.report.write import write_html
+
+        write_html(Path(out), ranking_page(found, command_line(("out", "as_json"))))
     if as_json:
-        echo_json({**to_json(found), "verdict": found.verdict})
-    else:
-        _print(found)
+        page = {} if out is None else {"page": out}
+        echo_json({**to_json(found), "verdict": found.verdict, **page})
+        return
+    _print(found)
+    if out is not None:
+        echo_entry("page", out)
 
 
 def _print(found: Ranking) -> None:
@@ -83,18 +101,38 @@ def _print(found: Ranking) -> None:
             *(percentage(one.rates[name].rate) if name in one.rates else "" for name in protocols),
             "" if one.loss is None else one.loss.points,
             one.standing,
+            _coverage(one),
             f"{one.training_s:.2g} s",
         )
         for one in found.candidates
     ]
     headings = [name.replace("_", " ").upper() for name in protocols]
-    echo_table(("CLASSIFIER", "FEATURES", *headings, "LOSS, IN POINTS", "STANDING", "TRAINING"), rows)
+    echo_table(
+        ("CLASSIFIER", "FEATURES", *headings, "LOSS, IN POINTS", "STANDING", "SETS COVER", "TRAINING"), rows
+    )
     for note in found.notes:
         echo_entry("note", note)
 
 
-def _names(text: str, option: str) -> tuple[str, ...]:
+def _coverage(candidate: Candidate) -> str:
+    """Return how many of the prediction sets contain the true label; empty if that was not measured."""
+    from graspsense.evaluation.intervals import percentage
+
+    sets = candidate.sets
+    return "" if sets is None or sets.covered is None else percentage(sets.covered.rate)
+
+
+def _names(text: str, option: str, role: str) -> tuple[str, ...]:
+    """Return the names of components of a role that an option lists. Raises UsageError for an unknown one."""
+    from graspsense.core.errors import UnknownName
+    from graspsense.core.plugins import installed
+
     names = tuple(dict.fromkeys(one.strip() for one in text.split(",") if one.strip()))
     if not names:
         raise click.UsageError(f"{option} names nothing: give names with commas between them")
+    for name in names:
+        try:
+            installed().find(role, name)
+        except UnknownName as unknown:
+            raise click.UsageError(f"{option} {name}: {unknown}") from None
     return names

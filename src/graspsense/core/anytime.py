@@ -112,6 +112,11 @@ class Anytime:
             reason = self._checkpoint(frame.t_s, phase)
         return reason
 
+    @property
+    def computing(self) -> bool:
+        """Whether a thread computes a prediction at this moment."""
+        return self._running is not None and not self._running.done()
+
     def end(self) -> None:
         """Wait for a prediction that is still running, which is dropped."""
         if self._pool is not None:

@@ -1,13 +1,14 @@
 """Classifiers and feature sets crossed on the same folds: which are as good as the best, and which is cheapest.
 
 Every candidate is compared with the one that has the highest rate, paired by trial, with intervals corrected for the
-number of comparisons (Bonferroni).
+number of comparisons (Bonferroni). A classifier outside of graspsense can be compared too, if it predicts the same
+trials with the same folds (`OutsideAnswers`).
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ from attrs import frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, cross_validate
-from graspsense.evaluation.doubt import exchangeable_instances
+from graspsense.evaluation.doubt import SetCoverage, exchangeable_instances, set_coverage
 from graspsense.evaluation.folds import in_order, instance_held_out, stratified
 from graspsense.evaluation.intervals import Difference, RecognitionRate, difference, rate_of
 
@@ -35,8 +36,9 @@ Standing = Literal["best", "equivalent", "undecided", "worse", "control"]
 class Candidate:
     """A classifier with a feature set.
 
-    `rates` has the rate under each protocol. `training_s` is the mean time of a fit. `loss` is the rate of the best
-    minus this rate, under the first protocol. The candidate is `equivalent` if the interval of the loss is below
+    `rates` has the rate under each protocol. `training_s` is the mean time of a fit. `sets` is the coverage of the
+    prediction sets under the first protocol, None for a control or an answer from outside. `loss` is the rate of the
+    best minus this rate, under the first protocol. The candidate is `equivalent` if the interval of the loss is below
     2 points, `worse` if it is above zero, else `undecided`: more trials could show either. Features from before the
     contact are a `control`, which is not compared.
     """
@@ -45,6 +47,7 @@ class Candidate:
     features: str
     rates: Mapping[str, RecognitionRate]
     training_s: float
+    sets: SetCoverage | None
     loss: Difference | None
     standing: Standing
 
@@ -91,18 +94,41 @@ class Ranking:
         return text
 
 
+@frozen(kw_only=True)
+class OutsideAnswers:
+    """The labels that a classifier outside of graspsense predicts for all trials, under each of `protocols_of`.
+
+    `training_s` is the mean time of a fit.
+    """
+
+    predicted: Mapping[str, Sequence[str]]
+    training_s: float
+
+
+@frozen(kw_only=True)
+class _Measured:
+    """What is known of a classifier with a feature set: which trials are right under each protocol, and the sets."""
+
+    right: Mapping[str, list[bool]]
+    training_s: float
+    sets: SetCoverage | None = None
+
+
 def rank(
     learners: Mapping[str, ClassifierFactory],
     trials: Mapping[str, Labelled],
     *,
     folds: int = 10,
     seed: int = 0,
+    protocols: Mapping[str, Folds] | None = None,
+    outside: Mapping[tuple[str, str], OutsideAnswers] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Ranking:
     """Cross-validate every classifier with every feature set, on the same folds.
 
-    `trials` are the same trials with different features. Raises ConfigError if they differ in labels, or if no
-    candidate can be measured.
+    `trials` are the same trials with different features. `protocols` are some of `protocols_of`, which are used
+    otherwise; the candidates are compared under the first. `outside` has further answers by the name of the classifier
+    and of its features. Raises ConfigError if the trials differ in labels, or if no candidate can be measured.
     """
     first = next(iter(trials.values()))
     for name, one in trials.items():
@@ -110,43 +136,38 @@ def rank(
             raise ConfigError(
                 f"the trials with the features {name!r} are not those with {next(iter(trials))!r}"
             )
-    protocols = _protocols(first, folds, seed)
+    protocols = protocols or protocols_of(first, folds, seed)
     headline = next(iter(protocols))
-    tables: list[tuple[str, str, str, FeatureTable, Folds]] = [
-        (learner, name, protocol, one.table, of)
-        for learner in learners
-        for name, one in trials.items()
-        for protocol, of in protocols.items()
-    ]
+    tables = {name: one.table for name, one in trials.items()}
     if first.before_contact is not None:
-        before = first.before_contact.table
-        tables += [(one, BEFORE_CONTACT, headline, before, protocols[headline]) for one in learners]
-    right: dict[tuple[str, str], dict[str, list[bool]]] = {}
-    seconds: dict[tuple[str, str], float] = {}
-    notes = []
-    for done, (learner, name, protocol, table, of) in enumerate(tables):
+        tables[BEFORE_CONTACT] = first.before_contact.table
+    measured: dict[tuple[str, str], _Measured] = {}
+    notes: list[str] = []
+    pairs = [(learner, name) for name in tables for learner in learners]
+    for done, (learner, name) in enumerate(pairs):
         if progress is not None:
-            progress(f"{learner} with {name}", done, len(tables))
-        began = time.perf_counter()
+            progress(f"{learner} with {name}", done, len(pairs))
+        wanted = {headline: protocols[headline]} if name == BEFORE_CONTACT else protocols
         try:
-            pooled = cross_validate(
-                learners[learner], table, first.labels, [np.arange(len(first))], [of], seed=seed
-            )
+            measured[learner, name] = _measured(learners[learner], tables[name], first, wanted, seed)
         except FitRefused as refusal:
-            notes.append(f"{learner} with {name}, {protocol}: {refusal}")
-            continue
-        right.setdefault((learner, name), {})[protocol] = pooled.right(first.labels)
-        seconds.setdefault((learner, name), (time.perf_counter() - began) / (int(of.max()) + 1))
+            notes.append(f"{learner} with {name}: {refusal}")
+    for key, answers in (outside or {}).items():
+        right = {
+            protocol: [a == b for a, b in zip(predicted, first.labels, strict=True)]
+            for protocol, predicted in answers.predicted.items()
+        }
+        measured[key] = _Measured(right=right, training_s=answers.training_s)
     return Ranking(
         source=first.source,
         protocol=headline,
         trials=len(first),
-        candidates=_ranked(right, seconds, headline, first),
+        candidates=_ranked(measured, headline, first),
         notes=(*first.notes, *notes),
     )
 
 
-def _protocols(trials: Labelled, k: int, seed: int) -> dict[str, Folds]:
+def protocols_of(trials: Labelled, k: int, seed: int) -> dict[str, Folds]:
     """Return the folds of each protocol that these trials allow, that of the comparison first."""
     protocols: dict[str, Folds] = {}
     instances = exchangeable_instances(trials)
@@ -158,37 +179,67 @@ def _protocols(trials: Labelled, k: int, seed: int) -> dict[str, Folds]:
     return protocols
 
 
-def _ranked(
-    right: Mapping[tuple[str, str], Mapping[str, list[bool]]],
-    seconds: Mapping[tuple[str, str], float],
-    headline: str,
+def _measured(
+    learner: ClassifierFactory,
+    table: FeatureTable,
     trials: Labelled,
+    protocols: Mapping[str, Folds],
+    seed: int,
+) -> _Measured:
+    """Return the answers of a classifier under each protocol. Raises FitRefused."""
+    labels, groups = trials.labels, [np.arange(len(trials))]
+    right, seconds, sets = {}, [], None
+    for protocol, of in protocols.items():
+        began = time.perf_counter()
+        pooled = cross_validate(learner, table, labels, groups, [of], seed=seed)
+        seconds.append((time.perf_counter() - began) / (int(of.max()) + 1))
+        right[protocol] = pooled.right(labels)
+        if sets is None:
+            sets = set_coverage(
+                pooled, labels, exchangeable_instances(trials), groups, [of], _rate_among(trials)
+            )
+    return _Measured(right=right, training_s=seconds[0], sets=sets)
+
+
+def _rate_among(trials: Labelled) -> Callable[[Sequence[bool], Sequence[int] | None], RecognitionRate]:
+    """Return a function that gives the rate of some rows, or of all, with the interval that the trials allow."""
+
+    def rate(right: Sequence[bool], rows: Sequence[int] | None) -> RecognitionRate:
+        chosen = range(len(trials)) if rows is None else rows
+        instances = None if trials.instances is None else [trials.instances[i] for i in chosen]
+        return rate_of([right[i] for i in chosen], instances, trials.no_interval)
+
+    return rate
+
+
+def _ranked(
+    measured: Mapping[tuple[str, str], _Measured], headline: str, trials: Labelled
 ) -> tuple[Candidate, ...]:
-    """Return the candidates that were measured under the headline protocol; those from before contact come last."""
-    measured = [key for key in right if headline in right[key]]
+    """Return the candidates by their rate under the headline protocol; those from before contact come last."""
     judged = [key for key in measured if key[1] != BEFORE_CONTACT]
     if not judged:
         raise ConfigError("no classifier could be trained on these trials")
-    best = max(judged, key=lambda key: sum(right[key][headline]))
+    right = {key: one.right[headline] for key, one in measured.items()}
+    best = max(judged, key=lambda key: sum(right[key]))
     comparisons = max(len(judged) - 1, 1)
     candidates = []
-    for key in sorted(
-        measured, key=lambda key: (key[1] == BEFORE_CONTACT, -sum(right[key][headline]), key != best)
-    ):
+    for key in sorted(right, key=lambda key: (key[1] == BEFORE_CONTACT, -sum(right[key]), key != best)):
         loss = None
         standing: Standing = "best" if key == best else "control"
         if key != best and key in judged:
-            loss = difference(right[best][headline], right[key][headline], trials.instances, comparisons)
+            loss = difference(right[best], right[key], trials.instances, comparisons)
             standing = _standing(loss)
+        one = measured[key]
         candidates.append(
             Candidate(
                 classifier=key[0],
                 features=key[1],
                 rates={
                     protocol: rate_of(of, trials.instances, trials.no_interval)
-                    for protocol, of in right[key].items()
+                    for protocol, of in one.right.items()
                 },
-                training_s=seconds[key],
+                training_s=one.training_s,
+                sets=one.sets if key in judged else None,
                 loss=loss,
                 standing=standing,
             )

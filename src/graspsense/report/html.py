@@ -144,6 +144,8 @@ VERDICTS: Final = {
     "does not hold": ("✗", "bad"),
     "no": ("✗", "bad"),
     "lower": ("▼", "bad"),
+    "equivalent": ("✓", "good"),
+    "worse": ("▼", "bad"),
 }
 """Words that say whether something holds or is better, each with its mark and its kind of colour."""
 

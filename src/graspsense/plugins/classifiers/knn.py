@@ -42,7 +42,7 @@ class Knn(ScikitClassifier[KnnConfig]):
         given: Sequence[FeatureValue],
         shares: Mapping[str, float],
     ) -> Sequence[Reason]:
-        """Return the votes, and the distance of the nearest trial."""
+        """Return the contributions of the features to the share of votes, the votes, and the nearest distance."""
         distances, rows = fitted.estimator.kneighbors(row)
         votes = [fitted.labels[i] for i in rows[0].tolist()]
         label = next(iter(shares))
@@ -50,7 +50,7 @@ class Knn(ScikitClassifier[KnnConfig]):
             f"{votes.count(label)} of the {len(votes)} nearest training trials are {label}; the nearest is "
             f"{distances[0, 0]:.2g} standard deviations away"
         )
-        return (Reason(words=words),)
+        return (*self.shapley_reasons(fitted, row, given, shares), Reason(words=words))
 
     def support(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float]:
         """Return the votes for the label, and all votes."""

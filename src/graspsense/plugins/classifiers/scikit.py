@@ -24,6 +24,7 @@ from graspsense.plugin_api import (
     FeatureValue,
     Prediction,
     Reason,
+    contribution_reasons,
     in_words,
     missing_feature,
     setting,
@@ -90,6 +91,35 @@ class ScikitClassifier(Classifier[ScikitConfigT]):
         `row` is the preprocessed trial, of shape (1, features), `given` its features before that; `shares` are its
         probabilities, the most probable label first.
         """
+
+    def shapley_reasons(
+        self,
+        fitted: FittedEstimator,
+        row: NDArray[np.float64],
+        given: Sequence[FeatureValue],
+        shares: Mapping[str, float],
+    ) -> tuple[Reason, ...]:
+        """Return the contributions of the features to the probability of the label, as Shapley values.
+
+        The arguments are those of `reasons`.
+        """
+        import numpy as np
+
+        from graspsense.plugins.classifiers.shapley import shapley_values
+
+        label = next(iter(shares))
+        column = self.classes().index(label)
+        start, parts = shapley_values(
+            lambda rows: self.shares(fitted, rows)[:, column],
+            row[0],
+            fitted.ready(np.full(len(given), np.nan)),
+        )
+        return contribution_reasons(
+            [((feature,), value) for feature, value in zip(given, parts, strict=True)],
+            start,
+            scale="probability",
+            label=label,
+        )
 
     def support(self, fitted: FittedEstimator, row: NDArray[np.float64]) -> tuple[float, float] | None:
         """Return the training trials that the largest probability was counted from: with the label, and in all.

@@ -69,5 +69,8 @@ class Svm(ScikitClassifier[SvmConfig]):
         given: Sequence[FeatureValue],
         shares: Mapping[str, float],
     ) -> Sequence[Reason]:
-        """Return the nearest labels."""
-        return (most_likely(shares, "softmax of the decision values (not calibrated)"),)
+        """Return the contributions of the features to the softmax, and the labels with the largest values."""
+        return (
+            *self.shapley_reasons(fitted, row, given, shares),
+            most_likely(shares, "softmax of the decision values (not calibrated)"),
+        )

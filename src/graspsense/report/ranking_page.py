@@ -1,0 +1,131 @@
+"""The page of a comparison of classifiers and feature sets."""
+
+from __future__ import annotations
+
+from graspsense.evaluation.intervals import percentage
+from graspsense.evaluation.ranking import MARGIN, Candidate, Ranking
+from graspsense.report.html import Page, Section, bullets, facts, pair, paragraph, table
+from graspsense.report.rates import RateRow, rates_picture
+from graspsense.report.verdict import in_hundred
+from graspsense.report.wording import CONTROLS, control_words, protocol_words
+
+
+def ranking_page(ranking: Ranking, command: str) -> Page:
+    """Return the page; `command` is the command line that measured the comparison."""
+    best = ranking.candidates[0]
+    rate = best.rates[ranking.protocol].rate
+    return Page(
+        kind="Comparison of classifiers",
+        title=ranking.source,
+        question=f"Which classifier recognises most, with which features, on {ranking.source}?",
+        answer=ranking.verdict,
+        headline=f"{best.name} recognises most: {in_hundred(rate)} grasps",
+        beside=bullets(ranking.notes, "warning"),
+        sections=(_rates(ranking), _differences(ranking), _sets(ranking), _made_of(ranking, command)),
+    )
+
+
+def _rates(ranking: Ranking) -> Section:
+    protocols = list(dict.fromkeys(name for one in ranking.candidates for name in one.rates))
+    rows = [
+        RateRow(
+            name=_name(one),
+            rate=one.rates[ranking.protocol].rate,
+            interval=one.rates[ranking.protocol].interval,
+            strong=one.standing == "best",
+        )
+        for one in ranking.candidates
+    ]
+    picture = rates_picture(rows, "Recognition rates. Bars are 95 % intervals.")
+    text = paragraph(f"Every grasp is classified by {protocol_words(ranking.protocol)}.")
+    text += facts([control_words(name, "") for name in protocols])
+    if any(one.standing == "control" for one in ranking.candidates):
+        text += facts([CONTROLS["before_contact"]])
+    cells = [
+        (
+            one.classifier,
+            _features(one),
+            *(percentage(one.rates[name].rate) if name in one.rates else "" for name in protocols),
+            f"{one.training_s:.2g}",
+        )
+        for one in ranking.candidates
+    ]
+    header = ("classifier", "features", *(control_words(name, "")[0] for name in protocols), "training, s")
+    return Section(
+        id="rates",
+        title="Recognition rates",
+        body=pair(picture, text) + table("Rates of all candidates", header, cells, 2),
+    )
+
+
+def _differences(ranking: Ranking) -> Section:
+    best, margin = ranking.candidates[0], f"{100 * MARGIN:.0f} points"
+    text = (
+        f"The loss is the rate of {best.name} minus that of the candidate on the same grasps, in percentage points. "
+        "The 95 % intervals are corrected for the number of comparisons. A candidate is equivalent if the interval is "
+        f"below {margin}, worse if it is above zero, else undecided: more grasps could show either."
+    )
+    rows = [
+        (one.classifier, _features(one), one.loss.points, one.standing)
+        for one in ranking.candidates
+        if one.loss is not None
+    ]
+    header = ("classifier", "features", "loss (interval), points", "standing")
+    body = table(f"Losses against {best.name}", header, rows, verdicts=(3,)) if rows else ""
+    return Section(id="losses", title="Differences from the best", body=paragraph(text) + body)
+
+
+def _sets(ranking: Ranking) -> Section:
+    judged = [one.sets for one in ranking.candidates if one.sets is not None]
+    if not judged:
+        return Section(id="sets", title="Prediction sets", body=paragraph("Not measured."))
+    text = (
+        f"A prediction set has the labels that cannot be ruled out. It shall contain the true label of "
+        f"{100 * judged[0].asked:.0f} % of new grasps. Of two classifiers with the same coverage, the one with the "
+        "smaller sets tells more."
+    )
+    rows = []
+    for one in ranking.candidates:
+        sets = one.sets
+        if sets is None:
+            continue
+        if sets.covered is None or sets.mean_size is None or sets.single is None:
+            rows.append((one.classifier, _features(one), f"not measured: {sets.reason}", "", "", ""))
+            continue
+        lowest = min(sets.by_label.items(), key=lambda item: item[1].rate)
+        rows.append(
+            (
+                one.classifier,
+                _features(one),
+                percentage(sets.covered.rate),
+                f"{percentage(lowest[1].rate)} ({lowest[0]})",
+                f"{sets.mean_size:.2f}",
+                percentage(sets.single.rate),
+            )
+        )
+    header = (
+        "classifier",
+        "features",
+        "contain the true label",
+        "least of a label",
+        "labels in a set",
+        "single label",
+    )
+    return Section(
+        id="sets",
+        title="Prediction sets",
+        body=paragraph(text) + table("Prediction sets of all candidates", header, rows, 2),
+    )
+
+
+def _made_of(ranking: Ranking, command: str) -> Section:
+    pairs = [("trials", f"{ranking.trials} of {ranking.source}"), ("command", command)]
+    return Section(id="made", title="Provenance", body=facts(pairs))
+
+
+def _features(one: Candidate) -> str:
+    return "before contact (control)" if one.standing == "control" else one.features
+
+
+def _name(one: Candidate) -> str:
+    return f"{one.classifier}, {_features(one)}"
