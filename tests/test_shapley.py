@@ -13,7 +13,7 @@ from test_reasons import FULL_CAN, MISSING, total
 from graspsense.core.reasons import FeatureValue
 from graspsense.plugins.classifiers.shapley import shapley_values
 
-NAMES = ("svm", "mlp", "knn")
+NAMES = ("svm", "mlp", "backprop", "knn")
 
 
 def interacting(rows):

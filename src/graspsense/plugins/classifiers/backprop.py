@@ -72,8 +72,11 @@ class Backprop(ScikitClassifier[BackpropConfig]):
         given: Sequence[FeatureValue],
         shares: Mapping[str, float],
     ) -> Sequence[Reason]:
-        """Return the most probable labels."""
-        return (most_likely(shares, "outputs of the network"),)
+        """Return the contributions of the features to the probability, and the most probable labels."""
+        return (
+            *self.shapley_reasons(fitted, row, given, shares),
+            most_likely(shares, "outputs of the network"),
+        )
 
 
 class SigmoidNetwork:
