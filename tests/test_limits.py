@@ -34,6 +34,7 @@ MANY_PARAMETERS = {
     "graspsense/cli/import_.py:import_": OPTIONS,
     "graspsense/cli/report.py:report": OPTIONS,
     "graspsense/cli/run.py:run": OPTIONS,
+    "graspsense/cli/tradeoff.py:condition": OPTIONS,
     "graspsense/cli/tradeoff.py:simulation": OPTIONS,
     "graspsense/cli/train.py:train": OPTIONS,
     "graspsense/core/setting.py:setting": "public; every part of a declaration is optional and by keyword only",

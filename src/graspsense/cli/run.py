@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from graspsense.core.roles import DeviceInfo
     from graspsense.core.runner import Sink
     from graspsense.core.trial import Trial
+    from graspsense.experiments.condition import Conditions
 
 EXIT_ABORTED: Final = 4
 EXIT_NOT_KEPT: Final = 2
@@ -99,11 +100,19 @@ def run(
     else:
         trial, kept = _kept(save, label, settings, sinks, changed)
 
+    condition = _condition(settings) if explain_model and "model" in trial.report else None
     if as_json:
-        echo_json(trial_as_json(trial) if kept is None else {**trial_as_json(trial), "kept": kept})
+        extra: dict[str, Any] = {} if kept is None else {"kept": kept}
+        if condition is not None:
+            extra["condition"] = condition.as_values()
+        echo_json({**trial_as_json(trial), **extra})
     else:
         print_trial(trial)
         _print_model(trial)
+        if condition is not None:
+            from graspsense.cli.condition_table import print_conditions
+
+            print_conditions(condition, getattr(settings.gripper.config, "accuracy", None))
     if plot is not None:
         draw_grasp(trial, Path(plot))
     if kept is not None and kept["problem"]:
@@ -111,6 +120,18 @@ def run(
         raise click.exceptions.Exit(EXIT_NOT_KEPT)
     if trial.outcome in (Outcome.ABORTED, Outcome.DEVICE_LOST):
         raise click.exceptions.Exit(EXIT_ABORTED)
+
+
+def _condition(settings: Settings) -> Conditions | None:
+    """Return how far each feature of this grasp moves for 1 ppm of a parameter; None without an object."""
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.experiments.condition import conditions
+
+    scene = str(getattr(settings.gripper.config, "object", "none"))
+    if scene == "none":
+        return None
+    with ProgressLine() as progress:
+        return conditions(settings, [scene], [settings.run.seed], progress=progress)
 
 
 def _print_model(trial: Trial) -> None:

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import click
+from attrs import asdict
 
 from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json, file_to_write
@@ -22,6 +23,63 @@ for _one in commands():
     tradeoff.add_command(_one)
 
 
+@tradeoff.command(short_help="How far each feature moves for 1 ppm of a parameter.")
+@pipeline_options
+@click.option(
+    "--scene",
+    "scenes",
+    metavar="NAME:STATE",
+    multiple=True,
+    help="Object to grasp. Can be repeated.  [default: six of the catalogue]",
+)
+@click.option(
+    "--seeds", type=click.IntRange(min=1), default=10, show_default=True, help="Grasps of each scene."
+)
+@click.option(
+    "--markdown", metavar="FILE", callback=file_to_write, help="Write the tables as a Markdown page."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def condition(
+    scenes: tuple[str, ...],
+    seeds: int,
+    markdown: str | None,
+    as_json: bool,
+    pipeline: str | None,
+    gripper: str | None,
+    object_name: str | None,
+    options: tuple[str, ...],
+    seed: int | None,
+    force: bool,
+) -> None:
+    """Change each parameter of gripper and object by one part in a million, and measure how far features move.
+
+    With ideal sensors, and with the sensors of the gripper. What 1 ppm moves, no accuracy of the simulator can fix in
+    a single grasp.
+    """
+    from graspsense.cli.condition_table import conditions_markdown, print_conditions
+    from graspsense.cli.progress import ProgressLine
+    from graspsense.experiments.condition import conditions
+    from graspsense.experiments.simulation import SCENES
+
+    settings = settings_of(pipeline, gripper, object_name, options, seed, force)
+    wanted = scenes or ((object_name,) if object_name else SCENES)
+    names = [scene for scene in wanted for _ in range(seeds)]
+    numbers = [settings.run.seed + k for _ in wanted for k in range(seeds)]
+    sensors = dict.fromkeys(("ideal", str(getattr(settings.gripper.config, "sensor", "ideal"))))
+    with ProgressLine() as progress:
+        measured = [
+            conditions(settings, names, numbers, sensor=sensor, progress=progress) for sensor in sensors
+        ]
+    if markdown:
+        write_text(markdown, conditions_markdown(measured))
+    if as_json:
+        echo_json([one.as_values() for one in measured])
+        return
+    echo(f"simulated: {', '.join(wanted)}, {seeds} seeds each")
+    for one in measured:
+        print_conditions(one)
+
+
 @tradeoff.command(short_help="Accuracy of the simulator against its run time.")
 @pipeline_options
 @click.option(
@@ -34,7 +92,26 @@ for _one in commands():
 @click.option(
     "--seeds", type=click.IntRange(min=1), default=2, show_default=True, help="Grasps of each scene."
 )
-@click.option("--png", metavar="FILE", callback=file_to_write, help="Draw the result.")
+@click.option(
+    "--recognition-seeds",
+    type=click.IntRange(min=0),
+    default=4,
+    show_default=True,
+    help="Seeds for recognition and the distributions of features, with the sensors of the gripper; 0: leave it out.",
+)
+@click.option(
+    "--instances",
+    type=click.IntRange(min=2),
+    default=4,
+    show_default=True,
+    help="Individuals of each object and state that a seed grasps, for recognition.",
+)
+@click.option(
+    "--png",
+    metavar="FILE",
+    callback=file_to_write,
+    help="Draw the result; recognition in FILE_recognition.png.",
+)
 @click.option(
     "--markdown", metavar="FILE", callback=file_to_write, help="Write the tables as a Markdown page."
 )
@@ -42,6 +119,8 @@ for _one in commands():
 def simulation(
     scenes: tuple[str, ...],
     seeds: int,
+    recognition_seeds: int,
+    instances: int,
     png: str | None,
     markdown: str | None,
     as_json: bool,
@@ -54,11 +133,15 @@ def simulation(
 ) -> None:
     """Run the same grasps with every scheme and fidelity of the simulator.
 
-    Errors of features, peak force and force trace are relative to a reference that keeps every term and halves its
-    steps until nothing changes. Times are measured on the same grasps.
+    Errors of features, peak force and force trace with ideal sensors are relative to a reference that keeps every term
+    and halves its steps until nothing changes. With the sensors of the gripper, recognition and the distributions of
+    features are compared with those of the reference, and the fastest equivalent variant is named. Times are measured
+    on the same grasps.
     """
     from graspsense.cli.progress import ProgressLine
+    from graspsense.experiments.sensed import sensed_trade
     from graspsense.experiments.simulation import SCENES, trade_simulation
+    from graspsense.report.sensed import about, conclusion, sensed_markdown, sensed_png, sensed_rows
     from graspsense.report.simulation import simulation_markdown, simulation_png, simulation_rows
 
     settings = settings_of(pipeline, gripper, object_name, options, seed, force)
@@ -68,19 +151,40 @@ def simulation(
         found = trade_simulation(
             settings, scenes=wanted, seeds=range(first, first + seeds), progress=progress
         )
+        sensed = None
+        if recognition_seeds:
+            numbers = range(first, first + recognition_seeds)
+            sensed = sensed_trade(settings, instances=instances, seeds=numbers, progress=progress)
+    pictures = []
     if png:
-        simulation_png(found, Path(png))
-        talk(f"drawn in {png}")
+        pictures = [Path(png)]
+        simulation_png(found, pictures[0])
+        if sensed is not None:
+            pictures.append(pictures[0].with_name(f"{pictures[0].stem}_recognition.png"))
+            sensed_png(sensed, pictures[1])
+        talk(f"drawn in {', '.join(map(str, pictures))}")
     if markdown:
-        picture = os.path.relpath(png, Path(markdown).parent) if png else None
-        try:
-            Path(markdown).write_text(simulation_markdown(found, picture), encoding="utf-8")
-        except OSError as error:
-            raise click.ClickException(f"{markdown} cannot be written: {error.strerror}") from error
-        talk(f"written to {markdown}")
+        places = [os.path.relpath(picture, Path(markdown).parent) for picture in pictures]
+        page = simulation_markdown(found, places[0] if places else None)
+        if sensed is not None:
+            drawn = [f"![Recognition against time]({places[1]})", ""] if places else []
+            page = "\n".join([page, *drawn, *sensed_markdown(sensed)])
+        write_text(markdown, page)
     if as_json:
-        echo_json(found.as_json())
+        echo_json(found.as_json() if sensed is None else {**found.as_json(), "recognition": asdict(sensed)})
         return
     made = ", ".join(f"{key} {value}" for key, value in found.made.items())
     echo(f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each\n{made}\n")
     echo_table(*simulation_rows(found))
+    if sensed is not None:
+        echo(f"\n{about(sensed)}\n{conclusion(sensed)}\n")
+        echo_table(*sensed_rows(sensed))
+
+
+def write_text(path: str, text: str) -> None:
+    """Write a page and say where it is. Raises ClickException if that is not possible."""
+    try:
+        Path(path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise click.ClickException(f"{path} cannot be written: {error.strerror}") from error
+    talk(f"written to {path}")

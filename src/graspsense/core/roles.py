@@ -224,7 +224,7 @@ class SimulationVariant:
     """Settings of a simulated gripper with a certain trade-off between accuracy and time.
 
     `settings` are keys of the gripper's own table. Variants of one `method` and `fidelity` form a curve, on which
-    `step` names the point. The `role` is `reference` for the variant that errors are measured against, and `floor`
+    `step` names the point. Recognition is measured as well with those that are `for_recognition`. The `role` is `reference` for the variant that errors are measured against, and `floor`
     for one whose steps are so short that only the error of the model remains.
     """
 
@@ -233,6 +233,7 @@ class SimulationVariant:
     step: str
     settings: Mapping[str, Any]
     role: Literal["curve", "floor", "reference"] = "curve"
+    for_recognition: bool = False
 
 
 class BatchOptions(TypedDict, total=False):
@@ -266,6 +267,13 @@ class BatchBackend(SensorBackend[ConfigT]):
         raise ConfigError(
             f"{type(self).__name__} cannot identify an object from recordings. --gripper sim can"
         )
+
+    def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, BatchBackend[Any]]:
+        """Return this gripper with each parameter of it, or of these scenes, larger by a share; "" is unchanged.
+
+        They keep every term, and their steps do not depend on the parameters. Empty if this is not possible.
+        """
+        return {}
 
     @abstractmethod
     def run_many(

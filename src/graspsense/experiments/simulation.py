@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-import os
-import platform
 import time
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from datetime import date
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,7 +14,8 @@ from attrs import evolve, fields_dict, frozen
 
 from graspsense.core.errors import ConfigError
 from graspsense.core.roles import BatchBackend, Grasped, SimulationVariant
-from graspsense.experiments.versions import versions
+from graspsense.experiments.condition import SCALES
+from graspsense.experiments.versions import measured_on
 from graspsense.report.simulation import PEAK, TRACE, SimulationTrade, VariantPoint
 
 if TYPE_CHECKING:
@@ -35,8 +33,6 @@ SCENES: Final = (
     "toy",
     "block",
 )
-SCALES: Final[Mapping[str, float]] = {"m": 1e-3, "N": 1.0, "s": 0.05, "m/s": 1e-3, "N/s": 1.0}
-"""Relative errors are relative to the reference value, or to this value of the same unit if that is larger."""
 LEAST_S: Final = 0.2
 """A variant is run again until this much processor time is measured, so that the clock's resolution is negligible."""
 
@@ -88,13 +84,7 @@ def trade_simulation(
         seeds=tuple(seeds),
         quantities=quantities,
         points=tuple(points),
-        made={
-            "date": date.today().isoformat(),
-            "processor": platform.processor() or platform.machine(),
-            "system": f"{platform.system()} {platform.release()}",
-            "load": f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores",
-            **versions(),
-        },
+        made=measured_on(),
     )
 
 

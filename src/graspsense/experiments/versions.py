@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from collections.abc import Mapping
+from datetime import date
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Final
@@ -28,6 +30,22 @@ def versions() -> Mapping[str, str]:
             status.version if status.state == "loaded" else f"{status.version} ({status.state})"
         )
     return found
+
+
+def measured_on() -> dict[str, str]:
+    """Return when and where a time is measured: date, processor, system, load, and `versions`."""
+    return {
+        "date": date.today().isoformat(),
+        "processor": platform.processor() or platform.machine(),
+        "system": f"{platform.system()} {platform.release()}",
+        "load": f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores",
+        **versions(),
+    }
+
+
+def where_measured() -> str:
+    """Return `measured_on` as text."""
+    return ", ".join(f"{key} {value}" for key, value in measured_on().items())
 
 
 def differences(here: Mapping[str, str], there: Mapping[str, str]) -> list[str]:

@@ -88,12 +88,13 @@ def simulation_markdown(trade: SimulationTrade, picture: str | None = None) -> s
         f"Measured with: {made}.",
         "",
         *([f"![Error against time]({picture})", ""] if picture else []),
-        *_markdown(*simulation_rows(trade)),
+        *markdown_table(*simulation_rows(trade)),
     ]
     return "\n".join(lines) + "\n"
 
 
-def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return a table in Markdown."""
     lines = [f"| {' | '.join(header)} |", f"|{'---|' * len(header)}"]
     return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
 
@@ -119,7 +120,7 @@ def simulation_png(trade: SimulationTrade, path: Path) -> None:
     for ax, name in zip(axes, names, strict=False):
         handles.update(_draw_curves(ax, trade, name))
         handles.update(_draw_floors(ax, trade, name))
-        _axes(ax, name, "error, relative")
+        axes_of(ax, name, "error, relative")
     for ax in axes[panels:]:
         ax.set_axis_off()
     failed = [p for p in trade.points if p.failure]
@@ -177,7 +178,8 @@ def _draw_floors(ax: Any, trade: SimulationTrade, quantity: str) -> dict[str, An
     return handles
 
 
-def _axes(ax: Any, title: str, y: str) -> None:
+def axes_of(ax: Any, title: str, y: str) -> None:
+    """Prepare axes for values of `y` against the time of a grasp."""
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_title(title, fontsize=9)

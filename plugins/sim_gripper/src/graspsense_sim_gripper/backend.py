@@ -38,7 +38,9 @@ from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.fingertip import CELLS, FIRST_PAD_CELL, fingertips
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
+from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.palm import PalmBuffers, PalmSignals, channel, palm_signals
+from graspsense_sim_gripper.perturbed import perturbed
 from graspsense_sim_gripper.problem import GraspController
 from graspsense_sim_gripper.reduction.propose import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.reduction.select import select
@@ -77,6 +79,7 @@ class SimBackend(BatchBackend[SimConfig]):
     def __init__(self, config: SimConfig) -> None:
         super().__init__(config)
         self._controller: GraspController | None = None
+        self._scaled: ScaledParameter | None = None
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -244,6 +247,14 @@ class SimBackend(BatchBackend[SimConfig]):
 
         return identify(self.config, squeezes, progress)
 
+    def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, SimBackend]:
+        """Return this gripper, and this gripper with each parameter larger by this share, see `perturbed`."""
+        changed = {}
+        for name, one in perturbed(self.config, scenes, share).items():
+            changed[name] = SimBackend(one.config)
+            changed[name]._scaled = one.scaled
+        return changed
+
     def run_many(
         self,
         controller: Controller[Any],
@@ -255,7 +266,9 @@ class SimBackend(BatchBackend[SimConfig]):
         # Imported here, since a single grasp needs neither threads nor compiling.
         from graspsense_sim_gripper.batch.threads import grasps
 
-        done = grasps(self.config, controller, scenes, seeds, _COMPILED[self.config.compile], options)
+        done = grasps(
+            self.config, controller, scenes, seeds, _COMPILED[self.config.compile], options, self._scaled
+        )
         return [
             Grasped(
                 outcome=grasp.outcome,

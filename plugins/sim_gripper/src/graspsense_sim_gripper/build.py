@@ -31,6 +31,7 @@ from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
 from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.objects.instance import Instance, cell_weights, central_cells, sample
 from graspsense_sim_gripper.objects.library import find, split_number
+from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.palm import AT_REST, palm_params
 from graspsense_sim_gripper.problem import GraspSetup, Problem
@@ -79,15 +80,18 @@ def device_info(config: SimConfig) -> DeviceInfo:
     )
 
 
-def build(config: SimConfig, scene: str) -> Problem:
+def build(config: SimConfig, scene: str, scaled: ScaledParameter | None = None) -> Problem:
     """Return the problem of grasping an object: a name, a scene file (`*.toml`), or `none` for no object.
+
+    `scaled`: a parameter of the object that is larger by a share.
 
     Raises UnknownName for an unknown name, ConfigError for a file that cannot be read as an object.
     """
     if scene == "none":
         return problem_of(config, None)
     name, number = split_number(scene)
-    return problem_of(config, find(name), number)
+    spec = find(name)
+    return problem_of(config, spec if scaled is None else scaled.applied_to(spec), number)
 
 
 def problem_of(config: SimConfig, spec: ObjectSpec | None, number: int | None = None) -> Problem:

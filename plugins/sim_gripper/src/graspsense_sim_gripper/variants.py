@@ -9,7 +9,8 @@ from attrs import evolve
 
 from graspsense.plugin_api import SimulationVariant
 
-ACCURACIES: Final = (0.3, 0.1, 0.03, 0.01, 0.001, 1e-4)
+ACCURACIES: Final = (0.5, 0.3, 0.1, 0.03, 0.01, 0.001, 1e-4)
+MIDDLE: Final = 0.01
 STEPS_S: Final = (1e-3, 5e-4, 2e-4, 1e-4)
 FINE_S: Final = 2e-5
 """Steps so short that their error is negligible beside that of the model."""
@@ -21,6 +22,7 @@ _FORMS: Final = (
         step="until all stands still",
         settings={"fidelity": "reference", "accuracy": 1e-4},
         role="reference",
+        for_recognition=True,
     ),
     *(
         SimulationVariant(
@@ -28,6 +30,7 @@ _FORMS: Final = (
             fidelity=fidelity,
             step=f"{accuracy:g}",
             settings={"fidelity": fidelity, "accuracy": accuracy},
+            for_recognition=fidelity == "scene" or accuracy == MIDDLE,
         )
         for fidelity in ("scene", "full")
         for accuracy in ACCURACIES
@@ -38,6 +41,7 @@ _FORMS: Final = (
             fidelity="full",
             step=f"{step_s * 1e3:g} ms",
             settings={"fidelity": "full", "scheme": scheme, "step_s": step_s},
+            for_recognition=step_s == STEPS_S[0],
         )
         for scheme in ("explicit", "implicit")
         for step_s in STEPS_S

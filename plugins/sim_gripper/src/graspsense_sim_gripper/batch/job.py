@@ -46,6 +46,7 @@ from graspsense_sim_gripper.loop import (
     has_ended,
 )
 from graspsense_sim_gripper.objects.library import split_number
+from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers, sample_trace
 from graspsense_sim_gripper.problem import GraspController, GraspSetup, PalmNoise, Problem
 from graspsense_sim_gripper.reduction.model import Reduction
@@ -98,6 +99,8 @@ class Job:
     """Called with each trace, for example to compute features; its result is `FinishedGrasp.extracted`."""
     traces: bool
     """Whether traces are kept."""
+    scaled: ScaledParameter | None = None
+    """A parameter of the objects that is larger by a share."""
     params: TickParams = field(init=False)
     """The parameters of controller and guard in every grasp."""
     initial: TickState = field(init=False)
@@ -130,7 +133,8 @@ class Scenes:
 
         Raises UnknownName and ConfigError as `build` and `select` do.
         """
-        job, problem, reduction = self.job, build(self.job.config, scene), None
+        job, reduction = self.job, None
+        problem = build(job.config, scene, job.scaled)
         if problem.spec is not None:
             reduction = select(problem, GraspController(job.controller, job.run), compiled=compiled)
         self._scenes[scene_key(scene)] = problem, reduction

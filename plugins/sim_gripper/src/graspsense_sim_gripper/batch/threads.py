@@ -35,6 +35,7 @@ from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
 from graspsense_sim_gripper.compiled.padding import compiled_kinds, composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import kinds_in
+from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.problem import GraspSetup
 
 WORTH_COMPILING: Final = 50
@@ -78,8 +79,12 @@ def grasps(
     seeds: Sequence[int],
     compiled: bool | None,
     options: BatchOptions,
+    scaled: ScaledParameter | None = None,
 ) -> Iterator[FinishedGrasp]:
-    """Yield the results of `run_many` one by one, in order. Raises as `run_many` does."""
+    """Yield the results of `run_many` one by one, in order. Raises as `run_many` does.
+
+    `scaled`: a parameter of the objects that is larger by a share.
+    """
     unknown = options.keys() - BatchOptions.__annotations__.keys()
     if unknown:
         raise TypeError(f"run_many has no {sorted(unknown)}; it has {sorted(BatchOptions.__annotations__)}")
@@ -91,6 +96,7 @@ def grasps(
         run=options.get("run") or RunConfig(),
         extract=options.get("extract"),
         traces=options.get("traces", False),
+        scaled=scaled,
     )
     workers = options.get("workers") or os.cpu_count() or 1
     batch = _Batch(job, scenes, seeds, max(1, workers), compiled)
