@@ -224,8 +224,9 @@ class SimulationVariant:
     """Settings of a simulated gripper with a certain trade-off between accuracy and time.
 
     `settings` are keys of the gripper's own table. Variants of one `method` and `fidelity` form a curve, on which
-    `step` names the point. Recognition is measured as well with those that are `for_recognition`. The `role` is `reference` for the variant that errors are measured against, and `floor`
-    for one whose steps are so short that only the error of the model remains.
+    `step` names the point. The `role` is `reference` for the variant that errors are measured against, and `floor`
+    for one whose steps are so short that only the error of the model remains. With those that are `for_recognition`,
+    recognition is measured as well.
     """
 
     method: str

@@ -62,8 +62,8 @@ def conclusion(trade: SensedTrade) -> str:
     margin, least = f"{100 * tests[0].margin:g} points", min(test.power for test in tests)
     best = trade.coarsest
     found = (
-        f"The fastest variant whose recognition is equivalent to that of the reference within {margin} is: {best.name}, "
-        f"{1e3 * best.seconds:.3g} ms a grasp."
+        f"The fastest variant whose recognition is equivalent to that of the reference within {margin} is: "
+        f"{best.name}, {1e3 * best.seconds:.3g} ms a grasp."
         if best is not None
         else f"With {len(trade.seeds)} seeds, no variant is shown to be equivalent to the reference within {margin}."
     )

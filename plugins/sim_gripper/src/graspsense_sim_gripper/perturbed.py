@@ -29,7 +29,7 @@ def perturbed(config: SimConfig, scenes: Sequence[str], share: float) -> Mapping
 
     A parameter that is 0, infinite or not used is left out. Raises UnknownName and ConfigError as `find` does.
     """
-    # Steps of a fixed length depend smoothly on the parameters: what a change of 1 ppm moves is not due to their control.
+    # Steps of a fixed length depend smoothly on the parameters, so what 1 ppm moves is not due to their control.
     step_s = config.step_s or 1.0 / config.rate_hz
     steady = evolve(config, fidelity="full", step_s=step_s, explain=False)
     names = dict.fromkeys(
@@ -57,6 +57,6 @@ def _settings(config: SimConfig) -> Iterator[str]:
         unused.update(("noise_counts", "pad_period_s", "pad_delay_s"))
     for one in fields(SimConfig):
         value = getattr(config, one.name)
-        if isinstance(value, float) and value != 0.0 and math.isfinite(value):
-            if one.name not in OF_THE_MODEL and one.name not in unused:
-                yield one.name
+        is_number = isinstance(value, float) and value != 0.0 and math.isfinite(value)
+        if is_number and one.name not in unused.union(OF_THE_MODEL):
+            yield one.name
