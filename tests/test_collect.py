@@ -328,7 +328,7 @@ def test_what_is_grasped_and_what_changes_no_result_may_differ(graspsense, colle
     folder = str(tmp_path / "t")
     assert graspsense(*SAVED, folder).returncode == 0
 
-    command = ("run", "--label", "toy", "--seed", "3", "--explain-model", "--save", folder)
+    command = ("run", "--label", "toy", "--seed", "3", "-o", "gripper.explain=true", "--save", folder)
     done = graspsense(*command, "-o", "gripper.compile=never")
     assert done.returncode == 0, done.stderr
     assert collect(folder, "q\n").returncode == 0

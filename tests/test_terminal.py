@@ -132,7 +132,7 @@ def outcome_colours(shown):
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_grasp_fits_the_terminal_with_outcome_prediction_and_warning_in_colour(width):
-    shown = in_terminal(["run", "--explain-model"], width)
+    shown = in_terminal(["run", "-o", "gripper.explain=true"], width)
 
     assert shown.code == 0
     assert max(map(len, shown.lines)) <= width

@@ -117,3 +117,54 @@ def test_the_simulator_gets_better_with_finer_steps(capsys, tmp_path):
         # Near what the reference itself is exact to.
         assert errors[3] < 0.2 * errors[0]
         assert f"| {method} |" in page.read_text()
+
+
+@pytest.mark.slow
+def test_the_condition_of_features_is_told_and_sensors_make_it_worse(capsys):
+    arguments = ["--scene", "odwalla:full_closed", "--seeds", "3", "--json"]
+    assert ended(["tradeoff", "condition", *arguments]) == 0
+    ideal, pads = json.loads(capsys.readouterr().out)
+    assert (ideal["sensor"], pads["sensor"]) == ("ideal", "pads")
+    finest = {one["feature"]: one["finest"] for one in ideal["features"]}
+    jumpy = {one["feature"]: one["finest"] for one in pads["features"]}
+    # With ideal sensors the physics is well conditioned; the reading of cell images is not.
+    assert max(finest.values()) < 1e-3
+    assert jumpy["delta_t"] > 1e-3
+
+
+@pytest.mark.slow
+def test_who_asks_for_more_than_a_feature_can_give_is_told(capsys):
+    assert ended(["run", "--explain-model"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "gripper.accuracy = 0.01 is finer than delta_t, dp_dt, df_dt can be" in printed
+    assert ended(["run", "--explain-model", "-o", "gripper.sensor=ideal"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "relative movement for 1 ppm of each of" in printed
+    assert "is finer than" not in printed
+
+
+@pytest.mark.slow
+def test_recognition_and_distances_of_variants_against_the_reference(tmp_path):
+    from graspsense.core.config import resolve
+    from graspsense.experiments.sensed import sensed_trade
+    from graspsense.report.sensed import conclusion, sensed_png, sensed_rows
+
+    settings = resolve("default", options=["classifier.type=c45"])
+    variants = [
+        one
+        for one in settings.gripper.create().variants()
+        if one.role == "reference"
+        or (one.settings.get("accuracy") in (0.5, 1e-4) and one.fidelity == "scene")
+    ]
+    trade = sensed_trade(settings, objects=["can"], instances=6, seeds=(1, 2), variants=variants)
+    points = {one.step: one for one in trade.points}
+    coarse, fine = points["0.5"], points["0.0001"]
+    assert coarse.largest.upper > 3.0 * fine.largest.upper
+    assert coarse.largest.p_difference < 0.05
+    assert trade.grasps == 18
+    # Two seeds show no equivalence, and that is said.
+    assert "no variant is shown to be equivalent" in conclusion(trade)
+    header, rows = sensed_rows(trade)
+    assert all(len(row) == len(header) for row in rows)
+    sensed_png(trade, tmp_path / "trade.png")
+    assert (tmp_path / "trade.png").read_bytes().startswith(b"\x89PNG")

@@ -284,7 +284,7 @@ def test_the_explanation_adds_up_to_the_force_that_was_felt():
 
 
 def test_run_explains_the_model_in_the_terminal_and_in_json():
-    shown = CliRunner().invoke(cli, ["run", "--object", "leaking_bottle", "--explain-model"])
+    shown = CliRunner().invoke(cli, ["run", "--object", "leaking_bottle", "-o", "gripper.explain=true"])
     assert shown.exit_code == 0
     table = shown.output[shown.output.index("model       peak force 1") :].splitlines()
     assert table[1].split()[:2] == ["TERM", "PEAK"]
