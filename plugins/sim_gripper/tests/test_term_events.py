@@ -273,7 +273,7 @@ def test_an_oscillation_that_is_too_fast_is_left_out_and_reported(tmp_path):
     selection = gripper.report()["selection"]
     slosh, contact = selection["decisions"][-3], selection["decisions"][-1]
     assert (slosh["term"], slosh["decision"]) == ("slosh", "dropped")
-    assert contact["decision"] == "peak not resolved"
+    assert contact["decision"] == "trace not verified"
     assert selection["verified"] is None
 
 

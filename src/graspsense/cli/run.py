@@ -102,17 +102,11 @@ def run(
 
     condition = _condition(settings) if explain_model and "model" in trial.report else None
     if as_json:
-        extra: dict[str, Any] = {} if kept is None else {"kept": kept}
-        if condition is not None:
-            extra["condition"] = condition.as_values()
-        echo_json({**trial_as_json(trial), **extra})
+        further = {} if condition is None else {"condition": condition.as_values()}
+        echo_json({**trial_as_json(trial), **({} if kept is None else {"kept": kept}), **further})
     else:
         print_trial(trial)
-        _print_model(trial)
-        if condition is not None:
-            from graspsense.cli.condition_table import print_conditions
-
-            print_conditions(condition, getattr(settings.gripper.config, "accuracy", None))
+        _print_model(trial, condition)
     if plot is not None:
         draw_grasp(trial, Path(plot))
     if kept is not None and kept["problem"]:
@@ -134,12 +128,16 @@ def _condition(settings: Settings) -> Conditions | None:
         return conditions(settings, [scene], [settings.run.seed], progress=progress)
 
 
-def _print_model(trial: Trial) -> None:
-    """Print what each term of the simulated object contributed, and the selection of terms, if the trial has them."""
+def _print_model(trial: Trial, condition: Conditions | None) -> None:
+    """Print what each term of the simulated object contributed, how it was selected, and the condition of features."""
+    from graspsense.cli.condition_table import print_conditions
+
     if "model" in trial.report:
         print_model(trial.report["model"])
         if "selection" in trial.report:
             print_selection(trial.report["selection"])
+    if condition is not None:
+        print_conditions(condition, trial.report["selection"]["accuracy"])
 
 
 def _labelled_settings(

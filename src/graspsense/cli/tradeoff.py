@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from attrs import asdict
@@ -12,6 +13,10 @@ from graspsense.cli.options import pipeline_options, settings_of
 from graspsense.cli.output import echo_json, file_to_write
 from graspsense.cli.terminal import echo, echo_table, talk
 from graspsense.cli.tradeoff_recognition import commands
+
+if TYPE_CHECKING:
+    from graspsense.experiments.sensed import SensedTrade
+    from graspsense.report.simulation import SimulationTrade
 
 
 @click.group(short_help="Measure recognition or accuracy against cost.")
@@ -141,8 +146,8 @@ def simulation(
     from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.sensed import sensed_trade
     from graspsense.experiments.simulation import SCENES, trade_simulation
-    from graspsense.report.sensed import about, conclusion, sensed_markdown, sensed_png, sensed_rows
-    from graspsense.report.simulation import simulation_markdown, simulation_png, simulation_rows
+    from graspsense.report.sensed import about, conclusion, sensed_markdown, sensed_rows
+    from graspsense.report.simulation import simulation_markdown, simulation_rows
 
     settings = settings_of(pipeline, gripper, object_name, options, seed, force)
     wanted = scenes or ((object_name,) if object_name else SCENES)
@@ -155,14 +160,7 @@ def simulation(
         if recognition_seeds:
             numbers = range(first, first + recognition_seeds)
             sensed = sensed_trade(settings, instances=instances, seeds=numbers, progress=progress)
-    pictures = []
-    if png:
-        pictures = [Path(png)]
-        simulation_png(found, pictures[0])
-        if sensed is not None:
-            pictures.append(pictures[0].with_name(f"{pictures[0].stem}_recognition.png"))
-            sensed_png(sensed, pictures[1])
-        talk(f"drawn in {', '.join(map(str, pictures))}")
+    pictures = _drawn(Path(png), found, sensed) if png else []
     if markdown:
         places = [os.path.relpath(picture, Path(markdown).parent) for picture in pictures]
         page = simulation_markdown(found, places[0] if places else None)
@@ -179,6 +177,20 @@ def simulation(
     if sensed is not None:
         echo(f"\n{about(sensed)}\n{conclusion(sensed)}\n")
         echo_table(*sensed_rows(sensed))
+
+
+def _drawn(path: Path, found: SimulationTrade, sensed: SensedTrade | None) -> list[Path]:
+    """Draw the result and return the names of the pictures."""
+    from graspsense.report.sensed import sensed_png
+    from graspsense.report.simulation import simulation_png
+
+    pictures = [path]
+    simulation_png(found, path)
+    if sensed is not None:
+        pictures.append(path.with_name(f"{path.stem}_recognition.png"))
+        sensed_png(sensed, pictures[1])
+    talk(f"drawn in {', '.join(map(str, pictures))}")
+    return pictures
 
 
 def write_text(path: str, text: str) -> None:

@@ -111,7 +111,7 @@ def _distances(samples: FloatArray, references: FloatArray, unit: float) -> Floa
         return gaps
     from scipy.stats import wasserstein_distance
 
-    distances = np.abs(missing[0].mean(axis=1) - missing[1].mean(axis=1))
+    distances: FloatArray = np.abs(missing[0].mean(axis=1) - missing[1].mean(axis=1))
     for i, (a, b) in enumerate(zip(samples, references, strict=True)):
         known = a[~missing[0][i]], b[~missing[1][i]]
         if len(known[0]) and len(known[1]):

@@ -208,7 +208,7 @@ def _rate(
     classes = classifier.classes()
     best = classifier.probabilities(test[0]).argmax(axis=1)
     right = sum(classes[int(k)] == label for k, label in zip(best, test[1], strict=True))
-    return right / len(test[1])
+    return float(right / len(test[1]))
 
 
 def _point(

@@ -42,6 +42,9 @@ REFERENCE_ACCURACY: Final = 1e-3
 """The steps of a reference begin with the tolerance for this accuracy, or for a finer one that is requested."""
 CONVERGED: Final = 1e-7
 """A reference halves the steps of a tick until speed and force change by less than this times the accuracy."""
+NOT_VERIFIED: Final = "trace not verified"
+"""The decision on a contact that is too stiff or too fast for trial grasps: it bounces within a tick, so peaks are
+near those of the reference, but the time course between bounces is not."""
 STIFFEST_N_M: Final = 1e6
 """The largest contact stiffness (N/m) for which peak forces agree with those of the reference."""
 SWING_SHARE: Final = 10.0
@@ -210,7 +213,7 @@ def _frequencies(kinds: Sequence[str], model: ObjectModel, point: WorkingPoint) 
 
 
 def _resolution(grip: Grip, dt_s: float, too_fast_per_s: float) -> TermDecision:
-    """Return whether the peak force of the contact is resolved, and its natural frequency times the tick.
+    """Return whether the force trace of the contact is resolved, and its natural frequency times the tick.
 
     `too_fast_per_s`: the frequency of a term that is too fast to be resolved, 0 if none is.
     """
@@ -219,7 +222,7 @@ def _resolution(grip: Grip, dt_s: float, too_fast_per_s: float) -> TermDecision:
     resolved = max(within_tick, at_once) <= 1.05 * STIFFEST_N_M and number <= 1.05
     return TermDecision(
         term="contact",
-        decision="peak resolved" if resolved else "peak not resolved",
+        decision="trace resolved" if resolved else NOT_VERIFIED,
         what="natural frequency times tick",
         number=number,
         error=0.0 if resolved else math.inf,
