@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from graspsense.core.contact import REST_SPEED_M_S, REST_WINDOW_S, first_rest
 from graspsense.core.signals import NO_PADS, Frame, Reading
 from graspsense.recording.replayable import Recording
 from graspsense.sources.noise_thresholds import thresholds_for
@@ -53,7 +54,7 @@ def test_noisy_forces_get_a_contact_threshold_that_noise_does_not_reach():
     assert max(free) < force < 20.0
 
 
-@pytest.mark.parametrize(("gap_noise_m", "step_s"), [(2e-5, 0.001), (0.0, 0.05)], ids=["noise", "slow"])
+@pytest.mark.parametrize(("gap_noise_m", "step_s"), [(2e-5, 0.001), (2e-5, 0.05)], ids=["noise", "slow"])
 def test_rest_is_within_the_noise_and_several_samples(gap_noise_m, step_s):
     chosen = thresholds_for([squeeze(gap_noise_m=gap_noise_m, step_s=step_s, seed=k) for k in range(5)])
     speed, window = (chosen.settings[f"controller.{key}"] for key in ("rest_speed_m_s", "rest_window_s"))
@@ -86,3 +87,34 @@ def test_forces_that_are_no_more_than_noise_are_doubted():
 
 def test_recordings_in_other_units_keep_the_defaults():
     assert thresholds_for([squeeze(peak_n=0.5, units={"gap": "deg"})]).settings == {}
+
+
+def test_slow_recordings_whose_gap_is_still_at_rest_keep_the_thresholds_of_rest():
+    """Coarse steps while the fingers move are not noise: with these thresholds rest is where the gap stays."""
+    slow = [squeeze(step_s=0.05, seed=k) for k in range(5)]
+    coarse = [
+        evolve(one, readings=tuple(
+            reading._replace(frame=reading.frame._replace(gap_m=round(reading.frame.gap_m / 2e-4) * 2e-4))
+            for reading in one.readings
+        ))
+        for one in slow
+    ]  # fmt: skip
+    for recordings in (slow, coarse):
+        assert thresholds_for(recordings).settings == {}
+        for one in recordings:
+            times = np.array([reading.frame.t_s for reading in one.readings])
+            gap = np.array([reading.frame.gap_m for reading in one.readings])
+            since, _ = first_rest(times, gap, np.ones(len(times), dtype=bool), REST_SPEED_M_S, REST_WINDOW_S)
+            assert times[since] == pytest.approx(1.5, abs=0.051)
+
+
+def test_the_contact_force_stays_where_three_of_four_recordings_reach_it():
+    strong, weak = [squeeze(peak_n=1.0, seed=k) for k in range(4)], [squeeze(peak_n=0.4, seed=9)]
+    assert thresholds_for([*strong, *weak]).settings == {}
+    assert "controller.contact_force_n" in thresholds_for([*strong[:2], *weak]).settings
+
+
+def test_a_time_out_that_is_shorter_than_a_recording_is_extended():
+    chosen = thresholds_for([squeeze()], {"move_timeout_s": 10.0, "steady_timeout_s": 1.5})
+    assert chosen.settings == {"controller.steady_timeout_s": 2.0}
+    assert "steady_timeout_s 2 s (recordings last up to 2 s)" in chosen.words

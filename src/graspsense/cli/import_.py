@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 LISTED: Final = 20
 """Largest number of unreadable recordings whose errors are printed; `--json` lists all."""
+TIMEOUTS: Final = ("move_timeout_s", "steady_timeout_s")
+"""Settings of a controller that would end a grasp before its recording does."""
 FEW: Final = 3
 """Largest number of recordings that are printed one by one."""
 
@@ -133,7 +135,9 @@ class _Chosen:
         """Choose the thresholds that are not given."""
         from graspsense.sources.noise_thresholds import thresholds_for
 
-        found = thresholds_for([one.labelled.recording for one in recordings])
+        controller = self._settings.values.get("controller", {})
+        timeouts = {key: controller[key] for key in TIMEOUTS if key in controller}
+        found = thresholds_for([one.labelled.recording for one in recordings], timeouts)
         open_keys = {key for key in found.settings if self._settings.origins.get(key) == "default"}
         self.words = found.words if open_keys or not found.settings else "thresholds: those that are given"
         self._added = tuple(f"{key}={found.settings[key]!r}" for key in sorted(open_keys))

@@ -1,8 +1,8 @@
 """Thresholds of contact and rest for recordings of other programs, from the noise of these recordings.
 
-The default thresholds are those of the PR2 gripper. Where they do not fit the recordings of an import, contact is found
-in the noise, or never, and rest never. The thresholds that are chosen here are the same for all recordings of an
-import, so that their features are comparable.
+The default thresholds are those of the PR2 gripper. They stay unless the recordings require others: where contact would
+be found in the noise, or not in most recordings, or rest never. A time-out that would end a grasp before its recording
+does is extended. What is chosen here is the same for all recordings of an import, so that features are comparable.
 
 The noise of a force is its scatter in the first third of the time before it reaches a fifth of its peak. In a recording
 that begins in contact, or whose force grows from the beginning, it is that of its second differences, as is the noise
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from attrs import frozen
 
-from graspsense.core.contact import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S
+from graspsense.core.contact import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S, first_rest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,10 +34,13 @@ _EARLY_SHARE: Final = 0.2
 """Share of the peak force up to which a force counts as without contact."""
 _FEW: Final = 5
 """Number of samples that scatter is computed from at least, and that a window of rest has at least."""
+_REACHING: Final = 0.75
+"""Share of the recordings that must reach the default contact force on both pads, or come to rest, so that it stays."""
 _LEAST_FORCE_N, _MOST_FORCE_N = 0.01, 20.0
 _SLOW_SHARE: Final = 0.1
 """A rest speed is at most this share of the mean closing speed, so that closing is not taken for rest."""
 _MOST_WINDOW_S: Final = 1.0
+_MOST_TIMEOUT_S: Final = 600.0
 _SOON_M: Final = 0.001
 """Travel within which a contact counts as too wide an object by default, although a recording may begin close to it."""
 
@@ -53,10 +56,13 @@ class Thresholds:
     words: str
 
 
-def thresholds_for(recordings: Sequence[Recording]) -> Thresholds:
+def thresholds_for(
+    recordings: Sequence[Recording], timeouts_s: Mapping[str, float] | None = None
+) -> Thresholds:
     """Return the thresholds of contact and rest that these recordings need.
 
-    Recordings that are not in SI units keep the defaults.
+    `timeouts_s` are the time-outs of the controller, by their keys. Recordings that are not in SI units keep the
+    defaults.
     """
     in_si = [one for one in recordings if not one.units and len(one.readings) > _FEW]
     if not in_si:
@@ -66,7 +72,8 @@ def thresholds_for(recordings: Sequence[Recording]) -> Thresholds:
     rest, rest_words = _rest(measured)
     contact_n = force.get("controller.contact_force_n", CONTACT_FORCE_N)
     close = sum(_touches_soon(one, contact_n) for one in in_si)
-    settings = {**force, **rest, **({"controller.too_wide_m": 0.0} if close else {})}
+    times, times_words = _timeouts(in_si, timeouts_s or {})
+    settings = {**force, **rest, **times, **({"controller.too_wide_m": 0.0} if close else {})}
     if not settings:
         return Thresholds(
             settings={}, words="thresholds of contact and rest: the defaults, which fit the noise"
@@ -76,7 +83,7 @@ def thresholds_for(recordings: Sequence[Recording]) -> Thresholds:
         if close
         else ""
     )
-    words = "; ".join(filter(None, (force_words, rest_words, close_words)))
+    words = "; ".join(filter(None, (force_words, rest_words, times_words, close_words)))
     return Thresholds(settings=settings, words=f"thresholds chosen from the recordings: {words}")
 
 
@@ -106,7 +113,7 @@ class _Noise:
         return cls(
             free_force_n=max(_free_force(left), _free_force(right)),
             peak_force_n=float(np.nanmax(both)) if not np.isnan(both).all() else 0.0,
-            gap_m=_gap_at_rest(gap),
+            gap_m=_gap_at_rest(times, gap, both),
             step_s=float(np.median(np.diff(times))),
             closing_m_s=(float(np.nanmax(gap) - np.nanmin(gap)) / duration if duration > 0.0 else 0.0),
         )
@@ -115,11 +122,12 @@ class _Noise:
 def _contact_force(measured: Sequence[_Noise]) -> tuple[dict[str, float], str]:
     """Return the contact threshold if the default does not fit, and why."""
     needed = float(np.quantile([one.free_force_n for one in measured], 0.9))
-    # Nine of ten recordings must reach the threshold by a factor of two.
-    most = 0.5 * float(np.quantile([one.peak_force_n for one in measured], 0.1))
-    if needed <= CONTACT_FORCE_N <= most:
+    peaks = [one.peak_force_n for one in measured]
+    if needed <= CONTACT_FORCE_N <= float(np.quantile(peaks, 1.0 - _REACHING, method="lower")):
         return {}, ""
-    typical = 0.05 * float(np.median([one.peak_force_n for one in measured]))
+    # Nine of ten recordings must reach the threshold by a factor of two.
+    most = 0.5 * float(np.quantile(peaks, 0.1))
+    typical = 0.05 * float(np.median(peaks))
     chosen = max(needed, min(typical, most), _LEAST_FORCE_N)
     chosen = min(_rounded_up(chosen), _MOST_FORCE_N)
     doubt = (
@@ -134,11 +142,12 @@ def _contact_force(measured: Sequence[_Noise]) -> tuple[dict[str, float], str]:
 
 def _rest(measured: Sequence[_Noise]) -> tuple[dict[str, float], str]:
     """Return the rest speed and window if the defaults do not fit, and why."""
-    travel = float(np.quantile([one.gap_m for one in measured], 0.9))
+    travel = float(np.quantile([one.gap_m for one in measured], _REACHING))
     step = float(np.median([one.step_s for one in measured]))
-    window = max(REST_WINDOW_S, _rounded_up(_FEW * step)) if _FEW * step > REST_WINDOW_S else REST_WINDOW_S
-    if window == REST_WINDOW_S and travel <= REST_SPEED_M_S * window:
+    # Between samples that are further apart than the window, the gap may move for as long as they are apart.
+    if travel <= REST_SPEED_M_S * max(REST_WINDOW_S, step):
         return {}, ""
+    window = max(REST_WINDOW_S, _rounded_up(_FEW * step)) if _FEW * step > REST_WINDOW_S else REST_WINDOW_S
     slow = max(_SLOW_SHARE * float(np.median([one.closing_m_s for one in measured])), REST_SPEED_M_S)
     if travel > slow * window:
         window = min(_rounded_up(travel / slow), _MOST_WINDOW_S)
@@ -149,6 +158,19 @@ def _rest(measured: Sequence[_Noise]) -> tuple[dict[str, float], str]:
         f"within {REST_WINDOW_S:g} s)"
     )
     return {"controller.rest_speed_m_s": speed, "controller.rest_window_s": window}, words
+
+
+def _timeouts(
+    recordings: Sequence[Recording], timeouts_s: Mapping[str, float]
+) -> tuple[dict[str, float], str]:
+    """Return the time-outs that are shorter than a recording, extended to the longest one, and why."""
+    longest = max(one.readings[-1].frame.t_s - one.readings[0].frame.t_s for one in recordings)
+    limit = min(_rounded_up(longest), _MOST_TIMEOUT_S)
+    chosen = {f"controller.{key}": limit for key, value in timeouts_s.items() if value < longest}
+    if not chosen:
+        return {}, ""
+    keys = " and ".join(key for key, value in timeouts_s.items() if value < longest)
+    return chosen, f"{keys} {limit:g} s (recordings last up to {longest:.3g} s)"
 
 
 def _touches_soon(recording: Recording, contact_force_n: float) -> bool:
@@ -182,15 +204,37 @@ def _rises(force: NDArray[np.float64]) -> bool:
     return growth > _FORCE_SIGMAS * _scatter_of_differences(force)
 
 
-def _gap_at_rest(gap: NDArray[np.float64]) -> float:
-    """Return the distance within which a gap at rest stays: its noise, or one step of a coarse encoder."""
+def _gap_at_rest(times_s: NDArray[np.float64], gap: NDArray[np.float64], force: NDArray[np.float64]) -> float:
+    """Return the distance within which a gap at rest stays: its noise, or one step of a coarse encoder.
+
+    It is 0 for an encoder that repeats its numbers, if the default thresholds find the rest of the squeeze: the second
+    differences of its steps are motion, not noise.
+    """
     known = gap[~np.isnan(gap)]
     if len(known) <= _FEW:
         return 0.0
     steps = np.abs(np.diff(known))
     moved = steps[steps > 0.0]
+    if len(moved) < len(steps) and _comes_to_rest(times_s, gap, force):
+        return 0.0
     coarse = 1.5 * float(np.median(moved)) if len(moved) and 2 * len(moved) <= len(steps) else 0.0
     return max(_GAP_SIGMAS * _scatter_of_differences(known), coarse)
+
+
+def _comes_to_rest(
+    times_s: NDArray[np.float64], gap: NDArray[np.float64], force: NDArray[np.float64]
+) -> bool:
+    """Return whether the default thresholds find a rest after the force has risen."""
+    loaded = (
+        force >= _EARLY_SHARE * np.nanmax(force)
+        if not np.isnan(force).all()
+        else np.zeros(len(force), np.bool_)
+    )
+    if not loaded.any():
+        return False
+    k = int(loaded.argmax())
+    shows = np.ones(len(gap) - k, dtype=np.bool_)
+    return first_rest(times_s[k:], gap[k:], shows, REST_SPEED_M_S, REST_WINDOW_S) is not None
 
 
 def _scatter_of_differences(values: NDArray[np.float64]) -> float:
