@@ -29,6 +29,8 @@ GROUPS, KERNELS, LENGTH = 64, 8, 9
 INNER_FOLDS = 3
 GRID = {"learning_rate": (0.05, 0.15), "max_leaf_nodes": (4, 12)}
 ITERATIONS = 100
+LEAST_KNOWN = 0.1
+"""Share of the training trials that must have a feature."""
 
 
 class Hydra:
@@ -112,8 +114,11 @@ def tuned_boosted_forest(data: dict, training: np.ndarray, test: np.ndarray, see
         {name: list(values) for name, values in GRID.items()},
         cv=StratifiedGroupKFold(INNER_FOLDS, shuffle=True, random_state=seed),
     )
-    search.fit(data["features"][training], data["labels"][training], groups=data["instances"][training])
-    return search.predict(data["features"][test])
+    # A feature that few trials have can be missing in all of a fold, which scikit-learn refuses.
+    known = np.isfinite(data["features"][training]).mean(axis=0) > LEAST_KNOWN
+    features = data["features"][:, known]
+    search.fit(features[training], data["labels"][training], groups=data["instances"][training])
+    return search.predict(features[test])
 
 
 CLASSIFIERS = {"MultiRocket-Hydra": multirocket_hydra, "tuned boosted forest": tuned_boosted_forest}

@@ -62,6 +62,24 @@ def test_its_sets_are_calibrated_for_each_label():
     assert {(units, own) for _, units, own in KEPT["sets"]["thresholds"].values()} == {(60, True)}
 
 
+def test_a_grasp_has_predictions_while_it_goes_on_and_the_answer_of_the_whole_grasp(pipeline):
+    events = []
+    trial = pipeline.grasp(object="odwalla:full_closed", seed=5, on_event=events.append)
+    told = [event for event in events if event.source == "model"]
+
+    assert [one.after_s for one in trial.checkpoints] == [one["after_contact_s"] for one in KEPT["checkpoints"]]
+    assert [event.what for event in told] == [one.words for one in trial.checkpoints]
+    assert all("odwalla:full_closed" in one.prediction.prediction_set for one in trial.checkpoints)
+    assert trial.prediction.model == trial.checkpoints[0].prediction.model.partition(", 0.")[0]
+
+
+def test_its_sets_at_the_checkpoints_are_calibrated():
+    for part in KEPT["checkpoints"]:
+        assert part["sets"]["unit"] == "instances"
+        assert part["trials"] > 100
+        assert part["sets"]["thresholds"]
+
+
 def test_its_provenance_says_what_made_it():
     provenance = KEPT["provenance"]
 
