@@ -104,7 +104,7 @@ def test_the_law_that_made_the_forces_is_chosen_with_its_numbers():
     found = fit(model, true, [noisy])
     assert found.values == pytest.approx(values, rel=0.1)
     chosen = choose(model, [noisy], scale, has_memory=True, progress=lambda done, total: None)
-    assert chosen.fitted.candidate.name == "elastic + maxwell"
+    assert chosen.fitted.candidate.name == "elastic (k1, k3) + maxwell"
 
 
 @pytest.mark.slow

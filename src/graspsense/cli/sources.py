@@ -27,6 +27,8 @@ SOURCES: Final = """\b
       NAME:FOLDER  a data set of a plugin, such as icub:FOLDER
       store:DIR    the labelled trials of a store
       simulated    grasps of the simulated gripper
+      identified:FILE.toml,...  simulated grasps of objects that
+                   `graspsense identify` has identified
     """
 
 _OPTIONS: Final = (
@@ -159,7 +161,7 @@ def trials_of(
         talk("grasping; where the simulator can be compiled, the first seconds go into that")
     return labelled_trials(
         described,
-        settings=lambda: _settings(given, None),
+        settings=lambda: _settings(source, given, None),
         features=lambda: _alone("features", "chitta", given, source).create(),
         options=given["options"],
         seed=given["seed"],
@@ -174,7 +176,7 @@ def learner_of(source: str, classifier: str | None, given: Mapping[str, Any]) ->
     from graspsense.sources.trial_source import kind_of
 
     if kind_of(source) == SIMULATED:
-        chosen = _settings(given, classifier).classifier
+        chosen = _settings(source, given, classifier).classifier
         assert chosen is not None
         return chosen
     return _alone("classifier", classifier or DEFAULT_CLASSIFIER, given, source)
@@ -210,10 +212,12 @@ def _refuse_misplaced(kind: str) -> None:
                 raise click.UsageError(f"--{name} is for a {owner} source; this one is a {kind}", context)
 
 
-def _settings(given: Mapping[str, Any], classifier: str | None) -> Settings:
+def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> Settings:
     from graspsense.core.config import Flag, resolve
+    from graspsense.sources.identified import gripper_flags
 
-    flags = [Flag("--gripper", "gripper.type", given["gripper"])] if given["gripper"] else []
+    flags = gripper_flags(source)
+    flags += [Flag("--gripper", "gripper.type", given["gripper"])] if given["gripper"] else []
     if classifier:
         flags.append(Flag("--classifier", "classifier.type", classifier))
     settings = resolve(given["pipeline"], options=given["options"], flags=flags, force=given["force"])

@@ -110,8 +110,8 @@ def _fit_picture(fit: SqueezeFit) -> str:
         picture.y_axis(below, LEFT, RIGHT, "measured − fitted, N")
         picture.x_axis(x, 178.0, 215.0, "time, s")
         picture.dots(_points(x, below, t, residual), INKS[0], "residual")
-    picture.text(RIGHT, 34.0, "● measured", at="end", ink=INKS[0])
-    picture.text(RIGHT, 48.0, "— fitted", at="end", ink=INKS[1])
+    picture.text(RIGHT - 56.0, 14.0, "● measured", at="end", ink=INKS[0])
+    picture.text(RIGHT, 14.0, "— fitted", at="end", ink=INKS[1])
     return picture.svg(f"Force over time of {fit.name}, measured and fitted, and the residual", "s")
 
 

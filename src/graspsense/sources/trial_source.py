@@ -13,6 +13,7 @@ from graspsense.core.checkpoints import with_checkpoints
 from graspsense.core.errors import ConfigError, PluginUnavailable
 from graspsense.core.labelled import Labelled
 from graspsense.core.strict import ValidationFailed, structured
+from graspsense.sources.identified import IDENTIFIED, gripper_flags, identified_scenes
 from graspsense.sources.simulated import Group, simulated
 
 if TYPE_CHECKING:
@@ -29,7 +30,8 @@ Kind = Literal["CSV", "data set", "simulated"]
 class TrialSource(Group):
     """Labelled trials, as a user describes them.
 
-    `source` is `simulated`, the name of a CSV, or a data set with its folder (`icub:FOLDER`, `store:DIR`).
+    `source` is `simulated`, scenes of `graspsense identify` (`identified:cup.toml,mug.toml`), the name of a CSV, or a
+    data set with its folder (`icub:FOLDER`, `store:DIR`).
     """
 
     source: str = SIMULATED
@@ -79,7 +81,7 @@ def load_trials(
         described = structured({**keys, "source": source}, TrialSource, source)
     except ValidationFailed as misfit:
         raise ConfigError("\n".join(f"{one.path[0]}: {one.text}" for one in misfit.problems)) from None
-    settings = cache(lambda: resolve(pipeline, options=options))
+    settings = cache(lambda: resolve(pipeline, options=options, flags=gripper_flags(source)))
     return labelled_trials(
         described,
         settings=settings,
@@ -92,7 +94,7 @@ def load_trials(
 
 def kind_of(source: str) -> Kind:
     """Return the kind of source that this text names. Raises ConfigError if it names none."""
-    if source == SIMULATED:
+    if source == SIMULATED or source.startswith(IDENTIFIED):
         return "simulated"
     if source.lower().endswith((".csv", ".tsv", ".txt")) or Path(source).is_file():
         return "CSV"
@@ -100,7 +102,7 @@ def kind_of(source: str) -> Kind:
         return "data set"
     raise ConfigError(
         f"{source!r} is not a source of trials: name a FILE.csv, a data set as icub:FOLDER, a store as "
-        f"store:DIR, or `{SIMULATED}`"
+        f"store:DIR, `{SIMULATED}`, or scenes of `graspsense identify` as {IDENTIFIED}cup.toml,mug.toml"
     )
 
 
@@ -150,6 +152,12 @@ def groups_of(source: TrialSource) -> tuple[Group, ...]:
     """Return the groups of simulated trials that a source describes. Raises ConfigError."""
     keys: Mapping[str, Any] = {name: getattr(source, name) for name in fields_dict(Group)}
     own = Group(**keys)
+    if source.source.startswith(IDENTIFIED):
+        if own.objects or own.named or source.groups:
+            raise ConfigError(
+                f"{source.source} names the objects itself: leave out objects, named and groups"
+            )
+        return (evolve(own, named={scene.label: scene.path for scene in identified_scenes(source.source)}),)
     if source.groups and evolve(own, states_per_instance="all") != Group():
         raise ConfigError("trials are described both by keys of [data] and by [[data.groups]]: leave one out")
     groups = source.groups or (own,)

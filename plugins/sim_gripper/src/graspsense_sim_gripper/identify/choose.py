@@ -19,6 +19,7 @@ from graspsense_sim_gripper.identify.fit import Fitted, Mask, fit, held_out_rms
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import Squeeze
+from graspsense_sim_gripper.identify.threads import in_threads
 
 MAX_FOLDS: Final = 5
 STRETCHES: Final = 9
@@ -58,12 +59,9 @@ def choose(
     direct = evolve(model, direct=True)
     statics = static_candidates(scale)
     with_memory = memories(scale) if has_memory else []
-    total = 2 * len(statics) + STATIC_KEPT * len(with_memory)
-    rough: list[Fitted] = []
-    for candidate in statics:
-        first = candidate.joined(with_memory[1]) if with_memory else candidate
-        rough.append(fit(direct, first, squeezes))
-        progress(len(rough), total)
+    counter = _Counter(len(statics) + 2 * (STATIC_KEPT + 1) * (1 + len(with_memory)), progress)
+    roughly = [one.joined(with_memory[1]) if with_memory else one for one in statics]
+    rough = in_threads(lambda one: fit(direct, one, squeezes), roughly, counter.done)
     order = np.argsort([one.cost for one in rough], kind="stable")[:STATIC_KEPT].tolist()
     # The simplest law stays among the candidates, so that the table shows what it costs to leave the others out.
     kept = sorted({0, *(int(k) for k in order)})
@@ -72,14 +70,12 @@ def choose(
         for k in kept
         for joined in (statics[k], *(statics[k].joined(one) for one in with_memory))
     ]
-    fits = []
-    for done, candidate in enumerate(candidates):
-        fits.append(fit(model, candidate, squeezes))
-        progress(len(statics) + done, total + len(candidates))
+    fits = in_threads(lambda one: fit(model, one, squeezes), candidates, counter.done)
     least = min(one.rms for one in fits)
-    judged = [_judged(model, one, squeezes) for one in fits if one.rms <= WORTH_TRYING * least]
+    worth = [one for one in fits if one.rms <= WORTH_TRYING * least]
+    judged = in_threads(lambda one: _judged(model, one, squeezes), worth, counter.done)
     best = _simplest(judged)
-    scores = [_score(one, best, judged) for one in sorted(fits, key=lambda one: one.rms)]
+    scores = [_score(one, best, judged) for one in fits]
     dropped = [
         CandidateScore(
             terms=one.candidate.name,
@@ -91,7 +87,24 @@ def choose(
         for k, one in enumerate(rough)
         if k not in kept
     ]
-    return Choice(fitted=best.fitted, scores=(*scores, *dropped))
+    ranked = sorted(scores, key=_rank)
+    return Choice(fitted=best.fitted, scores=(*ranked, *dropped))
+
+
+def _rank(score: CandidateScore) -> tuple[bool, float, float]:
+    """Return the key of the order of the table: the chosen candidate, then by the error on held-out data."""
+    return not score.chosen, math.inf if math.isnan(score.error) else score.error, score.fit_error
+
+
+class _Counter:
+    """Counts what is done, for the progress."""
+
+    def __init__(self, total: int, progress: Callable[[int, int], None]) -> None:
+        self._n, self._total, self._progress = 0, total, progress
+
+    def done(self) -> None:
+        self._n += 1
+        self._progress(min(self._n, self._total), self._total)
 
 
 def _values(fitted: Fitted) -> dict[str, float]:

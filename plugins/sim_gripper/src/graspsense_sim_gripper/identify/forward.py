@@ -15,7 +15,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import NotCompilable, first_call
+from graspsense.plugin_api import NotCompilable, entry_point, first_call
 from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.compiled.compose import (
     INTERPRETED,
@@ -69,10 +69,15 @@ def path_forces() -> tuple[PathForces, bool]:
         path = np.linspace(-1e-4, 1e-3, 4)
         with first_call():
             compiled(model, uncompressed(SLOTS), path, path, path + 1.0, np.zeros(4))
-        return compiled, True
+        return entry_point(compiled), True
     except NotCompilable:
         force = sum_of_active(active_laws(SLOTS))
         return bind_reachable(forces_along, {"object_force": force}, INTERPRETED), False
+
+
+@cache
+def _at_rest() -> ContactState:
+    return uncompressed(SLOTS)
 
 
 def _some_terms() -> tuple[Any, ...]:
@@ -99,25 +104,20 @@ class ForwardModel:
         """Return the force (N) at the samples of a squeeze; NaN where a law has none."""
         run, compiled = path_forces()
         closure, speed, pads = width_m - squeeze.gap_m, squeeze.speed_m_s, self.pads
-        if self.direct and math.isfinite(pads.stiffness_n_m):
-            yielded = (
-                np.interp(squeeze.t_s, squeeze.t_s[squeeze.sample], squeeze.force_n) / pads.stiffness_n_m
-            )
-            closure = closure - yielded
-            speed = speed - np.gradient(yielded, squeeze.t_s)
-            pads = RIGID_PADS
-        elif self.direct:
+        if self.direct:
+            if math.isfinite(pads.stiffness_n_m):
+                yielded, rate = squeeze.measured_path
+                closure = closure - yielded / pads.stiffness_n_m
+                speed = speed - rate / pads.stiffness_n_m
             pads = RIGID_PADS
         model = ObjectModel(width_m, 0.0, pads, candidate.terms(values, factor), 0, 1)
         out: Any = np.zeros(len(closure))
         try:
             if compiled:
-                run(model, uncompressed(SLOTS), closure, speed, squeeze.step_s, out)
+                run(model, _at_rest(), closure, speed, squeeze.step_s, out)
             else:
                 out = out.tolist()
-                run(
-                    model, uncompressed(SLOTS), closure.tolist(), speed.tolist(), squeeze.step_s.tolist(), out
-                )
+                run(model, _at_rest(), closure.tolist(), speed.tolist(), squeeze.step_s.tolist(), out)
                 out = np.array(out)
         except LAW_ERRORS:
             out = np.full(len(closure), math.nan)

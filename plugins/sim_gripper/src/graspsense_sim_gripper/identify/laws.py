@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from itertools import product
 from typing import Any, Final, NamedTuple
 
@@ -34,13 +35,17 @@ class DataScale(NamedTuple):
 
 @frozen(kw_only=True)
 class FreeParameter:
-    """A parameter that is fitted, by its logarithm: its slot, its name, its range, and values to start from."""
+    """A parameter that is fitted, by its logarithm: its slot, its name, its range, and values to start from.
+
+    These are positive; the parameter of the term is `sign` times the value.
+    """
 
     slot: int
     name: str
     low: float
     high: float
     starts: tuple[float, ...]
+    sign: float = 1.0
 
     @property
     def term(self) -> str:
@@ -75,8 +80,9 @@ class Candidate:
         """Its terms in words; an elastic term without a cubic part is a spring."""
         words = []
         for slot in self.slots:
-            is_spring = slot == ELASTIC and all(parameter.name != "k3_n_m3" for parameter in self.free)
-            words.append("elastic (k1)" if is_spring else SLOTS[slot])
+            cubic = [parameter.sign for parameter in self.free if parameter.name == "k3_n_m3"]
+            form = "softening" if cubic == [-1.0] else "k1, k3" if cubic else "k1"
+            words.append(f"elastic ({form})" if slot == ELASTIC else SLOTS[slot])
         return " + ".join(words)
 
     def joined(self, other: Candidate) -> Candidate:
@@ -89,23 +95,45 @@ class Candidate:
         for (slot, name), value in self.fixed.items():
             of_slot[slot][name] = value
         for parameter, value in zip(self.free, values, strict=True):
-            of_slot[parameter.slot][parameter.name] = float(value)
+            of_slot[parameter.slot][parameter.name] = parameter.sign * float(value)
         return of_slot
+
+    @cached_property
+    def _layout(self) -> tuple[tuple[type[Any], tuple[tuple[int, float, bool], ...]] | None, ...]:
+        """For each slot the class of the parameters, and for each parameter: the index of the free one (or -1), its
+        sign or fixed value, and whether it is a stiffness; None for a term that the candidate does not have."""
+        places = {(one.slot, one.name): (i, one.sign) for i, one in enumerate(self.free)}
+        layout: list[tuple[type[Any], tuple[tuple[int, float, bool], ...]] | None] = []
+        for slot, kind in enumerate(SLOTS):
+            term = find_term(kind)[1]
+            if slot not in self.slots:
+                layout.append(None)
+                continue
+            params: Any = term.params
+            defaults = {**params._field_defaults, **{n: v for (s, n), v in self.fixed.items() if s == slot}}
+            layout.append(
+                (
+                    params,
+                    tuple(
+                        (*(places.get((slot, name)) or (-1, float(defaults[name]))), name in term.stiffnesses)
+                        for name in params._fields
+                    ),
+                )
+            )
+        return tuple(layout)
 
     def terms(self, values: Sequence[float], factor: float = 1.0) -> tuple[Switchable, ...]:
         """Return the parameters as the compiled law takes them, with every stiffness times `factor`."""
-        given = self.parameters(values)
         terms: list[Switchable] = [_NOTHING_LUMPED]
-        for slot, kind in enumerate(SLOTS):
-            term = find_term(kind)[1]
-            if slot not in given:
-                terms.append(_FILLERS[kind])
+        for filler, own in zip(_FILLERS, self._layout, strict=True):
+            if own is None:
+                terms.append(filler)
                 continue
             numbers = [
-                float(value) * (factor if name in term.stiffnesses else 1.0)
-                for name, value in term.params(**given[slot])._asdict().items()
+                (number if i < 0 else number * values[i]) * (factor if stiff else 1.0)
+                for i, number, stiff in own[1]
             ]
-            terms.append(Switchable(1, term.params._make(numbers)))
+            terms.append(Switchable(1, own[0](*numbers)))
         return tuple(terms)
 
     def starts(self) -> list[tuple[float, ...]]:
@@ -129,7 +157,7 @@ def _filler(kind: str) -> Switchable:
     return Switchable(0, params(*(1.0 for _ in params._fields)))
 
 
-_FILLERS: Final = {kind: _filler(kind) for kind in SLOTS}
+_FILLERS: Final = tuple(_filler(kind) for kind in SLOTS)
 _NOTHING_LUMPED: Final = Switchable(0, LumpedSpringDamper(0.0, 0.0))
 
 
@@ -143,6 +171,11 @@ def static_candidates(scale: DataScale) -> list[Candidate]:
     k3 = FreeParameter(
         slot=ELASTIC, name="k3_n_m3", low=1e-4 * cubic, high=100.0 * cubic, starts=(0.5 * cubic, 0.05 * cubic)
     )
+    # Down to where the shell has softened completely at a quarter of the compression.
+    softening = FreeParameter(
+        slot=ELASTIC, name="k3_n_m3", low=1e-3 * cubic, high=20.0 * cubic, starts=(0.3 * cubic,), sign=-1.0
+    )
+    softer = evolve(k1, starts=(1.3 * k, 2.5 * k))
     hertz = FreeParameter(
         slot=RIGID, name="hertz_n_m15", low=1e-3 * power, high=1e4 * power, starts=(power, 3.0 * power)
     )
@@ -171,6 +204,7 @@ def static_candidates(scale: DataScale) -> list[Candidate]:
         Candidate(free=(k1,)),
         Candidate(free=(hertz,)),
         Candidate(free=(k1, k3)),
+        Candidate(free=(softer, softening)),
         Candidate(free=foam, fixed={(FOAM, "at_m"): float(f"{depth:.2g}")}),
         Candidate(free=snap),
     ]

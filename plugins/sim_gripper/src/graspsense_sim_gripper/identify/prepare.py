@@ -7,6 +7,7 @@ behind the gap by up to a period, which makes a fast branch look stiffer and slo
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -73,12 +74,18 @@ class Squeeze:
     share: float = 1.0
     """The share of the force that the pads measure."""
 
-    @property
+    @cached_property
+    def measured_path(self) -> tuple[Floats, Floats]:
+        """The measured force at every node, and its rate."""
+        force = np.interp(self.t_s, self.t_s[self.sample], self.force_n)
+        return force, np.gradient(force, self.t_s)
+
+    @cached_property
     def peak_n(self) -> float:
         """The largest force."""
         return float(np.max(self.force_n))
 
-    @property
+    @cached_property
     def depth_m(self) -> float:
         """The largest closure beyond the contact."""
         return float(self.width_m - np.min(self.gap_m))

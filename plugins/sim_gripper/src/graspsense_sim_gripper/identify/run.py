@@ -71,9 +71,8 @@ def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: P
         has_memory=shows_memory(ready),
         progress=lambda done, total: progress("fitting candidates", done, total),
     )
-    found = uncertainty(
-        model, choice.fitted, ready, lambda done, total: progress("computing intervals", done, total)
-    )
+    progress("computing intervals", 0, 1)
+    found = uncertainty(model, choice.fitted, ready)
     open_ = undetermined(choice.fitted, found, ready, shares, cells)
     values, parameters = _values(choice.fitted, found, share, shares, cells)
     label = next((one.label for one in squeezes if one.label), "")
@@ -169,13 +168,14 @@ def _values(
         if len(known) > 1:
             values["share_spread"] = float(np.std(known, ddof=1))
     for i, one in enumerate(fitted.candidate.free):
+        ends = sorted((one.sign * found.low[i], one.sign * found.high[i]))
         parameters.append(
             IdentifiedParameter(
                 name=one.label,
                 unit=_unit(one.name),
-                value=fitted.values[i],
-                low=found.low[i],
-                high=found.high[i],
+                value=one.sign * fitted.values[i],
+                low=ends[0],
+                high=ends[1],
                 basis=found.basis,
             )
         )

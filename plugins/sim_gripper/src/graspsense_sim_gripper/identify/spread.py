@@ -9,7 +9,7 @@ squeeze shows no such scatter: blocks of its residuals are drawn again.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import chain
 from typing import Final
 
@@ -21,6 +21,7 @@ from graspsense_sim_gripper.identify.choose import fit_residuals
 from graspsense_sim_gripper.identify.fit import Fitted, fit
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.prepare import Squeeze
+from graspsense_sim_gripper.identify.threads import in_threads
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +55,6 @@ def uncertainty(
     model: ForwardModel,
     fitted: Fitted,
     squeezes: Sequence[Squeeze],
-    progress: Callable[[int, int], None],
     seed: int = 0,
 ) -> Uncertainty:
     """Return the uncertainty of a fit."""
@@ -62,16 +62,13 @@ def uncertainty(
     groups = _groups(squeezes)
     at = np.log(fitted.values)
     if len(groups) < 2:
-        refits = _bootstrapped(model, fitted, squeezes[0], rng, progress)
-        covariance = np.cov(refits, rowvar=False, ddof=1).reshape(len(at), len(at))
+        again = _bootstrapped(model, fitted, squeezes[0], rng)
+        covariance = np.cov(again, rowvar=False, ddof=1).reshape(len(at), len(at))
         centre, factor, basis = at, _normal(), "within one squeeze; not between squeezes"
     else:
-        left_out = []
-        for k, group in enumerate(groups):
-            kept = [i for i in range(len(squeezes)) if i not in group]
-            left_out.append(np.log(_refit(model, fitted, squeezes, kept).values))
-            progress(k + 1, len(groups))
-        table = np.array(left_out)
+        kept = [[i for i in range(len(squeezes)) if i not in group] for group in groups]
+        refits = in_threads(lambda one: _refit(model, fitted, squeezes, one), kept)
+        table = np.log([one.values for one in refits])
         g = len(groups)
         deviations = table - table.mean(axis=0)
         covariance = (g - 1) / g * deviations.T @ deviations
@@ -136,20 +133,18 @@ def _bootstrapped(
     fitted: Fitted,
     squeeze: Squeeze,
     rng: np.random.Generator,
-    progress: Callable[[int, int], None],
 ) -> Floats:
     """Return the logarithms of the values of refits to the fitted force with blocks of residuals drawn again."""
     residuals = fit_residuals(model, fitted, squeeze) * squeeze.peak_n
     clean = squeeze.force_n + residuals
     length = max(len(residuals) // BLOCKS, 1)
-    refits = []
-    for k in range(BOOTSTRAPS):
+    drawn_again = []
+    for _ in range(BOOTSTRAPS):
         starts = rng.integers(0, max(len(residuals) - length, 1), size=-(-len(residuals) // length))
         drawn = np.concatenate([residuals[s : s + length] for s in starts])[: len(residuals)]
-        again = evolve(squeeze, force_n=clean - drawn * rng.choice((-1.0, 1.0)))
-        refits.append(np.log(fit(model, fitted.candidate, [again], start=fitted).values))
-        progress(k + 1, BOOTSTRAPS)
-    return np.array(refits)
+        drawn_again.append(evolve(squeeze, force_n=clean - drawn * rng.choice((-1.0, 1.0))))
+    refits = in_threads(lambda one: fit(model, fitted.candidate, [one], start=fitted), drawn_again)
+    return np.log([one.values for one in refits])
 
 
 def _spreads(fitted: Fitted, squeezes: Sequence[Squeeze]) -> dict[str, float]:

@@ -1,0 +1,74 @@
+"""Recorded squeezes of one object for `identify`, and trials of scenes that were identified."""
+
+from __future__ import annotations
+
+import pytest
+from click.testing import CliRunner
+
+from graspsense.cli.main import cli
+from graspsense.core.errors import ConfigError
+from graspsense.sources.identified import gripper_flags, identified_scenes
+from graspsense.sources.squeezes import recorded_squeezes
+from graspsense.sources.trial_source import TrialSource, groups_of, kind_of
+
+CUP = 'width_m = 0.05\n[identified]\nlabel = "cup:full"\n[identified.gripper]\npad_stiffness_n_m = 8000.0\n'
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    """Return a store with one simulated squeeze of each of two objects."""
+    folder = tmp_path_factory.mktemp("store")
+    for name in ("sponge", "block"):
+        arguments = ["run", "--object", name, "--save", str(folder), "--label", name]
+        done = CliRunner().invoke(cli, [*arguments, "-o", "classifier.type=none"])
+        assert done.exit_code == 0, done.output
+    return f"store:{folder}"
+
+
+@pytest.mark.slow
+def test_recordings_of_two_objects_need_a_name(store):
+    with pytest.raises(ConfigError, match=r"of 2 objects.*--class"):
+        recorded_squeezes([store])
+    (squeeze,) = recorded_squeezes([store], "sponge")
+    assert squeeze.label == "sponge"
+    assert len(squeeze.sha256) == 64
+    assert squeeze.gripper["pad_stiffness_n_m"] == 3e4
+    with pytest.raises(ConfigError, match=r"'spong'.*sponge"):
+        recorded_squeezes([store], "spong")
+
+
+def test_an_identified_scene_gives_its_label_and_its_fingertips(tmp_path):
+    path = tmp_path / "cup.toml"
+    path.write_text(CUP)
+    source = f"identified:{path}"
+    assert kind_of(source) == "simulated"
+    (scene,) = identified_scenes(source)
+    assert scene.label == "cup:full"
+    assert [(flag.key, flag.value) for flag in gripper_flags(source)] == [
+        ("gripper.pad_stiffness_n_m", 8000.0)
+    ]
+    (group,) = groups_of(TrialSource(source=source, instances=2, trials=3))
+    assert dict(group.named) == {"cup:full": str(path)}
+    assert group.instances == 2
+
+
+def test_scenes_that_cannot_be_trained_on_together_are_refused(tmp_path):
+    cup, other, own = (tmp_path / name for name in ("cup.toml", "other.toml", "own.toml"))
+    cup.write_text(CUP)
+    own.write_text("width_m = 0.05\n")
+    other.write_text(CUP)
+    with pytest.raises(ConfigError, match="the same label"):
+        identified_scenes(f"identified:{cup},{other}")
+    other.write_text(CUP.replace("8000", "9000").replace("cup", "mug"))
+    with pytest.raises(ConfigError, match="different fingertips"):
+        identified_scenes(f"identified:{cup},{other}")
+    with pytest.raises(ConfigError, match="no table"):
+        identified_scenes(f"identified:{own}")
+    with pytest.raises(ConfigError, match="there is no scene"):
+        identified_scenes(f"identified:{tmp_path / 'no.toml'}")
+
+
+def test_the_command_refuses_what_is_not_a_scene_before_it_reads(tmp_path):
+    done = CliRunner().invoke(cli, ["identify", "none.mcap", "--out", str(tmp_path / "cup.json")])
+    assert isinstance(done.exception, ConfigError)
+    assert ".toml" in str(done.exception)
