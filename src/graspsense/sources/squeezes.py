@@ -91,7 +91,10 @@ def _of_import(source: str) -> Iterator[RecordedSqueeze]:
     from graspsense.sources.import_sources import recordings_to_import
     from graspsense.sources.labelled_recordings import trace_of_recording
 
-    for imported in recordings_to_import(source, {}, None):
+    readable, unreadable = recordings_to_import([source], {}, None)
+    if unreadable:
+        raise unreadable[0].error
+    for imported in readable:
         labelled = imported.labelled
         instance = f"{class_of(labelled.label)}#{labelled.instance}" if labelled.instance else ""
         yield RecordedSqueeze(

@@ -28,6 +28,8 @@ STATIC_KEPT: Final = 2
 """Static laws that are tried with every memory."""
 WORTH_TRYING: Final = 3.0
 """A candidate whose fit is worse than the best by this factor is not judged by held-out data."""
+LEAST_ERROR: Final = 1e-3
+"""Errors below this share of the peak are those of the path's nodes: they tell no candidates apart."""
 LEAST_GAIN: Final = 0.03
 """A term more has to reduce the error on held-out data by at least this share."""
 
@@ -72,7 +74,7 @@ def choose(
     ]
     fits = in_threads(lambda one: fit(model, one, squeezes), candidates, counter.done)
     least = min(one.rms for one in fits)
-    worth = [one for one in fits if one.rms <= WORTH_TRYING * least]
+    worth = [one for one in fits if one.rms <= WORTH_TRYING * max(least, LEAST_ERROR)]
     judged = in_threads(lambda one: _judged(model, one, squeezes), worth, counter.done)
     best = _simplest(judged)
     scores = [_score(one, best, judged) for one in fits]
@@ -154,14 +156,20 @@ def _stretch_masks(squeeze: Squeeze) -> list[Mask]:
 
 def _simplest(judged: Sequence[_Judged]) -> _Judged:
     """Return the simplest candidate that is not worse than the best."""
-    best = min(judged, key=lambda one: float(np.mean(np.log(one.errors + 1e-12))))
+    best = min(judged, key=lambda one: float(np.mean(_logarithms(one))))
     for one in sorted(judged, key=lambda one: len(one.fitted.values)):
-        difference = np.log(one.errors + 1e-12) - np.log(best.errors + 1e-12)
+        difference = _logarithms(one) - _logarithms(best)
         spread = float(np.std(difference, ddof=1)) if len(difference) > 1 else 0.0
         error = spread / math.sqrt(len(difference))
         if float(np.mean(difference)) <= max(error, LEAST_GAIN):
             return one
     return best
+
+
+def _logarithms(judged: _Judged) -> NDArray[np.float64]:
+    """Return the logarithms of the errors, in which those below `LEAST_ERROR` hardly differ."""
+    result: NDArray[np.float64] = 0.5 * np.log(judged.errors**2 + LEAST_ERROR**2)
+    return result
 
 
 def _score(fitted: Fitted, best: _Judged, judged: Sequence[_Judged]) -> CandidateScore:

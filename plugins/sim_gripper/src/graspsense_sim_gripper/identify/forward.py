@@ -19,7 +19,6 @@ from graspsense.plugin_api import NotCompilable, entry_point, first_call
 from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.compiled.compose import (
     INTERPRETED,
-    active_laws,
     sum_of,
     sum_of_active,
     uncompressed,
@@ -29,7 +28,7 @@ from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, 
 from graspsense_sim_gripper.dynamics.state import ContactState
 from graspsense_sim_gripper.identify.laws import SLOTS, Candidate
 from graspsense_sim_gripper.identify.prepare import Squeeze
-from graspsense_sim_gripper.terms.registry import laws_of
+from graspsense_sim_gripper.terms.registry import active_laws, laws_of
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
 Floats = NDArray[np.float64]

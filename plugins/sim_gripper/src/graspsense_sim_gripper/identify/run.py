@@ -19,6 +19,7 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.build import drive_and_pads
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.drive import Drive
 from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.identify.check import predictive_checks
 from graspsense_sim_gripper.identify.choose import choose
@@ -72,7 +73,7 @@ def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: P
         progress=lambda done, total: progress("fitting candidates", done, total),
     )
     progress("computing intervals", 0, 1)
-    found = uncertainty(model, choice.fitted, ready)
+    found = uncertainty(model, choice.fitted, ready, _scale_error(config, drive, ready) if cells else 0.0)
     open_ = undetermined(choice.fitted, found, ready, shares, cells)
     values, parameters = _values(choice.fitted, found, share, shares, cells)
     label = next((one.label for one in squeezes if one.label), "")
@@ -129,6 +130,13 @@ def _has_cells(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> bool:
 def _share(shares: Sequence[float]) -> float:
     known = [one for one in shares if math.isfinite(one)]
     return min(float(np.median(known)), 1.0) if known else 1.0
+
+
+def _scale_error(config: SimConfig, drive: Drive, squeezes: Sequence[Squeeze]) -> float:
+    """Return the relative standard deviation of the share: that of the Coulomb friction over the mean force."""
+    mean_n = 0.5 * float(np.median([one.peak_n for one in squeezes]))
+    single = config.coulomb_spread_n / ((1.0 + drive.friction.load_friction_coefficient) * mean_n)
+    return float(single / math.sqrt(len(squeezes)))
 
 
 def _with_share(squeeze: Squeeze, share: float) -> Squeeze:

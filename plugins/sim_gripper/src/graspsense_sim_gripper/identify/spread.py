@@ -32,6 +32,8 @@ BOOTSTRAPS: Final = 24
 BLOCKS: Final = 12
 """Blocks of neighbouring residuals of a squeeze, which are drawn again together."""
 DRAWS: Final = 200
+PATH_ERROR: Final = 1e-3
+"""Standard deviation of the logarithm of a value that the finite number of nodes of a path causes."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -55,9 +57,10 @@ def uncertainty(
     model: ForwardModel,
     fitted: Fitted,
     squeezes: Sequence[Squeeze],
+    force_scale: float = 0.0,
     seed: int = 0,
 ) -> Uncertainty:
-    """Return the uncertainty of a fit."""
+    """Return the uncertainty of a fit. `force_scale`: standard deviation of the logarithm of the force's scale."""
     rng = np.random.default_rng(seed)
     groups = _groups(squeezes)
     at = np.log(fitted.values)
@@ -74,6 +77,10 @@ def uncertainty(
         covariance = (g - 1) / g * deviations.T @ deviations
         what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
         centre, factor, basis = at, _student(g - 1), f"between {g} {what if g == len(groups) else 'groups'}"
+    # An error of the scale of the force is common to all squeezes, so that none of them shows it.
+    stiff = np.array([1.0 if one.is_stiffness else 0.0 for one in fitted.candidate.free])
+    own = force_scale**2 * np.outer(stiff, stiff) + PATH_ERROR**2 * np.eye(len(at))
+    covariance = covariance + own * (_normal() / factor) ** 2
     spread = np.sqrt(np.diag(covariance))
     low, high = np.exp(centre - factor * spread), np.exp(centre + factor * spread)
     values, vectors = np.linalg.eigh(covariance)
