@@ -383,15 +383,8 @@ def of_kind(kind: str) -> Callable[[str], bool]:
     return lambda label: label.startswith(f"{kind}:")
 
 
-class At20N(NamedTuple):
-    """What a posterior is conditioned on, and the trials, from which further figures are predicted."""
-
-    statistics: dict[str, float]
-    trials: Trials
-
-
-def rates_at_20_n(values: Values, seed: int) -> At20N:
-    """Return the figures of Tables II and III and the facts at 20 N, of one replicate."""
+def rates_at_20_n(values: Values, seed: int) -> dict[str, float]:
+    """Return the figures of Tables II and III and the facts at 20 N, of one replicate: what is conditioned on."""
     trials = squeeze(TRIALS, values, seed, 20.0, create("feature-set", "chitta").extract)
     classes = [label.partition(":")[0] for label in trials.labels]
     found = answers(trials.extracted, classes, seed)
@@ -414,7 +407,7 @@ def rates_at_20_n(values: Values, seed: int) -> At20N:
     statistics["p_first_separates"] = max(SPLIT - lowest, 0.0)
     statistics["p_first_does_not_separate"] = max(bottles - SPLIT, 0.0)
     statistics["f_steady_separates"] = max(SPLIT - f_steady, 0.0)
-    return At20N(statistics, trials)
+    return statistics
 
 
 class Observed(NamedTuple):
@@ -488,10 +481,11 @@ def predictions(values: Values, seed: int) -> dict[str, float]:
         s: np.nanmedian([t for t, of in zip(times, states, strict=True) if of == s]) for s in set(states)
     }
     found["full_open_longest"] = float(max(medians, key=lambda s: medians[s]) == "full_open")
-    eleven = rates_at_20_n(values, seed).trials.of("odwalla", "naked", "can")
+    extract = create("feature-set", "chitta").extract
+    without_water = {kind: TRIALS[kind] for kind in CONTAINERS if kind != "water"}
+    eleven = squeeze(without_water, values, seed, 20.0, extract)
     found["eleven_classes"] = rate(answers(eleven.extracted, eleven.labels, seed), eleven.labels)
     tree = tree_of(matrix_of(trials.extracted), states)
-    extract = create("feature-set", "chitta").extract
     for name, kind in (("worn_bottles", "odwalla_worn"), ("other_new_bottles", "odwalla")):
         others = squeeze({kind: TABLE_IV}, values, seed, 23.0, extract, first_instance=500)
         true = [label.partition(":")[2] for label in others.labels]

@@ -86,6 +86,8 @@ class Size(NamedTuple):
     generations: int
     minutes: float
     calibrations: int
+    alone: int
+    """Replicates of each explanation alone."""
 
 
 class Weighted(NamedTuple):
@@ -163,7 +165,7 @@ def infer(folder: Folder, size: Size, say: Callable[[str], None]) -> pyabc.Histo
 
     def simulate(values: Mapping[str, float]) -> dict[str, float]:
         plain = {name: float(values[name]) for name in NAMES}
-        statistics = rates_at_20_n(plain, int(rng.integers(SEEDS))).statistics
+        statistics = rates_at_20_n(plain, int(rng.integers(SEEDS)))
         folder.add("simulations.jsonl", {"values": plain, "statistics": statistics})
         return statistics
 
@@ -186,21 +188,33 @@ def infer(folder: Folder, size: Size, say: Callable[[str], None]) -> pyabc.Histo
 
 def predict(
     folder: Folder, sample: Weighted, generation: int, say: Callable[[str], None]
-) -> list[dict[str, Any]]:
-    """Return the predictions of each particle, and how much each explanation alone raises the rate from 17 to 23 N."""
+) -> list[dict[str, float]]:
+    """Return one replicate of the predictions of each particle."""
     name = f"predictions-{generation}.jsonl"
     done = folder.lines(name)
     for k in range(len(done), len(sample.values)):
-        values, seed = sample.values[k], SEEDS + k
-        none = {**values, **dict.fromkeys(EXPLANATIONS, 0.0)}
-        gains = {"none": gain(none, seed)}
-        gains.update({one: gain({**none, one: 1.0}, seed) for one in EXPLANATIONS})
-        found = {"predicted": predictions(values, seed), "gains": gains}
-        folder.add(name, found)
-        done.append(found)
+        done.append(predictions(sample.values[k], SEEDS + k))
+        folder.add(name, done[-1])
         if k % 10 == 9:
             say(f"predictions of {k + 1} particles")
     return done
+
+
+def gains_alone(folder: Folder, sample: Weighted, generation: int, draws: int) -> dict[str, list[float]]:
+    """Return how much each explanation alone, at full strength, raises the rate from 17 to 23 N, and `none` of them.
+
+    Each list has one replicate for each of `draws` particles, which are drawn by their weights.
+    """
+    name = f"alone-{generation}.jsonl"
+    done = folder.lines(name)
+    drawn = np.random.default_rng(0).choice(len(sample.values), draws, p=sample.weight)
+    for k in range(len(done), draws):
+        none = {**sample.values[drawn[k]], **dict.fromkeys(EXPLANATIONS, 0.0)}
+        gains = {"none": gain(none, SEEDS + k)}
+        gains.update({one: gain({**none, one: 1.0}, SEEDS + k) for one in EXPLANATIONS})
+        folder.add(name, gains)
+        done.append(gains)
+    return {one: [gains[one] for gains in done] for one in ("none", *EXPLANATIONS)}
 
 
 class Surrogate(NamedTuple):
@@ -301,6 +315,8 @@ def summarise(
     sample = sample_of(history)
     generation = int(history.max_t)
     predicted = predict(folder, sample, generation, say)
+    alone = gains_alone(folder, sample, generation, size.alone)
+    say("explanations alone")
     ranks = calibrate(folder, size, say)
     populations = history.get_all_populations()
     used = populations[populations["t"] >= 0]
@@ -323,7 +339,7 @@ def summarise(
         "fitted": _fitted(history),
         "figures": _figures(sample),
         "predictions": _predictions(predicted, w),
-        "explanations": _explanations(sample, predicted),
+        "explanations": _explanations(sample, predicted, alone),
         "calibration": _calibration(ranks),
     }
 
@@ -353,10 +369,10 @@ def _figures(sample: Weighted) -> dict[str, Any]:
     return found
 
 
-def _predictions(predicted: list[dict[str, Any]], w: Any) -> dict[str, Any]:
+def _predictions(predicted: list[dict[str, float]], w: Any) -> dict[str, Any]:
     found = {}
     for name, (what, printed) in PREDICTED.items():
-        values = np.array([one["predicted"][name] for one in predicted], dtype=np.float64)
+        values = np.array([one[name] for one in predicted], dtype=np.float64)
         known = ~np.isnan(values)
         found[name] = {
             "what": what,
@@ -368,7 +384,9 @@ def _predictions(predicted: list[dict[str, Any]], w: Any) -> dict[str, Any]:
     return found
 
 
-def _explanations(sample: Weighted, predicted: list[dict[str, Any]]) -> dict[str, Any]:
+def _explanations(
+    sample: Weighted, predicted: list[dict[str, float]], alone: Mapping[str, list[float]]
+) -> dict[str, Any]:
     """Return the Bayes factor of each explanation, without and with Table IV, and the points that it gives."""
     w = sample.weight
     printed = {one.id: one for one in published().rates}
@@ -377,15 +395,15 @@ def _explanations(sample: Weighted, predicted: list[dict[str, Any]]) -> dict[str
         one = printed[name]
         assert one.n is not None
         deviation = math.sqrt(one.rate * (1.0 - one.rate) / one.n)
-        rates = np.array([p["predicted"][name] for p in predicted])
+        rates = np.array([p[name] for p in predicted])
         likelihood -= 0.5 * ((rates - one.rate) / deviation) ** 2
     both = w * np.exp(likelihood - likelihood.max())
     both /= both.sum()
-    gains = np.array([p["predicted"]["gain"] for p in predicted])
+    gains = np.array([p["gain"] for p in predicted])
     found: dict[str, Any] = {
         "none": {
             "says": "none of them",
-            "alone": _mean([p["gains"]["none"] for p in predicted], w),
+            "alone": _mean_of(alone["none"]),
         }
     }
     for name, one in EXPLANATIONS.items():
@@ -400,7 +418,7 @@ def _explanations(sample: Weighted, predicted: list[dict[str, Any]]) -> dict[str
             "with_table_4": _odds(on, both),
             "gain_if_on": _mean(gains[on], w[on]) if on.any() else None,
             "gain_if_off": _mean(gains[~on], w[~on]) if (~on).any() else None,
-            "alone": _mean([p["gains"][name] for p in predicted], w),
+            "alone": _mean_of(alone[name]),
         }
     return {
         "effective_sample_size_with_table_4": effective_sample_size(both),
@@ -440,6 +458,16 @@ def _mean(values: Any, w: Any) -> dict[str, Any]:
     }
 
 
+def _mean_of(values: list[float]) -> dict[str, Any]:
+    """Return the mean of independent replicates with its 95 % interval (Student's t), and their number."""
+    from scipy.stats import t
+
+    v, n = np.array(values), len(values)
+    half = float(t.ppf(0.975, n - 1) * v.std(ddof=1) / math.sqrt(n)) if n > 1 else math.inf
+    mean = float(v.mean())
+    return {"mean": mean, "interval": [mean - half, mean + half], "replicates": n}
+
+
 def _calibration(ranks: Mapping[str, list[float]]) -> dict[str, Any]:
     every = [rank for of in ranks.values() for rank in of]
     return {
@@ -461,6 +489,7 @@ def main() -> None:
     parser.add_argument("--generations", type=int, default=5)
     parser.add_argument("--minutes", type=float, default=60.0, help="limit of the time of the inference")
     parser.add_argument("--calibrations", type=int, default=40, help="runs of the calibration")
+    parser.add_argument("--alone", type=int, default=20, help="replicates of each explanation alone")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     parser.add_argument(
         "--markdown", type=Path, help="write the page from the result of FOLDER, and run nothing"
@@ -477,9 +506,9 @@ def main() -> None:
         given.markdown.write_text(page(json.loads(result.read_text(encoding="utf-8"))), encoding="utf-8")
         return
     logging.getLogger("ABC").setLevel(logging.WARNING)
-    size = Size(given.particles, given.generations, given.minutes, given.calibrations)
+    size = Size(given.particles, given.generations, given.minutes, given.calibrations, given.alone)
     if given.short:
-        size = Size(particles=4, generations=1, minutes=1.0, calibrations=2)
+        size = Size(particles=4, generations=1, minutes=1.0, calibrations=2, alone=2)
     began = time.time()
 
     def say(text: str) -> None:
