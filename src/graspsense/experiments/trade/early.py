@@ -41,8 +41,8 @@ class EarlySettings(CostSettings):
 def early(params: Mapping[str, Any], seed: int) -> RecognitionResult:
     """Return the rate at each moment, trained and tested on the trace up to it.
 
-    Before rest, all features except `p_first` are missing. The cost is the mean time from contact to the moment, or to
-    rest if that comes first.
+    Of the features of the paper, all but `p_first` are missing before rest. The cost is the mean time from contact to
+    the moment, or to rest if that comes first.
     """
     early_settings = structured(params["judge"], EarlySettings, "[judge]")
     moments = early_settings.moments_s
