@@ -487,9 +487,9 @@ def predictions(values: Values, seed: int) -> dict[str, float]:
     found["eleven_classes"] = rate(answers(eleven.extracted, eleven.labels, seed), eleven.labels)
     tree = tree_of(matrix_of(trials.extracted), states)
     for name, kind in (("worn_bottles", "odwalla_worn"), ("other_new_bottles", "odwalla")):
-        others = squeeze({kind: TABLE_IV}, values, seed, 23.0, extract, first_instance=500)
-        true = [label.partition(":")[2] for label in others.labels]
-        found[name] = rate(tree.answers(matrix_of(others.extracted)), true)
+        tested = squeeze({kind: TABLE_IV}, values, seed, 23.0, extract, first_instance=500)
+        true = [label.partition(":")[2] for label in tested.labels]
+        found[name] = rate(tree.answers(matrix_of(tested.extracted)), true)
     return {**found, **_figures(values, seed)}
 
 

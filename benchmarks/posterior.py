@@ -86,6 +86,8 @@ class Size(NamedTuple):
     generations: int
     minutes: float
     calibrations: int
+    predicted: int
+    """Particles that are predicted from, at most."""
     alone: int
     """Replicates of each explanation alone."""
 
@@ -187,12 +189,12 @@ def infer(folder: Folder, size: Size, say: Callable[[str], None]) -> pyabc.Histo
 
 
 def predict(
-    folder: Folder, sample: Weighted, generation: int, say: Callable[[str], None]
+    folder: Folder, sample: Weighted, generation: int, most: int, say: Callable[[str], None]
 ) -> list[dict[str, float]]:
-    """Return one replicate of the predictions of each particle."""
+    """Return one replicate of the predictions of each particle, or of the first `most`, whose order is by chance."""
     name = f"predictions-{generation}.jsonl"
     done = folder.lines(name)
-    for k in range(len(done), len(sample.values)):
+    for k in range(len(done), min(len(sample.values), most)):
         done.append(predictions(sample.values[k], SEEDS + k))
         folder.add(name, done[-1])
         if k % 10 == 9:
@@ -218,16 +220,17 @@ def gains_alone(folder: Folder, sample: Weighted, generation: int, draws: int) -
 
 
 class Surrogate(NamedTuple):
-    """A quadratic regression of the statistics on the figures, with the covariance of its residuals."""
+    """A quadratic regression of the statistics on the figures, with a root of the covariance of its residuals."""
 
-    model: Any
-    covariance: Any
+    coefficients: Any
+    """Shape (statistics, 1 + figures + squares and products): constant, linear and quadratic."""
+    scatter: Any
     names: tuple[str, ...]
 
     def draw(self, values: Mapping[str, float], rng: np.random.Generator) -> dict[str, float]:
         """Return one replicate of the statistics."""
-        mean = self.model.predict(np.array([_levels(values)]))[0]
-        drawn = rng.multivariate_normal(mean, self.covariance)
+        mean = self.coefficients @ _squares(np.array([_levels(values)]))[0]
+        drawn = mean + self.scatter @ rng.standard_normal(len(self.names))
         return dict(zip(self.names, drawn.tolist(), strict=True))
 
 
@@ -239,18 +242,24 @@ def _levels(values: Mapping[str, float]) -> list[float]:
     return [float(DISTRIBUTIONS[name].cdf(values[name])) for name in NAMES]
 
 
+def _squares(levels: Any) -> Any:
+    """Return a constant, the centred levels, and their squares and products, for each row."""
+    x = levels - 0.5
+    i, k = np.triu_indices(x.shape[1])
+    return np.column_stack((np.ones(len(x)), x, x[:, i] * x[:, k]))
+
+
 def surrogate_of(simulations: list[dict[str, Any]]) -> Surrogate:
-    """Return the regression of these simulations; ridge, because there are more squares than simulations at first."""
+    """Return the regression of these simulations; ridge, because few simulations may be left for each product."""
     from sklearn.linear_model import RidgeCV
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
     names = tuple(observed())
-    x = np.array([_levels(one["values"]) for one in simulations])
+    x = _squares(np.array([_levels(one["values"]) for one in simulations]))
     y = np.array([[one["statistics"][name] for name in names] for one in simulations])
-    model = make_pipeline(PolynomialFeatures(2), StandardScaler(), RidgeCV(np.logspace(-1, 4, 11)))
-    model.fit(x, y)
-    return Surrogate(model, np.cov((y - model.predict(x)).T), names)
+    model = RidgeCV(np.logspace(-1, 4, 11)).fit(x[:, 1:], y)
+    residuals = y - model.predict(x[:, 1:])
+    root = np.linalg.cholesky(np.cov(residuals.T) + 1e-12 * np.eye(len(names)))
+    return Surrogate(np.column_stack((model.intercept_, model.coef_)), root, names)
 
 
 def calibrate(folder: Folder, size: Size, say: Callable[[str], None]) -> dict[str, list[float]]:
@@ -314,7 +323,7 @@ def summarise(
     """Return the result as JSON values."""
     sample = sample_of(history)
     generation = int(history.max_t)
-    predicted = predict(folder, sample, generation, say)
+    predicted = predict(folder, sample, generation, size.predicted, say)
     alone = gains_alone(folder, sample, generation, size.alone)
     say("explanations alone")
     ranks = calibrate(folder, size, say)
@@ -338,7 +347,9 @@ def summarise(
         "conditioned_on": {name: one._asdict() for name, one in observed().items()},
         "fitted": _fitted(history),
         "figures": _figures(sample),
-        "predictions": _predictions(predicted, w),
+        "predicted_particles": len(predicted),
+        "predicted_effective_sample_size": effective_sample_size(w[: len(predicted)]),
+        "predictions": _predictions(predicted, w[: len(predicted)]),
         "explanations": _explanations(sample, predicted, alone),
         "calibration": _calibration(ranks),
     }
@@ -388,7 +399,7 @@ def _explanations(
     sample: Weighted, predicted: list[dict[str, float]], alone: Mapping[str, list[float]]
 ) -> dict[str, Any]:
     """Return the Bayes factor of each explanation, without and with Table IV, and the points that it gives."""
-    w = sample.weight
+    every, w = sample.weight, sample.weight[: len(predicted)]
     printed = {one.id: one for one in published().rates}
     likelihood = np.zeros(len(w))
     for name in ("table_4_17", "table_4_23"):
@@ -407,14 +418,15 @@ def _explanations(
         }
     }
     for name, one in EXPLANATIONS.items():
-        on = np.array([is_on(name, v) for v in sample.values])
+        on_of_all = np.array([is_on(name, v) for v in sample.values])
+        on = on_of_all[: len(predicted)]
         found[name] = {
             "says": one.says,
             "reason": one.reason,
             "figure": one.figure,
             "full_strength": one.limit,
             "unit": one.unit,
-            "at_20_n": _odds(on, w),
+            "at_20_n": _odds(on_of_all, every),
             "with_table_4": _odds(on, both),
             "gain_if_on": _mean(gains[on], w[on]) if on.any() else None,
             "gain_if_off": _mean(gains[~on], w[~on]) if (~on).any() else None,
@@ -458,12 +470,17 @@ def _mean(values: Any, w: Any) -> dict[str, Any]:
     }
 
 
-def _mean_of(values: list[float]) -> dict[str, Any]:
-    """Return the mean of independent replicates with its 95 % interval (Student's t), and their number."""
+def _mean_of(values: list[float]) -> dict[str, Any] | None:
+    """Return the mean of independent replicates with its 95 % interval (Student's t), and their number.
+
+    None for fewer than two.
+    """
     from scipy.stats import t
 
     v, n = np.array(values), len(values)
-    half = float(t.ppf(0.975, n - 1) * v.std(ddof=1) / math.sqrt(n)) if n > 1 else math.inf
+    if n < 2:
+        return None
+    half = float(t.ppf(0.975, n - 1) * v.std(ddof=1) / math.sqrt(n))
     mean = float(v.mean())
     return {"mean": mean, "interval": [mean - half, mean + half], "replicates": n}
 
@@ -489,6 +506,7 @@ def main() -> None:
     parser.add_argument("--generations", type=int, default=5)
     parser.add_argument("--minutes", type=float, default=60.0, help="limit of the time of the inference")
     parser.add_argument("--calibrations", type=int, default=40, help="runs of the calibration")
+    parser.add_argument("--predicted", type=int, default=1000, help="particles to predict from, at most")
     parser.add_argument("--alone", type=int, default=20, help="replicates of each explanation alone")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     parser.add_argument(
@@ -506,9 +524,11 @@ def main() -> None:
         given.markdown.write_text(page(json.loads(result.read_text(encoding="utf-8"))), encoding="utf-8")
         return
     logging.getLogger("ABC").setLevel(logging.WARNING)
-    size = Size(given.particles, given.generations, given.minutes, given.calibrations, given.alone)
+    size = Size(
+        given.particles, given.generations, given.minutes, given.calibrations, given.predicted, given.alone
+    )
     if given.short:
-        size = Size(particles=4, generations=1, minutes=1.0, calibrations=2, alone=2)
+        size = Size(particles=4, generations=1, minutes=1.0, calibrations=2, predicted=4, alone=2)
     began = time.time()
 
     def say(text: str) -> None:

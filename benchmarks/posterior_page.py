@@ -48,7 +48,7 @@ def page(result: Mapping[str, Any]) -> str:
         "## The data",
         _data(result),
         "## Predictions",
-        _predictions(result["predictions"]),
+        _predictions(result),
         "## Explanations of the rise of the rate with the force",
         _explanations(result["explanations"]),
         "## Is the inference calibrated?",
@@ -73,15 +73,25 @@ def _answer(result: Mapping[str, Any]) -> str:
     ]
     met = [one for one in tested if _met(one)]
     rise = predicted["gain"]
-    strongest = max((name for name in of if name != "none"), key=lambda name: of[name]["alone"]["mean"])
     determined = [name for name, one in result["figures"].items() if one["contraction"] >= PINNED]
     return (
         f"With the figures that the results at 20 N allow, {len(met)} of {len(tested)} published figures that were "
         "not used and have a standard deviation lie within the 95 % interval of one predicted replicate. The paper's "
         f"rate rises by 25.0 points from 17 to 23 N; predicted are {_points(rise['mean'])} points "
-        f"({_points(rise['interval'][0])} to {_points(rise['interval'][1])}). The strongest explanation alone, "
-        f"{of[strongest]['says']}, gives {_points(of[strongest]['alone']['mean'])} points on average at its full "
-        f"strength. {_determined(determined, len(result['figures']))}"
+        f"({_points(rise['interval'][0])} to {_points(rise['interval'][1])}). {_strongest(of)}"
+        f"{_determined(determined, len(result['figures']))}"
+    )
+
+
+def _strongest(of: Mapping[str, Any]) -> str:
+    """Return which explanation alone gives most; nothing if this was not simulated."""
+    alone = {name: one["alone"]["mean"] for name, one in of.items() if name != "none" and one["alone"]}
+    if not alone:
+        return ""
+    best = max(alone, key=lambda name: alone[name])
+    return (
+        f"The strongest explanation alone, {of[best]['says']}, gives {_points(alone[best])} points on average at its "
+        "full strength. "
     )
 
 
@@ -174,9 +184,9 @@ def _data(result: Mapping[str, Any]) -> str:
     )
 
 
-def _predictions(predictions: Mapping[str, Any]) -> str:
+def _predictions(result: Mapping[str, Any]) -> str:
     rows = []
-    for name, one in predictions.items():
+    for name, one in result["predictions"].items():
         is_share = not name.startswith("fig_")
 
         def show(value: float | None, is_share: bool = is_share, name: str = name) -> str:
@@ -195,7 +205,8 @@ def _predictions(predictions: Mapping[str, Any]) -> str:
         )
     return (
         "None of these were used for the inference. The interval is that of one replicate with the numbers of trials "
-        "of the paper, over the posterior.\n\n"
+        f"of the paper, over {result['predicted_particles']} particles (effective sample size "
+        f"{result['predicted_effective_sample_size']:.1f}).\n\n"
         + table(
             ("figure", "published", "predicted mean", "95 % of one replicate", "published within that"), rows
         )
@@ -224,8 +235,8 @@ def _explanations(explanations: Mapping[str, Any]) -> str:
         f"weights (effective sample size then {explanations['effective_sample_size_with_table_4']:.1f}; its interval "
         "is only that of so small a sample). Points are the rate at 23 N minus that at 17 N, printed: +25.0. *Alone* "
         "is at full strength with all others off, whether or not the data at 20 N allow it: the mean of "
-        f"{explanations['of']['none']['alone']['replicates']} replicates with its 95 % interval; the other columns "
-        "have the interval of one replicate.\n\n"
+        f"{_replicates(explanations)} replicates with its 95 % interval; the other columns have the interval of one "
+        "replicate.\n\n"
         + table(
             (
                 "explanation",
@@ -243,13 +254,18 @@ def _explanations(explanations: Mapping[str, Any]) -> str:
     )
 
 
+def _replicates(explanations: Mapping[str, Any]) -> int:
+    alone = explanations["of"]["none"]["alone"]
+    return int(alone["replicates"]) if alone else 0
+
+
 def _factor(one: Mapping[str, float]) -> str:
     return f"{one['bayes_factor']:.2g} ({one['bayes_factor_low']:.2g} to {one['bayes_factor_high']:.2g})"
 
 
 def _interval(one: Mapping[str, Any] | None) -> str:
     if one is None:
-        return "no particle"
+        return "none simulated"
     low, high = one["interval"]
     return f"{_points(one['mean'])} ({_points(low)} to {_points(high)})"
 

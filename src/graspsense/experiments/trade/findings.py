@@ -20,8 +20,8 @@ NOTES: Final = {
     "trade_next": "Next squeeze: the width alone rarely gives a sure answer, so one squeeze is almost always needed. "
     "A second squeeze costs about a second for opening and closing. It adds little information, because the object "
     "is in the same place and its stiffness blurs all squeezes in the same way.",
-    "trade_time": "Duration: the features are those of the curve up to the moment. Of the features of the paper, only "
-    "p_first exists before rest.",
+    "trade_time": "Duration: before rest, p_first is the only known feature. The rate therefore rises as more grasps "
+    "come to rest.",
     "trade_joint": "Speed and force: whole bottles are held out. The number of squeezes and the rule for rest are not "
     "varied with them.",
 }
