@@ -117,6 +117,15 @@ def test_a_parameter_with_a_spread_varies_between_instances_and_alone():
         ('type = "fracture"\nforce_n = 5.0\nleft = 2', "left = 2 must be at most 1"),
         ('type = "elastic"\nk1_n_m = 0\nk3_n_m3 = -1e6', "the shell would pull"),
         ('type = "elastic"\nk1_n_m = 100\nk3_n_m3 = -1e12', r"has to be at least -1.48e\+07"),
+        (
+            'type = "elastic"\nk1_n_m = 1e308',
+            r"k1_n_m: 1e\+308 is too large for a computation: at most 1e\+20",
+        ),
+        ('type = "maxwell"\nk_n_m = 1.0\ntau_s = 1e-200', "tau_s: 1e-200 is too small .*at least 1e-30"),
+        (
+            'type = "foam"\nforce_n = 1.0\nat_m = 0.01\nexponent = 50',
+            "exponent = 50 is too large.*at most 20",
+        ),
         ('type = "elastic"\nk1_n_m = -100', "k1_n_m: -100 is negative"),
         ('type = "elastic"\nk1_n_m = 100\nspread = { k = 1 }', "no such parameter 'k'"),
         ('type = "elastic"\nk1_n_m = 100\nspread = { k1_n_m = 5 }', "spread.k1_n_m: 5 is too large"),

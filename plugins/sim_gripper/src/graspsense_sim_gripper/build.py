@@ -241,6 +241,9 @@ def _gripper(config: SimConfig) -> _Gripper:
         damping_n_s_m=0.5 * float(config.pad_damping_n_s_m),
         branch_n_m=0.5 * float(config.pad_creep_n_m),
         branch_tau_s=float(config.pad_creep_s),
+        # Two pads in series compress twice as far.
+        hardening_m=math.inf if config.pad_hardening_m is None else 2.0 * config.pad_hardening_m,
+        exponent=float(config.pad_exponent),
     )
     motion = Motion(drive.open_rev, 0.0, *gap_and_rate(link, drive.open_rev))
     return _Gripper(drive, pads, Steps(step_tolerance(config.accuracy)), motion)

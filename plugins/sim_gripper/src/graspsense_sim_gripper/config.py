@@ -179,6 +179,21 @@ class SimConfig:
         plausible=(10.0, math.inf),
         meaning="Stiffness of one fingertip's pad: 1e4 to 1e5 N/m (an assumption); inf: rigid.",
     )
+    pad_hardening_m: float | None = setting(
+        default=None,
+        unit="m",
+        above=0.0,
+        plausible=(1e-6, 1.0),
+        meaning="Compression of one pad at which its force is twice that of a linear spring: the force is "
+        "k u (1 + (u / pad_hardening_m)^pad_exponent); not set: linear.",
+    )
+    pad_exponent: float = setting(
+        default=2.0,
+        above=0.0,
+        maximum=10.0,
+        meaning="Exponent of the hardening of the pad: 2 gives a cubic law; 0.5 a power law with exponent 1.5 where "
+        "pad_stiffness_n_m is small.",
+    )
     pad_damping_n_s_m: float = setting(
         default=0.0,
         origin="assumed",

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.build import build, instantiate
-from graspsense_sim_gripper.compiled.compose import phase_of_all, sum_of
+from graspsense_sim_gripper.compiled.compose import hardens, pad_parts, phase_of_all, sum_of
 from graspsense_sim_gripper.compiled.jit import compile_part
 from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
@@ -231,15 +231,15 @@ def _until_event(model: ObjectModel, contact: Contact, gap_m: float, speed_m_s: 
 
 
 @lru_cache(maxsize=64)
-def _follower(kinds: tuple[str, ...]) -> Callable[..., Driven]:
-    """Return `follow` for an object of these terms."""
+def _follower(kinds: tuple[str, ...], hardens: bool) -> Callable[..., Driven]:
+    """Return `follow` for an object of these terms. `hardens`: whether the pads are nonlinear."""
     parts = {"object_force": sum_of(laws_of(kinds)), "object_phase": phase_of_all(phases_of(kinds))}
-    return bind_reachable(follow, parts)
+    return bind_reachable(follow, {**parts, **pad_parts(hardens)})
 
 
 @lru_cache(maxsize=64)
-def _compiled_follower(kinds: tuple[str, ...]) -> Callable[..., Driven]:
-    return compile_part(_follower(kinds))
+def _compiled_follower(kinds: tuple[str, ...], hardens: bool) -> Callable[..., Driven]:
+    return compile_part(_follower(kinds, hardens))
 
 
 def follow_many(
@@ -276,7 +276,7 @@ def _squeeze(
         contact, first_m = contact._replace(offset_m=0.0), model.width_m
     if not compiled:
         table, recorded = table.tolist(), (path.t_s.tolist(), path.values.tolist(), recorded[2])
-    run = _compiled_follower(setup.kinds) if compiled else _follower(setup.kinds)
+    run = (_compiled_follower if compiled else _follower)(setup.kinds, hardens(model))
     end = run(model, Driven(contact, first_m, 0.0, 0), recorded, table, float(longest_s))
     columns = np.asarray(table)
     return DrivenSqueeze(

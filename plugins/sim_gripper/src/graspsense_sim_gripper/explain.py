@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from graspsense_sim_gripper.dynamics.contact import pad_compression
 from graspsense_sim_gripper.objects.spec import TermParams
 from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.terms.registry import find_term
@@ -46,7 +47,7 @@ def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> d
         "touched": True,
         "peak_n": forces_n[peak],
         "compression_m": deepest,
-        "pads_m": forces_n[peak] / setup.plant.object.pads.stiffness_n_m,
+        "pads_m": pad_compression(setup.plant.object.pads, forces_n[peak]),
         "speed_m_s": point.speed_m_s,
         "seconds": point.seconds,
         "terms": rows,

@@ -8,7 +8,7 @@ from traceback import walk_tb
 from types import CodeType
 
 from graspsense.plugin_api import GraspsenseError
-from graspsense_sim_gripper.compiled.compose import plant_move
+from graspsense_sim_gripper.compiled.compose import hardens, plant_move
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.terms.registry import active_laws, phases_of
@@ -42,7 +42,7 @@ def not_finite_in_tick(
         OnSum(_checked_on_sum(kind, law.law)) if isinstance(law, OnSum) else _checked(kind, law)
         for kind, law in zip(("lumped", *kinds), active_laws(kinds), strict=True)
     ]
-    move = plant_move(laws, phases_of(kinds))
+    move = plant_move(laws, phases_of(kinds), hardens=hardens(plant.object))
     try:
         move(plant, before, effort_n, dt_s)
     except TermFailed as error:

@@ -14,7 +14,13 @@ from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import Frame, bind, events_of, maker, tick
 from graspsense_sim_gripper.binding import Constructors, bind_reachable
-from graspsense_sim_gripper.dynamics.contact import BalanceSearch, ObjectModel, PadLoad, solve_contact
+from graspsense_sim_gripper.dynamics.contact import (
+    BalanceSearch,
+    ObjectModel,
+    PadLoad,
+    hardening,
+    solve_contact,
+)
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
 from graspsense_sim_gripper.exact.propagate import bind_move
@@ -221,19 +227,33 @@ class Composition(NamedTuple):
     """Whether the force of the drive lags behind the command."""
     has_palm: bool = False
     """Whether the gripper has an accelerometer."""
+    hardens: bool = False
+    """Whether the pads are nonlinear."""
 
 
 def composition(
     kinds: tuple[str, ...], plant: PlantParams, shape: Shape | None, *, has_palm: bool = False
 ) -> Composition:
     """Return the composition of a loop for this plant; `shape` is that of its exact discretisation, or None."""
-    return Composition(kinds, shape, plant.steps.settle > 0.0, plant.drive.lag_s > 0.0, has_palm)
+    converges, lags = plant.steps.settle > 0.0, plant.drive.lag_s > 0.0
+    return Composition(kinds, shape, converges, lags, has_palm, hardens(plant.object))
+
+
+def hardens(model: ObjectModel) -> bool:
+    """Return whether the pads are nonlinear."""
+    return model.pads.hardening_m < math.inf
+
+
+def pad_parts(nonlinear: bool) -> dict[str, Any]:
+    """Return what `bind_reachable` binds for nonlinear pads; nothing for linear ones."""
+    return {"pad_excess": hardening} if nonlinear else {}
 
 
 @lru_cache(maxsize=64)
-def contact_solver(kinds: tuple[str, ...]) -> ContactSolver:
-    """Return `solve_contact` for an object of these terms."""
-    return bind_reachable(solve_contact, {"object_force": sum_of_active(active_laws(kinds))}, INTERPRETED)
+def contact_solver(kinds: tuple[str, ...], hardens: bool = False) -> ContactSolver:
+    """Return `solve_contact` for an object of these terms. `hardens`: whether the pads are nonlinear."""
+    parts = {"object_force": sum_of_active(active_laws(kinds)), **pad_parts(hardens)}
+    return bind_reachable(solve_contact, parts, INTERPRETED)
 
 
 def plant_move(
@@ -242,16 +262,17 @@ def plant_move(
     *,
     converges: bool = True,
     lags: bool = True,
+    hardens: bool = False,
 ) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
     """Return `move` for an object whose force is the sum of these laws, with the events of `phases_of`.
 
     `converges`: whether the steps of a tick may be halved until the result no longer changes; `lags`: whether the force
-    of the drive may lag behind the command.
+    of the drive may lag behind the command; `hardens`: whether the pads are nonlinear.
     """
     over_a_tick: PlantMove = refine_until_converged if converges else advance
     if lags:
         over_a_tick = bind(move, advance=over_a_tick)
-    parts = {"object_force": sum_of(laws), "object_phase": phase_of_all(phases)}
+    parts = {"object_force": sum_of(laws), "object_phase": phase_of_all(phases), **pad_parts(hardens)}
     return bind_reachable(over_a_tick, parts)
 
 
@@ -270,7 +291,11 @@ def _step_move(composition: Composition) -> PlantMove:
     """Return the function that advances the plant by a tick in time steps."""
     kinds = composition.kinds
     return plant_move(
-        laws_of(kinds), phases_of(kinds), converges=composition.converges, lags=composition.lags
+        laws_of(kinds),
+        phases_of(kinds),
+        converges=composition.converges,
+        lags=composition.lags,
+        hardens=composition.hardens,
     )
 
 

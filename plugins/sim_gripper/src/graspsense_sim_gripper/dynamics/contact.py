@@ -53,6 +53,10 @@ class PadCompliance(NamedTuple):
     """Stiffness of the Maxwell branch, by which the pads creep."""
     branch_tau_s: float = 1.0
     """Relaxation time of the Maxwell branch."""
+    hardening_m: float = math.inf
+    """Compression at which the force of the spring is twice that of a linear one; inf: it is linear."""
+    exponent: float = 2.0
+    """Of the hardening, which is k u (u / hardening_m)^exponent at a compression u."""
 
 
 class ObjectModel(NamedTuple):
@@ -78,6 +82,8 @@ class PadLoad(NamedTuple):
     base_m: float
     span_s: float
     """The rate of the compression is (d - base_m) / span_s."""
+    closure_m: float
+    """Compression of pads and object together; -inf where they are separated."""
 
 
 class BalanceSearch(NamedTuple):
@@ -112,6 +118,35 @@ class _Creep(NamedTuple):
 
 
 _NO_CREEP: Final = _Creep(1.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _linear(pads: PadCompliance, pad_m: float) -> tuple[float, float]:
+    return 0.0, 0.0
+
+
+def hardening(pads: PadCompliance, pad_m: float) -> tuple[float, float]:
+    """Return the force (N) of the pads beyond that of their linear spring at this compression, and its slope (N/m)."""
+    if pad_m <= 0.0:
+        return 0.0, 0.0
+    stiffness = pads.stiffness_n_m * (pad_m / pads.hardening_m) ** pads.exponent
+    return stiffness * pad_m, stiffness * (1.0 + pads.exponent)
+
+
+pad_excess: Callable[[PadCompliance, float], tuple[float, float]] = _linear
+"""The composition of a scene binds it to `hardening` where the pads are nonlinear."""
+
+
+def pad_compression(pads: PadCompliance, force_n: float) -> float:
+    """Return the compression (m) of the pads at rest under this force."""
+    pad = force_n / pads.stiffness_n_m
+    if pads.hardening_m < math.inf and pad > 0.0:
+        for _ in range(MAX_ITERATIONS):
+            excess, slope = hardening(pads, pad)
+            step = (pads.stiffness_n_m * pad + excess - force_n) / (pads.stiffness_n_m + slope)
+            pad -= step
+            if abs(step) <= ARGUMENT_RTOL * pad:
+                break
+    return pad
 
 
 def _unbound(params: Any, states: Any, d0: float, d1: float, h: float, v1: float) -> tuple[float, Any]:
@@ -182,10 +217,10 @@ def _release_from_rigid_pads(
 ) -> tuple[ContactState, int]:
     """Return the object that rigid pads at `closure_m` would pull with `force_n`: separated, or pressed after all."""
     d0, force0, slope, states0, _, branch0, _, _ = now
-    load = PadLoad(0.0, 0.0, d0, h)
+    load = PadLoad(0.0, 0.0, d0, h, -math.inf)
     total = _release_slope(slope, force_n, force0, d0, closure_m)
     search = BalanceSearch(d0 + (0.0 - force0) / total, d0, 0.0, slope, total, -math.inf, math.inf, 0)
-    search, force, states = _balance(model.terms, now, load, search, h)
+    search, force, states = _balance(model, now, load, search, h)
     if closure_m > search.compression_m:
         # Free, it would have ended behind the pads: they press it where they are.
         d1 = closure_m
@@ -198,7 +233,7 @@ def _release_from_rigid_pads(
         total = _release_slope(search.slope_n_m, force, force0, d0, closure_m)
         _, last, last_n, slope, _, lower, upper, n = search
         search = BalanceSearch(d0 - force0 / total, last, last_n, slope, total, lower, upper, n)
-        search, force, states = _balance(model.terms, now, load, search, h)
+        search, force, states = _balance(model, now, load, search, h)
     d1 = search.compression_m
     # No force, but NaN where a law gave no finite one, so that it is noticed.
     none = force - force
@@ -242,19 +277,22 @@ def _press_through_pads(
         push += branch0 * decay + mean * (closure_m - pad0) + damper * (speed_m_s + base / over)
     n_changes = 0
     while True:
-        k, c = (stiffness, push) if pressed else (0.0, 0.0)
-        total = max(k + slope, MIN_SLOPE_SHARE * k, MIN_SLOPE_N_M)
+        k, c, closed = (stiffness, push, closure_m) if pressed else (0.0, 0.0, -math.inf)
+        excess, excess_slope = pad_excess(pads, closed - d0)
+        total = max(k + slope + excess_slope, MIN_SLOPE_SHARE * k, MIN_SLOPE_N_M)
         search = BalanceSearch(
-            d0 + (c - k * d0 - force0) / total, d0, 0.0, slope, total, -math.inf, math.inf, 0
+            d0 + (c - k * d0 + excess - force0) / total, d0, 0.0, slope, total, -math.inf, math.inf, 0
         )
-        search, force, states = _balance(model.terms, now, PadLoad(k, c, base, over), search, h)
+        load = PadLoad(k, c, base, over, closed)
+        search, force, states = _balance(model, now, load, search, h)
         d1, slope = search.compression_m, search.slope_n_m
         # NaN ends the search too.
         if not force < 0.0 if pressed else n_changes > 0 or closure_m <= d1 + creep.free_pad_m:
             break
         pressed, n_changes = not pressed, n_changes + 1
         over, base = h, d0
-    rate, unbalanced = (d1 - d0) / h, _unbalanced(force, c - k * d1)
+    excess, _ = pad_excess(pads, closed - d1)
+    rate, unbalanced = (d1 - d0) / h, _unbalanced(force, c - k * d1 + excess)
     if not pressed:
         pad = creep.free_pad_m
         branch = branch0 * creep.decay + (creep.mean_n_m + creep.ramp_n_m) * (pad - pad0)
@@ -281,19 +319,21 @@ def _creep(pads: PadCompliance, now: ContactState, h: float) -> _Creep:
 
 
 def _balance(
-    terms: Any, now: ContactState, load: PadLoad, search: BalanceSearch, h: float
+    model: ObjectModel, now: ContactState, load: PadLoad, search: BalanceSearch, h: float
 ) -> tuple[BalanceSearch, float, Any]:
     """Search the compression at which the object bears the pads' force; return it with the force and terms' states."""
     d0, states0 = now.compression_m, now.states
-    k, c, base, over = load
+    terms = model.terms
+    k, c, base, over, closed = load
     d1, last, last_n, slope, total, lower, upper, n = search
     while True:
         force, states = object_force(terms, states0, d0, d1, h, (d1 - base) / over)
-        miss = force - (c - k * d1)
+        excess, excess_slope = pad_excess(model.pads, closed - d1)
+        miss = force - (c - k * d1) - excess
         # The difference of two forces that are closer than this is mostly rounding.
         if n > 0 and abs(force - last_n) > 1e-12 * abs(force) and d1 != last:
             slope = max((force - last_n) / (d1 - last), 0.0)
-            total = max(k + slope, MIN_SLOPE_SHARE * k, MIN_SLOPE_N_M)
+            total = max(k + slope + excess_slope, MIN_SLOPE_SHARE * k, MIN_SLOPE_N_M)
         n += 1
         tolerance = FORCE_ATOL_N + FORCE_RTOL * abs(force) + LENGTH_RTOL * abs(c)
         if n >= MAX_ITERATIONS or not abs(miss) > tolerance:

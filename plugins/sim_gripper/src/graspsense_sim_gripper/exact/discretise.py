@@ -35,6 +35,8 @@ def why_not_exact(config: SimConfig, setup: GraspSetup) -> str:
         return "friction is greater at rest than while sliding"
     if model.held == 1 and setup.state.contact.offset_m != 0.0:
         return "the object is held off the centre line, so that each half would have modes of its own"
+    if model.pads.hardening_m < math.inf and model.pads.stiffness_n_m < math.inf:
+        return "the pads are not linear"
     nonlinear = [kind for kind, form in _forms(setup) if form is None]
     if nonlinear:
         return f"terms are not linear: {', '.join(nonlinear)}"

@@ -20,6 +20,9 @@ from graspsense_sim_gripper.terms.registry import find_term, in_order
 
 PATCHES: Final = ("line", "face", "point")
 
+LARGEST: Final = 1e20
+SMALLEST: Final = 1e-30
+"""The largest and the smallest magnitude of a number of a scene; products of a few of them stay finite."""
 MOST_SPREAD: Final = 3.0
 """The largest standard deviation of the logarithm of a parameter: instances then differ by a factor of 20 and more."""
 
@@ -204,6 +207,10 @@ def _number(entry: TomlValue, label: str, problems: list[str], negative: bool = 
         problems.append(f"{label}: {entry!r} is not a finite number")
     elif entry < 0.0 and not negative:
         problems.append(f"{label}: {entry!r} is negative")
+    elif abs(entry) > LARGEST:
+        problems.append(f"{label}: {entry!r} is too large for a computation: at most {LARGEST:g}")
+    elif 0.0 < abs(entry) < SMALLEST:
+        problems.append(f"{label}: {entry!r} is too small for a computation: 0, or at least {SMALLEST:g}")
     else:
         return float(entry)
     return 0.0

@@ -12,7 +12,7 @@ from typing import Final
 
 from attrs import evolve, frozen
 
-from graspsense_sim_gripper.compiled.compose import contact_solver, uncompressed
+from graspsense_sim_gripper.compiled.compose import contact_solver, hardens, uncompressed
 from graspsense_sim_gripper.dynamics.contact import ObjectModel
 from graspsense_sim_gripper.reduction.candidates import without_term
 from graspsense_sim_gripper.terms.term import WorkingPoint
@@ -92,7 +92,7 @@ class Grip:
 
 def forces_along(model: ObjectModel, kinds: Sequence[str], path: ProbePath) -> Iterator[float]:
     """Yield the force (N) at each point of the path."""
-    press = contact_solver(tuple(kinds))
+    press = contact_solver(tuple(kinds), hardens(model))
     contact, before = uncompressed(kinds), 0.0
     for closure, t, speed in zip(path.closures, path.times, path.speeds, strict=True):
         contact, _ = press(model, contact, closure, speed, t - before)
@@ -106,7 +106,7 @@ def stiffness(grip: Grip, dt_s: float) -> tuple[float, float]:
     The first is the force after a further step within a tick less the force after a tick at rest, over that step.
     """
     model, path = grip.model, grip.paths[-1]
-    press = contact_solver(grip.kinds)
+    press = contact_solver(grip.kinds, hardens(model))
     contact = uncompressed(grip.kinds)
     largest, before, further_m = 0.0, 0.0, path.closures[-1] / POINTS
     for k, (closure, t, speed) in enumerate(zip(path.closures, path.times, path.speeds, strict=True)):

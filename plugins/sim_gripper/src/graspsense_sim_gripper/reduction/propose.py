@@ -13,7 +13,7 @@ from typing import Final
 
 from graspsense.plugin_api import gap_and_rate, revolutions_at
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.contact import ObjectModel
+from graspsense_sim_gripper.dynamics.contact import ObjectModel, pad_compression
 from graspsense_sim_gripper.dynamics.drive import Drive
 from graspsense_sim_gripper.objects.spec import TermParams
 from graspsense_sim_gripper.problem import GraspSetup, Problem
@@ -268,7 +268,7 @@ def _reduce(
 
 def _pads_decision(grip: Grip, name: str, error: float) -> TermDecision:
     """Return the decision on the pads; `error` is the change of the joint error that it causes."""
-    share = grip.forces[0][-1] / grip.model.pads.stiffness_n_m / max(grip.point.compression_m, 1e-9)
+    share = pad_compression(grip.model.pads, grip.forces[0][-1]) / max(grip.point.compression_m, 1e-9)
     what = "their compression over the total compression"
     return TermDecision(term="pads", decision=name, what=what, number=share, error=error)
 

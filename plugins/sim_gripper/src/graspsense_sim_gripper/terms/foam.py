@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
 from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, WorkingPoint
+
+MOST_EXPONENT: Final = 20.0
 
 
 class Foam(NamedTuple):
@@ -85,6 +87,16 @@ def linear(params: Foam) -> LinearForm | None:
     )
 
 
+def refusal(params: Foam) -> str:
+    """Return why there is no law with this exponent."""
+    if params.exponent > MOST_EXPONENT:
+        return (
+            f"exponent = {params.exponent:g} is too large, since the force then overflows within the width of an "
+            f"object: at most {MOST_EXPONENT:g} (sponges have 1.5 to 3)"
+        )
+    return ""
+
+
 TERM = Term(
     name="foam",
     summary="power law with two Maxwell branches",
@@ -94,6 +106,7 @@ TERM = Term(
     rates=rates,
     limits=limits,
     linear=linear,
+    refusal=refusal,
     positive=("at_m", "exponent", "tau1_s", "tau2_s"),
     stiffnesses=("force_n", "arm1_n_m", "arm2_n_m"),
 )
