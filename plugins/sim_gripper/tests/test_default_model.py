@@ -67,7 +67,9 @@ def test_a_grasp_has_predictions_while_it_goes_on_and_the_answer_of_the_whole_gr
     trial = pipeline.grasp(object="odwalla:full_closed", seed=5, on_event=events.append)
     told = [event for event in events if event.source == "model"]
 
-    assert [one.after_s for one in trial.checkpoints] == [one["after_contact_s"] for one in KEPT["checkpoints"]]
+    assert [one.after_s for one in trial.checkpoints] == [
+        one["after_contact_s"] for one in KEPT["checkpoints"]
+    ]
     assert [event.what for event in told] == [one.words for one in trial.checkpoints]
     assert all("odwalla:full_closed" in one.prediction.prediction_set for one in trial.checkpoints)
     assert trial.prediction.model == trial.checkpoints[0].prediction.model.partition(", 0.")[0]
