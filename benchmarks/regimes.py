@@ -1,0 +1,401 @@
+"""A map of regimes: which scheme and which terms a scene needs, and where fixed steps of 1 ms fail. Simulated.
+
+    python benchmarks/regimes.py [--scenes 1500] [--rows FILE] [--markdown docs/regimes.md] [--first N] [--short]
+
+The scenes are drawn from the ranges that gripper, object and controller may physically have, not from those in which
+the simulator works, and apart from those of `benchmarks/selection.py`. Their seeds are fresh unless `--first` names the
+first. Each is grasped by the hybrid controller in the model that is selected for 10, 1 and 0.1 %, with every term in
+fixed steps of 1 ms (explicit and implicit), and in the reference. The error is that of
+`graspsense_sim_gripper.reduction.error`; a different outcome is an infinite error. Finished scenes are appended to the
+file of `--rows`, and are not run again if the program is started again with the same file. Times are processor times of
+the compiled loop that holds all kinds of terms; selecting the model is measured apart.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import secrets
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from attrs import evolve
+from selection import KINDS, Bench, Scene, controller_is_stable, record_of
+
+from graspsense.evaluation.intervals import wilson
+from graspsense.experiments.versions import where_measured
+from graspsense.plugin_api import ConfigError
+from graspsense_sim_gripper.batch.job import FinishedGrasp, grasp_once
+from graspsense_sim_gripper.compiled.padding import padded
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.reduction.error import deviation
+from graspsense_sim_gripper.reduction.propose import NOT_VERIFIED
+from graspsense_sim_gripper.terms.registry import in_order
+
+Row = dict[str, Any]
+ACCURACIES: Final = (0.1, 0.01, 0.001)
+FIXED: Final = ("explicit", "implicit")
+REFERENCE: Final = 1e-4
+TIMES: Final = 3
+ATMOSPHERE_PA: Final = 101325.0
+
+
+def scene_of(number: int) -> tuple[Scene, Row]:
+    """Return the scene with this number, and the quantities that it is mapped by."""
+    rng = np.random.default_rng([77_003, number])
+
+    def log(least: float, most: float) -> float:
+        return float(10.0 ** rng.uniform(math.log10(least), math.log10(most)))
+
+    stiffness, speed, rate = log(1e2, 1e7), log(1e-3, 0.1), log(200.0, 5000.0)
+    # A light plastic jaw to a large geared hand, as seen at the gap.
+    mass = log(0.5, 300.0)
+    at: Row = {"stiffness_n_m": stiffness, "speed_m_s": speed, "tick_s": 1.0 / rate, "moving_mass_kg": mass}
+    terms: dict[str, dict[str, float]] = {"elastic": {"k1_n_m": stiffness}}
+    if rng.random() < 0.2:
+        terms = {"rigid": {"hertz_n_m15": (stiffness / 1.5) ** 1.5 / math.sqrt(20.0)}}
+    if rng.random() < 0.5:
+        at["mass_ratio"] = ratio = log(1e-5, 10.0)
+        terms["surface"] = {"mass_kg": mass * ratio, "k_n_m": max(stiffness * log(0.01, 1.0), 100.0)}
+        critical = 2.0 * math.sqrt(terms["surface"]["k_n_m"] * mass * ratio)
+        terms["surface"] |= {"damping_n_s_m": critical * log(0.01, 10.0), "contact_n_m": stiffness}
+    if rng.random() < 0.5:
+        at["damping_ratio"] = share = log(1e-3, 30.0)
+        terms["loss"] = {"damping_n_s_m": share * 2.0 * math.sqrt(stiffness * mass)}
+    if rng.random() < 0.5:
+        at["relaxation_s"] = log(1e-6, 1e4)
+        terms["maxwell"] = {"k_n_m": stiffness * log(0.01, 3.0), "tau_s": at["relaxation_s"]}
+    if rng.random() < 0.5:
+        at["head_space_m3"], at["vent_m2"] = log(1e-7, 2e-3), log(1e-11, 1e-4) if rng.random() < 0.7 else 0.0
+        terms["gas"] = {"area_m2": log(1e-4, 5e-3), "area_slope_m": 0.0, "volume_m3": at["head_space_m3"]}
+        terms["gas"] |= {"pressure_pa": ATMOSPHERE_PA, "exponent": 1.4, "bulge_m3_pa": log(1e-11, 1e-9)}
+        terms["gas"] |= {"heat_s": log(1e-2, 1e2), "vent_m2": at["vent_m2"]}
+    if rng.random() < 0.15:
+        at["slosh_hz"] = log(0.5, 2000.0)
+        terms["slosh"] = {
+            "mass_kg": log(1e-3, 1.0),
+            "frequency_hz": at["slosh_hz"],
+            "damping_ratio": log(1e-3, 2.0),
+        }
+    order = list(terms)
+    spec = ObjectSpec(
+        name=f"regime {number}",
+        width_m=float(rng.uniform(0.01, 0.07)),
+        mass_kg=log(5e-3, 2.0),
+        held=bool(rng.random() < 0.2),
+        offset_m=float(rng.uniform(-3e-3, 3e-3)) if rng.random() < 0.5 else 0.0,
+        terms=tuple((order[i], terms[order[i]]) for i in in_order(order)),
+    )
+    straight = bool(rng.random() < 0.5)
+    friction = log(0.1, 10.0)
+    at["sensor"] = "pads" if rng.random() < 0.3 else "ideal"
+    config = SimConfig(
+        sensor=at["sensor"],
+        spread=False,
+        rate_hz=rate,
+        transmission="straight" if straight else "pr2",
+        moving_mass_kg=mass,
+        coulomb_n=friction,
+        # Above Coulomb friction, as with any real drive: no scene is piecewise linear.
+        breakaway_n=1.2 * friction,
+        coulomb_spread_n=0.0,
+        load_friction_coefficient=float(rng.uniform(0.0, 0.5)),
+        stribeck_m_s=log(1e-4, 1e-2),
+        pad_stiffness_n_m=log(3e3, 1e6),
+        pad_damping_n_s_m=0.0 if rng.random() < 0.5 else log(0.1, 100.0),
+        open_gap_m=spec.width_m + 2.0 * abs(spec.offset_m) + min(max(0.5 * speed, 2e-3), 0.01),
+    )
+    # Pads, and the object, in series.
+    series = 1.0 / (1.0 / stiffness + 2.0 / config.pad_stiffness_n_m)
+    at["phase_rad"] = math.sqrt(series / (mass if straight else 100.0)) / rate
+    return Scene(number=number, spec=spec, config=config, speed_m_s=speed), at
+
+
+def measured(bench: Bench, number: int) -> Row:
+    """Return the errors, decisions and times of a scene."""
+    scene, at = scene_of(number)
+    row: Row = {"scene": number, **at}
+    dt = 1.0 / scene.config.rate_hz
+    try:
+        reference, setup, reduction, _ = bench.grasp(scene, REFERENCE, "reference")
+    except ConfigError as error:
+        return {**row, "failed": f"the reference: {error}"}
+    row |= {"outcome": reference.outcome.name, "stable": controller_is_stable(setup, reduction)}
+    row["reference_resolved"] = reference.state.step.unresolved + reference.state.contact.unbalanced == 0
+    for accuracy in ACCURACIES:
+        row[f"{accuracy:g}"] = _case(bench, scene, accuracy, "scene", reference, dt)
+    row["full"] = _case(bench, scene, 0.01, "full", reference, dt)
+    for scheme in FIXED:
+        fixed = evolve(scene, config=evolve(scene.config, scheme=scheme, step_s=1e-3))
+        row[scheme] = _case(bench, fixed, 0.01, "full", reference, dt)
+    return row
+
+
+def _case(
+    bench: Bench, scene: Scene, accuracy: float, fidelity: str, reference: FinishedGrasp, dt_s: float
+) -> Row:
+    try:
+        done, setup, reduction, job = bench.grasp(scene, accuracy, fidelity)
+    except ConfigError as error:
+        return {"error": math.inf, "refused": str(error)[:200]}
+    except ArithmeticError as error:
+        return {"error": math.inf, "refused": f"{type(error).__name__}: {error}"}
+    error, of = deviation(record_of(done, dt_s), record_of(reference, dt_s))
+    full = padded(setup, KINDS)
+    loop = bench.loop_of(job.config, full, type(job.controller).step)
+    spent = []
+    for _ in range(TIMES):
+        began = time.thread_time()
+        grasp_once(job, full, loop, bench.storage, on_arrays=True)
+        spent.append(time.thread_time() - began)
+    state = done.state
+    flags = []
+    if reduction.contact.decision == NOT_VERIFIED:
+        flags.append(NOT_VERIFIED)
+    if state.step.unresolved + state.contact.unbalanced > 0:
+        flags.append("not resolved")
+    if reduction.verification is None and not job.config.has_forced_steps:
+        flags.append("not verified")
+    return {
+        "error": error,
+        "of": of,
+        "flags": flags,
+        "scheme": reduction.scheme.decision,
+        "terms": {one.term: one.decision for one in reduction.decisions if one.term in KINDS},
+        "steps": state.step.n_steps,
+        "ms": 1e3 * float(np.median(spent)),
+        "selection_ms": 1e3 * bench.selection_s,
+    }
+
+
+def run(bench: Bench, file: Path, scenes: int, first: int) -> list[Row]:
+    """Measure the scenes that the file does not hold yet, and append them; return all rows."""
+    rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    first = rows[0]["scene"] if rows else first
+    known = {row["scene"] for row in rows}
+    for number in range(first, first + scenes):
+        if number in known:
+            continue
+        row = measured(bench, number)
+        rows.append(row)
+        with file.open("a") as out:
+            out.write(json.dumps(row) + "\n")
+        print(f"\r{len(rows)} scenes", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    return rows
+
+
+def share_words(n: int, of: int) -> str:
+    """Return a number of scenes with the lower end of its 95 % interval."""
+    if of == 0:
+        return "-"
+    return f"{n} of {of} ({n / of:.1%}; at least {wilson(n, of)[0]:.1%})"
+
+
+def page(rows: Sequence[Row], picture: str | None) -> str:
+    """Return the page in Markdown."""
+    done = [row for row in rows if "failed" not in row]
+    stable = [row for row in done if row["stable"] and row["sensor"] == "ideal"]
+    pads = [row for row in done if row["stable"] and row["sensor"] == "pads"]
+    unstable = [row for row in done if not row["stable"]]
+    lines = [
+        "# Regimes of the simulator",
+        "",
+        "Written by `python benchmarks/regimes.py --markdown docs/regimes.md`. Simulated. Scenes are drawn from physical ranges,",
+        "apart from the scenes on which the simulator was developed: contact stiffness 1e2 to 1e7 N/m, moving mass 0.5 to 300 kg,",
+        "mass ratio 1e-5 to 10, damping ratio 1e-3 to 30, head space 1e-7 to 2e-3 m³, vent 0 to 1e-4 m², relaxation time 1e-6 to",
+        "1e4 s, approach 1 to 100 mm/s, tick 0.2 to 5 ms, slosh 0.5 to 2000 Hz, with pads or ideal sensors.",
+        "",
+        f"{len(rows)} scenes (numbers {rows[0]['scene']} to {rows[-1]['scene']}); the full count is 1500. "
+        f"{len(unstable)} have an unstable sampled velocity loop, {len(rows) - len(done)} have no reference, "
+        f"{sum(not row['reference_resolved'] for row in done)} have a reference that is not resolved. {where_measured()}.",
+        "",
+        *([f"![Regimes]({picture})", ""] if picture else []),
+    ]
+    for title, some in (
+        ("Ideal sensors, stable loop", stable),
+        (
+            "Read by pads and encoder, stable loop: single grasps, which the condition of features limits",
+            pads,
+        ),
+        ("Unstable loop", unstable),
+    ):
+        lines += ["", f"## {title}", "", *_within(some)]
+    lines += ["", "## Schemes and terms", "", *_needed(stable + pads)]
+    lines += ["", "## Where fixed steps of 1 ms fail", "", *_fixed(stable)]
+    lines += ["", "## Largest errors without a flag", "", *_misses(stable)]
+    return "\n".join(lines) + "\n"
+
+
+def _within(rows: Sequence[Row]) -> Iterator[str]:
+    yield "| model | within | within, flagged or refused | flagged | refused | worst without a flag / accuracy | ms a grasp | selection, ms |"
+    yield "|---|---|---|---|---|---|---|---|"
+    cases = [(f"{a:g}", a, f"selected for {a:.1%}") for a in ACCURACIES]
+    cases += [
+        ("full", 0.01, "every term, 1 %"),
+        *((s, 0.01, f"fixed steps of 1 ms, {s}, against 1 %") for s in FIXED),
+    ]
+    for name, accuracy, what in cases:
+        mine = [row[name] for row in rows]
+        if not mine:
+            continue
+        within = sum(one["error"] <= accuracy for one in mine)
+        refused = sum("refused" in one for one in mine)
+        flagged = sum(bool(one.get("flags")) for one in mine)
+        silent = [one["error"] / accuracy for one in mine if "refused" not in one and not one["flags"]]
+        kept = sum(one["error"] <= accuracy or "refused" in one or bool(one["flags"]) for one in mine)
+        ms = [one["ms"] for one in mine if "ms" in one]
+        selection = [one["selection_ms"] for one in mine if "ms" in one]
+        yield (
+            f"| {what} | {share_words(within, len(mine))} | {share_words(kept, len(mine))} | {flagged} | {refused} "
+            f"| {max(silent, default=math.nan):.3g} | {_median(ms):.3g} | {_median(selection):.0f} |"
+        )
+
+
+def _median(values: Sequence[float]) -> float:
+    return float(np.median(values)) if values else math.nan
+
+
+def _needed(rows: Sequence[Row]) -> Iterator[str]:
+    yield "| accuracy | schemes | terms: kept as they are, of the scenes that have them |"
+    yield "|---|---|---|"
+    for accuracy in ACCURACIES:
+        mine = [row[f"{accuracy:g}"] for row in rows if "refused" not in row[f"{accuracy:g}"]]
+        schemes = ", ".join(f"{name} {n}" for name, n in Counter(one["scheme"] for one in mine).most_common())
+        kept: Counter[str] = Counter()
+        of: Counter[str] = Counter()
+        for one in mine:
+            for term, decision in one["terms"].items():
+                of[term] += 1
+                kept[term] += decision == "kept"
+        terms = ", ".join(f"{term} {kept[term]} of {n}" for term, n in of.most_common())
+        yield f"| {accuracy:.1%} | {schemes} | {terms} |"
+
+
+BINS: Final[Sequence[tuple[str, str, Sequence[float]]]] = (
+    ("phase_rad", "natural frequency of the contact times the tick, rad", (0.03, 0.1, 0.3, 1.0)),
+    ("mass_ratio", "mass ratio", (1e-4, 1e-2, 1.0)),
+    ("damping_ratio", "damping ratio", (0.1, 1.0, 10.0)),
+    ("relaxation_s", "relaxation time, s", (1e-4, 1e-2, 1.0)),
+    ("head_space_m3", "head space, m³", (1e-6, 1e-4)),
+    ("vent_m2", "vent, m²", (1e-9, 1e-7)),
+    ("speed_m_s", "approach, m/s", (0.01, 0.03)),
+    ("tick_s", "tick, s", (5e-4, 2e-3)),
+    ("slosh_hz", "slosh, Hz", (10.0, 100.0)),
+)
+
+
+def _fixed(rows: Sequence[Row]) -> Iterator[str]:
+    yield "| quantity | range | scenes | explicit beyond 10, 1, 0.1 % | implicit beyond 10, 1, 0.1 % | selected for 1 %: beyond, unflagged |"
+    yield "|---|---|---|---|---|---|"
+    for key, what, edges in BINS:
+        for least, most in zip((-math.inf, *edges), (*edges, math.inf), strict=True):
+            mine = [row for row in rows if least <= row.get(key, math.nan) < most]
+            if not mine:
+                continue
+            beyond = [
+                ", ".join(str(sum(row[scheme]["error"] > a for row in mine)) for a in ACCURACIES)
+                for scheme in FIXED
+            ]
+            silent = sum(
+                row["0.01"]["error"] > 0.01 and "refused" not in row["0.01"] and not row["0.01"]["flags"]
+                for row in mine
+            )
+            yield f"| {what} | {least:g} to {most:g} | {len(mine)} | {beyond[0]} | {beyond[1]} | {silent} |"
+
+
+def _misses(rows: Sequence[Row]) -> Iterator[str]:
+    yield "| scene | accuracy | error | of | outcome of the reference | scheme |"
+    yield "|---|---|---|---|---|---|"
+    missed = [
+        (row[f"{a:g}"]["error"] / a, a, row)
+        for row in rows
+        for a in ACCURACIES
+        if row[f"{a:g}"]["error"] > a and "refused" not in row[f"{a:g}"] and not row[f"{a:g}"]["flags"]
+    ]
+    for _, accuracy, row in sorted(missed, key=lambda one: -one[0])[:20]:
+        case = row[f"{accuracy:g}"]
+        yield (
+            f"| {row['scene']} | {accuracy:g} | {case['error']:.3g} | {case['of']} | {row['outcome']} | {case['scheme']} |"
+        )
+
+
+def draw(rows: Sequence[Row], file: Path) -> None:
+    """Draw the errors over the regimes, as a small PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    some = [row for row in rows if "failed" not in row and row["stable"] and row["sensor"] == "ideal"]
+    figure = Figure(figsize=(11.0, 7.0), dpi=80, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes: Any = figure.subplots(2, 2)
+    for ax, (name, what) in zip(
+        axes.ravel(),
+        (
+            ("0.01", "selected for 1 %"),
+            ("0.001", "selected for 0.1 %"),
+            ("explicit", "fixed 1 ms, explicit"),
+            ("implicit", "fixed 1 ms, implicit"),
+        ),
+        strict=True,
+    ):
+        looks: Sequence[tuple[str, str, Callable[[Row], bool]]] = (
+            ("C0", "no flag", lambda one: not one.get("flags") and "refused" not in one),
+            ("C1", "flagged", lambda one: bool(one.get("flags"))),
+            ("C3", "refused", lambda one: "refused" in one),
+        )
+        for colour, label, has in looks:
+            mine = [row for row in some if has(row[name])]
+            ax.plot(
+                [row["phase_rad"] for row in mine],
+                [min(max(row[name]["error"], 1e-7), 3.0) for row in mine],
+                ".",
+                color=colour,
+                label=label,
+            )
+        for accuracy in ACCURACIES:
+            ax.axhline(accuracy, color="0.7", lw=0.7)
+        ax.set(xscale="log", yscale="log", title=what, ylim=(5e-8, 5.0))
+        ax.set(
+            xlabel="natural frequency of the contact times the tick, rad", ylabel="error (3: other outcome)"
+        )
+        ax.legend(fontsize=8)
+    figure.savefig(file, format="png")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--scenes", type=int, default=1500)
+    parser.add_argument("--first", type=int)
+    parser.add_argument("--rows", type=Path, help="JSON lines of the finished scenes, to go on with later")
+    parser.add_argument("--markdown", type=Path)
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
+    given = parser.parse_args()
+    first = given.first if given.first is not None else secrets.randbelow(2**31)
+    if given.short:
+        given.scenes = 1
+    with tempfile.TemporaryDirectory() as folder:
+        rows = run(Bench(), given.rows or Path(folder) / "rows.jsonl", given.scenes, first)
+    if given.markdown:
+        picture = given.markdown.with_suffix(".png")
+        draw(rows, picture)
+        given.markdown.write_text(
+            page(rows, os.path.relpath(picture, given.markdown.parent)), encoding="utf-8"
+        )
+    else:
+        print(page(rows, None))
+
+
+if __name__ == "__main__":
+    main()
