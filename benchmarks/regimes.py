@@ -210,14 +210,16 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
     lines = [
         "# Regimes of the simulator",
         "",
-        "Written by `python benchmarks/regimes.py --markdown docs/regimes.md`. Simulated. Scenes are drawn from physical ranges,",
-        "apart from the scenes on which the simulator was developed: contact stiffness 1e2 to 1e7 N/m, moving mass 0.5 to 300 kg,",
-        "mass ratio 1e-5 to 10, damping ratio 1e-3 to 30, head space 1e-7 to 2e-3 m³, vent 0 to 1e-4 m², relaxation time 1e-6 to",
-        "1e4 s, approach 1 to 100 mm/s, tick 0.2 to 5 ms, slosh 0.5 to 2000 Hz, with pads or ideal sensors.",
+        "Written by `python benchmarks/regimes.py --markdown docs/regimes.md`. Simulated.",
+        "Scenes are drawn from physical ranges, apart from the scenes on which the simulator was developed:",
+        "contact stiffness 1e2 to 1e7 N/m, moving mass 0.5 to 300 kg, mass ratio 1e-5 to 10, damping ratio",
+        "1e-3 to 30, head space 1e-7 to 2e-3 m³, vent 0 to 1e-4 m², relaxation time 1e-6 to 1e4 s,",
+        "approach 1 to 100 mm/s, tick 0.2 to 5 ms, slosh 0.5 to 2000 Hz, with pads or ideal sensors.",
         "",
         f"{len(rows)} scenes (numbers {rows[0]['scene']} to {rows[-1]['scene']}); the full count is 1500. "
         f"{len(unstable)} have an unstable sampled velocity loop, {len(rows) - len(done)} have no reference, "
-        f"{sum(not row['reference_resolved'] for row in done)} have a reference that is not resolved. {where_measured()}.",
+        f"{sum(not row['reference_resolved'] for row in done)} have a reference that is not resolved. "
+        f"{where_measured()}.",
         "",
         *([f"![Regimes]({picture})", ""] if picture else []),
     ]
@@ -237,7 +239,10 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
 
 
 def _within(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| model | within | within, flagged or refused | flagged | refused | worst without a flag / accuracy | ms a grasp | selection, ms |"
+    yield (
+        "| model | within | within, flagged or refused | flagged | refused | worst without a flag / accuracy "
+        "| ms a grasp | selection, ms |"
+    )
     yield "|---|---|---|---|---|---|---|---|"
     cases = [(f"{a:g}", a, f"selected for {a:.1%}") for a in ACCURACIES]
     cases += [
@@ -295,7 +300,10 @@ BINS: Final[Sequence[tuple[str, str, Sequence[float]]]] = (
 
 
 def _fixed(rows: Sequence[Row]) -> Iterator[str]:
-    yield "| quantity | range | scenes | explicit beyond 10, 1, 0.1 % | implicit beyond 10, 1, 0.1 % | selected for 1 %: beyond, unflagged |"
+    yield (
+        "| quantity | range | scenes | explicit beyond 10, 1, 0.1 % | implicit beyond 10, 1, 0.1 % "
+        "| selected for 1 %: beyond, unflagged |"
+    )
     yield "|---|---|---|---|---|---|"
     for key, what, edges in BINS:
         for least, most in zip((-math.inf, *edges), (*edges, math.inf), strict=True):
@@ -325,7 +333,8 @@ def _misses(rows: Sequence[Row]) -> Iterator[str]:
     for _, accuracy, row in sorted(missed, key=lambda one: -one[0])[:20]:
         case = row[f"{accuracy:g}"]
         yield (
-            f"| {row['scene']} | {accuracy:g} | {case['error']:.3g} | {case['of']} | {row['outcome']} | {case['scheme']} |"
+            f"| {row['scene']} | {accuracy:g} | {case['error']:.3g} | {case['of']} | {row['outcome']} "
+            f"| {case['scheme']} |"
         )
 
 
