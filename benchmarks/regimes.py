@@ -32,13 +32,17 @@ from selection import KINDS, Bench, Scene, controller_is_stable, record_of
 
 from graspsense.evaluation.intervals import wilson
 from graspsense.experiments.versions import where_measured
-from graspsense.plugin_api import ConfigError
-from graspsense_sim_gripper.batch.job import FinishedGrasp, grasp_once
+from graspsense.plugin_api import ConfigError, RunConfig, create
+from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, grasp_once, grasp_plain
+from graspsense_sim_gripper.build import instantiate, problem_of
 from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.reduction.error import deviation
+from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.propose import NOT_VERIFIED
+from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.terms.registry import in_order
 
 Row = dict[str, Any]
@@ -120,6 +124,39 @@ def scene_of(number: int) -> tuple[Scene, Row]:
     return Scene(number=number, spec=spec, config=config, speed_m_s=speed), at
 
 
+class Interpreted(Bench):
+    """The same in the interpreter: slower, but without the half minute that compiling takes."""
+
+    def grasp(
+        self, scene: Scene, accuracy: float, fidelity: str
+    ) -> tuple[FinishedGrasp, GraspSetup, Reduction, Job]:
+        controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
+        config = evolve(scene.config, accuracy=accuracy, fidelity=fidelity)
+        run = RunConfig(grasp_timeout_s=20.0)
+        problem = problem_of(config, scene.spec)
+        began = time.thread_time()
+        reduction = select(problem, GraspController(controller, run))
+        self.selection_s = time.thread_time() - began
+        setup = instantiate(problem, reduction, 0)
+        job = Job(config=config, controller=controller, run=run, extract=None, traces=True)
+        return grasp_plain(job, setup), setup, reduction, job
+
+
+def seconds_of(bench: Bench, job: Job, setup: GraspSetup) -> float:
+    """Return the processor time of a grasp once more, the median of some."""
+    spent = []
+    for _ in range(1 if isinstance(bench, Interpreted) else TIMES):
+        began = time.thread_time()
+        if isinstance(bench, Interpreted):
+            grasp_plain(job, setup)
+        else:
+            full = padded(setup, KINDS)
+            loop = bench.loop_of(job.config, full, type(job.controller).step)
+            grasp_once(job, full, loop, bench.storage, on_arrays=True)
+        spent.append(time.thread_time() - began)
+    return float(np.median(spent))
+
+
 def measured(bench: Bench, number: int) -> Row:
     """Return the errors, decisions and times of a scene."""
     scene, at = scene_of(number)
@@ -150,13 +187,6 @@ def _case(
     except ArithmeticError as error:
         return {"error": math.inf, "refused": f"{type(error).__name__}: {error}"}
     error, of = deviation(record_of(done, dt_s), record_of(reference, dt_s))
-    full = padded(setup, KINDS)
-    loop = bench.loop_of(job.config, full, type(job.controller).step)
-    spent = []
-    for _ in range(TIMES):
-        began = time.thread_time()
-        grasp_once(job, full, loop, bench.storage, on_arrays=True)
-        spent.append(time.thread_time() - began)
     state = done.state
     flags = []
     if reduction.contact.decision == NOT_VERIFIED:
@@ -172,7 +202,7 @@ def _case(
         "scheme": reduction.scheme.decision,
         "terms": {one.term: one.decision for one in reduction.decisions if one.term in KINDS},
         "steps": state.step.n_steps,
-        "ms": 1e3 * float(np.median(spent)),
+        "ms": 1e3 * seconds_of(bench, job, setup),
         "selection_ms": 1e3 * bench.selection_s,
     }
 
@@ -389,13 +419,15 @@ def main() -> None:
     parser.add_argument("--first", type=int)
     parser.add_argument("--rows", type=Path, help="JSON lines of the finished scenes, to go on with later")
     parser.add_argument("--markdown", type=Path)
+    parser.add_argument("--interpreter", action="store_true", help="compile nothing, for a few scenes")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     first = given.first if given.first is not None else secrets.randbelow(2**31)
     if given.short:
         given.scenes = 1
     with tempfile.TemporaryDirectory() as folder:
-        rows = run(Bench(), given.rows or Path(folder) / "rows.jsonl", given.scenes, first)
+        bench = Interpreted() if given.short or given.interpreter else Bench()
+        rows = run(bench, given.rows or Path(folder) / "rows.jsonl", given.scenes, first)
     if given.markdown:
         picture = given.markdown.with_suffix(".png")
         draw(rows, picture)
