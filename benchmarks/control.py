@@ -25,13 +25,15 @@ from datetime import date
 from importlib.metadata import version
 from typing import Any
 
+from attrs import evolve
+
 from graspsense.core.anytime import Anytime, anytime_of
 from graspsense.core.config import resolve
 from graspsense.core.model import model_for
 from graspsense.core.plugins import installed
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
-from graspsense.plugin_api import SQUEEZE, create
+from graspsense.plugin_api import SQUEEZE, DeviceInfo, create
 from graspsense_pr2_gripper import backend as driver
 from graspsense_pr2_gripper import emulation, opening
 from graspsense_pr2_gripper.backend import Pr2Backend
@@ -101,6 +103,13 @@ class Playback(Transport):
         pass
 
 
+class RealTime(Pr2Backend):
+    """Says that its clock does not wait, so that predictions are computed beside the loop as with a real gripper."""
+
+    def open(self, seed: int) -> DeviceInfo:
+        return evolve(super().open(seed), clock="device")
+
+
 class Watched:
     """Passes every tick on to the predictions, and notes in which ticks of a squeeze one is computed."""
 
@@ -137,7 +146,8 @@ def played(wire: Playback, feature: bytes, watcher: Watched | None = None) -> No
     identity = decode_identity(feature)
     link = LockStepLink(wire, 1.0 / identity.report_rate_hz)
     driver.open_board = lambda *_: opening.Opened(link, identity, None)  # type: ignore[assignment]
-    grasp = run_grasp(Pr2Backend(EMULATED), create("controller", "hybrid"), RunConfig(), watcher=watcher)
+    backend = Pr2Backend(EMULATED) if watcher is None else RealTime(EMULATED)
+    grasp = run_grasp(backend, create("controller", "hybrid"), RunConfig(), watcher=watcher)
     driver.open_board = opening.open_board
     assert grasp.outcome.words == "steady", grasp.reason
 
