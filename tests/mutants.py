@@ -37,6 +37,8 @@ from graspsense.plugin_api import (
     ClassifierConfig,
     Command,
     Features,
+    FreeLimits,
+    FreeMotion,
     ObjectKind,
     Reading,
     UnknownName,
@@ -381,6 +383,57 @@ class Teller(Law):
         command, after = step(params, state.inner, reading)
         told = int(after.phase > state.phase == APPROACH)
         return command, Telling(after.phase, after.outcome, told, after)
+
+
+class FreeState(NamedTuple):
+    phase: int
+    outcome: int
+    n: int
+
+
+def free_step(params, state, reading):
+    n = state.n + 1
+    outcome = STEADY if n >= 100 else state.outcome
+    return Command(EFFORT, 2.0 + 0.001 * n, inf, inf), FreeState(APPROACH, outcome, n)
+
+
+def free_begin(params, state, frame):
+    return float(state.n), FreeLimits(0.0, inf)
+
+
+def free_command(params, n, gap_m, velocity_m_s, dt_s):
+    # The hundredth tick ends the grasp, which is left to `step`.
+    return 2.0 + 0.001 * (n + 1.0) if n < 99.0 else nan, n + 1.0
+
+
+def free_command_of_another_law(params, n, gap_m, velocity_m_s, dt_s):
+    return 2.0, n + 1.0
+
+
+def free_end(params, state, n, effort_n, t_s):
+    return FreeState(state.phase, state.outcome, int(n))
+
+
+def free_end_that_forgets(params, state, n, effort_n, t_s):
+    return state
+
+
+class FreeController(Law):
+    step = staticmethod(free_step)
+    free_motion = FreeMotion(free_begin, free_command, free_end)
+
+    def init(self):
+        return FreeState(APPROACH, 0, 0)
+
+
+@mutant("controller", "free-motion-is-step", "the law of free motion commands 2.0 N")
+class ControllerWithFreeMotionOfAnother(FreeController):
+    free_motion = FreeMotion(free_begin, free_command_of_another_law, free_end)
+
+
+@mutant("controller", "free-motion-is-step", "set every field that `step` changes")
+class ControllerWithForgettingFreeMotion(FreeController):
+    free_motion = FreeMotion(free_begin, free_command, free_end_that_forgets)
 
 
 @mutant("controller", "events-are-declared", "set bit i for the i-th name")

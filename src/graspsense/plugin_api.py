@@ -116,6 +116,7 @@ _TABLE: Final[Table] = {
     },
     "Controllers": {
         "roles": ("Controller", "ControllerState", "StepLaw"),
+        "free_motion": ("NOT_FREE", "FreeLimits", "FreeMotion"),
     },
     "Contact and rest, the same for controllers and features": {
         "contact": (
@@ -161,7 +162,19 @@ _TABLE: Final[Table] = {
         "guard": ("GuardParams", "GuardState"),
         "run_config": ("RunConfig",),
         "runner": ("ended_by_itself", "overdue", "seconds_at_most", "tick_params"),
-        "tick": ("Schedule", "TickParams", "TickState", "events_of", "first_state", "tick"),
+        "tick": (
+            *("Schedule", "TickParams", "TickState", "events_of", "first_state", "tick"),
+            *(
+                "CALLED",
+                "FreeRun",
+                "FreeState",
+                "FreeTicks",
+                "after_free",
+                "free_from",
+                "free_parts",
+                "free_tick",
+            ),
+        ),
     },
     "Compiling a function with all that it calls": {
         "call_graph": ("NotCompilable", "fingerprint"),

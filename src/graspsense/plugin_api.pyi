@@ -107,6 +107,9 @@ from graspsense.core.transmission import straight_linkage as straight_linkage
 from graspsense.core.roles import Controller as Controller
 from graspsense.core.roles import ControllerState as ControllerState
 from graspsense.core.roles import StepLaw as StepLaw
+from graspsense.core.free_motion import NOT_FREE as NOT_FREE
+from graspsense.core.free_motion import FreeLimits as FreeLimits
+from graspsense.core.free_motion import FreeMotion as FreeMotion
 
 # Contact and rest, the same for controllers and features
 from graspsense.core.contact import CONTACT_FORCE_N as CONTACT_FORCE_N
@@ -185,6 +188,14 @@ from graspsense.core.tick import TickState as TickState
 from graspsense.core.tick import events_of as events_of
 from graspsense.core.tick import first_state as first_state
 from graspsense.core.tick import tick as tick
+from graspsense.core.tick import CALLED as CALLED
+from graspsense.core.tick import FreeRun as FreeRun
+from graspsense.core.tick import FreeState as FreeState
+from graspsense.core.tick import FreeTicks as FreeTicks
+from graspsense.core.tick import after_free as after_free
+from graspsense.core.tick import free_from as free_from
+from graspsense.core.tick import free_parts as free_parts
+from graspsense.core.tick import free_tick as free_tick
 
 # Compiling a function with all that it calls
 from graspsense.core.call_graph import NotCompilable as NotCompilable

@@ -23,9 +23,9 @@ def bind(function: FunctionT, **parts: Any) -> FunctionT:
     unknown = parts.keys() - function.__globals__.keys()
     if unknown:
         raise TypeError(f"{function.__module__}.{function.__name__} has no part named {sorted(unknown)}")
-    bound = FunctionType(
-        function.__code__, {**function.__globals__, **parts}, function.__name__, function.__defaults__
-    )
+    # The interpreter caches lookups of globals in the code object, so copies that share one would evict each other.
+    code = function.__code__.replace()
+    bound = FunctionType(code, {**function.__globals__, **parts}, function.__name__, function.__defaults__)
     bound.__module__, bound.__qualname__ = function.__module__, function.__qualname__
     return cast(FunctionT, bound)
 

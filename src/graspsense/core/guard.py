@@ -30,6 +30,15 @@ class GuardState(NamedTuple):
     stopped: int
 
 
+def limits_without_contact(params: GuardParams, state: GuardState) -> tuple[float, float]:
+    """Return the limits of effort (N) and speed (m/s) within which the guard changes nothing while no force changes."""
+    if state.contact_seen == 1:
+        return params.effort_limit_n, params.speed_limit_m_s
+    return min(params.effort_limit_n, params.first_effort_n), min(
+        params.speed_limit_m_s, params.first_speed_m_s
+    )
+
+
 def guard(
     params: GuardParams, state: GuardState, frame: Frame, command: Command
 ) -> tuple[Command, GuardState]:

@@ -26,8 +26,9 @@ from typing import (
 from attrs import field, frozen
 
 from graspsense.core.errors import ConfigError
+from graspsense.core.free_motion import FreeMotion
 from graspsense.core.setting import NAMES_INPUT, setting
-from graspsense.core.signals import Command, Outcome, Pads, Reading
+from graspsense.core.signals import Command, Frame, Outcome, Pads, Reading
 from graspsense.core.step_params import params_of
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from graspsense.core.features import Features, FeatureTable, Prediction
     from graspsense.core.identification import Identification, Progress, RecordedSqueeze
     from graspsense.core.run_config import RunConfig
+    from graspsense.core.tick import FreeRun, TickParams, TickState
     from graspsense.core.trace import Trace
     from graspsense.core.tree import TreeNode
 
@@ -175,6 +177,15 @@ class SensorBackend(ABC, Generic[ConfigT]):
         The guard has limited the command. With a device clock, it limits effort and speed to `run.first_effort_n` and
         `run.first_speed_m_s` (by default 12 N and 15 mm/s) until a pad touches, so a fast approach needs larger ones.
         """
+
+    def free_ticks(self, params: TickParams, state: TickState, frame: Frame, most: int) -> FreeRun | None:
+        """Run up to `most` ticks of free motion at once after the command that was applied last; None to run none.
+
+        A simulator may do so while no force changes and no cell image arrives (see `free_motion.FreeMotion`), with the
+        controller of `expect`. `state` is that after the tick of `frame`. The results are those of `read` and `apply`.
+        """
+        del params, state, frame, most
+        return None
 
     @abstractmethod
     def tare(self, images: Sequence[Pads]) -> None:
@@ -324,13 +335,24 @@ def _copy(function: FunctionType) -> FunctionType:
     return same
 
 
+def _mark(controller: type[Controller[Any]], name: str, value: Any) -> None:
+    """Set an attribute of the step of this class; of a copy, if the step is inherited from a class without it."""
+    step = controller.step
+    if not isinstance(step, FunctionType):
+        return
+    if "step" not in vars(controller):
+        step = _copy(step)
+        controller.step = staticmethod(step)  # type: ignore[method-assign]
+    setattr(step, name, value)
+
+
 class Controller(ABC, Generic[ConfigT]):
     """A control law: a pure step function of named tuples of numbers.
 
     Write `step` as a module function and assign it: `step = staticmethod(step)`. It must not use a clock, input, output
     or objects, and must stay within the subset of Python that numba compiles. The same function then drives a gripper,
     runs in a debugger, and is compiled together with a simulated plant. The class declares what it `requires` and its
-    `commands`.
+    `commands`. It may declare `free_motion`, by which a simulated grasp takes less time.
     """
 
     requires: ClassVar[tuple[Channel, ...]]
@@ -341,17 +363,18 @@ class Controller(ABC, Generic[ConfigT]):
     """The kinds that it can send instead, each alone; the key `sends` of its config then names one kind."""
     events: ClassVar[tuple[str, ...]] = ()
     """The names of the events that it tells by the field `events` of its state: `("contact", "slip")`."""
+    free_motion: ClassVar[FreeMotion | None] = None
+    """What `step` does while only position and speed of the fingers change, by which a simulator is faster.
+
+    It belongs to the `step` that the class has: a subclass with another `step` declares its own, or has none."""
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
-        step = cls.step
-        if cls.events and isinstance(step, FunctionType) and not getattr(step, "tells_events", False):
-            if "step" not in vars(cls):
-                # The class that it is inherited from tells no events, so it keeps its own function.
-                step = _copy(step)
-                cls.step = staticmethod(step)  # type: ignore[method-assign]
-            # What composes a tick has the function alone.
-            step.tells_events = True  # type: ignore[attr-defined]
+        # What composes a tick has the function alone, so the function carries what is declared about it.
+        if cls.events and not getattr(cls.step, "tells_events", False):
+            _mark(cls, "tells_events", True)
+        if "free_motion" in vars(cls) and getattr(cls.step, "free_motion", None) is not cls.free_motion:
+            _mark(cls, "free_motion", cls.free_motion)
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config

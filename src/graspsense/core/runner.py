@@ -12,8 +12,7 @@ import gc
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from itertools import count
-from math import ceil
+from math import ceil, inf
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 from attrs import evolve, frozen
@@ -26,7 +25,19 @@ from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.interrupts import Interrupts
 from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
 from graspsense.core.run_config import RunConfig
-from graspsense.core.signals import APPROACH, RUNNING, SQUEEZE, Command, Frame, Outcome, Pads, Phase, Reading
+from graspsense.core.signals import (
+    APPROACH,
+    EFFORT,
+    HOLD,
+    RUNNING,
+    SQUEEZE,
+    Command,
+    Frame,
+    Outcome,
+    Pads,
+    Phase,
+    Reading,
+)
 from graspsense.core.tick import (
     OPEN_SPEED_M_S,
     OPEN_WINDOW_S,
@@ -294,7 +305,7 @@ class _Grasp:
         return 0.0 if self.last is None or self.first_t_s is None else self.last.t_s - self.first_t_s
 
     def _loop(self) -> None:
-        read, apply, sinks, run = self.backend.read, self.backend.apply, self.sinks, self.run
+        read, apply, run = self.backend.read, self.backend.apply, self.run
         advance = bind(tick, step=self.step, events_told=events_of(self.step), TickState=maker(TickState))
         params, record = self.params, self.recorder.add
         on_device_clock = self.info.clock == "device"
@@ -302,8 +313,10 @@ class _Grasp:
         timeout_s = frame_timeout_s(run, self.info)
         state, phase, watcher = self.state, self.state.phase, self.state.guard
         images: list[Pads] = []
-        newest = 0
-        for _ in self._due():
+        newest = n_ticks = 0
+        most_ticks, leaps = self._most_ticks(), self._leaps()
+        while n_ticks < most_ticks:
+            n_ticks += 1
             reading = read(timeout_s)
             if reading is None:
                 raise DeviceLost(no_frame(run, self.info))
@@ -314,11 +327,11 @@ class _Grasp:
             acted = state.guard.acted
             command, state = advance(params, state, reading)
             self.state = state
-            stepped = phase != TARING
+            stepped, same_phase = phase != TARING, state.phase == phase
             if not stepped and pads.counter > newest:
                 newest = pads.counter
                 images.append(pads)
-            if state.phase != phase:
+            if not same_phase:
                 if phase == TARING:
                     self.backend.tare(images)
                 phase, newest = state.phase, pads.counter
@@ -340,27 +353,54 @@ class _Grasp:
                 if state.events:
                     self._told(frame, phase, state.events)
             if recorded:
-                for sink in sinks:
-                    try:
-                        sink.take(reading, phase, command)
-                    except Exception as error:
-                        # A failing sink must not change the outcome of a grasp.
-                        self.sinks = sinks = [one for one in sinks if one is not sink]
-                        self._event(frame.t_s, Phase(phase), f"{type(sink).__name__} failed: {named(error)}")
+                if self.sinks:
+                    self._show(reading, phase, command)
                 if self.watcher is not None and phase < RELEASE and not state.done:
                     state = self._watched(self.watcher, frame, state)
             if state.done or watcher.stopped:
                 return
+            if leaps and same_phase and phase != SQUEEZE and phase != HOLD:
+                n_ticks += self._leap(phase, reading, int(most_ticks - n_ticks))
+                state = self.state
+        raise _Overdue(overdue(run))
 
-    def _due(self) -> Iterator[int]:
-        """Yield once for each tick that a grasp may take; a recording ends by itself.
+    def _most_ticks(self) -> float:
+        """Return the number of ticks that a grasp may take; a recording ends by itself.
 
-        This counts ticks and does not read the clock of the device: if that stands still, the squeeze must still end.
+        Ticks are counted, since the clock of a device may stand still, and the squeeze must end nevertheless.
         """
-        if self.info.opening is None:
-            yield from count()
-        yield from range(ceil(seconds_at_most(self.run) * self.info.rate_hz))
-        raise _Overdue(overdue(self.run))
+        return inf if self.info.opening is None else ceil(seconds_at_most(self.run) * self.info.rate_hz)
+
+    def _leaps(self) -> bool:
+        """Return whether the gripper is asked for several ticks of free motion at once: a simulated one, unwatched."""
+        offers = type(self.backend).free_ticks is not SensorBackend.free_ticks
+        return offers and self.info.clock == "virtual" and self.watcher is None
+
+    def _leap(self, phase: int, before: Reading, most: int) -> int:
+        """Let the gripper run ticks of free motion at once, record and show them, and return their number.
+
+        The cell image of all of them is that of the reading before.
+        """
+        free = self.backend.free_ticks(self.params, self.state, before.frame, most)
+        if free is None:
+            return 0
+        self.state = free.state
+        if free.frames:
+            self.last = free.frames[-1]
+            self.recorder.extend(free.frames, phase, free.commands)
+        if self.sinks:
+            for frame, effort_n in zip(free.frames, free.commands, strict=True):
+                self._show(Reading(frame, before.pads), phase, Command(EFFORT, effort_n, inf, inf))
+        return free.n_ticks
+
+    def _show(self, reading: Reading, phase: int, command: Command) -> None:
+        """Pass a tick to the sinks. One that fails is dropped, because it must not change the outcome of a grasp."""
+        for sink in self.sinks:
+            try:
+                sink.take(reading, phase, command)
+            except Exception as error:
+                self.sinks = [other for other in self.sinks if other is not sink]
+                self._event(reading.frame.t_s, Phase(phase), f"{type(sink).__name__} failed: {named(error)}")
 
     def _guard_event(self, frame: Frame, before: GuardState, now: GuardState) -> None:
         if now.stopped and not before.stopped:

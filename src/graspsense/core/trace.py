@@ -158,6 +158,12 @@ class TraceRecorder:
         if pads.counter and (not images or images[-1].counter != pads.counter):
             images.append(pads)
 
+    def extend(self, frames: Sequence[Frame], phase: int, commands: Sequence[float]) -> None:
+        """Add ticks of one phase without a new cell image, of a gripper without further channels."""
+        self.frames.extend(frames)
+        self.phases.extend([phase] * len(frames))
+        self.commands.extend(commands)
+
     def trace(self) -> Trace:
         """Return the trace of the ticks collected so far."""
         trace = trace_of(self.frames, self.phases, self.commands, self.images, self.units, self.signals)

@@ -47,7 +47,7 @@ class Result:
 MINIMUM_CHECKS: Final[Mapping[str, int]] = {
     "distribution": 4,
     "sensor-backend": 18,
-    "controller": 16,
+    "controller": 17,
     "feature-set": 15,
     "classifier": 15,
 }

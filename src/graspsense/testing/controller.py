@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import inspect
 import json
-from collections.abc import Iterator
-from math import isfinite, isinf, nan
+from collections.abc import Iterator, Sequence
+from math import inf, isfinite, isinf, nan
 from typing import Any, Final, NamedTuple, get_type_hints
 
 from graspsense.core.channels import further, no_signals
 from graspsense.core.entries import KINDS, Channel
 from graspsense.core.errors import named
+from graspsense.core.free_motion import FreeMotion, free_motion_of
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
 from graspsense.core.signals import (
     APPROACH,
+    EFFORT,
     HOLD,
     RUNNING,
     Command,
@@ -31,6 +33,8 @@ from graspsense.testing.subject import Subject
 
 TICKS: Final = 4000
 LONGEST_S: Final = 60.0
+FORCES: Final = slice(5, 9)
+"""The forces of a frame, on pads and edges."""
 
 
 class Tick(NamedTuple):
@@ -336,6 +340,49 @@ def events_are_declared(subject: Subject) -> None:
             )
 
 
+def free_motion_is_step(subject: Subject) -> None:
+    """A law of free motion commands what `step` commands, and ends in the same state, while no force changes."""
+    law = subject.create()
+    motion, params = free_motion_of(type(law).step), law.params()
+    if motion is None:
+        return
+    for function in (motion.begin, motion.command, motion.end):
+        demand(
+            inspect.isfunction(function), f"{function!r} in `free_motion` is not a module function: write one"
+        )
+    for object_name in OBJECTS:
+        ticks = ticks_of(subject, object_name)
+        first = 0
+        while first < len(ticks):
+            first += max(_free_ticks_that_agree(motion, params, ticks[first:]), 1)
+
+
+def _free_ticks_that_agree(motion: FreeMotion, params: Any, ticks: Sequence[Tick]) -> int:
+    """Return in how many ticks after the first one the law of free motion applies; all of them agree with `step`."""
+    start = ticks[0].after
+    memory, limits = motion.begin(params, start, ticks[0].frame)
+    for n, tick in enumerate(ticks[1:]):
+        frame = tick.frame
+        same = frame[FORCES] == ticks[0].frame[FORCES]
+        if not (same and frame.gap_m > limits.gap_m and frame.t_s <= limits.until_s):
+            return n
+        effort, memory = motion.command(params, memory, frame.gap_m, frame.velocity_m_s, frame.dt_s)
+        if effort != effort:
+            return n
+        where = f"at t = {frame.t_s:.3f} s, {n + 1} ticks after `begin`,"
+        demand(
+            repr(Command(EFFORT, effort, inf, inf)) == repr(tick.command),
+            f"{where} the law of free motion commands {effort} N and `step` gives {tick.command}: let `begin` return "
+            "NOT_FREE, or narrower limits, where it does not apply, and `command` compute what `step` does",
+        )
+        after = motion.end(params, start, memory, effort, frame.t_s)
+        demand(
+            repr(after) == repr(tick.after),
+            f"{where} `end` gives the state {after} and `step` gives {tick.after}: set every field that `step` changes",
+        )
+    return len(ticks) - 1
+
+
 def phases_are_in_order(subject: Subject) -> None:
     """The phases are APPROACH, SQUEEZE and HOLD, in this order."""
     for object_name in OBJECTS:
@@ -385,6 +432,7 @@ CHECKS: Final = (
         requires_what_it_reads,
         handles_frames_of_nan,
         events_are_declared,
+        free_motion_is_step,
         phases_are_in_order,
         ends_every_grasp,
     ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import repeat
 from typing import Any, Final, Unpack
 
 from attrs import evolve
@@ -15,6 +16,7 @@ from graspsense.plugin_api import (
     Controller,
     DeviceInfo,
     Frame,
+    FreeRun,
     Grasped,
     Identification,
     ObjectKind,
@@ -23,6 +25,8 @@ from graspsense.plugin_api import (
     RecordedSqueeze,
     RunConfig,
     SimulationVariant,
+    TickParams,
+    TickState,
     create,
     maker,
     no_pads,
@@ -30,13 +34,14 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.build import CELL_OFFSET, EFFORT_LIMIT_N, build, device_info, instantiate
-from graspsense_sim_gripper.compiled.compose import INTERPRETED, composed_move, composition
+from graspsense_sim_gripper.compiled.compose import INTERPRETED, composed_move, composition, free_motion
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState, is_finite
 from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.fingertip import CELLS, FIRST_PAD_CELL, fingertips
+from graspsense_sim_gripper.loop import COLUMNS, FreeProgress, GraspParams
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.palm import PalmBuffers, PalmSignals, channel, palm_signals
@@ -54,6 +59,9 @@ SIDES: Final = ("left", "right")
 
 NOISE_TICKS: Final = 512
 """Ticks for which the noise of the palm is drawn at once."""
+
+MOST_FREE_TICKS: Final = 1024
+"""Largest number of ticks of free motion that are run at once."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -127,7 +135,12 @@ class SimBackend(BatchBackend[SimConfig]):
         exact = discretise(self.config, setup)
         self._plant: PlantParams | ExactPlant = setup.plant if exact is None else exact[0]
         shape = None if exact is None else exact[1]
-        self._move = composed_move(composition(setup.kinds, setup.plant, shape))
+        composed = composition(setup.kinds, setup.plant, shape, has_palm=setup.has_palm)
+        self._move = composed_move(composed)
+        self._free_ticks = None if self._controller is None else free_motion(composed, self._controller.step)
+        self._table = [[0.0] * MOST_FREE_TICKS for _ in COLUMNS]
+        self._phases = [0] * MOST_FREE_TICKS
+        self._moved_on = False
         self._state, self._sensor = setup.state, setup.sensor_state
         self._ticks = 0
         zero = (CELL_OFFSET[0],) * CELLS
@@ -150,14 +163,10 @@ class SimBackend(BatchBackend[SimConfig]):
         dt = setup.dt_s
         if effort is None:
             effort = 0.0
+        elif self._moved_on:
+            self._moved_on = False
         else:
-            self._state = self._moved(effort)
-            self._ticks += 1
-            contact = self._state.contact
-            if self._explains and contact.touched == 1:
-                # Of an object that is fixed in place, the half that is pressed harder.
-                half = max(contact.left, contact.right, key=lambda half: half.force_n)
-                self._compressions.append((half.compression_m, half.force_n))
+            self._move_on(effort)
         buffers = self._buffers
         if self._sensor.images >= len(buffers.images):
             self._draw_noise()
@@ -169,6 +178,36 @@ class SimBackend(BatchBackend[SimConfig]):
             image = buffers.images[count - 1]
             self._pads = Pads(self._sensor.image_t_s, count, tuple(image[0]), tuple(image[1]))
         return _reading(frame, self._pads, self._further_signals(frame) if self._palm else ())
+
+    def _move_on(self, effort_n: float) -> None:
+        """Move the plant to the next tick. Raises TermFailed."""
+        self._state = self._moved(effort_n)
+        self._ticks += 1
+        contact = self._state.contact
+        if self._explains and contact.touched == 1:
+            # Of an object that is fixed in place, the half that is pressed harder.
+            half = max(contact.left, contact.right, key=lambda half: half.force_n)
+            self._compressions.append((half.compression_m, half.force_n))
+
+    def free_ticks(self, params: TickParams, state: TickState, frame: Frame, most: int) -> FreeRun | None:
+        """Run ticks of free motion. Raises TermFailed."""
+        effort = self._effort_n
+        contact = self._state.contact
+        pressed = contact.left.force_n > 0.0 or contact.right.force_n > 0.0
+        if self._free_ticks is None or self._explains or pressed or effort is None:
+            return None
+        self._move_on(effort)
+        self._moved_on = True
+        setup, table, first = self._setup, self._table, self._ticks
+        most = min(most, MOST_FREE_TICKS)
+        constants = GraspParams(self._plant, setup.sensor, params, setup.dt_s, first + most)
+        at = FreeProgress(first, 0, effort, self._state, self._sensor, state)
+        at = self._free_ticks(constants, at, frame, table, self._phases)
+        self._ticks, n, self._effort_n, self._state, self._sensor, state = at
+        t, gap, velocity, efforts, left, right, edge_left, edge_right, commands = (row[:n] for row in table)
+        columns = t, repeat(setup.dt_s), gap, velocity, efforts, left, right, edge_left, edge_right, repeat(0)
+        frames = list(map(Frame._make, zip(*columns, strict=False)))
+        return FreeRun(self._ticks - first, frames, commands, state)
 
     def _further_signals(self, frame: Frame) -> PalmSignals:
         """Return the samples of the palm in this tick."""

@@ -9,9 +9,33 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
-from graspsense.plugin_api import TARING, Command, Frame, Pads, Reading, TickParams, TickState
-from graspsense_sim_gripper.dynamics.state import PlantState, is_finite
-from graspsense_sim_gripper.sensing import PadBuffers, SensorParams, SensorState, apply_tare, sense
+from graspsense.plugin_api import (
+    CALLED,
+    HOLD,
+    SQUEEZE,
+    TARING,
+    Command,
+    Frame,
+    Pads,
+    Reading,
+    TickParams,
+    TickState,
+    after_free,
+    free_from,
+    free_tick,
+)
+from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, is_finite
+from graspsense_sim_gripper.sensing import (
+    PadBuffers,
+    SensorParams,
+    SensorState,
+    apply_tare,
+    moved_sensor,
+    next_image_s,
+    sense,
+    sense_motion,
+)
+from graspsense_sim_gripper.stepping.coast import glided
 
 COLUMNS: Final = (
     "t_s",
@@ -61,6 +85,18 @@ class LoopState(NamedTuple):
     """1: a force or the motion was not finite after the last tick (see `before_failure`)."""
 
 
+class FreeProgress(NamedTuple):
+    """The part of the state that changes in free motion: between two ticks, after the plant has moved."""
+
+    ticks: int
+    recorded: int
+    effort_n: float
+    """The commanded effort of the last tick."""
+    plant: PlantState
+    sensor: SensorState
+    controller: TickState
+
+
 class SimulationState(NamedTuple):
     """The complete state of a grasp between two ticks."""
 
@@ -108,6 +144,16 @@ def _no_signals(
     return (), state
 
 
+def _cannot_glide(plant: PlantModel, state: PlantState, dt_s: float) -> bool:
+    return False
+
+
+def _never_glides(
+    plant: PlantModel, motion: Motion, contact: Contact, effort_n: float, h: float
+) -> tuple[bool, Motion, Contact]:
+    return False, motion, contact
+
+
 def _keep_nothing(signals: Any, buffers: Any, row: int) -> None:
     pass
 
@@ -118,6 +164,12 @@ keep_signals: Callable[[Any, Any, int], None] = _keep_nothing
 """What records them: `palm.keep_samples` of a gripper with an accelerometer."""
 move: Callable[[PlantModel, PlantState, float, float], PlantState] = _move_unbound
 control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = _control_unbound
+glide: Callable[[PlantModel, Motion, Contact, float, float, float], tuple[bool, Motion, float]] = (
+    _never_glides
+)
+"""`stepping.coast.glide`, where it does what `move` does in a tick of free motion."""
+can_glide: Callable[[PlantModel, PlantState, float], bool] = _cannot_glide
+"""`stepping.coast.can_glide`, likewise."""
 
 
 def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
@@ -142,8 +194,8 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
             pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
         signals, palm = further_signals(params.palm, palm, plant, ticks * dt_s, dt_s, ticks, buffers.palm)
         command, state = control(params.controller, state, Reading(frame, pads, signals))
-        past_tare = phase != TARING
-        if state.phase != phase:
+        past_tare, same_phase = phase != TARING, state.phase == phase
+        if not same_phase:
             if phase == TARING and count > tare_from:
                 _tare(pad_buffers, tare_from, count)
                 sensor = apply_tare(sensor, pad_buffers)
@@ -164,8 +216,69 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
         if not is_finite(plant):
             failed = 1
             break
+        if same_phase and phase != SQUEEZE and phase != HOLD:
+            at = FreeProgress(ticks, recorded, effort, plant, sensor, state)
+            ticks, recorded, effort, plant, sensor, state = free_ticks(
+                params, at, frame, columns, buffers.phases
+            )
     ended = LoopState(ticks, recorded, phase, tare_from, effort, failed)
     return SimulationState(ended, plant, sensor, state, palm)
+
+
+def free_ticks(
+    params: GraspParams, at: FreeProgress, frame: Frame, columns: Table, phases: Any
+) -> FreeProgress:
+    """Run the ticks of free motion that follow that of `frame`, and return where they end: at `at` if there are none.
+
+    In these ticks no force changes, no cell image is taken or arrives, and the controller follows a law that needs
+    neither (see `graspsense.core.free_motion`). What they give is what `grasp` gives tick by tick, to the bit.
+    """
+    free, now = free_from(params.controller, at.controller, frame)
+    if free.kind == CALLED or not _is_free(params, at, frame):
+        return at
+    dt_s, sensor, image_s = params.dt_s, params.sensor, next_image_s(params.sensor, at.sensor)
+    ticks, recorded, effort, plant = at.ticks, at.recorded, at.effort_n, at.plant
+    shown = (at.sensor.encoder_ticks, at.sensor.gap_m, at.sensor.velocity_m_s)
+    phase, capacity, t_s, n_steps = at.controller.phase, len(columns[0]), 0.0, 0
+    motion, contact = plant.motion, plant.contact
+    while ticks < params.max_ticks and recorded < capacity:
+        next_t_s = ticks * dt_s
+        if next_t_s >= image_s:
+            break
+        next_shown = sense_motion(sensor, shown, motion, dt_s)
+        _, gap, velocity = next_shown
+        command, next_now = free_tick(params.controller, free, now, next_t_s, dt_s, gap, velocity)
+        if command != command:
+            break
+        glides, next_motion, next_contact = glide(params.plant, motion, contact, command, dt_s)
+        if not glides:
+            break
+        if motion.speed_rev_s != 0.0:
+            n_steps += 1
+        t_s, shown, now, motion, contact = next_t_s, next_shown, next_now, next_motion, next_contact
+        if phase > TARING:
+            row = recorded & NOT_NEGATIVE
+            columns[0][row], columns[1][row], columns[2][row] = t_s, gap, velocity
+            columns[3][row], columns[8][row] = effort, command
+            phases[row] = phase
+            recorded += 1
+        ticks += 1
+        effort = command
+    if ticks == at.ticks:
+        return at
+    for row in range(at.recorded, recorded):
+        columns[4][row], columns[5][row] = frame.force_left_n, frame.force_right_n
+        columns[6][row], columns[7][row] = frame.edge_left_n, frame.edge_right_n
+    plant = glided(plant, motion, contact, n_steps)
+    state = after_free(params.controller, at.controller, now, effort, t_s)
+    return FreeProgress(ticks, recorded, effort, plant, moved_sensor(at.sensor, shown), state)
+
+
+def _is_free(params: GraspParams, at: FreeProgress, frame: Frame) -> bool:
+    """Return whether nothing is pressed, and the next frame shows the forces of this one unless an image arrives."""
+    contact = at.plant.contact
+    same = frame.force_left_n == contact.left_n and frame.force_right_n == contact.right_n
+    return (same or params.sensor.ideal == 0) and can_glide(params.plant, at.plant, params.dt_s)
 
 
 def before_failure(

@@ -22,7 +22,7 @@ from graspsense.plugin_api import (
     pad_force,
 )
 from graspsense_sim_gripper.drive_models import ENCODER_TICKS
-from graspsense_sim_gripper.dynamics.state import PlantState
+from graspsense_sim_gripper.dynamics.state import Motion, PlantState
 from graspsense_sim_gripper.fingertip import CELLS, FIRST_PAD_CELL
 
 VELOCITY_FILTER_S: Final = 0.003
@@ -156,26 +156,17 @@ def sense(
 
     `effort_n` is the commanded effort (N), which the frame repeats.
     """
+    encoder_ticks, gap, velocity, count, image_t, forces, pending = state
+    encoder_ticks, gap, velocity = sense_motion(params, (encoder_ticks, gap, velocity), plant.motion, dt_s)
     if params.ideal == 1:
-        velocity = plant.motion.speed_rev_s * plant.motion.jacobian_m_rev
-        gap, left_n, right_n = plant.motion.gap_m, plant.contact.left_n, plant.contact.right_n
-        force_error_n, travel_share, from_m = params.bias
+        left_n, right_n = plant.contact.left_n, plant.contact.right_n
+        force_error_n = params.bias.force_n
         if force_error_n != 0.0:
-            gap += travel_share * min(gap - from_m, 0.0)
             left_n += force_error_n if left_n > 0.0 else 0.0
             right_n += force_error_n if right_n > 0.0 else 0.0
         return Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, 0.0, 0.0, 0), state
 
-    encoder_ticks, gap, velocity, count, image_t, forces, pending = state
-    motion, moved = plant.motion, 0.0
-    ticks = float(math.floor(motion.revolutions * ENCODER_TICKS))
-    if ticks != encoder_ticks:
-        # Over one encoder tick the linkage is linear to a tenth of a picometre.
-        moved = -gap
-        gap = motion.gap_m - motion.jacobian_m_rev * (motion.revolutions - ticks / ENCODER_TICKS)
-        moved += gap
-    velocity += dt_s / (VELOCITY_FILTER_S + dt_s) * (moved / dt_s - velocity)
-    due_s = params.clock.phase_s + count * params.clock.period_s - CLOCK_TOLERANCE_S
+    due_s = image_due_s(params, state)
     if pending.waiting == 0 and t_s >= due_s:
         pending = Pending(1, plant.contact.left_n, plant.contact.right_n)
     if pending.waiting == 1 and t_s >= due_s + params.clock.delay_s:
@@ -187,7 +178,48 @@ def sense(
         pending = Pending(0, pending.left_n, pending.right_n)
     left_n, right_n, left_edge_n, right_edge_n = forces
     frame = Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, left_edge_n, right_edge_n, 0)
-    return frame, SensorState(ticks, gap, velocity, count, image_t, forces, pending)
+    return frame, SensorState(encoder_ticks, gap, velocity, count, image_t, forces, pending)
+
+
+def sense_motion(
+    params: SensorParams, last: tuple[float, float, float], motion: Motion, dt_s: float
+) -> tuple[float, float, float]:
+    """Return the ticks of the encoder, the gap (m) and its rate (m/s) that the sensors show, given the last ones."""
+    encoder_ticks, gap, velocity = last
+    if params.ideal == 1:
+        gap, velocity = motion.gap_m, motion.speed_rev_s * motion.jacobian_m_rev
+        if params.bias.force_n != 0.0:
+            gap += params.bias.travel_share * min(gap - params.bias.from_m, 0.0)
+        return encoder_ticks, gap, velocity
+    moved = 0.0
+    ticks = float(math.floor(motion.revolutions * ENCODER_TICKS))
+    if ticks != encoder_ticks:
+        # Over one encoder tick the linkage is linear to a tenth of a picometre.
+        moved = -gap
+        gap = motion.gap_m - motion.jacobian_m_rev * (motion.revolutions - ticks / ENCODER_TICKS)
+        moved += gap
+    velocity += dt_s / (VELOCITY_FILTER_S + dt_s) * (moved / dt_s - velocity)
+    return ticks, gap, velocity
+
+
+def moved_sensor(state: SensorState, shown: tuple[float, float, float]) -> SensorState:
+    """Return the state of the sensors after `sense_motion` has given these values, and no cell image was taken."""
+    encoder_ticks, gap, velocity = shown
+    _, _, _, count, image_t, forces, pending = state
+    return SensorState(encoder_ticks, gap, velocity, count, image_t, forces, pending)
+
+
+def image_due_s(params: SensorParams, state: SensorState) -> float:
+    """Return the time from which on the next image is taken; that of an ideal sensor, which takes none, is inf."""
+    if params.ideal == 1:
+        return math.inf
+    return params.clock.phase_s + state.images * params.clock.period_s - CLOCK_TOLERANCE_S
+
+
+def next_image_s(params: SensorParams, state: SensorState) -> float:
+    """Return the time at which an image is taken next, or at which the one that was taken arrives."""
+    due_s = image_due_s(params, state)
+    return due_s + params.clock.delay_s if state.pending.waiting == 1 else due_s
 
 
 def image_forces(left: CellColumn, right: CellColumn, pads: PadBuffers) -> PadForces:

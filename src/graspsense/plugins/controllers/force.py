@@ -10,7 +10,17 @@ from typing import Literal, NamedTuple
 
 from attrs import frozen
 
-from graspsense.plugin_api import APPROACH, EFFORT, Command, Controller, Frame, Reading, setting
+from graspsense.plugin_api import (
+    APPROACH,
+    EFFORT,
+    Command,
+    Controller,
+    Frame,
+    FreeLimits,
+    FreeMotion,
+    Reading,
+    setting,
+)
 from graspsense.plugins.controllers.supervision import (
     EVENTS,
     LAW_CHANNELS,
@@ -18,6 +28,7 @@ from graspsense.plugins.controllers.supervision import (
     Supervision,
     SupervisionConfig,
     events_of,
+    free_limits,
     not_begun,
     supervise,
     supervision,
@@ -132,6 +143,25 @@ def step(params: ForceParams, state: ForceState, reading: Reading) -> tuple[Comm
     )
 
 
+def free_begin(params: ForceParams, state: ForceState, frame: Frame) -> tuple[float, FreeLimits]:
+    """Begin free motion, whose effort is constant: its memory is unused."""
+    return 0.0, free_limits(params.supervision, state.progress)
+
+
+def free_command(
+    params: ForceParams, memory: float, gap_m: float, velocity_m_s: float, dt_s: float
+) -> tuple[float, float]:
+    """Return the effort of a tick of free motion."""
+    return params.loop.probing_force_n, memory
+
+
+def free_end(
+    params: ForceParams, state: ForceState, memory: float, effort_n: float, t_s: float
+) -> ForceState:
+    """Return the state after free motion."""
+    return ForceState(state.phase, state.outcome, state.progress, effort_n, 0)
+
+
 class ForceController(Controller[ForceConfig]):
     """Closes with a constant effort, or squeezes to a given force."""
 
@@ -139,6 +169,7 @@ class ForceController(Controller[ForceConfig]):
     commands = ("effort",)
     step = staticmethod(step)
     events = EVENTS
+    free_motion = FreeMotion(free_begin, free_command, free_end)
 
     def params(self) -> ForceParams:
         """Return the parameters of the law."""

@@ -11,7 +11,19 @@ from typing import NamedTuple
 
 from attrs import frozen
 
-from graspsense.plugin_api import APPROACH, VELOCITY, Command, Controller, Reading, setting
+from graspsense.plugin_api import (
+    APPROACH,
+    EFFORT,
+    NOT_FREE,
+    VELOCITY,
+    Command,
+    Controller,
+    Frame,
+    FreeLimits,
+    FreeMotion,
+    Reading,
+    setting,
+)
 from graspsense.plugins.controllers.force import (
     ForceLoop,
     ForceLoopConfig,
@@ -26,6 +38,7 @@ from graspsense.plugins.controllers.supervision import (
     Supervision,
     SupervisionConfig,
     events_of,
+    free_limits,
     not_begun,
     supervise,
     supervision,
@@ -84,7 +97,7 @@ def step(params: HybridParams, state: HybridState, reading: Reading) -> tuple[Co
     progress = supervise(params.supervision, state.progress, frame)
     _, _, _, integral, force_effort, approach_effort, contact_t, _ = state
     if progress.phase == APPROACH:
-        effort, integral = closing_effort(params.velocity, integral, frame)
+        effort, integral = closing_effort(params.velocity, integral, frame.velocity_m_s, frame.dt_s)
         approach_effort = effort
         contact_t = frame.t_s
     else:
@@ -110,6 +123,27 @@ def step(params: HybridParams, state: HybridState, reading: Reading) -> tuple[Co
     )
 
 
+def free_begin(params: HybridParams, state: HybridState, frame: Frame) -> tuple[float, FreeLimits]:
+    """Begin free motion: its memory is the integral of the velocity loop."""
+    limits = free_limits(params.supervision, state.progress) if params.kind == EFFORT else NOT_FREE
+    return state.integral_n, limits
+
+
+def free_command(
+    params: HybridParams, integral_n: float, gap_m: float, velocity_m_s: float, dt_s: float
+) -> tuple[float, float]:
+    """Return the effort and the integral of a tick of free motion."""
+    return closing_effort(params.velocity, integral_n, velocity_m_s, dt_s)
+
+
+def free_end(
+    params: HybridParams, state: HybridState, integral_n: float, effort_n: float, t_s: float
+) -> HybridState:
+    """Return the state after free motion."""
+    phase, outcome, progress, _, force_effort, _, _, _ = state
+    return HybridState(phase, outcome, progress, integral_n, force_effort, effort_n, t_s, 0)
+
+
 class HybridController(Controller[HybridConfig]):
     """The controller of the paper, and the default."""
 
@@ -118,6 +152,7 @@ class HybridController(Controller[HybridConfig]):
     alternatives = ("velocity",)
     step = staticmethod(step)
     events = EVENTS
+    free_motion = FreeMotion(free_begin, free_command, free_end)
 
     def params(self) -> HybridParams:
         """Return the parameters of the law."""

@@ -18,6 +18,7 @@ from graspsense.plugin_api import (
     CRUSHED,
     HOLD,
     NEVER_STEADY,
+    NOT_FREE,
     NOTHING_THERE,
     ONE_FINGER,
     REST_SPEED_M_S,
@@ -30,6 +31,7 @@ from graspsense.plugin_api import (
     TOO_WIDE,
     Channel,
     Frame,
+    FreeLimits,
     RestState,
     at_rest,
     both_touch,
@@ -221,6 +223,13 @@ def supervise(params: Supervision, now: GraspProgress, frame: Frame) -> GraspPro
     if now.phase == APPROACH:
         return _approaching(params, now, frame)
     return _squeezing(params, now, frame)
+
+
+def free_limits(params: Supervision, now: GraspProgress) -> FreeLimits:
+    """Return until when `supervise` returns the same progress, if no force changes (see `FreeMotion`)."""
+    if now.phase == APPROACH and now.outcome == RUNNING and now.begun == 1:
+        return FreeLimits(params.closed_gap_m, now.deadline_s)
+    return NOT_FREE
 
 
 def _approaching(params: Supervision, now: GraspProgress, frame: Frame) -> GraspProgress:

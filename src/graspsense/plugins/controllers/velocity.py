@@ -11,7 +11,18 @@ from typing import Literal, NamedTuple
 
 from attrs import frozen
 
-from graspsense.plugin_api import EFFORT, VELOCITY, Command, Controller, Frame, Reading, setting
+from graspsense.plugin_api import (
+    EFFORT,
+    NOT_FREE,
+    VELOCITY,
+    Command,
+    Controller,
+    Frame,
+    FreeLimits,
+    FreeMotion,
+    Reading,
+    setting,
+)
 from graspsense.plugins.controllers.supervision import (
     EVENTS,
     LAW_CHANNELS,
@@ -19,6 +30,7 @@ from graspsense.plugins.controllers.supervision import (
     Supervision,
     SupervisionConfig,
     events_of,
+    free_limits,
     not_begun,
     supervise,
     supervision,
@@ -91,11 +103,13 @@ def kind_sent(config: VelocityLoopConfig) -> int:
     return VELOCITY if config.sends == "velocity" else EFFORT
 
 
-def closing_effort(loop: VelocityLoop, integral_n: float, frame: Frame) -> tuple[float, float]:
+def closing_effort(
+    loop: VelocityLoop, integral_n: float, velocity_m_s: float, dt_s: float
+) -> tuple[float, float]:
     """Return the effort (N) of the velocity loop, and its integral (N) after this tick."""
     speed, gain, integral_gain, limit, _ = loop
-    error = speed + frame.velocity_m_s
-    integral_n += integral_gain * error * frame.dt_s
+    error = speed + velocity_m_s
+    integral_n += integral_gain * error * dt_s
     if integral_n > limit:
         integral_n = limit
     elif integral_n < -limit:
@@ -126,12 +140,32 @@ def step(params: VelocityParams, state: VelocityState, reading: Reading) -> tupl
     """Close at the given speed against any resistance."""
     frame = reading.frame
     progress = supervise(params.supervision, state.progress, frame)
-    value, integral = closing_effort(params.loop, state.integral_n, frame)
+    value, integral = closing_effort(params.loop, state.integral_n, frame.velocity_m_s, frame.dt_s)
     if params.kind == VELOCITY:
         value = -params.loop.closing_speed_m_s
     return Command(params.kind, value, inf, inf), VelocityState(
         progress.phase, progress.outcome, progress, integral, events_of(state.progress, progress)
     )
+
+
+def free_begin(params: VelocityParams, state: VelocityState, frame: Frame) -> tuple[float, FreeLimits]:
+    """Begin free motion: its memory is the integral."""
+    limits = free_limits(params.supervision, state.progress) if params.kind == EFFORT else NOT_FREE
+    return state.integral_n, limits
+
+
+def free_command(
+    params: VelocityParams, integral_n: float, gap_m: float, velocity_m_s: float, dt_s: float
+) -> tuple[float, float]:
+    """Return the effort and the integral of a tick of free motion."""
+    return closing_effort(params.loop, integral_n, velocity_m_s, dt_s)
+
+
+def free_end(
+    params: VelocityParams, state: VelocityState, integral_n: float, effort_n: float, t_s: float
+) -> VelocityState:
+    """Return the state after free motion."""
+    return VelocityState(state.phase, state.outcome, state.progress, integral_n, 0)
 
 
 class VelocityController(Controller[VelocityConfig]):
@@ -142,6 +176,7 @@ class VelocityController(Controller[VelocityConfig]):
     alternatives = ("velocity",)
     step = staticmethod(step)
     events = EVENTS
+    free_motion = FreeMotion(free_begin, free_command, free_end)
 
     def params(self) -> VelocityParams:
         """Return the parameters of the law."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
-from graspsense.plugin_api import Frame, bind, events_of, maker, tick
+from graspsense.plugin_api import Frame, bind, events_of, free_parts, maker, tick
 from graspsense_sim_gripper.binding import Constructors, bind_reachable
 from graspsense_sim_gripper.dynamics.contact import (
     BalanceSearch,
@@ -24,11 +24,12 @@ from graspsense_sim_gripper.dynamics.contact import (
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
 from graspsense_sim_gripper.exact.propagate import bind_move
-from graspsense_sim_gripper.loop import SimulationState, grasp
+from graspsense_sim_gripper.loop import FreeProgress, GraspParams, SimulationState, free_ticks, grasp
 from graspsense_sim_gripper.palm import keep_samples, palm_signals
 from graspsense_sim_gripper.problem import ControllerStep
 from graspsense_sim_gripper.sensing import SensorState
 from graspsense_sim_gripper.stepping.advance import advance, move
+from graspsense_sim_gripper.stepping.coast import can_glide, glide
 from graspsense_sim_gripper.stepping.converge import refine_until_converged
 from graspsense_sim_gripper.stepping.implicit import SpeedSearch
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start
@@ -305,7 +306,7 @@ def grasp_loop(
 ) -> Callable[..., SimulationState]:
     """Return the loop of a grasp for a controller with this step; `interpreted` False: in the form that is compiled."""
     force = sum_of_active(active_laws(composition.kinds)) if interpreted else None
-    return _loop_of(composed_move(composition, interpreted=False), step, force, composition.has_palm)
+    return _loop_of(composed_move(composition, interpreted=False), step, force, composition)
 
 
 @lru_cache(maxsize=64)
@@ -313,16 +314,36 @@ def guarded_loop(composition: Composition, step: ControllerStep) -> Callable[...
     """Return the loop of a grasp by steps in the interpreter, in which a law that raises an exception gives NaN."""
     laws = [law if isinstance(law, OnSum) else _guarded(law) for law in active_laws(composition.kinds)]
     force = sum_of_active(laws)
-    return _loop_of(_step_move(composition), step, force, composition.has_palm)
+    return _loop_of(_step_move(composition), step, force, composition)
+
+
+@lru_cache(maxsize=64)
+def free_motion(
+    composition: Composition, step: ControllerStep
+) -> Callable[[GraspParams, FreeProgress, Frame, Any, Any], FreeProgress] | None:
+    """Return `loop.free_ticks` for the interpreter; None where every tick needs the controller and all sensors."""
+    parts = _free_parts(composition, step)
+    if "free_begin" not in parts or "glide" not in parts:
+        return None
+    return bind_reachable(free_ticks, parts, INTERPRETED)
+
+
+def _free_parts(composition: Composition, step: ControllerStep) -> dict[str, Any]:
+    """Return the parts of `loop.free_ticks`. The plant has none where `move` does more in a tick than `glide`."""
+    parts = free_parts(step)
+    by_steps = composition.shape is None and not composition.converges and not composition.lags
+    if by_steps and not composition.has_palm:
+        parts |= {"can_glide": can_glide, "glide": glide}
+    return parts
 
 
 def _loop_of(
-    move: PlantMove, step: ControllerStep, force: Law | None, has_palm: bool
+    move: PlantMove, step: ControllerStep, force: Law | None, composition: Composition
 ) -> Callable[..., SimulationState]:
     """Return the loop with this plant; `force`: of the object, in the form that suits the interpreter."""
     control = bind_reachable(tick, {"step": step, "events_told": events_of(step)})
-    parts: dict[str, Any] = {"move": move, "control": control}
-    if has_palm:
+    parts: dict[str, Any] = {"move": move, "control": control, **_free_parts(composition, step)}
+    if composition.has_palm:
         parts |= {"further_signals": palm_signals, "keep_signals": keep_samples}
     loop = bind_reachable(grasp, parts)
     return bind_reachable(loop, {"object_force": force}, INTERPRETED) if force else loop

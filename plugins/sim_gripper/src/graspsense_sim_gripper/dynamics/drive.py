@@ -19,7 +19,7 @@ import math
 from typing import Final, NamedTuple
 
 from graspsense.plugin_api import ScrewLinkage
-from graspsense_sim_gripper.dynamics.state import Contact, PlantState
+from graspsense_sim_gripper.dynamics.state import Contact, Motion
 
 STRIBECK_SPEEDS: Final = 4.5
 """Multiple of the Stribeck speed beyond which the excess is below 2e-9 of its maximum and counts as zero."""
@@ -58,9 +58,10 @@ def stribeck_excess(friction: Friction, velocity_m_s: float) -> tuple[float, flo
 
     The excess is in N, its first derivative with respect to the speed in N s/m, the second in N s2/m2.
     """
-    excess = friction.breakaway_n - friction.coulomb_n
+    coulomb_n, breakaway_n, stribeck_m_s, _, _ = friction
+    excess = breakaway_n - coulomb_n
     if excess > 0.0:
-        per_speed = 1.0 / friction.stribeck_m_s
+        per_speed = 1.0 / stribeck_m_s
         x = velocity_m_s * per_speed
         if -STRIBECK_SPEEDS < x < STRIBECK_SPEEDS:
             excess *= math.exp(-x * x)
@@ -110,12 +111,12 @@ def load_at_rest(contact: Contact, effort_n: float) -> float:
     return load
 
 
-def is_held(drive: Drive, state: PlantState, effort_n: float) -> bool:
+def is_held(drive: Drive, motion: Motion, contact: Contact, effort_n: float) -> bool:
     """Return whether a drive at rest stays at rest, held by friction or by an end of its travel."""
-    load = load_at_rest(state.contact, effort_n)
+    load = load_at_rest(contact, effort_n)
     net = load - effort_n
     return (
         abs(net) <= breakaway_friction(drive.friction, load)
-        or (net > 0.0 and state.motion.revolutions >= drive.open_rev)
-        or (net < 0.0 and state.motion.revolutions <= drive.closed_rev)
+        or (net > 0.0 and motion.revolutions >= drive.open_rev)
+        or (net < 0.0 and motion.revolutions <= drive.closed_rev)
     )

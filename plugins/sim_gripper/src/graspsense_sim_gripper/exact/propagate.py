@@ -123,9 +123,9 @@ def cold_calls(function: Callable[..., Any]) -> tuple[str, ...]:
     The compiler should not inline them, so that the registers remain for the frequent path.
     """
     code = function.__code__
-    if code is move.__code__:
+    if code == move.__code__:
         return ("step_move",)
-    return ("locate_events",) if code is propagate.__code__ else ()
+    return ("locate_events",) if code == propagate.__code__ else ()
 
 
 def workspace_size(shape: Shape) -> int:

@@ -16,6 +16,7 @@ from graspsense_sim_gripper.stepping.control import (
     MIN_STEP_S,
     accept,
     after_contact,
+    fits_a_step,
     next_length,
     relative_error,
 )
@@ -70,7 +71,7 @@ def advance(params: PlantParams, state: PlantState, effort_n: float, dt: float) 
     if state.motion.speed_rev_s == 0.0:
         if rests(params.drive, state, effort_n):
             return state
-    elif params.steps.longest_s >= dt <= state.step.next_s:
+    elif fits_a_step(params.steps, state.step, dt):
         coasts, after = coast(params, state, effort_n, dt)
         if coasts:
             return after
@@ -100,7 +101,7 @@ def take_step(
     """
     drive, _, steps = params
     contact, step = state.contact, state.step
-    if state.motion.speed_rev_s == 0.0 and is_held(drive, state, effort_n):
+    if state.motion.speed_rev_s == 0.0 and is_held(drive, state.motion, contact, effort_n):
         if contact.touched == 0:
             return state, left_s
         return stick(
@@ -144,7 +145,7 @@ def _after_event(attempt: Attempt) -> Attempt:
 
 def rests(drive: Drive, state: PlantState, effort_n: float) -> bool:
     """Return whether fingers at rest remain so, with nothing that relaxes between them."""
-    return state.contact.touched == 0 and is_held(drive, state, effort_n)
+    return state.contact.touched == 0 and is_held(drive, state.motion, state.contact, effort_n)
 
 
 def _standing(start: Start) -> Attempt:

@@ -12,8 +12,9 @@ from typing import Final
 
 from graspsense.plugin_api import gap_and_rate
 from graspsense_sim_gripper.dynamics.contact import ObjectModel
-from graspsense_sim_gripper.dynamics.drive import ARREST_M_S, stribeck_excess
+from graspsense_sim_gripper.dynamics.drive import ARREST_M_S, is_held, stribeck_excess
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState
+from graspsense_sim_gripper.stepping.control import fits_a_step
 from graspsense_sim_gripper.stepping.scheme import SPEED_SCALE_M_S, PlantParams
 
 SHAPE_SCALE_M: Final = 1e-3
@@ -22,25 +23,48 @@ SHAPE_SCALE_M: Final = 1e-3
 
 def coast(params: PlantParams, state: PlantState, effort_n: float, h: float) -> tuple[bool, PlantState]:
     """Return whether a tick of `h` is of this kind, and the plant after it."""
-    motion, contact, step, given, peak = state
-    reach, pending = params.object.width_m + 2.0 * abs(contact.offset_m), contact.pending_s
-    if contact.touched == 1:
+    coasts, motion, contact = glide(params, state.motion, state.contact, effort_n, h)
+    return coasts, glided(state, motion, contact, 1) if coasts else state
+
+
+def can_glide(params: PlantParams, state: PlantState, dt: float) -> bool:
+    """Return whether `glide` may advance this plant in ticks of `dt`, as long as it can."""
+    left, right = state.contact.left, state.contact.right
+    return fits_a_step(params.steps, state.step, dt) and left.force_n == 0.0 and right.force_n == 0.0
+
+
+def glide(
+    params: PlantParams, motion: Motion, contact: Contact, effort_n: float, h: float
+) -> tuple[bool, Motion, Contact]:
+    """Return whether a tick of `h` is of this kind, or the fingers rest in it; and motion and contact after it.
+
+    The forces on the pads do not change.
+    """
+    if motion.speed_rev_s == 0.0:
+        return contact.touched == 0 and is_held(params.drive, motion, contact, effort_n), motion, contact
+    left_n, right_n, offset, touched, left, right, pending, unbalanced = contact
+    reach = params.object.width_m + 2.0 * abs(offset)
+    if touched == 1:
         coasts, reach, pending = _free_until(params, contact, motion, h)
         if not coasts:
-            return False, state
-    load = 0.5 * (contact.left_n + contact.right_n)
+            return False, motion, contact
+    load = 0.5 * (left_n + right_n)
     coasts, motion1 = _coasted(params, motion, load, effort_n, h)
     if not coasts or motion1.gap_m <= reach:
-        return False, state
-    if contact.touched == 1:
-        left_n, right_n, offset, touched, left, right, _, unbalanced = contact
+        return False, motion, contact
+    if touched == 1:
         if load > 0.0:
             # The finger pushes the object towards the middle.
             pushed = 0.5 * (motion1.gap_m - reach)
             offset = pushed if offset >= 0.0 else -pushed
         contact = Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
-    next_s, n, unresolved = step
-    return True, PlantState(motion1, contact, StepState(next_s, n + 1, unresolved), given, peak)
+    return True, motion1, contact
+
+
+def glided(state: PlantState, motion: Motion, contact: Contact, n_steps: int) -> PlantState:
+    """Return the plant after `glide` has given this motion and contact, in so many steps."""
+    _, _, (next_s, n, unresolved), given, peak = state
+    return PlantState(motion, contact, StepState(next_s, n + n_steps, unresolved), given, peak)
 
 
 def _free_until(params: PlantParams, contact: Contact, motion: Motion, h: float) -> tuple[bool, float, float]:
@@ -70,36 +94,39 @@ def _coasted(
     params: PlantParams, motion: Motion, load_n: float, effort_n: float, h: float
 ) -> tuple[bool, Motion]:
     """Return whether the motion over `h` has no event of the drive and little error, and the motion after it."""
-    drive, friction = params.drive, params.drive.friction
+    # Fields by name would take the interpreter a third of the time of this function.
+    (link, inertia, friction, closed_rev, open_rev, _), _, steps = params
+    coulomb_n, _, _, load_coefficient, damping = friction
     revolutions, speed, _, jacobian = motion
     direction = 1.0 if speed > 0.0 else -1.0
     velocity = speed * jacobian
     excess, slope, curvature = stribeck_excess(friction, velocity)
-    friction_n = friction.coulomb_n + friction.load_friction_coefficient * load_n + excess
+    friction_n = coulomb_n + load_coefficient * load_n + excess
     net = load_n - effort_n - direction * friction_n
-    net -= friction.damping_n_s_m * velocity
-    per_inertia = 1.0 / drive.inertia
+    net -= damping * velocity
+    per_inertia = 1.0 / inertia
     rate = jacobian * per_inertia * net
+    gained = h * rate
     # The linkage where the motion would end at constant speed; the rest of the path is linear.
-    gap1, jacobian1 = gap_and_rate(drive.link, revolutions + h * speed)
+    gap1, jacobian1 = gap_and_rate(link, revolutions + h * speed)
     bend = jacobian1 - jacobian
-    resistance = direction * slope + friction.damping_n_s_m
-    change = per_inertia * (
-        bend * (net - resistance * velocity) - jacobian * jacobian * resistance * (h * rate)
-    )
-    # Where friction has its maximum its slope is zero, and yet it changes.
-    gained = h * rate * jacobian
-    second_order = abs(jacobian) * per_inertia * 0.5 * abs(curvature) * gained * gained
-    gain = 0.5 * h * rate
+    resistance = direction * slope + damping
+    change = per_inertia * (bend * (net - resistance * velocity) - jacobian * jacobian * resistance * gained)
+    error = abs(change)
+    if curvature != 0.0:
+        # Where friction has its maximum its slope is zero, and yet it changes.
+        gained_m_s = gained * jacobian
+        error += abs(jacobian) * per_inertia * 0.5 * abs(curvature) * gained_m_s * gained_m_s
+    gain = 0.5 * gained
     speed1 = speed + h * (rate + 0.5 * change)
-    if (speed + h * rate) * direction <= 0.0 or abs(velocity) < ARREST_M_S:
+    if (speed + gained) * direction <= 0.0 or abs(velocity) < ARREST_M_S:
         return False, motion
     revolutions1 = revolutions + h * (speed + gain)
     gap1 += h * gain * jacobian1
     jacobian1 += bend / speed * gain
     coasts = (
         speed1 * direction > 0.0
-        and drive.closed_rev < revolutions1 < drive.open_rev
-        and h * abs(jacobian) * (abs(change) + second_order) <= params.steps.tolerance * SPEED_SCALE_M_S
+        and closed_rev < revolutions1 < open_rev
+        and h * abs(jacobian) * error <= steps.tolerance * SPEED_SCALE_M_S
     )
     return coasts, Motion(revolutions1, speed1, gap1, jacobian1)

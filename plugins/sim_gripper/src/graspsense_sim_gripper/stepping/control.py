@@ -63,6 +63,11 @@ def next_length(
     return h, forced
 
 
+def fits_a_step(steps: Steps, step: StepState, dt: float) -> bool:
+    """Return whether a whole tick of `dt` is no longer than the next step may be, where nothing is compressed."""
+    return steps.longest_s >= dt <= step.next_s
+
+
 def relative_error(steps: Steps, start: Start, attempt: Attempt) -> float:
     """Return the error of a step relative to the tolerance, 0 if no error is estimated."""
     if attempt.speed_error_m_s + attempt.force_error_n <= 0.0:

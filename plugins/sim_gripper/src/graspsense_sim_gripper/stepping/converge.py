@@ -7,7 +7,7 @@ from typing import Final
 from graspsense_sim_gripper.dynamics.state import PlantState, StepState
 from graspsense_sim_gripper.stepping.advance import rests, take_steps
 from graspsense_sim_gripper.stepping.coast import SHAPE_SCALE_M, coast
-from graspsense_sim_gripper.stepping.control import MAX_STEPS
+from graspsense_sim_gripper.stepping.control import MAX_STEPS, fits_a_step
 from graspsense_sim_gripper.stepping.scheme import FORCE_SCALE_N, SPEED_SCALE_M_S, PlantParams, Steps
 
 MAX_HALVINGS: Final = 4
@@ -30,7 +30,7 @@ def refine_until_converged(params: PlantParams, state: PlantState, effort_n: flo
     if state.motion.speed_rev_s == 0.0:
         if rests(drive, state, effort_n):
             return state
-    elif steps.settle <= 0.0 and steps.longest_s >= dt <= state.step.next_s:
+    elif steps.settle <= 0.0 and fits_a_step(steps, state.step, dt):
         coasts, after = coast(params, state, effort_n, dt)
         if coasts:
             return after

@@ -1,0 +1,116 @@
+"""Free motion: ticks that are run at once give what every tick by itself gives, to the bit."""
+
+import numpy as np
+import pytest
+from attrs import fields
+
+from graspsense.core.run_config import RunConfig
+from graspsense.core.runner import run_grasp
+from graspsense.plugin_api import Controller, Trace, create
+from graspsense_sim_gripper.backend import SimBackend
+from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.library import catalogue
+
+CONTROLLERS = ("hybrid", "velocity", "force")
+COLUMNS = [f.name for f in fields(Trace) if f.name not in ("units", "signals", "events")]
+
+
+class CountingBackend(SimBackend):
+    """A simulated gripper that counts the readings that the runner asks for."""
+
+    reads = 0
+
+    def read(self, timeout_s):
+        self.reads += 1
+        return super().read(timeout_s)
+
+
+class Sink:
+    """Keeps the times of the ticks that it is shown."""
+
+    def __init__(self):
+        self.times = []
+
+    def take(self, reading, phase, command):
+        self.times.append((reading.frame.t_s, phase, command.value))
+
+
+def stepped(law):
+    """Return the same controller without its law of free motion."""
+
+    class Stepped(type(law)):
+        free_motion = None
+
+    return Stepped(law.config)
+
+
+def assert_identical(one, other):
+    assert one.outcome == other.outcome
+    assert one.trace.events == other.trace.events
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(one.trace, name), getattr(other.trace, name), err_msg=name)
+
+
+@pytest.mark.parametrize("sensor", ["ideal", "pads"])
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_a_grasp_with_free_motion_is_the_grasp_tick_by_tick(controller, sensor):
+    law = create("controller", controller)
+    fast, slow = (CountingBackend(SimConfig(object="can:empty_open", sensor=sensor)) for _ in range(2))
+    shown = Sink()
+    leapt = run_grasp(fast, law, RunConfig(seed=3), sinks=[shown])
+    every = run_grasp(slow, stepped(law), RunConfig(seed=3))
+    assert_identical(leapt, every)
+    assert fast.report() == slow.report()
+    trace = leapt.trace
+    assert shown.times == list(zip(trace.t_s, trace.phase, trace.command, strict=True))
+    assert slow.reads >= len(trace.t_s)
+    # Nearly everything but squeeze and hold is free motion.
+    held = int(np.isin(trace.phase, (3, 4)).sum())
+    assert fast.reads - held < 0.25 * (slow.reads - held)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("sensor", ["ideal", "pads"])
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_free_motion_changes_no_bit_of_the_catalogue(controller, sensor, compiled):
+    if compiled:
+        pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+    law, names, config = create("controller", controller), sorted(catalogue()), SimConfig(sensor=sensor)
+    seeds = range(len(names))
+    every = run_many(config, stepped(law), names, seeds, compiled=compiled)
+    for workers in (1, 2):
+        for leapt, tick_by_tick in zip(
+            run_many(config, law, names, seeds, compiled=compiled, workers=workers), every, strict=True
+        ):
+            assert_identical(leapt, tick_by_tick)
+            assert leapt.state == tick_by_tick.state
+
+
+@pytest.mark.parametrize(
+    "settings", [{"drive_lag_s": 0.01}, {"acceleration": True}, {"explain": True}, {"object": "none"}]
+)
+def test_settings_under_which_motion_is_not_free_give_the_same_too(settings):
+    law = create("controller", "hybrid", closing_speed_m_s=0.03)
+    config = SimConfig(**{"object": "block", "sensor": "ideal", **settings})
+    grasps = [run_grasp(SimBackend(config), one, RunConfig(seed=1)) for one in (law, stepped(law))]
+    assert_identical(*grasps)
+
+
+def test_a_subclass_with_another_step_does_not_inherit_the_law_of_free_motion():
+    hybrid = type(create("controller", "hybrid"))
+
+    def gentler(params, state, reading):
+        command, state = hybrid.step(params, state, reading)
+        return command._replace(value=0.9 * command.value), state
+
+    class Gentler(hybrid):
+        step = staticmethod(gentler)
+
+    law = Gentler(create("controller", "hybrid").config)
+    assert getattr(Gentler.step, "free_motion", None) is None
+    backend = CountingBackend(SimConfig(object="block", sensor="ideal"))
+    grasp = run_grasp(backend, law, RunConfig(seed=1))
+    assert backend.reads >= len(grasp.trace.t_s)
+    assert isinstance(law, Controller)
