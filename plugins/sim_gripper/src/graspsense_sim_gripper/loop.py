@@ -164,9 +164,7 @@ keep_signals: Callable[[Any, Any, int], None] = _keep_nothing
 """What records them: `palm.keep_samples` of a gripper with an accelerometer."""
 move: Callable[[PlantModel, PlantState, float, float], PlantState] = _move_unbound
 control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = _control_unbound
-glide: Callable[[PlantModel, Motion, Contact, float, float, float], tuple[bool, Motion, float]] = (
-    _never_glides
-)
+glide: Callable[[PlantModel, Motion, Contact, float, float], tuple[bool, Motion, Contact]] = _never_glides
 """`stepping.coast.glide`, where it does what `move` does in a tick of free motion."""
 can_glide: Callable[[PlantModel, PlantState, float], bool] = _cannot_glide
 """`stepping.coast.can_glide`, likewise."""
