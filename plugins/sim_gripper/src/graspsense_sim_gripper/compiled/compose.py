@@ -322,19 +322,11 @@ def free_motion(
     composition: Composition, step: ControllerStep
 ) -> Callable[[GraspParams, FreeProgress, Frame, Any, Any], FreeProgress] | None:
     """Return `loop.free_ticks` for the interpreter; None where every tick needs the controller and all sensors."""
-    parts = _free_parts(composition, step)
-    if "free_begin" not in parts or "glide" not in parts:
-        return None
-    return bind_reachable(free_ticks, parts, INTERPRETED)
-
-
-def _free_parts(composition: Composition, step: ControllerStep) -> dict[str, Any]:
-    """Return the parts of `loop.free_ticks`. The plant has none where `move` does more in a tick than `glide`."""
     parts = free_parts(step)
     by_steps = composition.shape is None and not composition.converges and not composition.lags
-    if by_steps and not composition.has_palm:
-        parts |= {"can_glide": can_glide, "glide": glide}
-    return parts
+    if not parts or not by_steps or composition.has_palm:
+        return None
+    return bind_reachable(free_ticks, {**parts, "can_glide": can_glide, "glide": glide}, INTERPRETED)
 
 
 def _loop_of(
@@ -342,7 +334,10 @@ def _loop_of(
 ) -> Callable[..., SimulationState]:
     """Return the loop with this plant; `force`: of the object, in the form that suits the interpreter."""
     control = bind_reachable(tick, {"step": step, "events_told": events_of(step)})
-    parts: dict[str, Any] = {"move": move, "control": control, **_free_parts(composition, step)}
+    parts: dict[str, Any] = {"move": move, "control": control}
+    leap = free_motion(composition, step) if force else None
+    if leap is not None:
+        parts["leap"] = leap
     if composition.has_palm:
         parts |= {"further_signals": palm_signals, "keep_signals": keep_samples}
     loop = bind_reachable(grasp, parts)
