@@ -14,7 +14,7 @@ from graspsense_sim_gripper.identify.fit import fit
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import prepared
-from graspsense_sim_gripper.identify.refuse import shows_memory
+from graspsense_sim_gripper.identify.refuse import _ruptures, shows_memory
 from graspsense_sim_gripper.objects.spec import parse_scene
 
 PADS = PadCompliance(15000.0, 0.0, 0.0, 1.0)
@@ -90,6 +90,16 @@ def test_a_ramp_at_one_speed_shows_no_memory_and_a_hold_does():
     assert not shows_memory([ramp, ramp])
     assert shows_memory([ramp, faster])
     assert shows_memory([held])
+
+
+def test_an_object_that_broke_is_told_with_the_force_at_which_it_did():
+    whole = prepared(recorded(), 0.0)
+    broken = prepared(recorded(lambda closure: np.where(closure < 0.006, 1000.0, 200.0) * closure), 0.0)
+    (told,) = _ruptures([whole, broken])
+    assert told.what == "fracture"
+    assert "1 squeezes drops at 6" in told.reason.replace("5.9", "6")
+    assert "force_n" in told.remedy
+    assert not _ruptures([whole])
 
 
 @pytest.mark.slow

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
+import numpy as np
+
 from graspsense.plugin_api import Undetermined
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.laws import NOT_TRIED
@@ -20,6 +22,9 @@ WIDE: Final = 4.0
 """A parameter whose interval spans this factor is not determined."""
 HOLD_TIMES: Final = 5.0
 """A hold of this many relaxation times determines one."""
+
+RUPTURE_SHARE: Final = 0.25
+"""A fall of the force by this share of the peak between two samples is a rupture."""
 
 _REMEDIES: Final = {
     "k3_n_m3": "squeeze deeper",
@@ -46,6 +51,7 @@ def undetermined(
     """Return what these squeezes leave open. `shares`: those of each squeeze, `cells`: whether cells measured them."""
     open_ = _memory(fitted, squeezes) if not shows_memory(squeezes) else []
     open_ += _parameters(fitted, found, squeezes)
+    open_ += _ruptures(squeezes)
     open_ += _spreads(found, squeezes)
     if cells and not any(math.isfinite(share) for share in shares):
         open_.append(
@@ -71,6 +77,28 @@ def undetermined(
         )
     )
     return open_
+
+
+def _ruptures(squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+    """Return the fracture of the objects that broke during the compression, with the forces at which they did."""
+    forces = []
+    for squeeze in squeezes:
+        gap = squeeze.gap_m[squeeze.sample]
+        loading = slice(0, int(np.argmin(gap)) + 1)
+        drops = -np.diff(squeeze.force_n[loading])
+        if len(drops) and float(np.max(drops)) > RUPTURE_SHARE * squeeze.peak_n:
+            forces.append(float(squeeze.force_n[loading][int(np.argmax(drops))]))
+    if not forces:
+        return []
+    return [
+        Undetermined(
+            what="fracture",
+            reason=f"the force of {len(forces)} squeezes drops at {min(forces):.3g} to {max(forces):.3g} N while the "
+            "fingers close, and a fracture is not fitted",
+            remedy='cut the recordings there (cut = "rupture" in a manifest), and write the term fracture by hand '
+            f"with force_n = {float(np.mean(forces)):.3g}",
+        )
+    ]
 
 
 def _memory(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
