@@ -134,7 +134,7 @@ def has_true_terms(result: Identification, terms: Sequence[Mapping[str, Any]]) -
     return names == set(true_values(terms, result.scene))
 
 
-def measured(name: str, sensor: str, count: int, repeats: int, first: int = 0) -> Row:
+def measured(name: str, sensor: str, count: int, repeats: int) -> Row:
     """Return the row of a scene."""
     terms = SCENES[name]
     text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0)
@@ -142,7 +142,9 @@ def measured(name: str, sensor: str, count: int, repeats: int, first: int = 0) -
     errors: list[float] = []
     seconds: list[float] = []
     for k in range(repeats):
-        seeds = [1000 * (first + k) + i for i in range(count)]
+        # Other objects in every row: the number of an object fixes its stiffness, whatever its terms.
+        series = 1000 * list(SCENES).index(name) + 10 * count + (sensor == "pads")
+        seeds = [1_000_000 * (series + 1) + 1000 * k + i for i in range(count)]
         result = identify(SimConfig(), squeezes_of(text, name, sensor, seeds), lambda *_: None)
         seconds.append(result.seconds)
         if not has_true_terms(result, terms):

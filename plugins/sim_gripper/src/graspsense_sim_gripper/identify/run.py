@@ -44,7 +44,10 @@ UNITS: Final = {
     "n_s_m": "N s/m",
 }
 """The units by the ends of names."""
-OF_FINGERTIPS: Final = ("pad_stiffness_n_m", "pad_damping_n_s_m", "pad_creep_n_m", "pad_creep_s")
+OF_FINGERTIPS: Final = (
+    *("pad_stiffness_n_m", "pad_damping_n_s_m", "pad_creep_n_m", "pad_creep_s"),
+    *("pad_hardening_m", "pad_exponent"),
+)
 """The settings of the gripper with which an object is identified, and has to be simulated."""
 
 
@@ -82,7 +85,7 @@ def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: P
         fitted=choice.fitted,
         parameters=parameters,
         values=values,
-        gripper={name: float(getattr(config, name)) for name in OF_FINGERTIPS},
+        gripper=_fingertips(config),
         squeezes=ready,
         candidates=choice.scores,
         undetermined=open_,
@@ -130,6 +133,12 @@ def _has_cells(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> bool:
 def _share(shares: Sequence[float]) -> float:
     known = [one for one in shares if math.isfinite(one)]
     return min(float(np.median(known)), 1.0) if known else 1.0
+
+
+def _fingertips(config: SimConfig) -> dict[str, float]:
+    """Return the settings of the fingertips that are set."""
+    values = {name: getattr(config, name) for name in OF_FINGERTIPS}
+    return {name: float(value) for name, value in values.items() if value is not None}
 
 
 def _scale_error(config: SimConfig, drive: Drive, squeezes: Sequence[Squeeze]) -> float:
