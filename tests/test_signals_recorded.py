@@ -11,6 +11,7 @@ import pytest
 from attrs import frozen
 
 from graspsense import load_pipeline
+from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.pipeline import grasp_with
 from graspsense.core.plugins import IsolatedPlugins
 from graspsense.core.trace import ImageTrace, SampleTrace
@@ -33,6 +34,7 @@ from graspsense.plugin_api import (
 )
 from graspsense.recording.export_trace import write_csv, write_npz
 from graspsense.recording.reader import read_recorded
+from graspsense.sources.exported_npz import read_exported
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 from graspsense.testing.model_gripper import ModelGripper
@@ -211,6 +213,40 @@ def test_an_export_has_the_signals_as_arrays(recorded, tmp_path):
         assert np.array_equal(exported["signal_acceleration_t_s"], signals["acceleration"].t_s)
         assert np.array_equal(exported["signal_acceleration"], signals["acceleration"].values)
         assert np.array_equal(exported["signal_motor_temperature"], signals["motor_temperature"])
+
+
+def test_an_exported_grasp_comes_back_with_the_same_features_arrays_and_samples(recorded, tmp_path):
+    trial, path, plugins = recorded
+    write_npz(tmp_path / "grasp.npz", read_recorded(path))
+    options = [
+        f"gripper.recording=npz:{tmp_path / 'grasp.npz'}",
+        "features.type=shaking",
+        "classifier.type=none",
+    ]
+    again = grasp_with(
+        load_pipeline(options=["gripper.type=replay", *options], plugins=plugins).settings, plugins
+    )
+    assert again.features.values == trial.features.values
+    before, now = trial.trace, again.trace
+    assert now.gap_m.tobytes() == before.gap_m.tobytes()
+    assert same(before.signals["palm"], now.signals["palm"])
+    assert same(before.signals["motor_temperature"], now.signals["motor_temperature"])
+    # The file does not say which samples were lost, so only their number and the spacing beside them differ.
+    acceleration = now.signals["acceleration"]
+    assert acceleration.values.tobytes() == before.signals["acceleration"].values.tobytes()
+    assert acceleration.t_s == pytest.approx(before.signals["acceleration"].t_s, abs=1e-3)
+    assert acceleration.lost == 0
+
+
+def test_an_npz_file_that_is_not_an_export_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="there is no file"):
+        read_exported(str(tmp_path / "none.npz"))
+    np.savez(tmp_path / "other.npz", t=np.arange(3.0))
+    with pytest.raises(DataDamaged, match=r"imported by a manifest \(docs/import\.md\)"):
+        read_exported(str(tmp_path / "other.npz"))
+    (tmp_path / "text.npz").write_text("t,gap")
+    with pytest.raises(DataDamaged, match="cannot be read as an NPZ file"):
+        read_exported(str(tmp_path / "text.npz"))
 
 
 def test_an_export_as_csv_has_a_line_for_each_sample_with_its_time_and_axes(recorded, tmp_path):

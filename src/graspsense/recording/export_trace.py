@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from graspsense.core.channels import as_json
 from graspsense.core.entries import FastChannel
 from graspsense.core.trace import PAD_COLUMNS, TICK_COLUMNS, ImageTrace
 from graspsense.recording.atomic_file import write_new
@@ -38,10 +40,21 @@ def write_npz(path: Path, grasp: RecordedGrasp) -> None:
     """Write the columns of the trace as arrays with the names of `graspsense.Trace`.
 
     A further channel is `signal_NAME`; the times of an array or a fast channel are `signal_NAME_t_s`. The events of the
-    controller are `event_t_s` and `event_name`, if there are any.
+    controller are `event_t_s` and `event_name`, if there are any. `declared` is a JSON text with the channels, units
+    and rate of the gripper, so that `import npz:FILE` reads the grasp back.
     """
     trace, out = grasp.trace(), io.BytesIO()
     columns = {name: getattr(trace, name) for name in (*TICK_COLUMNS, *PAD_COLUMNS)}
+    columns["dt_s"] = grasp.ticks["dt_s"]
+    recording = grasp.recording()
+    declared = {
+        "device": grasp.device.name,
+        "rate_hz": recording.rate_hz,
+        "units": recording.units,
+        "has_release": recording.has_release,
+        "channels": [as_json(channel) for channel in recording.channels],
+    }
+    columns["declared"] = np.array(json.dumps(declared))
     for name, signal in trace.signals.items():
         if isinstance(signal, np.ndarray):
             columns[f"signal_{name}"] = signal

@@ -50,10 +50,17 @@ def _bag(name: str) -> Recording:
     return read_bag(name)
 
 
+def _exported(name: str) -> Recording:
+    from graspsense.sources.exported_npz import read_exported
+
+    return read_exported(name)
+
+
 KINDS: Final[Mapping[str, Callable[[str], Recording]]] = {
     "csv": _csv,
     "icub": read_recording,
     "mcap": _mcap,
+    "npz": _exported,
     "rosbag": _bag,
     "store": _stored,
 }

@@ -1,0 +1,123 @@
+"""The NPZ file of one grasp that `graspsense export` writes, as a recording: frames, fingertips, further channels.
+
+Images and samples are delivered in the first tick that is not before their time. Which samples were lost is not in such
+a file; the recording itself (.mcap) keeps it.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from graspsense.core.channels import from_json, further, signal_type
+from graspsense.core.entries import Channel, FastChannel, TactileArray
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.signals import Frame, Image, Pads, Reading, Samples, no_pads
+from graspsense.recording.replayable import REPLAY_NOTE, Recording
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Arrays = Mapping[str, NDArray[Any]]
+
+DECLARED: Final = "declared"
+"""The array of one JSON text with the channels, units and rate of the gripper."""
+
+
+def read_exported(name: str) -> Recording:
+    """Return the grasp in an NPZ file of `graspsense export`.
+
+    Raises ConfigError if there is no such file, DataDamaged if it was not written by `graspsense export`.
+    """
+    path = Path(name).expanduser()
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {key: archive[key] for key in archive.files}
+    except FileNotFoundError:
+        raise ConfigError(f"there is no file {path}") from None
+    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
+        raise DataDamaged(f"{path} cannot be read as an NPZ file: {error}") from error
+    try:
+        about = json.loads(str(arrays[DECLARED]))
+        channels = tuple(from_json(one) for one in about["channels"])
+        return Recording(
+            name=f"export {path.name} of {about['device']}",
+            readings=tuple(_readings(arrays, further(channels))),
+            rate_hz=float(about["rate_hz"]),
+            units=dict(about["units"]),
+            notes=(REPLAY_NOTE,),
+            commands=None if np.isnan(arrays["command"]).any() else tuple(arrays["command"].tolist()),
+            has_release=bool(about["has_release"]),
+            channels=channels,
+        )
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise DataDamaged(
+            f"{path} is not a grasp that this version of `graspsense export` wrote ({type(error).__name__}: {error}). "
+            "Arrays of other programs are imported by a manifest (docs/import.md)"
+        ) from error
+
+
+def _readings(arrays: Arrays, channels: tuple[Channel, ...]) -> list[Reading]:
+    times = arrays["t_s"]
+    frames = [
+        Frame(*values[:-1], int(values[-1]))
+        for values in zip(*(arrays[name].tolist() for name in Frame._fields), strict=True)
+    ]
+    n = len(frames)
+    cells = arrays["pad_left"].shape[1]
+    images = [
+        Pads(t_s, k, tuple(left), tuple(right))
+        for k, (t_s, left, right) in enumerate(
+            zip(*(arrays[f"pad_{one}"].tolist() for one in ("t_s", "left", "right")), strict=True), 1
+        )
+    ]
+    pads = _latest(times, arrays["pad_t_s"], images, no_pads(cells))
+    signals: list[Any] = [()] * n
+    if channels:
+        make = signal_type(channels)._make  # type: ignore[attr-defined]
+        series = [_series(times, arrays, channel) for channel in channels]
+        signals = [make(values) for values in zip(*series, strict=True)]
+    return [Reading(*values) for values in zip(frames, pads, signals, strict=True)]
+
+
+def _series(times: NDArray[np.float64], arrays: Arrays, channel: Channel) -> list[Any]:
+    """Return the value of a further channel in each tick."""
+    values = arrays[f"signal_{channel.name}"]
+    if isinstance(channel, TactileArray):
+        at = arrays[f"signal_{channel.name}_t_s"]
+        images = [
+            Image(t_s, k, tuple(cells))
+            for k, (t_s, cells) in enumerate(zip(at.tolist(), values.tolist(), strict=True), 1)
+        ]
+        return _latest(times, at, images, Image(0.0, 0, (float("nan"),) * channel.cells))
+    if isinstance(channel, FastChannel):
+        return _blocks(times, arrays[f"signal_{channel.name}_t_s"], values, channel)
+    return list(values.tolist())
+
+
+def _latest(
+    times: NDArray[np.float64], at: NDArray[np.float64], values: list[Any], nothing: Any
+) -> list[Any]:
+    """Return the last of the values in each tick; `nothing` before the first."""
+    counts = np.searchsorted(at, times, side="right").tolist()
+    return [values[count - 1] if count else nothing for count in counts]
+
+
+def _blocks(
+    times: NDArray[np.float64], at: NDArray[np.float64], values: NDArray[np.float64], channel: FastChannel
+) -> list[Samples]:
+    """Return the samples that are new in each tick, at most as many as the channel declares."""
+    none = (float("nan"),) * len(channel.axes)
+    blocks, done = [], 0
+    for there in np.searchsorted(at, times, side="right").tolist():
+        new = min(there - done, channel.samples)
+        done += new
+        rows = [tuple(row) for row in values[done - new : done].tolist()]
+        t_s = float(at[done - 1]) if done else 0.0
+        blocks.append(Samples(t_s, done, new, (*rows, *[none] * (channel.samples - new))))
+    return blocks
