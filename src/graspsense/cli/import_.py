@@ -136,7 +136,7 @@ class _Chosen:
         from graspsense.sources.noise_thresholds import thresholds_for
 
         controller = self._settings.values.get("controller", {})
-        timeouts = {key: controller[key] for key in TIMEOUTS if key in controller}
+        timeouts: dict[str, float] = {key: controller[key] for key in TIMEOUTS if key in controller}
         found = thresholds_for([one.labelled.recording for one in recordings], timeouts)
         open_keys = {key for key in found.settings if self._settings.origins.get(key) == "default"}
         self.words = found.words if open_keys or not found.settings else "thresholds: those that are given"
