@@ -13,8 +13,8 @@ From the particles it predicts what was not used: Tables IV and V, section III.F
 authors' tree at 23 N. Each explanation of the rise of the rate with the force is on or off with equal prior
 probability, so the posterior odds are its Bayes factor.
 
-The inference is checked by simulation-based calibration: true figures from the prior, data from a quadratic regression
-of the simulations with their scatter, and the same inference.
+Simulation-based calibration: each simulation from the prior is taken as the data in turn. The rank of its figures among
+those of the nearest other simulations should be uniformly distributed.
 
 Every step is kept in FOLDER, and a run that was stopped continues there; `--minutes` limits the time of the inference.
 The result is `result.json`; `--markdown` writes the page from it. `--short` uses the least work, to show that it runs.
@@ -34,7 +34,6 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping
 from datetime import date, timedelta
-from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -72,6 +71,8 @@ from graspsense.inference import (
 )
 
 LEVELS: Final = (0.025, 0.5, 0.975)
+NEAREST: Final = 0.2
+"""Share of the simulations that the calibration accepts for each of them."""
 BINS: Final = 5
 """Parts of a rank histogram."""
 SEEDS: Final = 1_000_000
@@ -85,7 +86,6 @@ class Size(NamedTuple):
     particles: int
     generations: int
     minutes: float
-    calibrations: int
     predicted: int
     """Particles that are predicted from, at most."""
     alone: int
@@ -219,71 +219,24 @@ def gains_alone(folder: Folder, sample: Weighted, generation: int, draws: int) -
     return {one: [gains[one] for gains in done] for one in ("none", *EXPLANATIONS)}
 
 
-class Surrogate(NamedTuple):
-    """A quadratic regression of the statistics on the figures, with a root of the covariance of its residuals."""
+def calibrate(simulations: list[dict[str, Any]]) -> dict[str, list[float]]:
+    """Return the rank of the true figures of each simulation in their posterior, given its statistics as data.
 
-    coefficients: Any
-    """Shape (statistics, 1 + figures + squares and products): constant, linear and quadratic."""
-    scatter: Any
-    names: tuple[str, ...]
-
-    def draw(self, values: Mapping[str, float], rng: np.random.Generator) -> dict[str, float]:
-        """Return one replicate of the statistics."""
-        mean = self.coefficients @ _squares(np.array([_levels(values)]))[0]
-        drawn = mean + self.scatter @ rng.standard_normal(len(self.names))
-        return dict(zip(self.names, drawn.tolist(), strict=True))
-
-
-DISTRIBUTIONS: Final = {name: prior_of(name).distribution() for name in NAMES}
-
-
-def _levels(values: Mapping[str, float]) -> list[float]:
-    """Return the figures as probabilities of their priors."""
-    return [float(DISTRIBUTIONS[name].cdf(values[name])) for name in NAMES]
-
-
-def _squares(levels: Any) -> Any:
-    """Return a constant, the centred levels, and their squares and products, for each row."""
-    x = levels - 0.5
-    i, k = np.triu_indices(x.shape[1])
-    return np.column_stack((np.ones(len(x)), x, x[:, i] * x[:, k]))
-
-
-def surrogate_of(simulations: list[dict[str, Any]]) -> Surrogate:
-    """Return the regression of these simulations; ridge, because few simulations may be left for each product."""
-    from sklearn.linear_model import RidgeCV
-
-    names = tuple(observed())
-    x = _squares(np.array([_levels(one["values"]) for one in simulations]))
-    y = np.array([[one["statistics"][name] for name in names] for one in simulations])
-    model = RidgeCV(np.logspace(-1, 4, 11)).fit(x[:, 1:], y)
-    residuals = y - model.predict(x[:, 1:])
-    root = np.linalg.cholesky(np.cov(residuals.T) + 1e-12 * np.eye(len(names)))
-    return Surrogate(np.column_stack((model.intercept_, model.coef_)), root, names)
-
-
-def calibrate(folder: Folder, size: Size, say: Callable[[str], None]) -> dict[str, list[float]]:
-    """Return the rank of each true figure in its posterior, for every run of the calibration."""
-    surrogate = surrogate_of(folder.lines("simulations.jsonl"))
-    done = folder.lines("calibration.jsonl")
-    for k in range(len(done), size.calibrations):
-        rng = np.random.default_rng(k)
-        np.random.seed(k)  # noqa: NPY002 (pyABC draws from it)
-        truth = {name: float(DISTRIBUTIONS[name].rvs(random_state=rng)) for name in NAMES}
-        data = surrogate.draw(truth, rng)
-        abc = abc_of(partial(surrogate.draw, rng=rng), size)
-        with tempfile.TemporaryDirectory() as place:
-            abc.new(f"sqlite:///{place}/abc.db", data)
-            history = abc.run(minimum_epsilon=least_epsilon(), max_nr_populations=size.generations)
-            sample = sample_of(history)
-        ranks = {
-            name: rank_of(truth[name], [v[name] for v in sample.values], sample.weights) for name in NAMES
-        }
-        folder.add("calibration.jsonl", ranks)
-        done.append(ranks)
-        if k % 10 == 9:
-            say(f"{k + 1} runs of the calibration")
-    return {name: [one[name] for one in done] for name in NAMES}
+    The simulations are draws from the prior. The posterior of one is the share `NEAREST` of all others that are nearest
+    to it, which is rejection at that tolerance.
+    """
+    deviations = {name: one.deviation for name, one in observed().items()}
+    data = np.array([[s["statistics"][name] / d for name, d in deviations.items()] for s in simulations])
+    values = {name: np.array([s["values"][name] for s in simulations]) for name in NAMES}
+    ranks: dict[str, list[float]] = {name: [] for name in NAMES}
+    accepted = max(2, round(NEAREST * (len(simulations) - 1)))
+    for k, row in enumerate(data):
+        distances = np.linalg.norm(data - row, axis=1)
+        distances[k] = np.inf
+        near = np.argsort(distances)[:accepted]
+        for name, of in ranks.items():
+            of.append(rank_of(values[name][k], values[name][near], np.ones(accepted)))
+    return ranks
 
 
 PREDICTED: Final[Mapping[str, tuple[str, Observed | None]]] = {
@@ -326,9 +279,10 @@ def summarise(
     predicted = predict(folder, sample, generation, size.predicted, say)
     alone = gains_alone(folder, sample, generation, size.alone)
     say("explanations alone")
-    ranks = calibrate(folder, size, say)
     populations = history.get_all_populations()
     used = populations[populations["t"] >= 0]
+    from_prior = int(populations[populations["t"] <= 0]["samples"].sum())
+    ranks = calibrate(folder.lines("simulations.jsonl")[:from_prior])
     w = sample.weight
     distances = history.get_weighted_distances(generation)
     return {
@@ -489,6 +443,7 @@ def _calibration(ranks: Mapping[str, list[float]]) -> dict[str, Any]:
     every = [rank for of in ranks.values() for rank in of]
     return {
         "runs": len(next(iter(ranks.values()))),
+        "accepted": NEAREST,
         "bins": BINS,
         "histograms": {name: rank_histogram(of, BINS).tolist() for name, of in ranks.items()},
         "p": {name: uniformity_p(rank_histogram(of, BINS)) for name, of in ranks.items()},
@@ -505,7 +460,6 @@ def main() -> None:
     parser.add_argument("--particles", type=int, default=50)
     parser.add_argument("--generations", type=int, default=5)
     parser.add_argument("--minutes", type=float, default=60.0, help="limit of the time of the inference")
-    parser.add_argument("--calibrations", type=int, default=40, help="runs of the calibration")
     parser.add_argument("--predicted", type=int, default=1000, help="particles to predict from, at most")
     parser.add_argument("--alone", type=int, default=20, help="replicates of each explanation alone")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
@@ -524,11 +478,9 @@ def main() -> None:
         given.markdown.write_text(page(json.loads(result.read_text(encoding="utf-8"))), encoding="utf-8")
         return
     logging.getLogger("ABC").setLevel(logging.WARNING)
-    size = Size(
-        given.particles, given.generations, given.minutes, given.calibrations, given.predicted, given.alone
-    )
+    size = Size(given.particles, given.generations, given.minutes, given.predicted, given.alone)
     if given.short:
-        size = Size(particles=4, generations=1, minutes=1.0, calibrations=2, predicted=4, alone=2)
+        size = Size(particles=4, generations=1, minutes=1.0, predicted=4, alone=2)
     began = time.time()
 
     def say(text: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import tomllib
 from pathlib import Path
@@ -14,6 +15,7 @@ pytest.importorskip("graspsense_c45", reason="the paper's classifier")
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import paper_model  # noqa: E402
+import posterior_page  # noqa: E402
 
 VALUES = {
     **{prior.name: float(prior.distribution().median()) for prior in paper_model.PRIORS},
@@ -23,6 +25,14 @@ VALUES = {
 
 def scene(name, force_n=20.0, node=0.0, **values):
     return tomllib.loads(paper_model.scene_of(name, {**VALUES, **values}, force_n, node))
+
+
+def test_the_page_is_that_of_the_result():
+    result = json.loads((ROOT / "docs" / "posterior.json").read_text(encoding="utf-8"))
+    page = (ROOT / "docs" / "posterior.md").read_text(encoding="utf-8")
+    assert page == posterior_page.page(result), "run: python benchmarks/posterior.py --out ... --markdown"
+    assert set(result["figures"]) == set(paper_model.NAMES)
+    assert set(result["conditioned_on"]) == set(paper_model.observed())
 
 
 @pytest.mark.parametrize("name", paper_model.EXPLANATIONS)

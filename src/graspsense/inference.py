@@ -84,14 +84,17 @@ def contraction(prior: Prior, values: ArrayLike, weights: ArrayLike) -> Contract
     import numpy as np
 
     v, w = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
+    w = w / w.sum()
     law, levels = prior.distribution(), (0.025, 0.5, 0.975)
     mean = np.average(v, weights=w)
+    # Without bias also for few effective particles (variance of a sample with reliability weights).
+    variance = float(np.average((v - mean) ** 2, weights=w)) / max(1.0 - float(np.square(w).sum()), 1e-12)
     low, middle, high = weighted_quantiles(v, w, levels)
     before = [float(law.ppf(level)) for level in levels]
     return Contraction(
         prior=(before[0], before[1], before[2]),
         posterior=(low, middle, high),
-        contraction=1.0 - float(np.average((v - mean) ** 2, weights=w)) / float(law.var()),
+        contraction=1.0 - variance / float(law.var()),
     )
 
 
