@@ -65,7 +65,7 @@ def read_exported(name: str) -> Recording:
 def _readings(arrays: Arrays, channels: tuple[Channel, ...]) -> list[Reading]:
     times = arrays["t_s"]
     frames = [
-        Frame(*values[:-1], int(values[-1]))
+        Frame._make((*values[:-1], int(values[-1])))
         for values in zip(*(arrays[name].tolist() for name in Frame._fields), strict=True)
     ]
     n = len(frames)
