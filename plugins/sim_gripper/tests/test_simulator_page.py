@@ -49,6 +49,8 @@ def test_the_table_of_a_scene_has_every_key():
         "reasons",
         "fitted_to",
         "file",
+        # Written in the table of a term.
+        "spreads",
     }
 
 
