@@ -135,6 +135,19 @@ def test_a_hold_through_compliant_pads_is_not_biased_as_a_direct_fit_is():
     assert found.values == pytest.approx(values, rel=0.02)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("direct", [False, True])
+def test_fingertips_that_harden_are_part_of_the_forward_model(direct):
+    squeeze = prepared(recorded(), 0.0)
+    pads = PadCompliance(2000.0, 0.0, 0.0, 1.0, 0.002, 2.0)
+    spring = static_candidates(scale_of(squeeze))[0]
+    forces = ForwardModel(pads=pads).forces(squeeze, spring, (1500.0,), WIDTH_M, 1.0)
+    # Linear fingertips of 2000 N/m in series with the spring: 6.86 N at 8 mm.
+    assert forces.max() > 8.0
+    found = fit(ForwardModel(pads=pads, direct=direct), spring, [with_forces(squeeze, forces)])
+    assert found.values == pytest.approx((1500.0,), rel=1e-3)
+
+
 def test_the_table_identified_of_a_scene_is_checked():
     good = (
         'width_m = 0.05\n[identified]\nlabel = "cup"\n[identified.intervals]\n"elastic.k1_n_m" = [1.0, 2.0]\n'

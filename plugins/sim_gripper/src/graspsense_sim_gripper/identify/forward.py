@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -19,12 +19,18 @@ from graspsense.plugin_api import NotCompilable, entry_point, first_call
 from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.compiled.compose import (
     INTERPRETED,
+    pad_parts,
     sum_of,
     sum_of_active,
     uncompressed,
 )
 from graspsense_sim_gripper.compiled.jit import compile_part
-from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, solve_contact
+from graspsense_sim_gripper.dynamics.contact import (
+    ObjectModel,
+    PadCompliance,
+    pad_compression,
+    solve_contact,
+)
 from graspsense_sim_gripper.dynamics.state import ContactState
 from graspsense_sim_gripper.identify.laws import SLOTS, Candidate
 from graspsense_sim_gripper.identify.prepare import Squeeze
@@ -35,6 +41,9 @@ Floats = NDArray[np.float64]
 PathForces = Callable[[ObjectModel, ContactState, Any, Any, Any, Any], None]
 
 RIGID_PADS: Final = PadCompliance(math.inf, 0.0, 0.0, 1.0)
+TABLE: Final = 400
+LARGEST_N: Final = 1000.0
+"""Entries, and the largest force, of the table of the compression of nonlinear fingertips."""
 SHORTEST_S: Final = 1e-6
 """The shortest time since a contact in the node after it."""
 
@@ -60,10 +69,16 @@ def forces_along(
 
 
 @cache
-def path_forces() -> tuple[PathForces, bool]:
-    """Return `forces_along` for the terms of all candidates, and whether it is compiled."""
+def path_forces(hardens: bool) -> tuple[PathForces, bool]:
+    """Return `forces_along` for the terms of all candidates, and whether it is compiled.
+
+    `hardens`: whether the fingertips are nonlinear.
+    """
+    parts = pad_parts(hardens)
     try:
-        compiled = compile_part(bind_reachable(forces_along, {"object_force": sum_of(laws_of(SLOTS))}))
+        compiled = compile_part(
+            bind_reachable(forces_along, {"object_force": sum_of(laws_of(SLOTS)), **parts})
+        )
         model = ObjectModel(0.05, 0.0, RIGID_PADS, _some_terms(), 0, 1)
         path = np.linspace(-1e-4, 1e-3, 4)
         with first_call():
@@ -71,7 +86,7 @@ def path_forces() -> tuple[PathForces, bool]:
         return entry_point(compiled), True
     except NotCompilable:
         force = sum_of_active(active_laws(SLOTS))
-        return bind_reachable(forces_along, {"object_force": force}, INTERPRETED), False
+        return bind_reachable(forces_along, {"object_force": force, **parts}, INTERPRETED), False
 
 
 @cache
@@ -97,17 +112,44 @@ class ForwardModel:
     pads: PadCompliance
     direct: bool = False
 
+    @property
+    def _hardens(self) -> bool:
+        return self.pads.hardening_m < math.inf
+
+    def compile(self) -> None:
+        """Compile what a direct and a forward fit need, before several threads call it."""
+        path_forces(False)
+        path_forces(self._hardens)
+
+    @cached_property
+    def _table(self) -> tuple[Floats, Floats]:
+        """Forces (N), and the compression (m) of both fingertips under them."""
+        forces = np.concatenate([[0.0], np.geomspace(1e-3, LARGEST_N, TABLE)])
+        return forces, np.array([pad_compression(self.pads, float(one)) for one in forces])
+
+    @cached_property
+    def _compliance(self) -> tuple[Floats, Floats]:
+        """Forces (N), and the derivative of that compression (m/N)."""
+        forces, compressions = self._table
+        return forces, np.gradient(compressions, forces)
+
+    def compressed_m(self, force_n: Floats) -> Floats:
+        """Return the compression of both fingertips at rest under these forces."""
+        if self.pads.hardening_m == math.inf:
+            return force_n / self.pads.stiffness_n_m
+        return np.interp(force_n, *self._table)
+
     def forces(
         self, squeeze: Squeeze, candidate: Candidate, values: Sequence[float], width_m: float, factor: float
     ) -> Floats:
         """Return the force (N) at the samples of a squeeze; NaN where a law has none."""
-        run, compiled = path_forces()
+        run, compiled = path_forces(self._hardens and not self.direct)
         closure, speed, pads = width_m - squeeze.gap_m, squeeze.speed_m_s, self.pads
         if self.direct:
             if math.isfinite(pads.stiffness_n_m):
-                yielded, rate = squeeze.measured_path
-                closure = closure - yielded / pads.stiffness_n_m
-                speed = speed - rate / pads.stiffness_n_m
+                force, rate = squeeze.measured_path
+                closure = closure - self.compressed_m(force)
+                speed = speed - rate * np.interp(force, *self._compliance)
             pads = RIGID_PADS
         model = ObjectModel(width_m, 0.0, pads, candidate.terms(values, factor), 0, 1)
         out: Any = np.zeros(len(closure))

@@ -66,6 +66,7 @@ def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: P
         )
     drive, pads = drive_and_pads(config)
     model = ForwardModel(pads=pads)
+    model.compile()
     ready = [prepared(one, config.pad_delay_s) for one in squeezes]
     cells = _has_cells(config, squeezes)
     shares = [
@@ -231,7 +232,7 @@ def _fits(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> l
             SqueezeFit(
                 name=squeeze.name,
                 t_s=squeeze.t_s[squeeze.sample],
-                compression_m=closure - forces / model.pads.stiffness_n_m,
+                compression_m=closure - model.compressed_m(forces),
                 measured_n=squeeze.force_n,
                 fitted_n=forces,
                 rms_n=float(np.sqrt(np.mean((forces - squeeze.force_n) ** 2))),
