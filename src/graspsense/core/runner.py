@@ -372,7 +372,7 @@ class _Grasp:
         return inf if self.info.opening is None else ceil(seconds_at_most(self.run) * self.info.rate_hz)
 
     def _leaps(self) -> bool:
-        """Return whether the gripper is asked for ticks of free motion at once; watchers need those of the squeeze only."""
+        """Return whether the gripper is asked for ticks of free motion at once; watchers need only the squeeze."""
         offers = type(self.backend).free_ticks is not SensorBackend.free_ticks
         return offers and self.info.clock == "virtual"
 
