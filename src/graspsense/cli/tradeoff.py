@@ -146,8 +146,8 @@ def simulation(
     from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.sensed import sensed_trade
     from graspsense.experiments.simulation import SCENES, trade_simulation
-    from graspsense.report.sensed import about, conclusion, sensed_markdown, sensed_rows
-    from graspsense.report.simulation import simulation_markdown, simulation_rows
+    from graspsense.report.sensed import about, conclusion, sensed_rows
+    from graspsense.report.simulation import simulation_rows
 
     settings = settings_of(pipeline, gripper, object_name, options, seed, force)
     wanted = scenes or ((object_name,) if object_name else SCENES)
@@ -160,23 +160,37 @@ def simulation(
         if recognition_seeds:
             numbers = range(first, first + recognition_seeds)
             sensed = sensed_trade(settings, instances=instances, seeds=numbers, progress=progress)
-    pictures = _drawn(Path(png), found, sensed) if png else []
-    if markdown:
-        places = [os.path.relpath(picture, Path(markdown).parent) for picture in pictures]
-        page = simulation_markdown(found, places[0] if places else None)
-        if sensed is not None:
-            drawn = [f"![Recognition against time]({places[1]})", ""] if places else []
-            page = "\n".join([page, *drawn, *sensed_markdown(sensed)])
-        write_text(markdown, page)
+    # What may have taken an hour is printed before a file can fail to be written.
     if as_json:
         echo_json(found.as_json() if sensed is None else {**found.as_json(), "recognition": asdict(sensed)})
+    else:
+        made = ", ".join(f"{key} {value}" for key, value in found.made.items())
+        echo(
+            f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each\n{made}\n"
+        )
+        echo_table(*simulation_rows(found))
+        if sensed is not None:
+            echo(f"\n{about(sensed)}\n{conclusion(sensed)}\n")
+            echo_table(*sensed_rows(sensed))
+    _write_files(png, markdown, found, sensed)
+
+
+def _write_files(
+    png: str | None, markdown: str | None, found: SimulationTrade, sensed: SensedTrade | None
+) -> None:
+    """Draw the pictures and write the page, if they are asked for."""
+    from graspsense.report.sensed import sensed_markdown
+    from graspsense.report.simulation import simulation_markdown
+
+    pictures = _drawn(Path(png), found, sensed) if png else []
+    if markdown is None:
         return
-    made = ", ".join(f"{key} {value}" for key, value in found.made.items())
-    echo(f"{found.gripper}, simulated: {', '.join(found.scenes)}, {len(found.seeds)} seeds each\n{made}\n")
-    echo_table(*simulation_rows(found))
+    places = [os.path.relpath(picture, Path(markdown).parent) for picture in pictures]
+    page = simulation_markdown(found, places[0] if places else None)
     if sensed is not None:
-        echo(f"\n{about(sensed)}\n{conclusion(sensed)}\n")
-        echo_table(*sensed_rows(sensed))
+        drawn = [f"![Recognition against time]({places[1]})", ""] if places else []
+        page = "\n".join([page, *drawn, *sensed_markdown(sensed)])
+    write_text(markdown, page)
 
 
 def _drawn(path: Path, found: SimulationTrade, sensed: SensedTrade | None) -> list[Path]:

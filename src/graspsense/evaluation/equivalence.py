@@ -61,4 +61,5 @@ def equivalence(
     # With equal rates the mean difference has to be within margin - half of 0.
     reach = (margin - half) / error
     power = 2.0 * float(stdtr(n - 1, reach)) - 1.0 if reach > 0.0 else 0.0
-    return Equivalence(difference=mean, interval=(mean - half, mean + half), margin=margin, power=power)
+    interval = (max(mean - half, -1.0), min(mean + half, 1.0))
+    return Equivalence(difference=mean, interval=interval, margin=margin, power=power)

@@ -133,11 +133,14 @@ def _draw_rates(ax: Any, trade: SensedTrade) -> None:
         if test is None:
             ax.axvline(1e3 * one.seconds, color="0.5", lw=1.0, ls=":", label=f"{one.name} (the reference)")
             continue
-        half = 50.0 * (test.interval[1] - test.interval[0])
+        ends = [
+            [100.0 * (test.difference - test.interval[0])],
+            [100.0 * (test.interval[1] - test.difference)],
+        ]
         ax.errorbar(
             1e3 * one.seconds,
             100.0 * test.difference,
-            yerr=half,
+            yerr=ends,
             marker="os^vDP*X"[k % 8],
             color=f"C{k % 10}",
             ms=5,
@@ -145,7 +148,7 @@ def _draw_rates(ax: Any, trade: SensedTrade) -> None:
             label=one.name,
         )
         ax.axhspan(-100.0 * test.margin, 100.0 * test.margin, color="0.93", zorder=0, lw=0)
-    ax.legend(fontsize=6.5, loc="best")
+    ax.legend(fontsize=6.5, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
 
 
 def _draw_distances(ax: Any, trade: SensedTrade) -> None:
