@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from graspsense.plugin_api import ConfigError, RecordedSqueeze, Trace
-from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.contact import PadCompliance
 from graspsense_sim_gripper.identify.choose import choose
 from graspsense_sim_gripper.identify.fit import fit
@@ -16,7 +15,6 @@ from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import prepared
 from graspsense_sim_gripper.identify.refuse import _ruptures, shows_memory
-from graspsense_sim_gripper.identify.run import identify
 from graspsense_sim_gripper.objects.spec import parse_scene
 
 PADS = PadCompliance(15000.0, 0.0, 0.0, 1.0)
@@ -83,11 +81,6 @@ def test_a_force_of_the_pads_is_taken_at_the_time_of_its_image():
 def test_a_recording_without_contact_is_refused():
     with pytest.raises(ConfigError, match="nothing was touched"):
         prepared(recorded(lambda closure: 0.0 * closure), 0.0)
-
-
-def test_nonlinear_fingertips_are_refused():
-    with pytest.raises(ConfigError, match="behind linear fingertips only"):
-        identify(SimConfig(pad_hardening_m=1e-3), [recorded()], lambda *_: None)
 
 
 def test_a_ramp_at_one_speed_shows_no_memory_and_a_hold_does():

@@ -54,16 +54,10 @@ OF_FINGERTIPS: Final = (
 def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: Progress) -> Identification:
     """Return the object of these squeezes; `config` is that of a gripper whose recordings say nothing of their own.
 
-    Raises ConfigError if a squeeze has no contact, or too few measurements of the force, or if the fingertips are
-    nonlinear.
+    Raises ConfigError if a squeeze has no contact or too few measurements of the force.
     """
     begin = time.monotonic()
     config, notes = _own_settings(config, squeezes)
-    if config.pad_hardening_m is not None:
-        raise ConfigError(
-            f"gripper.pad_hardening_m = {config.pad_hardening_m:g}: objects are identified behind linear fingertips "
-            "only. Leave it unset, and give the stiffness at the forces of the squeezes (gripper.pad_stiffness_n_m)"
-        )
     drive, pads = drive_and_pads(config)
     model = ForwardModel(pads=pads)
     model.compile()
