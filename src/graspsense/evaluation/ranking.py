@@ -83,9 +83,8 @@ class Ranking:
             text += f" None is shown to be equivalent within {100 * MARGIN:.0f} points."
         if open_:
             cheapest = min((best, *open_), key=lambda one: one.training_s)
-            text += (
-                f" {len(open_)} more are undecided. Of these and the best, {cheapest.name} is the cheapest."
-            )
+            verb = "is" if len(open_) == 1 else "are"
+            text += f" {len(open_)} more {verb} undecided. Of these and the best, {cheapest.name} is the cheapest."
         controls = [one for one in self.candidates if one.standing == "control"]
         if controls:
             early = max(controls, key=lambda one: one.rates[self.protocol].rate)

@@ -36,11 +36,13 @@ def _rates(ranking: Ranking) -> Section:
         )
         for one in ranking.candidates
     ]
-    picture = rates_picture(rows, "Recognition rates. Bars are 95 % intervals.")
+    bars = " Bars are 95 % intervals." if any(row.interval for row in rows) else ""
+    picture = rates_picture(rows, f"Recognition rates.{bars}")
     text = paragraph(f"Every grasp is classified by {protocol_words(ranking.protocol)}.")
-    text += facts([control_words(name, "") for name in protocols])
+    words = [control_words(name, "") for name in protocols]
     if any(one.standing == "control" for one in ranking.candidates):
-        text += facts([CONTROLS["before_contact"]])
+        words.append(CONTROLS["before_contact"])
+    text += facts(words)
     cells = [
         (
             one.classifier,
