@@ -11,6 +11,7 @@ from graspsense.cli.sources import SOURCES, command_line, is_csv, learner_of, so
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
 
 if TYPE_CHECKING:
+    from graspsense.core.entries import Role
     from graspsense.evaluation.ranking import Candidate, Ranking
 
 
@@ -122,7 +123,7 @@ def _coverage(candidate: Candidate) -> str:
     return "" if sets is None or sets.covered is None else percentage(sets.covered.rate)
 
 
-def _names(text: str, option: str, role: str) -> tuple[str, ...]:
+def _names(text: str, option: str, role: Role) -> tuple[str, ...]:
     """Return the names of components of a role that an option lists. Raises UsageError for an unknown one."""
     from graspsense.core.errors import UnknownName
     from graspsense.core.plugins import installed
