@@ -159,8 +159,9 @@ def test_recognition_and_distances_of_variants_against_the_reference(tmp_path):
     trade = sensed_trade(settings, objects=["can"], instances=6, seeds=(1, 2), variants=variants)
     points = {one.step: one for one in trade.points}
     coarse, fine = points["0.5"], points["0.0001"]
-    assert coarse.largest.upper > 3.0 * fine.largest.upper
-    assert coarse.largest.p_difference < 0.05
+    # This feature is well conditioned, so that its distance is due to the model.
+    far, near = (next(d for d in one.distances if d.feature == "p_steady") for one in (coarse, fine))
+    assert far.distance > 10.0 * near.distance
     assert trade.grasps == 18
     # Two seeds show no equivalence, and that is said.
     assert "no variant is shown to be equivalent" in conclusion(trade)
