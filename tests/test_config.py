@@ -319,7 +319,7 @@ class TestClassifier:
     def test_a_table_without_a_type_is_an_error(self, plugins, write):
         assert complaint(write(BASE + "[classifier]\nforce_n = 3\n")) == (
             "lab.toml:11: classifier.type is not given: name a classifier. "
-            "Known: boosted, ebm, forest, guess, knn, mlp, svm, tree"
+            "Known: backprop, boosted, ebm, forest, guess, knn, mlp, svm, tree"
         )
 
 

@@ -141,8 +141,8 @@ def test_the_picture_of_the_confusion(run, csv, tmp_path):
         (
             ["evaluate", "nothing"],
             2,
-            "is not a source of trials: name a FILE.csv, a data set as icub:FOLDER, a store as store:DIR, or "
-            "`simulated`",
+            "is not a source of trials: name a FILE.csv, a data set as icub:FOLDER, a store as store:DIR, "
+            "`simulated`, or scenes of `graspsense identify` as identified:cup.toml,mug.toml",
         ),
         (["evaluate", "none.csv", "--label", "x"], 2, "none.csv cannot be read"),
         (["evaluate", "none.csv"], 2, "which column of none.csv holds the label? Name it: --label COLUMN"),

@@ -37,7 +37,9 @@ NUMBER = st.floats(0.05, 20.0)
 LINEAR_WITH = {"elastic": {"k3_n_m3": 0.0}, "foam": {"exponent": 1.0}}
 
 
-@pytest.mark.parametrize("name", [name for name in TERMS if name not in ("gas", "rigid", "snap", "worn")])
+@pytest.mark.parametrize(
+    "name", [name for name in TERMS if name not in ("fracture", "gas", "rigid", "snap", "worn")]
+)
 @settings(max_examples=30, deadline=None)
 @given(data=st.data())
 def test_a_terms_linear_form_is_its_law(name, data):

@@ -86,6 +86,7 @@ def test_an_object_breaks_at_a_compression(scheme):
     assert forces[-1] == 0.0
 
 
+@pytest.mark.slow
 def test_a_fracture_is_the_same_compiled_and_plain_and_in_a_reduced_model():
     scene = """width_m = 0.05
 [[terms]]

@@ -145,8 +145,8 @@ def simulation(
     """
     from graspsense.cli.progress import ProgressLine
     from graspsense.experiments.sensed import sensed_trade
+    from graspsense.experiments.sensed_report import about, conclusion, sensed_rows
     from graspsense.experiments.simulation import SCENES, trade_simulation
-    from graspsense.report.sensed import about, conclusion, sensed_rows
     from graspsense.report.simulation import simulation_rows
 
     settings = settings_of(pipeline, gripper, object_name, options, seed, force)
@@ -179,7 +179,7 @@ def _write_files(
     png: str | None, markdown: str | None, found: SimulationTrade, sensed: SensedTrade | None
 ) -> None:
     """Draw the pictures and write the page, if they are asked for."""
-    from graspsense.report.sensed import sensed_markdown
+    from graspsense.experiments.sensed_report import sensed_markdown
     from graspsense.report.simulation import simulation_markdown
 
     pictures = _drawn(Path(png), found, sensed) if png else []
@@ -195,7 +195,7 @@ def _write_files(
 
 def _drawn(path: Path, found: SimulationTrade, sensed: SensedTrade | None) -> list[Path]:
     """Draw the result and return the names of the pictures."""
-    from graspsense.report.sensed import sensed_png
+    from graspsense.experiments.sensed_report import sensed_png
     from graspsense.report.simulation import simulation_png
 
     pictures = [path]

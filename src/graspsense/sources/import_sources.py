@@ -88,13 +88,13 @@ def _named_by(
         yield ImportedRecording(source=source, name=name, labelled=_relabelled(numbered, label))
         return
     if kind not in KINDS:
-        known = ", ".join(f"{one}:" for one in dict.fromkeys((*KINDS, *datasets_with_recordings())))
+        kinds = ", ".join(f"{one}:" for one in dict.fromkeys((*KINDS, *datasets_with_recordings())))
         raise ConfigError(
-            f"{source!r} is not a source of recordings: name a FILE.csv, a manifest FILE.toml, or write one of {known} "
+            f"{source!r} is not a source of recordings: name a FILE.csv, a manifest FILE.toml, or write one of {kinds} "
             "before a file"
         )
-    labelled = LabelledRecording(recording=read_named(kind, file), source=source)
-    yield ImportedRecording(source=source, name=name, labelled=_relabelled(labelled, label))
+    recording = LabelledRecording(recording=read_named(kind, file), source=source)
+    yield ImportedRecording(source=source, name=name, labelled=_relabelled(recording, label))
 
 
 def _dataset(source: str) -> tuple[str, str] | None:

@@ -191,6 +191,7 @@ class SimConfig:
         default=2.0,
         above=0.0,
         maximum=10.0,
+        origin="assumed",
         meaning="Exponent of the hardening of the pad: 2 gives a cubic law; 0.5 a power law with exponent 1.5 where "
         "pad_stiffness_n_m is small.",
     )

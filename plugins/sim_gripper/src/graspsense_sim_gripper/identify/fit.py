@@ -20,7 +20,7 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense_sim_gripper.identify.forward import ForwardModel
-from graspsense_sim_gripper.identify.laws import Candidate
+from graspsense_sim_gripper.identify.laws import CandidateLaw
 from graspsense_sim_gripper.identify.prepare import Squeeze
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,7 @@ STARTS: Final = 2
 class Fitted:
     """The result of a fit."""
 
-    candidate: Candidate
+    candidate: CandidateLaw
     values: tuple[float, ...]
     """Of the free parameters of the candidate."""
     widths_m: tuple[float, ...]
@@ -75,7 +75,7 @@ class _Problem:
     """The residuals and their Jacobian as functions of one vector."""
 
     def __init__(
-        self, model: ForwardModel, candidate: Candidate, squeezes: Sequence[Squeeze], masks: Sequence[Mask]
+        self, model: ForwardModel, candidate: CandidateLaw, squeezes: Sequence[Squeeze], masks: Sequence[Mask]
     ) -> None:
         self.model, self.candidate, self.squeezes, self.masks = model, candidate, squeezes, masks
         self.p, self.n = len(candidate.free), len(squeezes)
@@ -145,7 +145,7 @@ def whole(squeezes: Sequence[Squeeze]) -> list[Mask]:
 
 def fit(
     model: ForwardModel,
-    candidate: Candidate,
+    candidate: CandidateLaw,
     squeezes: Sequence[Squeeze],
     masks: Sequence[Mask] | None = None,
     start: Fitted | None = None,

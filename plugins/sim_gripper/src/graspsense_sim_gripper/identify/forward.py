@@ -32,7 +32,7 @@ from graspsense_sim_gripper.dynamics.contact import (
     solve_contact,
 )
 from graspsense_sim_gripper.dynamics.state import ContactState
-from graspsense_sim_gripper.identify.laws import SLOTS, Candidate
+from graspsense_sim_gripper.identify.laws import SLOTS, CandidateLaw
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.terms.registry import active_laws, laws_of
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
@@ -98,7 +98,7 @@ def _some_terms() -> tuple[Any, ...]:
     from graspsense_sim_gripper.identify.laws import ELASTIC, FreeParameter
 
     k1 = FreeParameter(slot=ELASTIC, name="k1_n_m", low=1.0, high=2.0, starts=(1.0,))
-    return Candidate(free=(k1,)).terms((1.0,))
+    return CandidateLaw(free=(k1,)).terms((1.0,))
 
 
 @frozen(kw_only=True, eq=False)
@@ -140,7 +140,12 @@ class ForwardModel:
         return np.interp(force_n, *self._table)
 
     def forces(
-        self, squeeze: Squeeze, candidate: Candidate, values: Sequence[float], width_m: float, factor: float
+        self,
+        squeeze: Squeeze,
+        candidate: CandidateLaw,
+        values: Sequence[float],
+        width_m: float,
+        factor: float,
     ) -> Floats:
         """Return the force (N) at the samples of a squeeze; NaN where a law has none."""
         run, compiled = path_forces(self._hardens and not self.direct)

@@ -64,7 +64,7 @@ class FreeParameter:
 
 
 @frozen(kw_only=True)
-class Candidate:
+class CandidateLaw:
     """Terms with free and fixed parameters."""
 
     free: tuple[FreeParameter, ...]
@@ -85,9 +85,9 @@ class Candidate:
             words.append(f"elastic ({form})" if slot == ELASTIC else SLOTS[slot])
         return " + ".join(words)
 
-    def joined(self, other: Candidate) -> Candidate:
+    def joined(self, other: CandidateLaw) -> CandidateLaw:
         """Return the candidate with the terms of both."""
-        return Candidate(free=self.free + other.free, fixed={**self.fixed, **other.fixed})
+        return CandidateLaw(free=self.free + other.free, fixed={**self.fixed, **other.fixed})
 
     def parameters(self, values: Sequence[float]) -> dict[int, dict[str, float]]:
         """Return the parameters of each of its terms, by slot, for these values of the free ones."""
@@ -140,7 +140,7 @@ class Candidate:
         """Return combinations of the values to start from."""
         return list(product(*(parameter.starts for parameter in self.free)))[:MAX_STARTS]
 
-    def starting_at(self, values: Mapping[str, float]) -> Candidate:
+    def starting_at(self, values: Mapping[str, float]) -> CandidateLaw:
         """Return the candidate that starts at these values, by label, where it has the parameter."""
         free = tuple(
             evolve(one, starts=(min(max(values[one.label], one.low), one.high),))
@@ -161,7 +161,7 @@ _FILLERS: Final = tuple(_filler(kind) for kind in SLOTS)
 _NOTHING_LUMPED: Final = Switchable(0, LumpedSpringDamper(0.0, 0.0))
 
 
-def static_candidates(scale: DataScale) -> list[Candidate]:
+def static_candidates(scale: DataScale) -> list[CandidateLaw]:
     """Return the candidates without memory, the simplest first."""
     force, depth = scale.force_n, scale.depth_m
     k = force / depth
@@ -201,24 +201,24 @@ def static_candidates(scale: DataScale) -> list[Candidate]:
         FreeParameter(slot=SNAP, name="k2_n_m", low=0.01 * k, high=100.0 * k, starts=(k,)),
     )
     return [
-        Candidate(free=(k1,)),
-        Candidate(free=(hertz,)),
-        Candidate(free=(k1, k3)),
-        Candidate(free=(softer, softening)),
-        Candidate(free=foam, fixed={(FOAM, "at_m"): float(f"{depth:.2g}")}),
-        Candidate(free=snap),
+        CandidateLaw(free=(k1,)),
+        CandidateLaw(free=(hertz,)),
+        CandidateLaw(free=(k1, k3)),
+        CandidateLaw(free=(softer, softening)),
+        CandidateLaw(free=foam, fixed={(FOAM, "at_m"): float(f"{depth:.2g}")}),
+        CandidateLaw(free=snap),
     ]
 
 
-def memories(scale: DataScale) -> list[Candidate]:
+def memories(scale: DataScale) -> list[CandidateLaw]:
     """Return the terms with a memory that a candidate may have beside the others, the simplest first."""
     k = scale.force_n / scale.depth_m
     shortest, longest = 0.3 * scale.sample_s, 5.0 * scale.memory_s
     rate = scale.depth_m / max(scale.load_s, 1e-3)
 
-    def branch(slot: int, share: float, starts_s: tuple[float, ...]) -> Candidate:
+    def branch(slot: int, share: float, starts_s: tuple[float, ...]) -> CandidateLaw:
         inside = tuple(min(max(tau, 1.5 * shortest), 0.5 * longest) for tau in starts_s)
-        return Candidate(
+        return CandidateLaw(
             free=(
                 FreeParameter(
                     slot=slot, name="k_n_m", low=1e-3 * k, high=100.0 * k, starts=(share * k, 2.0 * share * k)
@@ -229,7 +229,7 @@ def memories(scale: DataScale) -> list[Candidate]:
 
     damper = scale.force_n / rate
     one = branch(MAXWELL, 0.3, (0.2 * scale.memory_s, 0.03 * scale.memory_s))
-    loss = Candidate(
+    loss = CandidateLaw(
         free=(
             FreeParameter(
                 slot=LOSS, name="damping_n_s_m", low=1e-4 * damper, high=10.0 * damper, starts=(0.1 * damper,)
