@@ -311,7 +311,7 @@ def test_a_number_is_changed_given_and_restored(store, run):
     [
         (
             ("--value", "fill [l]=0.2"),
-            r"fill of other trials is in ml, so fill \[l\]=0\.2 .* write fill \[ml\]=NUMBER",
+            r"fill of other trials is in ml, and 'fill \[l\]' .* write fill \[ml\]=NUMBER",
         ),
         (("--value", "fill [ml]=200"), r"trial 1 has fill \[ml\]=200 already"),
         (("--value", "fill [ml]"), r"write NAME \[UNIT\]=NUMBER"),
@@ -326,6 +326,14 @@ def test_a_number_that_cannot_be_changed_is_refused(store, run, given, says):
     assert code == 2
     assert re.search(says, " ".join(err.split()))
     assert changes.history(store) == []
+
+
+def test_trials_are_not_collected_with_a_number_in_another_unit(store, run):
+    keep(store, device=REAL, labels={"fill [ml]": "200"})
+    store.close()
+    code, _, err = run("collect", "--save", store.folder, "--labels", "can:full_open", "--value", "fill=3")
+    assert code == 2
+    assert "fill of other trials is in ml, and 'fill' cannot be compared with them" in " ".join(err.split())
 
 
 def test_the_page_of_a_store_has_a_section_for_a_number(store, run, tmp_path):

@@ -96,6 +96,7 @@ def collect(
 
     with Store.open(save) as store:
         _recover(store)
+        _refuse_other_units(store, values)
         collection = Collection(
             store=store,
             wanted=wanted,
@@ -193,6 +194,13 @@ def _has_model(settings: Settings) -> bool:
         talk(f"note: collecting without predictions: {str(error).splitlines()[0]}")
         return False
     return True
+
+
+def _refuse_other_units(store: Store, values: tuple[str, ...]) -> None:
+    from graspsense.core.target_value import value_label
+    from graspsense.store.changes import refuse_other_units
+
+    refuse_other_units(store, [value_label(text)[0] for text in values])
 
 
 def _recover(store: Store) -> None:

@@ -86,7 +86,11 @@ def values_of_labels(name: str, labels: Sequence[Mapping[str, str]], where: str)
             "when it is recorded: collect --value, or a column of the manifest of an import"
         )
     if len(units) > 1:
-        raise ConfigError(f"{name} has several units in {where}: {', '.join(map(repr, units))}")
+        said = ", ".join(unit or "none" for unit in units)
+        raise ConfigError(
+            f"{name} has several units in {where}: {said}. All trials need the same; in a store, change a "
+            f'number with graspsense trials value DIR#7 --value "{name} [UNIT]=NUMBER"'
+        )
     return next(iter(units)), values
 
 

@@ -8,7 +8,7 @@ trials are read, by `with_changed_numbers`.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -135,25 +135,11 @@ def set_number(store: Store, numbers: Sequence[int], heading: str, cell: str | N
     ConfigError, before anything is changed, if a trial does not exist, has this number already, or if other trials have
     it in another unit; SaveFailed, DataDamaged.
     """
-    name, unit = name_and_unit(heading)
-    chosen = set(numbers)
-    rows = store.query("SELECT trial, labels FROM detail ORDER BY trial")
-    recorded = {number: decoded(store.folder, text) for number, text in rows}
-    current = dict(
-        zip(recorded, with_changed_numbers(store, list(recorded), list(recorded.values())), strict=True)
-    )
-    units = {
-        name_and_unit(other)[1]
-        for number, labels in current.items()
-        for other in labels
-        if number not in chosen and name_and_unit(other)[0] == name
-    }
-    if cell is not None and units and unit not in units:
-        (first, *_) = sorted(units)
-        raise ConfigError(
-            f"{name} of other trials is in {first or 'no unit'}, so {heading}={cell} cannot be compared with them: "
-            f"write {name} [{first}]=NUMBER, or change all of them"
-        )
+    name, _ = name_and_unit(heading)
+    recorded, current = _labels_of_trials(store)
+    if cell is not None:
+        chosen = set(numbers)
+        _refuse_another_unit(heading, [labels for number, labels in current.items() if number not in chosen])
 
     def change(connection: sqlite3.Connection, trial: TrialSummary) -> None:
         before = _number_named(current[trial.id], name)
@@ -163,6 +149,36 @@ def set_number(store: Store, numbers: Sequence[int], heading: str, cell: str | N
         _keep(connection, trial.id, "value", before, after, why)
 
     _for_each(store, numbers, change)
+
+
+def refuse_other_units(store: Store, headings: Iterable[str]) -> None:
+    """Raise ConfigError if trials of the store have one of these numbers in another unit; DataDamaged."""
+    wanted = list(headings)
+    if wanted:
+        _, current = _labels_of_trials(store)
+        for heading in wanted:
+            _refuse_another_unit(heading, current.values())
+
+
+def _labels_of_trials(store: Store) -> tuple[dict[int, Mapping[str, str]], dict[int, Mapping[str, str]]]:
+    """Return the labels of each trial as recorded, and with the numbers that were changed since. Raises DataDamaged."""
+    rows = store.query("SELECT trial, labels FROM detail ORDER BY trial")
+    recorded: dict[int, Mapping[str, str]] = {number: decoded(store.folder, text) for number, text in rows}
+    current = with_changed_numbers(store, list(recorded), list(recorded.values()))
+    return recorded, dict(zip(recorded, current, strict=True))
+
+
+def _refuse_another_unit(heading: str, others: Iterable[Mapping[str, str]]) -> None:
+    """Raise ConfigError if these labels have the number of this name, but none in its unit."""
+    name, unit = name_and_unit(heading)
+    pairs = {name_and_unit(other) for labels in others for other in labels}
+    units = {of for known, of in pairs if known == name}
+    if units and unit not in units:
+        (first, *_) = sorted(units)
+        raise ConfigError(
+            f"{name} of other trials is in {first or 'no unit'}, and {heading!r} cannot be compared with them: "
+            f"write {f'{name} [{first}]' if first else name}=NUMBER, or change all of them with graspsense trials value"
+        )
 
 
 def with_changed_numbers(
