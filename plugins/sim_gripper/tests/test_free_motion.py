@@ -70,10 +70,14 @@ def test_a_grasp_with_free_motion_is_the_grasp_tick_by_tick(controller, sensor):
     assert fast.reads - held < 0.25 * (slow.reads - held)
 
 
+# In CI one controller in the interpreter, where free motion is used.
 @pytest.mark.slow
-@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=pytest.mark.long)])
 @pytest.mark.parametrize("sensor", ["ideal", "pads"])
-@pytest.mark.parametrize("controller", CONTROLLERS)
+@pytest.mark.parametrize(
+    "controller",
+    ["hybrid", *(pytest.param(name, marks=pytest.mark.long) for name in CONTROLLERS if name != "hybrid")],
+)
 def test_free_motion_changes_no_bit_of_the_catalogue(controller, sensor, compiled):
     if compiled:
         pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
