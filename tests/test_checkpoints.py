@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
-from graspsense.core.anytime import Anytime, anytime_of
+from graspsense.core.anytime import Anytime, CheckpointPrediction, anytime_of
 from graspsense.core.checkpoints import (
     CheckpointFeatures,
     checkpoints_of,
@@ -20,7 +20,7 @@ from graspsense.core.checkpoints import (
 )
 from graspsense.core.config import SelectedComponent, build, resolve
 from graspsense.core.errors import ConfigError
-from graspsense.core.features import table_of
+from graspsense.core.features import Features, Prediction, table_of
 from graspsense.core.labelled import Labelled
 from graspsense.core.model import load_model, train, write_model
 from graspsense.core.plugins import installed
@@ -155,6 +155,25 @@ def test_predictions_in_the_loop_are_those_of_the_same_part_afterwards(model, tm
     assert told == [one.words for one in anytime.predictions]
     assert told[-1].startswith("0.05 s after the contact: soft")
     assert "0.05 s after the contact" in anytime.predictions[-1].prediction.model
+
+
+@pytest.mark.parametrize(
+    ("labels", "said"),
+    [
+        (("soft", "stiff", "hard"), "soft or stiff or hard, 90 %"),
+        (("soft", "stiff", "hard", "empty"), "soft or one of 3 others, 90 %"),
+    ],
+)
+def test_a_large_set_stays_one_line(labels, said):
+    made = CheckpointPrediction(
+        after_s=0.2,
+        t_s=1.0,
+        features=Features(names=(), values=(), units=()),
+        prediction=Prediction(
+            label="soft", probabilities={}, because=(), prediction_set=labels, coverage=0.9
+        ),
+    )
+    assert made.words == f"0.2 s after the contact: {said}"
 
 
 @pytest.mark.parametrize("clock", ["virtual", "device"])

@@ -18,7 +18,7 @@ from attrs import frozen
 
 from graspsense.core.checkpoints import until_checkpoint
 from graspsense.core.errors import ConfigError, named
-from graspsense.core.features import UNKNOWN
+from graspsense.core.features import UNKNOWN, percent
 from graspsense.core.signals import HOLD, SQUEEZE
 from graspsense.core.trace import trace_of
 
@@ -53,8 +53,15 @@ class CheckpointPrediction:
 
     @property
     def words(self) -> str:
-        """The checkpoint with the prediction: `0.2 s after the contact: can:full or can:empty, 90 %`."""
-        said = self.prediction.set_in_words or self.prediction.label
+        """The checkpoint with the prediction: `0.2 s after the contact: can:full or can:empty, 90 %`.
+
+        Of a set with more than three labels, only the first is named, so that it stays one line in a terminal.
+        """
+        first, *others = self.prediction.prediction_set or (self.prediction.label,)
+        if len(others) > 2 and self.prediction.coverage is not None:
+            said = f"{first} or one of {len(others)} others, {percent(self.prediction.coverage)}"
+        else:
+            said = self.prediction.set_in_words or self.prediction.label
         return f"{self.after_s:g} s after the contact: {said}"
 
 
