@@ -68,8 +68,8 @@ def conclusion(trade: SensedTrade) -> str:
         else f"With {len(trade.seeds)} seeds, no variant is shown to be equivalent to the reference within {margin}."
     )
     return (
-        f"{found} If a rate were equal to that of the reference, its test would show it with a probability of "
-        f"{least:.2g} or more."
+        f"{found} The power of the weakest test is {least:.2g}: with this probability it shows that equal rates are "
+        "equivalent."
     )
 
 

@@ -40,8 +40,13 @@ def read_exported(name: str) -> Recording:
             arrays = {key: archive[key] for key in archive.files}
     except FileNotFoundError:
         raise ConfigError(f"there is no file {path}") from None
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
+    except OSError as error:
         raise DataDamaged(f"{path} cannot be read as an NPZ file: {error}") from error
+    except (ValueError, zipfile.BadZipFile, EOFError) as error:
+        # NumPy's own text would advise loading the file with pickle.
+        raise DataDamaged(
+            f"{path} cannot be read as an NPZ file: write one with graspsense export DIR#12 --to FILE.npz"
+        ) from error
     try:
         about = json.loads(str(arrays[DECLARED]))
         channels = tuple(from_json(one) for one in about["channels"])
