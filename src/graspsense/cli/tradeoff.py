@@ -28,15 +28,18 @@ for _one in commands():
     tradeoff.add_command(_one)
 
 
-@tradeoff.command(short_help="How far each feature moves for 1 ppm of a parameter.")
-@pipeline_options
-@click.option(
+scenes_option = click.option(
     "--scene",
     "scenes",
     metavar="NAME:STATE",
     multiple=True,
     help="Object to grasp. Can be repeated.  [default: six of the catalogue]",
 )
+
+
+@tradeoff.command(short_help="How far each feature moves for 1 ppm of a parameter.")
+@pipeline_options
+@scenes_option
 @click.option(
     "--seeds", type=click.IntRange(min=1), default=10, show_default=True, help="Grasps of each scene."
 )
@@ -87,13 +90,7 @@ def condition(
 
 @tradeoff.command(short_help="Accuracy of the simulator against its run time.")
 @pipeline_options
-@click.option(
-    "--scene",
-    "scenes",
-    metavar="NAME:STATE",
-    multiple=True,
-    help="Object to grasp. Can be repeated.  [default: six of the catalogue]",
-)
+@scenes_option
 @click.option(
     "--seeds", type=click.IntRange(min=1), default=2, show_default=True, help="Grasps of each scene."
 )
