@@ -36,6 +36,7 @@ from graspsense.plugin_api import (
     Channel,
     ClassifierConfig,
     Command,
+    CompiledFeatures,
     Features,
     FreeLimits,
     FreeMotion,
@@ -250,6 +251,31 @@ class Complex(float):
 @featuring("survives-json", "through JSON")
 def _(features, trace):
     return evolve(features, values=(Complex(features.values[0]),))
+
+
+def half_of_the_peak(params, ticks):
+    return (0.5 * max([0.0, *ticks.force_left_n]),)
+
+
+def nothing_to_measure(params, ticks):
+    return ()
+
+
+def peak_measured(feature_set, measured, units):
+    (peak,) = measured
+    return Features(names=("peak",), values=(peak,), units=("N",))
+
+
+@mutant(
+    "feature-set", "compiled-features-are-those-of-extract", "make `compiled` measure what `extract` does"
+)
+class CompiledForAnother(Peak):
+    compiled = CompiledFeatures(half_of_the_peak, lambda feature_set: (), peak_measured)
+
+
+@mutant("feature-set", "compiled-features-are-those-of-extract", "the same tuple of floats for every grasp")
+class CompiledWithoutNumbers(Peak):
+    compiled = CompiledFeatures(nothing_to_measure, lambda feature_set: (), peak_measured)
 
 
 # Controllers.

@@ -4,10 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from attrs import evolve
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from traces import made_trace
 
+from graspsense.core.compiled_features import TickColumns, columns_of_ticks, compiled_extraction
 from graspsense.core.signals import Phase
 from graspsense.core.trace import SI_UNITS
 from graspsense.core.units import in_words
@@ -177,3 +179,32 @@ def test_a_value_in_words():
     assert in_words(-0.0102, "m/s") == "-10.2 mm/s"
     assert in_words(7.3, "N") == "7.3 N"
     assert in_words(1.452, "1") == "1.452"
+
+
+def test_a_set_with_another_extract_is_not_extracted_by_the_compiled_form_of_its_base():
+    class Doubled(ChittaFeatures):
+        def extract(self, trace):
+            whole = super().extract(trace)
+            return evolve(whole, values=tuple(2.0 * value for value in whole.values))
+
+    assert compiled_extraction(FEATURES.extract) is not None
+    assert compiled_extraction(Doubled(ChittaConfig()).extract) is None
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_compiled_form_finds_contact_and_rest_where_the_search_in_the_interpreter_does(seed):
+    rng = np.random.default_rng(seed)
+    n = 400
+    gaps = 0.06 - 1e-7 * np.cumsum(rng.integers(0, 60, n) * (rng.random(n) < 0.2))
+    gaps[rng.random(n) < 0.002] = math.nan
+    forces = np.where(np.arange(n) > 40, rng.normal(2.0, 1.0, (2, n)), 0.0)
+    phases = np.sort(rng.integers(int(Phase.APPROACH), int(Phase.RELEASE) + 1, n))
+    trace = made_trace(list(zip(gaps.tolist(), *forces.tolist(), strict=True)), phases=phases.tolist())
+    for choice in ("mean", "left", "right", "min", "sum"):
+        features = ChittaFeatures(ChittaConfig(force=choice, rest_window_s=0.02))
+        form = compiled_extraction(features.extract)
+        columns = TickColumns(*(column.tolist() for column in columns_of_ticks(trace)))
+        extracted = features.extract(trace)
+        compiled = form.result(form.measure(form.params, columns))
+        assert repr(compiled.values) == repr(extracted.values)
+        assert compiled.reasons == extracted.reasons

@@ -133,6 +133,7 @@ _TABLE: Final[Table] = {
     "Feature sets": {
         "features": ("Features", "missing"),
         "roles": ("FeatureSet",),
+        "compiled_features": ("CompiledExtraction", "CompiledFeatures", "TickColumns", "compiled_extraction"),
         "trace": ("ImageTrace", "SampleTrace", "Trace", "TraceRecorder", "trace_of"),
         "units": ("in_words",),
     },

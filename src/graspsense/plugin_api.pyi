@@ -125,6 +125,10 @@ from graspsense.core.contact import update_rest as update_rest
 from graspsense.core.features import Features as Features
 from graspsense.core.features import missing as missing
 from graspsense.core.roles import FeatureSet as FeatureSet
+from graspsense.core.compiled_features import CompiledExtraction as CompiledExtraction
+from graspsense.core.compiled_features import CompiledFeatures as CompiledFeatures
+from graspsense.core.compiled_features import TickColumns as TickColumns
+from graspsense.core.compiled_features import compiled_extraction as compiled_extraction
 from graspsense.core.trace import ImageTrace as ImageTrace
 from graspsense.core.trace import SampleTrace as SampleTrace
 from graspsense.core.trace import Trace as Trace

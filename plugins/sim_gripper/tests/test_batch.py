@@ -7,7 +7,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from attrs import fields
+from attrs import evolve, fields
 
 from graspsense.core.errors import UnknownName
 from graspsense.core.plugins import IsolatedPlugins
@@ -75,6 +75,42 @@ def test_what_is_drawn_may_keep_a_column_of_the_trace():
     for one, other in zip(kept, whole, strict=True):
         assert one.kept is None
         assert one.extracted.tobytes() == other.trace.gap_m.tobytes()
+
+
+def test_features_without_traces_are_those_of_the_traces():
+    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+    scenes, seeds = ["odwalla:full_open", "egg", "none", "block"] * 3, range(12)
+    built = []
+
+    def from_traces(trace):
+        built.append(trace)
+        return FEATURES.extract(trace)
+
+    for options in ({}, {"run": RunConfig(grasp_timeout_s=0.4)}):
+        compiled, traced = (
+            run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True, extract=how, traces=False, **options)
+            for how in (FEATURES.extract, from_traces)
+        )
+        for one, other in zip(compiled, traced, strict=True):
+            assert repr(one.extracted.values) == repr(other.extracted.values)
+            assert one.extracted.reasons == other.extracted.reasons
+            assert (one.outcome, one.reason, one.state) == (other.outcome, other.reason, other.state)
+    assert len(built) == 24
+
+
+def test_features_that_cannot_be_compiled_are_extracted_from_traces():
+    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+
+    class Uncompilable(type(FEATURES)):
+        compiled = evolve(type(FEATURES).compiled, measure=lambda params, ticks: {}["a" + params])
+
+    features = Uncompilable(FEATURES.config)
+    with pytest.warns(UserWarning, match="features are extracted from traces, which takes longer"):
+        done = run_many(
+            SimConfig(), HYBRID, ["egg"], [3], compiled=True, extract=features.extract, traces=False
+        )
+    plain = run_many(SimConfig(), HYBRID, ["egg"], [3], compiled=True, extract=FEATURES.extract)
+    assert done[0].extracted == plain[0].extracted
 
 
 @pytest.mark.slow

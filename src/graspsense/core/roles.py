@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from graspsense.core.compiled_features import CompiledFeatures
     from graspsense.core.entries import Channel, Feature
     from graspsense.core.features import Features, FeatureTable, Prediction
     from graspsense.core.identification import Identification, Progress, RecordedSqueeze
@@ -398,12 +399,27 @@ class Controller(ABC, Generic[ConfigT]):
 
 
 class FeatureSet(ABC, Generic[ConfigT]):
-    """Extracts features from a trace. The class declares what it `requires`, and its `features`."""
+    """Extracts features from a trace. The class declares what it `requires`, and its `features`.
+
+    It may declare `compiled`, by which a batch of simulated grasps takes less time.
+    """
 
     requires: ClassVar[tuple[Channel, ...]]
     """The channels that `extract` reads."""
     features: ClassVar[tuple[Feature, ...]]
     """The features with their units and meanings, in the order in which they are returned."""
+    compiled: ClassVar[CompiledFeatures | None] = None
+    """The same features in a form that a simulator compiles (`compiled_features.CompiledFeatures`).
+
+    It belongs to the `extract` that the class has: a subclass with another `extract` declares its own, or has none."""
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        # A batch has the method alone, so the method carries what is declared about it.
+        if "compiled" in vars(cls) and isinstance(cls.extract, FunctionType):
+            if "extract" not in vars(cls):
+                cls.extract = _copy(cls.extract)  # type: ignore[method-assign]
+            cls.extract.compiled = cls.compiled  # type: ignore[attr-defined]
 
     def __init__(self, config: ConfigT) -> None:
         self.config = config

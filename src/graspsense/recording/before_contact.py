@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from graspsense.core.compiled_features import CompiledExtraction, TickColumns
 from graspsense.core.contact import CONTACT_FORCE_N
 from graspsense.core.features import Features, missing
 from graspsense.core.signals import APPROACH
@@ -37,26 +38,95 @@ def contact_force_of(settings: Mapping[str, Mapping[str, Any]]) -> float:
     return float(settings.get("controller", {}).get("contact_force_n", CONTACT_FORCE_N))
 
 
+NO_APPROACH: Final = 0.0
+SHORT: Final = 1.0
+TOUCHED: Final = 2.0
+FREE: Final = 3.0
+"""What was seen of the approach (`Before.seen`); only with FREE there are features."""
+
+
+class Before(NamedTuple):
+    """What the features follow from; all values are NaN unless `seen` is FREE."""
+
+    seen: float
+    gap_m: float = math.nan
+    velocity_m_s: float = math.nan
+    effort_n: float = math.nan
+    force_left_n: float = math.nan
+    force_right_n: float = math.nan
+
+
 def before_contact(trace: Trace, contact_force_n: float = CONTACT_FORCE_N) -> Features:
     """Return the features from before contact; they are missing, with the reason, if contact came too early."""
+    return _features(_seen(trace, contact_force_n))
+
+
+def before_contact_compiled(contact_force_n: float) -> CompiledExtraction:
+    """Return `before_contact` in a form that a simulator compiles; the means agree to rounding."""
+    return CompiledExtraction(measure, (contact_force_n,), _features)
+
+
+def measure(params: tuple[float], ticks: TickColumns) -> Before:
+    """Return what `before_contact` measures, from the columns of a grasp; it can be compiled."""
+    n, first = len(ticks.phase), 0
+    while first < n and ticks.phase[first] != APPROACH:
+        first += 1
+    if first == n:
+        return Before(NO_APPROACH, math.nan, math.nan, math.nan, math.nan, math.nan)
+    last = n - 1
+    while ticks.phase[last] != APPROACH:
+        last -= 1
+    start_s = ticks.t_s[first]
+    if ticks.t_s[last] < start_s + SPAN_S:
+        return Before(SHORT, math.nan, math.nan, math.nan, math.nan, math.nan)
+    count, velocity, effort, left, right = 0, 0.0, 0.0, 0.0, 0.0
+    for i in range(n):
+        if ticks.t_s[i] > start_s + SPAN_S + GUARD_S:
+            break
+        if ticks.force_left_n[i] >= params[0] or ticks.force_right_n[i] >= params[0]:
+            return Before(TOUCHED, math.nan, math.nan, math.nan, math.nan, math.nan)
+        if ticks.phase[i] == APPROACH and ticks.t_s[i] <= start_s + SPAN_S:
+            count += 1
+            velocity += ticks.velocity_m_s[i]
+            effort += ticks.effort_n[i]
+            left += ticks.force_left_n[i]
+            right += ticks.force_right_n[i]
+    return Before(FREE, ticks.gap_m[first], velocity / count, effort / count, left / count, right / count)
+
+
+def _seen(trace: Trace, contact_force_n: float) -> Before:
+    """Return what `measure` does, in less time in the interpreter."""
     approach = np.flatnonzero(trace.phase == APPROACH)
     if not len(approach):
-        return _missing("there was no approach")
+        return Before(NO_APPROACH)
     start = trace.t_s[approach[0]]
     if trace.t_s[approach[-1]] < start + SPAN_S:
-        return _missing(f"the approach took less than {SPAN_S:g} s")
-    felt = np.maximum(trace.force_left_n, trace.force_right_n) >= contact_force_n
+        return Before(SHORT)
+    felt = (trace.force_left_n >= contact_force_n) | (trace.force_right_n >= contact_force_n)
     if bool((felt & (trace.t_s <= start + SPAN_S + GUARD_S)).any()):
-        return _missing(f"a pad felt a force in the first {SPAN_S + GUARD_S:g} s of the approach")
+        return Before(TOUCHED)
     span = approach[trace.t_s[approach] <= start + SPAN_S]
     means = [
         float(column[span].mean())
         for column in (trace.velocity_m_s, trace.effort_n, trace.force_left_n, trace.force_right_n)
     ]
-    values = (float(trace.gap_m[span[0]]), *means)
+    return Before(FREE, float(trace.gap_m[span[0]]), *means)
+
+
+def _features(before: Any) -> Features:
+    seen, *values = before
+    if seen != FREE:
+        return _missing(_WHY_MISSING[seen])
     lacking = [name for name, value in zip(NAMES, values, strict=True) if math.isnan(value)]
     reasons = missing(lacking, "the gripper has no such channel")
-    return Features(names=NAMES, values=values, units=_UNITS, reasons=reasons)
+    return Features(names=NAMES, values=tuple(values), units=_UNITS, reasons=reasons)
+
+
+_WHY_MISSING: Final = {
+    NO_APPROACH: "there was no approach",
+    SHORT: f"the approach took less than {SPAN_S:g} s",
+    TOUCHED: f"a pad felt a force in the first {SPAN_S + GUARD_S:g} s of the approach",
+}
 
 
 def _missing(why: str) -> Features:

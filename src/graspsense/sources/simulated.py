@@ -9,12 +9,14 @@ seed s: object i has the number 1000 s + i, and trial k, counted over all trials
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import Attribute, evolve, field, frozen
 
 from graspsense.core.checkpoints import with_checkpoints
+from graspsense.core.compiled_features import CompiledExtraction, both, compiled_extraction
 from graspsense.core.errors import ComponentFailed, ConfigError, named
 from graspsense.core.features import Features, table_of
 from graspsense.core.labelled import Labelled, class_of
@@ -22,7 +24,11 @@ from graspsense.core.roles import BatchBackend, DeviceInfo, FeatureSet
 from graspsense.core.runner import run_grasp
 from graspsense.core.strict import plain
 from graspsense.core.wiring import check
-from graspsense.recording.before_contact import before_contact, contact_force_of
+from graspsense.recording.before_contact import (
+    before_contact,
+    before_contact_compiled,
+    contact_force_of,
+)
 from graspsense.recording.controls import controls
 
 if TYPE_CHECKING:
@@ -243,13 +249,31 @@ class _Extraction:
 
     def __call__(self, trace: Trace) -> tuple[Features, Features]:
         """Return the features, and those from before contact."""
-        try:
+        with self._named_failure():
             features = self.feature_set.extract(trace)
+        return features, before_contact(trace, self.contact_force_n)
+
+    def compiled_extraction(self) -> CompiledExtraction | None:
+        """Return the form that a simulator compiles; None if the feature set has none."""
+        form = compiled_extraction(self.feature_set.extract)
+        if form is None:
+            return None
+        of_set = form.result
+
+        def result(measured: Any) -> Any:
+            with self._named_failure():
+                return of_set(measured)
+
+        return both(evolve(form, result=result), before_contact_compiled(self.contact_force_n))
+
+    @contextmanager
+    def _named_failure(self) -> Iterator[None]:
+        try:
+            yield
         except Exception as error:
             raise ComponentFailed(
                 f"feature set {self.name} failed on a simulated grasp: {named(error)}"
             ) from error
-        return features, before_contact(trace, self.contact_force_n)
 
 
 def _grasps(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from typing import Final
 
+from graspsense.core.compiled_features import columns_of_ticks, compiled_extraction
 from graspsense.core.errors import named
 from graspsense.core.features import Features
 from graspsense.core.trace import Trace
@@ -45,7 +47,11 @@ def _own(subject: Subject) -> Trace:
 
 
 def _same(a: Features, b: Features) -> bool:
-    return repr(a) == repr(b)
+    return repr(a.as_dict()) == repr(b.as_dict()) and (a.names, a.units, a.reasons) == (
+        b.names,
+        b.units,
+        b.reasons,
+    )
 
 
 def returns_the_declared_features(subject: Subject) -> None:
@@ -169,6 +175,32 @@ def survives_json(subject: Subject) -> None:
         demand(text == dict(features.reasons), f"the reasons {features.reasons!r} are not plain text")
 
 
+def compiled_features_are_those_of_extract(subject: Subject) -> None:
+    """A form of the features that is compiled gives the features and the reasons of `extract`, for every trace."""
+    set_ = subject.create()
+    form = compiled_extraction(set_.extract)
+    if form is None:
+        return
+    demand(
+        inspect.isfunction(form.measure) and form.measure.__closure__ is None,
+        f"{form.measure!r} in `compiled` is not a module function: write one, which numba can compile",
+    )
+    for of, trace in {"a whole grasp": squeeze(), **unusual_traces()}.items():
+        extracted = set_.extract(trace)
+        try:
+            measured = form.measure(form.params, columns_of_ticks(trace))
+            features: Features = form.result(tuple(float(number) for number in measured))
+        except Exception as error:
+            raise CheckFailed(
+                f"`compiled` raised {named(error)} on {of}: return the same tuple of floats for every grasp"
+            ) from error
+        demand(
+            _same(features, extracted),
+            f"on {of} `compiled` gives {features.as_dict()} with the reasons {dict(features.reasons)}, and `extract` "
+            f"gives {extracted.as_dict()} with {dict(extracted.reasons)}: make `compiled` measure what `extract` does",
+        )
+
+
 CHECKS: Final = (
     *component.CHECKS,
     *checks_of(
@@ -183,5 +215,6 @@ CHECKS: Final = (
         independent_of_the_start_of_the_clock,
         views_and_copies_agree,
         survives_json,
+        compiled_features_are_those_of_extract,
     ),
 )

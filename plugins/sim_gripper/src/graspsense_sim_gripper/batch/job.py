@@ -12,6 +12,7 @@ from attrs import define, evolve, field, frozen
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import (
+    CompiledExtraction,
     Controller,
     GraspEvent,
     Outcome,
@@ -21,6 +22,7 @@ from graspsense.plugin_api import (
     TickParams,
     TickState,
     Trace,
+    compiled_extraction,
     ended_by_itself,
     event_name,
     first_state,
@@ -65,6 +67,8 @@ then: drawing is a sixth of the time of a grasp."""
 Extracted = Any
 """What `Job.extract` returns, such as features."""
 GraspLoop = Callable[[GraspParams, SimulationState, Buffers], SimulationState]
+Measure = Callable[[Any, Any, Any, int], Any]
+"""`compiled.extraction.measure_buffers` of a job, compiled."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -101,10 +105,16 @@ class Job:
     """Whether traces are kept."""
     scaled: ScaledParameter | None = None
     """A parameter of the objects that is larger by a share."""
+    extraction: CompiledExtraction | None = field(init=False)
+    """The form of `extract` that can be compiled; None if there is none, or if traces are kept."""
     params: TickParams = field(init=False)
     """The parameters of controller and guard in every grasp."""
     initial: TickState = field(init=False)
     """The state of controller and guard before the first tick."""
+
+    @extraction.default
+    def _extraction(self) -> CompiledExtraction | None:
+        return None if self.traces else compiled_extraction(self.extract)
 
     @params.default
     def _params(self) -> TickParams:
@@ -182,10 +192,15 @@ class Storage:
     buffers: Buffers = field(factory=_new_buffers)
 
 
-def grasp_compiled(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> FinishedGrasp:
-    """Simulate a grasp with the compiled loop of its composition (see `composition_of`)."""
+def grasp_compiled(
+    job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage, measure: Measure | None = None
+) -> FinishedGrasp:
+    """Simulate a grasp with the compiled loop of its composition (see `composition_of`).
+
+    `measure`: the compiled form of `Job.extraction`; None: `Job.extract` is called with a trace.
+    """
     try:
-        return grasp_once(job, padded(setup), loop, storage, on_arrays=True, own=setup)
+        return grasp_once(job, padded(setup), loop, storage, on_arrays=True, own=setup, measure=measure)
     except LAW_ERRORS:
         # Compiled code does not say which term raised it.
         return grasp_plain(job, setup)
@@ -210,10 +225,12 @@ def grasp_once(
     *,
     on_arrays: bool,
     own: GraspSetup | None = None,
+    measure: Measure | None = None,
 ) -> FinishedGrasp:
     """Grasp what `setup` describes with the loop, on arrays where it is compiled, on lists where it is not.
 
-    `own`: the same grasp before it was padded; the plant is returned with its terms.
+    `own`: the same grasp before it was padded; the plant is returned with its terms. `measure`: as for
+    `grasp_compiled`.
     """
     end, buffers = _run(job, setup, loop, storage, on_arrays)
     plant = end.plant if own is None else unpadded(end.plant, own)
@@ -229,6 +246,15 @@ def grasp_once(
         return finished(job, outcome, reason, plant, None)
     n, k = end.loop.recorded, end.sensor.images
     columns, phases = buffers.columns, buffers.phases
+    if measure is not None and job.extraction is not None:
+        try:
+            measured = measure(job.extraction.params, columns, phases, n)
+        except Exception:
+            # Compiled code does not say where an exception comes from. `extract` does, if it raises one too.
+            pass
+        else:
+            extracted = job.extraction.result(measured)
+            return FinishedGrasp(outcome=outcome, reason=reason, state=plant, extracted=extracted, kept=None)
     table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
     images, times = np.asarray(buffers.pads.images[:k]), np.asarray(buffers.image_times[:k])
     signals: dict[str, SampleTrace] = {}

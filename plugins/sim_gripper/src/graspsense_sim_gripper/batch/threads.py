@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
+from importlib.util import find_spec
 from typing import Any, Final, Unpack
 
 from attrs import define, field
@@ -23,6 +24,7 @@ from graspsense_sim_gripper.batch.job import (
     FinishedGrasp,
     GraspLoop,
     Job,
+    Measure,
     Scenes,
     Storage,
     grasp_compiled,
@@ -31,6 +33,7 @@ from graspsense_sim_gripper.batch.job import (
 )
 from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.compiled.compose import Composition
+from graspsense_sim_gripper.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
 from graspsense_sim_gripper.compiled.padding import compiled_kinds, composition_of
 from graspsense_sim_gripper.config import SimConfig
@@ -116,6 +119,8 @@ class _Batch:
     compiled: bool | None
     notes: dict[str, None] = field(factory=dict, init=False)
     """Remarks on how the grasps ran, as keys, so that each is given once."""
+    measure: Measure | None = field(default=None, init=False)
+    """The compiled form of `Job.extraction`."""
     models: Scenes = field(init=False)
     counts: Counter[Composition] = field(factory=Counter, init=False)
     """Number of grasps of each composition."""
@@ -184,6 +189,12 @@ class _Batch:
             self.counts[composition_of(self.job.config, self.models.setup(examples[key], 0))] += n
         for composition, n in self.counts.items():
             self.is_compiled[composition] = self._worth(n)
+        if self.job.extraction is not None and any(self.is_compiled.values()):
+            try:
+                self.measure = compiled_measure(self.job.extraction)
+            except NotCompilable as error:
+                if find_spec("numba") is not None:
+                    self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
 
     def _worth(self, n: int) -> bool:
         return n >= WORTH_COMPILING if self.compiled is None else self.compiled
@@ -216,11 +227,11 @@ class _Batch:
             return None
         loop = self.loops.get(composition)
         if loop is not None:
-            return grasp_compiled(self.job, setup, loop, self._storage())
+            return grasp_compiled(self.job, setup, loop, self._storage(), self.measure)
         try:
             loop = compiled_loop(composition, type(self.job.controller).step)
             with compiling(composition):
-                grasp = grasp_compiled(self.job, setup, loop, self._storage())
+                grasp = grasp_compiled(self.job, setup, loop, self._storage(), self.measure)
                 self.loops[composition] = entry_point(loop)
                 return grasp
         except NotCompilable as error:

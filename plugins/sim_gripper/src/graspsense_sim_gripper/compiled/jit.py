@@ -68,5 +68,12 @@ def compiling(composition: Composition) -> Iterator[None]:
 
     Threads wait for each other here, so that the code is not generated twice. Raises NotCompilable if numba refuses.
     """
-    with _COMPILING, first_call(slp_vectorize=composition.shape is not None):
+    with generating(slp_vectorize=composition.shape is not None):
+        yield
+
+
+@contextmanager
+def generating(*, slp_vectorize: bool = False) -> Iterator[None]:
+    """Context as of `first_call`, in which threads wait for each other."""
+    with _COMPILING, first_call(slp_vectorize=slp_vectorize):
         yield

@@ -1,0 +1,48 @@
+"""Compiling what a feature set measures, so that a batch needs no trace for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+
+from graspsense.plugin_api import CompiledExtraction, TickColumns, bind, compile_function, entry_point
+from graspsense_sim_gripper.compiled.jit import generating
+from graspsense_sim_gripper.loop import COLUMNS, EVENT_SHIFT, Table
+
+PHASE_BITS: Final = (1 << EVENT_SHIFT) - 1
+
+
+def _measure_unbound(params: Any, ticks: TickColumns) -> Any:
+    raise TypeError("nothing is measured: compiled_measure binds a measure")
+
+
+measure: Callable[[Any, TickColumns], Any] = _measure_unbound
+
+
+def measure_buffers(params: Any, columns: Table, phases: Any, n: int) -> Any:
+    """Return what is measured on the first `n` ticks of `Buffers`. The events are removed from the phases."""
+    for i in range(n):
+        phases[i] &= PHASE_BITS
+    ticks = TickColumns(
+        columns[0][:n],
+        columns[1][:n],
+        columns[2][:n],
+        columns[3][:n],
+        columns[4][:n],
+        columns[5][:n],
+        columns[6][:n],
+        columns[7][:n],
+        columns[8][:n],
+        phases[:n],
+    )
+    return measure(params, ticks)
+
+
+def compiled_measure(form: CompiledExtraction) -> Callable[[Any, Any, Any, int], Any]:
+    """Return `measure_buffers` of an extraction, compiled. Raises NotCompilable."""
+    compiled = compile_function(bind(measure_buffers, measure=form.measure))
+    with generating():
+        compiled(form.params, np.zeros((len(COLUMNS), 1)), np.zeros(1, np.int64), 0)
+    return entry_point(compiled)
