@@ -181,7 +181,7 @@ def markdown(ranking: Ranking) -> str:
     """Return the verdict and the table of a comparison."""
     protocols = list(dict.fromkeys(name for one in ranking.candidates for name in one.rates))
     header = ["classifier", "features", *(name.replace("_", " ") for name in protocols), "loss in points", "standing",
-              "sets cover", "labels in a set", "training"]  # fmt: skip
+              "sets cover", "of labels below 90 %", "labels in a set", "training"]  # fmt: skip
     lines = [
         f"{ranking.trials} {ranking.source}, compared by {ranking.protocol.replace('_', ' ')}. {ranking.verdict}",
         "",
@@ -193,9 +193,11 @@ def markdown(ranking: Ranking) -> str:
         interval = f" ({percentages(first.interval)})" if first.interval else ""
         rates = [percentage(one.rates[name].rate) if name in one.rates else "" for name in protocols]
         rates[protocols.index(ranking.protocol)] += interval
-        covered = size = ""
+        covered = below = size = ""
         if one.sets is not None and one.sets.covered is not None and one.sets.mean_size is not None:
             covered, size = percentage(one.sets.covered.rate), f"{one.sets.mean_size:.2f}"
+            if one.sets.covered_below is not None:
+                below = percentage(one.sets.covered_below.rate)
         loss = "" if one.loss is None else one.loss.points
         cells = [
             f"`{one.classifier}`",
@@ -204,6 +206,7 @@ def markdown(ranking: Ranking) -> str:
             loss,
             one.standing,
             covered,
+            below,
             size,
             f"{one.training_s:.2g} s",
         ]

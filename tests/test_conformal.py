@@ -46,31 +46,45 @@ def test_units_needed_are_the_smallest_n_with_a_finite_quantile(coverage, needed
     assert units_needed(coverage) == needed
 
 
-def test_the_threshold_is_the_quantile_of_split_conformal_prediction():
-    truth = (
-        np.arange(1, 20) / 20.0
-    )  # 19 trials: the 18th largest is the quantile of 90 % (ceil(20 * 0.9) = 18)
+def wrong(n):
+    return [False] * n
 
-    sets = sets_of(truth, ["a"] * 19, None)
 
-    assert sets.thresholds["a"].score == truth[1]
+def test_the_threshold_is_reached_by_90_percent_of_the_trials_that_are_not_recognised():
+    truth = np.arange(1, 21) / 20.0
+
+    sets = sets_of(truth, wrong(20), ["a"] * 20, None)
+
+    assert sets.thresholds["a"].score == truth[2]  # 18 of 20
+
+
+def test_a_label_that_is_recognised_more_often_than_asked_needs_no_other_member():
+    truth = np.arange(1, 21) / 40.0
+
+    often = sets_of(truth, [True] * 19 + [False], ["a"] * 20, None)
+    seldom = sets_of(truth, [False] * 10 + [True] * 10, ["a"] * 20, None)
+
+    assert often.of({"b": 0.6, "a": 0.4}, "b") == ("b",)
+    assert seldom.thresholds["a"].score == truth[2]  # with 8 of the 10 wrong ones, 18 of 20 are covered
+    assert seldom.of({"b": 0.8, "a": 0.2}, "b") == ("b", "a")
 
 
 def test_many_trials_of_one_instance_count_as_one():
     truth = np.array([0.05] * 100 + [0.5] * 20)
     instances = ["poor"] * 100 + [f"good{i}" for i in range(20)]
 
-    by_instance = sets_of(truth, ["a"] * 120, instances)
-    by_trial = sets_of(truth, ["a"] * 120, None)
+    by_instance = sets_of(truth, wrong(120), ["a"] * 120, instances)
+    by_trial = sets_of(truth, wrong(120), ["a"] * 120, None)
+    alone = sets_of(truth[99:], wrong(21), ["a"] * 21, instances[99:])
 
-    assert by_instance.thresholds["a"].score == 0.5  # reached by 20 of 21 instances: 20/22 is over 90 %
+    assert by_instance.thresholds["a"].score == 0.5  # reached by 20 of 21 instances
     assert by_trial.thresholds["a"].score == 0.05
-    assert sets_of(truth[99:], ["a"] * 21, instances[99:]).thresholds == by_instance.thresholds
+    assert alone.thresholds == by_instance.thresholds
 
 
 def test_eight_instances_are_too_few_and_nine_are_enough():
-    few = sets_of(np.ones(80), ["a"] * 80, [str(i % 8) for i in range(80)])
-    enough = sets_of(np.ones(81), ["a"] * 81, [str(i % 9) for i in range(81)])
+    few = sets_of(np.ones(80), wrong(80), ["a"] * 80, [str(i % 8) for i in range(80)])
+    enough = sets_of(np.ones(81), wrong(81), ["a"] * 81, [str(i % 9) for i in range(81)])
 
     assert few.thresholds == {}
     assert "8 calibration instances, 90 % needs 9" in few.in_words
@@ -90,7 +104,7 @@ def test_what_a_label_lacks_for_sets_is_counted_in_instances_where_each_label_ha
 def test_a_label_with_few_instances_shares_the_threshold_of_all():
     truth = np.concatenate((np.linspace(0.2, 0.9, 12), [0.5, 0.6, 0.7]))
 
-    sets = sets_of(truth, ["often"] * 12 + ["seldom"] * 3, [str(i) for i in range(15)])
+    sets = sets_of(truth, wrong(15), ["often"] * 12 + ["seldom"] * 3, [str(i) for i in range(15)])
 
     assert sets.thresholds["often"].own
     assert not sets.thresholds["seldom"].own
@@ -112,7 +126,7 @@ def test_sets_of_new_instances_cover_90_percent():
                 total += 1
 
     assert total > 400
-    assert 0.87 < covered / total < 0.98  # 90 % is asked for; 21 units, so up to 95 % is expected
+    assert 0.87 < covered / total < 0.95  # 90 % is asked for, and 80 to 90 % are recognised
 
 
 @pytest.mark.parametrize(
@@ -215,7 +229,7 @@ def test_equal_probabilities_are_told_apart_by_the_closeness_of_the_training_tri
 
 @pytest.fixture
 def csv_file(tmp_path):
-    trials = bottles(12)
+    trials = bottles(12, spread=1.5)
     lines = ["label,bottle,force [N],noise"]
     for label, name, row in zip(trials.labels, trials.instances, trials.table.values.tolist(), strict=True):
         lines.append(",".join((label, name, *map(repr, row))))

@@ -218,6 +218,10 @@ def _print_doubt(found: Evaluation) -> None:
             "sets",
             f"{sets.covered.words} contain the true label; {100 * sets.asked:.0f} % asked for, by {sets.unit}",
         )
+        if sets.covered_below is not None:
+            echo_entry(
+                "", f"{sets.covered_below.words} of the labels that are recognised less often than that"
+            )
         least = min(sets.by_label, key=lambda name: sets.by_label[name].rate)
         echo_entry("", f"{sets.mean_size:.2f} labels on average, {percentage(sets.single.rate)} of the sets have one; "
                        f"lowest coverage: {percentage(sets.by_label[least].rate)} of {least}")  # fmt: skip

@@ -31,6 +31,8 @@ RateOf = Callable[[Sequence[bool], Sequence[int] | None], RecognitionRate]
 class SetCoverage:
     """The share of held-out trials whose prediction set contains the true label, and the size of the sets.
 
+    A label is covered at least as often as it is recognised, since the prediction is a member. `covered_below` is the
+    share over the labels that are recognised less often than the coverage asked for; None if there are none.
     `mean_size` is the mean number of labels in a set, `single` the share of sets with one label. They are None if no
     set could be calibrated; `reason` then says why.
     """
@@ -38,6 +40,7 @@ class SetCoverage:
     asked: float
     unit: str
     covered: RecognitionRate | None = None
+    covered_below: RecognitionRate | None = None
     by_label: Mapping[str, RecognitionRate] = field(factory=dict)
     mean_size: float | None = None
     single: RecognitionRate | None = None
@@ -86,7 +89,7 @@ def calibrated_sets(learner: ClassifierFactory, labelled: Labelled, seed: int) -
     except (FitRefused, ConfigError) as refusal:
         unit = "trials" if instances is None else "instances"
         return PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=str(refusal))
-    sets = sets_of(_of_truth(pooled, labels), labels, instances)
+    sets = sets_of(_of_truth(pooled, labels), pooled.right(labels), labels, instances)
     return evolve(sets, unknown=int(pooled.unlike.sum()), trials=len(labels))
 
 
@@ -110,13 +113,14 @@ def held_out_members(
 
     The sets of a fold are calibrated with the predictions of the other folds.
     """
-    truth = _of_truth(pooled, labels)
+    truth, right = _of_truth(pooled, labels), pooled.right(labels)
     inside = np.zeros(pooled.scores.shape, dtype=np.bool_)
     for rows, of in zip(groups, folds, strict=True):
         for fold in np.unique(of).tolist():
             test, others = rows[of == fold], rows[of != fold].tolist()
             sets = sets_of(
                 truth[others],
+                [right[i] for i in others],
                 [labels[i] for i in others],
                 None if instances is None else [instances[i] for i in others],
             )
@@ -150,10 +154,13 @@ def set_coverage(
     covered = [bool(inside[i, column[label]]) for i, label in enumerate(labels)]
     sizes = inside.sum(axis=1)
     rows_of = {name: [i for i, label in enumerate(labels) if label == name] for name in pooled.classes}
+    right = np.array(pooled.right(labels))
+    below = [i for of in rows_of.values() if right[of].mean() < COVERAGE for i in of]
     return SetCoverage(
         asked=COVERAGE,
         unit=unit,
         covered=rate_of(covered, None),
+        covered_below=rate_of(covered, sorted(below)) if below else None,
         by_label={name: rate_of(covered, of) for name, of in rows_of.items()},
         mean_size=float(sizes.mean()),
         single=rate_of((sizes == 1).tolist(), None),

@@ -50,12 +50,16 @@ def doubt_section(sets: SetCoverage, reliability: Reliability) -> Section:
         rows = [
             RateRow(name="all labels", rate=sets.covered.rate, interval=sets.covered.interval, strong=True)
         ]
+        if (below := sets.covered_below) is not None:
+            name = f"labels recognised in less than {100 * sets.asked:.0f} %"
+            rows.append(RateRow(name=name, rate=below.rate, interval=below.interval, strong=True))
         rows += [
             RateRow(name=name, rate=one.rate, interval=one.interval) for name, one in sets.by_label.items()
         ]
         text += (
             f" In held-out grasps the sets contain it in {sets.covered.words}. They have {sets.mean_size:.2f} "
-            f"labels on average; {percentage(sets.single.rate)} have a single one."
+            f"labels on average; {percentage(sets.single.rate)} have a single one. The prediction is always a "
+            "member, so a label is covered at least as often as it is recognised."
         )
     probabilities = (
         f"Where the probabilities are right, predictions of 80 % are correct in 80 of 100 grasps. The Brier score is "

@@ -84,7 +84,8 @@ def _sets(ranking: Ranking) -> Section:
     text = (
         f"A prediction set has the labels that cannot be ruled out. It shall contain the true label of "
         f"{100 * judged[0].asked:.0f} % of new grasps. Of two classifiers with the same coverage, the one with the "
-        "smaller sets tells more."
+        "smaller sets tells more. The prediction is always a member, so a label that is recognised more often than "
+        "that is also covered more often; the next column has the other labels."
     )
     rows = []
     for one in ranking.candidates:
@@ -92,7 +93,7 @@ def _sets(ranking: Ranking) -> Section:
         if sets is None:
             continue
         if sets.covered is None or sets.mean_size is None or sets.single is None:
-            rows.append((one.classifier, _features(one), f"not measured: {sets.reason}", "", "", ""))
+            rows.append((one.classifier, _features(one), f"not measured: {sets.reason}", "", "", "", ""))
             continue
         lowest = min(sets.by_label.items(), key=lambda item: item[1].rate)
         rows.append(
@@ -100,6 +101,7 @@ def _sets(ranking: Ranking) -> Section:
                 one.classifier,
                 _features(one),
                 percentage(sets.covered.rate),
+                "" if sets.covered_below is None else percentage(sets.covered_below.rate),
                 f"{percentage(lowest[1].rate)} ({lowest[0]})",
                 f"{sets.mean_size:.2f}",
                 percentage(sets.single.rate),
@@ -109,6 +111,7 @@ def _sets(ranking: Ranking) -> Section:
         "classifier",
         "features",
         "contain the true label",
+        "if recognised less often",
         "least of a label",
         "labels in a set",
         "single label",
