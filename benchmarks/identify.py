@@ -1,12 +1,16 @@
 """Whether `graspsense identify` brings known scenes back, and at how many recordings a simulator stops paying.
 
-    python benchmarks/identify.py [--repeats 4] [--only NAME...] [--transfer] [--json] [--short]
+    python benchmarks/identify.py [--repeats 4] [--only NAME...] [--sensors NAME...] [--recordings N...] [--rows FILE]
+    python benchmarks/identify.py --rows FILE --markdown docs/identify.md
+    python benchmarks/identify.py --transfer [--rows FILE] [--markdown docs/identify.md] [--png docs/identify.png]
 
-Each scene below is grasped in simulation by the hybrid controller with a hold, with ideal sensors and with PR2 pads,
-once, three times and ten times. With three and ten grasps the stiffness differs between objects (10 %). The scene is
-then identified from these grasps. A row counts how often the true terms were chosen, how often the 90 % intervals hold
-the true values where the true terms were chosen, and gives the median error and time. An interval of a single squeeze
-is of this squeeze, whose object has the nominal stiffness.
+Each scene below is grasped in simulation by the hybrid controller with a hold, with ideal sensors, with PR2 pads, and
+with pads at the 60 Hz of Robotiq's TSF-85 whose fingertips harden, once, three times and ten times. In each repeat,
+every value of the scene is multiplied by a factor from 0.74 to 1.35. With three and ten grasps the stiffness differs
+between objects (10 %). The scene is then identified from these grasps. A row says whether the true terms were
+chosen, and how many of the 90 % intervals hold the true values where they were. An interval of a single squeeze is of
+this squeeze, whose object has the nominal stiffness. Rows are appended to the file of `--rows`, and `--markdown` writes
+its tables between the marks of a page.
 
 With `--transfer`: four containers of the catalogue are the real world. From 1, 3, 10 and 30 recordings of each,
 a classifier is trained on the recordings, and another on simulated squeezes of the scenes that they were identified as.
@@ -32,9 +36,11 @@ import numpy as np
 from attrs import asdict, frozen
 
 from graspsense import load_pipeline
-from graspsense.core.identification import Identification, RecordedSqueeze
+from graspsense.core.identification import RecordedSqueeze
+from graspsense.evaluation.intervals import wilson
 from graspsense.plugin_api import RunConfig, create, table_of
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.identify.laws import SLOTS
 from graspsense_sim_gripper.identify.run import identify
 
 WIDTH_M: Final = 0.05
@@ -50,15 +56,48 @@ SCENES: Final[Mapping[str, tuple[Mapping[str, Any], ...]]] = {
         {"type": "maxwell", "k_n_m": 500.0, "tau_s": 0.2},
     ),
     "damped": ({"type": "elastic", "k1_n_m": 1500.0}, {"type": "loss", "damping_n_s_m": 60.0}),
+    "snap": (
+        {
+            "type": "snap",
+            "k1_n_m": 3000.0,
+            "critical_m": 2e-3,
+            "drop_n": 2.0,
+            "fall_m": 1e-3,
+            "k2_n_m": 2500.0,
+        },
+    ),
     "creeping foam": (
         {"type": "foam", "force_n": 8.0, "at_m": AT_M, "exponent": 2.0},
         {"type": "maxwell", "k_n_m": 300.0, "tau_s": 0.3},
     ),
+    "creeping hertz": (
+        {"type": "rigid", "hertz_n_m15": 20000.0},
+        {"type": "maxwell", "k_n_m": 400.0, "tau_s": 0.25},
+    ),
+    "two branches": (
+        {"type": "elastic", "k1_n_m": 1000.0},
+        {"type": "maxwell", "k_n_m": 600.0, "tau_s": 0.08},
+        {"type": "maxwell", "k_n_m": 400.0, "tau_s": 0.5},
+    ),
+    "creeping and damped": (
+        {"type": "elastic", "k1_n_m": 1200.0},
+        {"type": "maxwell", "k_n_m": 600.0, "tau_s": 0.4},
+        {"type": "loss", "damping_n_s_m": 40.0},
+    ),
 }
 COUNTS: Final = (1, 3, 10)
-SENSORS: Final = ("ideal", "pads")
+SENSORS: Final[Mapping[str, Mapping[str, Any]]] = {
+    "ideal": {"sensor": "ideal"},
+    "PR2 pads": {"sensor": "pads"},
+    "60 Hz pads": {"sensor": "pads", "pad_period_s": 1.0 / 60.0, "pad_hardening_m": 0.001},
+}
+"""The settings of the gripper."""
+FACTOR: Final = 0.3
+"""The logarithm of the largest factor on the values of a scene."""
 STIFFNESS_SPREAD: Final = 0.1
 HOLD_S: Final = 1.5
+TOLD_APART: Final = 1.03
+"""Terms whose fits differ by less than this factor are not told apart by the data."""
 FORCE_N: Final = 18.0
 CONTAINERS: Final = ("odwalla:empty_open", "naked:empty_open", "can:empty_open", "water:empty_open")
 TRANSFER_COUNTS: Final = (1, 3, 10, 30)
@@ -69,18 +108,32 @@ SIMULATED_TRIALS: Final = 4
 
 @frozen(kw_only=True)
 class Row:
-    """The result for a scene, a sensor, and a number of recordings."""
+    """The result for a scene, a sensor, a number of recordings, and a repeat."""
 
     scene: str
     sensor: str
     recordings: int
-    repeats: int
-    right_terms: int
-    covered: int
-    intervals: int
-    median_error: float
-    """Relative error of the values, where the true terms were chosen."""
+    repeat: int
+    chosen: str
+    """The chosen terms."""
+    right_terms: bool
+    told_apart: bool
+    """Whether the data tell the true terms from the chosen ones: the chosen ones fit worse, or are more."""
+    found: tuple[tuple[str, float, float, float, float], ...]
+    """Each parameter with its true value, its value, and the ends of its interval, where the true terms were chosen."""
     seconds: float
+
+
+def drawn(terms: Sequence[Mapping[str, Any]], repeat: int) -> list[dict[str, Any]]:
+    """Return the terms of a repeat, with every value but that of `at_m` times a factor of its own."""
+    rng = np.random.default_rng([repeat, len(terms)])
+    return [
+        {
+            key: value if key in ("type", "at_m") else value * math.exp(rng.uniform(-FACTOR, FACTOR))
+            for key, value in term.items()
+        }
+        for term in terms
+    ]
 
 
 def scene_text(terms: Sequence[Mapping[str, Any]], spread: float) -> str:
@@ -92,128 +145,251 @@ def scene_text(terms: Sequence[Mapping[str, Any]], spread: float) -> str:
     return "\n".join(lines) + "\n"
 
 
-def squeezes_of(scene: str, label: str, sensor: str, seeds: Sequence[int]) -> list[RecordedSqueeze]:
-    """Return simulated recordings of a scene, each of another object."""
-    config = SimConfig(sensor=sensor)  # type: ignore[arg-type]
-    backend = create("sensor-backend", "sim", sensor=sensor)
+def squeezes_of(
+    scene: str, label: str, gripper: Mapping[str, Any], names: Sequence[str], seeds: Sequence[int]
+) -> list[RecordedSqueeze]:
+    """Return simulated recordings of a scene, one of each object, which the names tell apart."""
+    config = SimConfig(**gripper)
+    backend = create("sensor-backend", "sim", **gripper)
     controller = create("controller", "hybrid", probing_force_n=FORCE_N)
-    names = [f"{scene}#{seed}" for seed in seeds]
+    objects = [f"{scene}#{name}" for name in names]
     run = RunConfig(hold_s=HOLD_S)
-    done = backend.run_many(controller, names, list(seeds), run=run, traces=True)
+    done = backend.run_many(controller, objects, list(seeds), run=run, traces=True)
     return [
         RecordedSqueeze(
             name=f"{label}-{seed}",
             sha256="0" * 64,
             trace=grasp.trace,
             label=label,
-            instance=f"{label}#{seed}",
-            gripper={"sensor": sensor, "pad_stiffness_n_m": config.pad_stiffness_n_m},
+            instance=f"{label}#{name}",
+            gripper={"pad_stiffness_n_m": config.pad_stiffness_n_m, **gripper},
             simulated=True,
         )
-        for seed, grasp in zip(seeds, done, strict=True)
+        for name, seed, grasp in zip(names, seeds, done, strict=True)
     ]
 
 
 def true_values(terms: Sequence[Mapping[str, Any]], identified: str) -> dict[str, float]:
-    """Return the true values of the parameters, with a foam's force at the compression of the identified scene."""
-    at_m = {one["type"]: one.get("at_m") for one in tomllib.loads(identified)["terms"]}
+    """Return the true values of the parameters, with a foam's force at the compression of the identified scene.
+
+    The first of two Maxwell branches is the one that is the first in the identified scene, by their relaxation times.
+    """
+    scene = tomllib.loads(identified)["terms"]
+    at_m = {one["type"]: one.get("at_m") for one in scene}
+    times = [one["tau_s"] for one in scene if one["type"] == "maxwell"]
+    branches = sorted((one for one in terms if one["type"] == "maxwell"), key=lambda one: float(one["tau_s"]))
+    if times != sorted(times):
+        branches.reverse()
     values = {}
     for term in terms:
-        for name, value in term.items():
-            if name in ("type", "at_m"):
+        name = "maxwell 2" if term["type"] == "maxwell" and term is not branches[0] else term["type"]
+        for key, value in term.items():
+            if key in ("type", "at_m"):
                 continue
-            if term["type"] == "foam" and name == "force_n" and at_m.get("foam"):
+            if term["type"] == "foam" and key == "force_n" and at_m.get("foam"):
                 value = value * (at_m["foam"] / term["at_m"]) ** term["exponent"]
-            values[f"{term['type']}.{name}"] = float(value)
+            values[f"{name}.{key}"] = float(value)
     return values
 
 
-def has_true_terms(result: Identification, terms: Sequence[Mapping[str, Any]]) -> bool:
-    """Return whether the chosen parameters are those of the true terms."""
-    names = {one.name for one in result.parameters if "." in one.name}
-    return names == set(true_values(terms, result.scene))
+def named(terms: Sequence[Mapping[str, Any]]) -> str:
+    """Return the name of the candidate with these terms."""
+    cubic = sum(one.get("k3_n_m3", 0.0) for one in terms)
+    form = "softening" if cubic < 0.0 else "k1, k3" if cubic > 0.0 else "k1"
+    kinds = sorted((one["type"] for one in terms), key=SLOTS.index)
+    return " + ".join(f"elastic ({form})" if kind == "elastic" else kind for kind in kinds)
 
 
-def measured(name: str, sensor: str, count: int, repeats: int) -> Row:
+def measured(name: str, sensor: str, count: int, repeat: int) -> Row:
     """Return the row of a scene."""
-    terms = SCENES[name]
+    terms = drawn(SCENES[name], repeat)
     text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0)
-    right = covered = intervals = 0
-    errors: list[float] = []
-    seconds: list[float] = []
-    for k in range(repeats):
-        # Other objects in every row: the number of an object fixes its stiffness, whatever its terms.
-        series = 1000 * list(SCENES).index(name) + 10 * count + (sensor == "pads")
-        seeds = [1_000_000 * (series + 1) + 1000 * k + i for i in range(count)]
-        result = identify(SimConfig(), squeezes_of(text, name, sensor, seeds), lambda *_: None)
-        seconds.append(result.seconds)
-        if not has_true_terms(result, terms):
-            continue
-        right += 1
-        truth = true_values(terms, result.scene)
-        for one in result.parameters:
-            if one.name in truth:
-                intervals += 1
-                covered += one.low <= truth[one.name] <= one.high
-                errors.append(abs(one.value / truth[one.name] - 1.0))
+    # Other objects in every row: the number of an object fixes its stiffness, whatever its terms.
+    series = (list(SCENES).index(name) * 10 + list(SENSORS).index(sensor)) * 100 + count
+    seeds = [100_000 * (series + 1) + 100 * repeat + i for i in range(count)]
+    squeezes = squeezes_of(text, name, SENSORS[sensor], [str(one) for one in seeds], seeds)
+    result = identify(SimConfig(), squeezes, lambda *_: None)
+    chosen = next(one for one in result.candidates if one.chosen)
+    true = next((one for one in result.candidates if one.terms == named(terms)), None)
+    right = true is chosen
+    truth = true_values(terms, result.scene) if right else {}
+    found = [one for one in result.parameters if one.name in truth]
+    alike = true is not None and chosen.fit_error <= TOLD_APART * true.fit_error
     return Row(
         scene=name,
         sensor=sensor,
         recordings=count,
-        repeats=repeats,
+        repeat=repeat,
+        chosen=chosen.terms,
         right_terms=right,
-        covered=int(covered),
-        intervals=intervals,
-        median_error=float(np.median(errors)) if errors else math.nan,
-        seconds=float(np.median(seconds)),
+        told_apart=right or true is None or not alike or chosen.parameters > true.parameters,
+        found=tuple((one.name, truth[one.name], one.value, one.low, one.high) for one in found),
+        seconds=result.seconds,
     )
 
 
 def in_words(row: Row) -> str:
     """Return a row as a line of text."""
-    return (
-        f"{row.scene:14} {row.sensor:6} {row.recordings:3} recordings: "
-        f"right terms {row.right_terms} of {row.repeats}, covered {row.covered} of {row.intervals}, "
-        f"median error {100.0 * row.median_error:.2f} %, {row.seconds:.1f} s"
+    errors = ", ".join(f"{100.0 * (value / truth - 1.0):+.2f}" for _, truth, value, *_ in row.found)
+    covered = _covered([row.found])
+    right = (
+        "right terms" if row.right_terms else f"{row.chosen}{'' if row.told_apart else ' (as good a fit)'}"
     )
+    return (
+        f"{row.scene:20} {row.sensor:10} {row.recordings:3} {right}, covered {sum(covered)} of {len(covered)}, "
+        f"errors {errors} %, {row.seconds:.1f} s"
+    )
+
+
+def _covered(rows: Sequence[Sequence[Sequence[Any]]]) -> list[bool]:
+    """Return whether each interval holds the true value."""
+    return [low <= truth <= high for row in rows for _, truth, _, low, high in row]
+
+
+def _share(part: int, whole: int) -> str:
+    if not whole:
+        return "–"
+    low, high = wilson(part, whole)
+    return f"{100.0 * part / whole:.0f} % ({part} of {whole}; {100.0 * low:.0f} to {100.0 * high:.0f})"
+
+
+def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the tables of these rows: by sensor and number of recordings, and by scene."""
+
+    def line(head: Sequence[str], group: Sequence[Mapping[str, Any]]) -> str:
+        apart = [one for one in group if one["told_apart"]]
+        covered = _covered([one["found"] for one in group])
+        errors = [abs(value / truth - 1.0) for one in group for _, truth, value, *_ in one["found"]]
+        cells = (
+            *head,
+            str(len(group)),
+            _share(sum(one["right_terms"] for one in group), len(group)),
+            _share(sum(one["right_terms"] for one in apart), len(apart)),
+            _share(sum(covered), len(covered)),
+            f"{100.0 * float(np.median(errors)):.2g} %" if errors else "–",
+            f"{float(np.median([one['seconds'] for one in group])):.1f} s",
+        )
+        return "| " + " | ".join(cells) + " |"
+
+    columns = ("scenes", "right terms", "where the data tell them apart", "90 % intervals that cover")
+    columns += ("median error", "median time")
+
+    def header(head: Sequence[str]) -> list[str]:
+        names = (*head, *columns)
+        return ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
+
+    lines = header(("sensor", "squeezes"))
+    for sensor in SENSORS:
+        for count in COUNTS:
+            group = [one for one in rows if one["sensor"] == sensor and one["recordings"] == count]
+            if group:
+                lines.append(line((sensor, str(count)), group))
+    lines += [line(("all", "all"), rows), "", *header(("scene",))]
+    for name in SCENES:
+        group = [one for one in rows if one["scene"] == name]
+        if group:
+            lines.append(line((name,), group))
+    return "\n".join(lines)
+
+
+def write_between(path: Path, mark: str, text: str) -> None:
+    """Replace what is between the two comments `mark` of a page by a text."""
+    begin, end = f"<!-- {mark} -->", f"<!-- end of {mark} -->"
+    before, _, rest = path.read_text(encoding="utf-8").partition(begin)
+    _, found, after = rest.partition(end)
+    if not found:
+        raise SystemExit(f"{path} has no lines {begin} and {end}")
+    path.write_text(f"{before}{begin}\n{text}\n{end}{after}", encoding="utf-8")
 
 
 def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> list[dict[str, float]]:
     """Return the recognition rates of classifiers trained on recordings, and on the scenes identified from them."""
     settings = load_pipeline("default", options=[f"classifier.type={classifier}"]).settings
     extract = settings.features.create().extract
-    recorded = {name: squeezes_of(name, name, "pads", range(max(counts) + tested)) for name in CONTAINERS}
+    pads = SENSORS["PR2 pads"]
+    recorded = {
+        name: squeezes_of(name, name, pads, [str(i // 3) for i in seeds], seeds)
+        for name in CONTAINERS
+        for seeds in [range(max(counts) + tested)]
+    }
     test = [(extract(one.trace), name) for name in CONTAINERS for one in recorded[name][-tested:]]
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for count in counts:
             own = [(extract(one.trace), name) for name in CONTAINERS for one in recorded[name][:count]]
             simulated = []
+            begin = time.monotonic()
             for k, name in enumerate(CONTAINERS):
                 path = Path(folder) / f"{k}-{count}.toml"
                 result = identify(SimConfig(), recorded[name][:count], lambda *_: None)
                 path.write_text(result.scene, encoding="utf-8")
                 seeds = [10_000 + i for i in range(SIMULATED_INSTANCES * SIMULATED_TRIALS)]
-                new = squeezes_of(str(path), name, "pads", seeds)
+                names = [str(i // SIMULATED_TRIALS) for i in range(len(seeds))]
+                new = squeezes_of(str(path), name, pads, names, seeds)
                 simulated += [(extract(one.trace), name) for one in new]
             rows.append(
                 {
                     "recordings": count,
-                    "on_recordings": _rate(settings, own, test),
-                    "on_identified": _rate(settings, simulated, test),
-                    "on_both": _rate(settings, [*own, *simulated], test),
+                    "tested": len(test),
+                    "on_recordings": _right(settings, own, test),
+                    "on_identified": _right(settings, simulated, test),
+                    "on_both": _right(settings, [*own, *simulated], test),
+                    "seconds": time.monotonic() - begin,
                 }
             )
             print(rows[-1], flush=True)
     return rows
 
 
-def _rate(settings: Any, train: Sequence[tuple[Any, str]], test: Sequence[tuple[Any, str]]) -> float:
+def _right(settings: Any, train: Sequence[tuple[Any, str]], test: Sequence[tuple[Any, str]]) -> int:
+    """Return how many of the tested squeezes are recognised."""
     classifier = settings.classifier.create()
     classifier.fit(table_of([row for row, _ in train]), [label for _, label in train], seed=0)
     best = np.argmax(classifier.probabilities(table_of([row for row, _ in test])), axis=1)
     names = classifier.classes()
-    return float(np.mean([names[k] == label for k, (_, label) in zip(best, test, strict=True)]))
+    return sum(names[k] == label for k, (_, label) in zip(best, test, strict=True))
+
+
+_CURVES: Final = (
+    ("on_recordings", "the recordings"),
+    ("on_identified", "scenes identified from them"),
+    ("on_both", "both"),
+)
+
+
+def transfer_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of the transfer."""
+    names = ["recordings a class", *(f"trained on {name}" for _, name in _CURVES)]
+    lines = ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
+    for row in rows:
+        rates = [_share(int(row[key]), int(row["tested"])) for key, _ in _CURVES]
+        lines.append("| " + " | ".join([str(row["recordings"]), *rates]) + " |")
+    return "\n".join(lines)
+
+
+def draw_transfer(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """Draw the rates over the number of recordings."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(6.4, 3.8), layout="constrained")
+    counts = [row["recordings"] for row in rows]
+    for key, name in _CURVES:
+        rates = [100.0 * row[key] / row["tested"] for row in rows]
+        ends = [wilson(int(row[key]), int(row["tested"])) for row in rows]
+        low = [rate - 100.0 * end[0] for rate, end in zip(rates, ends, strict=True)]
+        high = [100.0 * end[1] - rate for rate, end in zip(rates, ends, strict=True)]
+        axes.errorbar(counts, rates, yerr=[low, high], marker="o", capsize=3.0, label=f"trained on {name}")
+    axes.set_xscale("log")
+    axes.set_xticks(counts, [str(one) for one in counts])
+    axes.minorticks_off()
+    axes.set_xlabel("recordings a class")
+    axes.set_ylabel("recognised, % (95 % interval)")
+    axes.grid(alpha=0.3)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, frameon=False)
+    figure.savefig(path, dpi=140)
 
 
 def main() -> None:
@@ -221,31 +397,64 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--repeats", type=int, default=4)
+    parser.add_argument("--first", type=int, default=0, help="number of the first repeat")
     parser.add_argument("--only", nargs="+", choices=list(SCENES), default=list(SCENES))
+    parser.add_argument("--sensors", nargs="+", choices=list(SENSORS), default=list(SENSORS))
     parser.add_argument("--recordings", nargs="+", type=int, default=list(COUNTS))
     parser.add_argument("--transfer", action="store_true")
+    parser.add_argument("--rows", type=Path, help="append the rows to this file (JSON lines)")
+    parser.add_argument(
+        "--markdown", type=Path, help="write the tables of --rows to this page, and run nothing"
+    )
+    parser.add_argument("--png", type=Path, help="draw the transfer of --rows, and run nothing")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     asked = parser.parse_args()
+    if asked.markdown or asked.png:
+        if asked.rows is None:
+            parser.error("--markdown and --png need --rows FILE")
+        _publish(asked)
+        return
     if asked.short:
         asked.only, asked.recordings, asked.repeats = ["creeping"], [1], 1
+        asked.sensors = ["PR2 pads"]
     begin = time.monotonic()
+    rows: list[Any] = []
     if asked.transfer:
-        rows: list[Any] = transfer(TRANSFER_COUNTS, TESTED)
+        rows = transfer(TRANSFER_COUNTS, TESTED)
+        if asked.rows:
+            asked.rows.write_text("".join(f"{json.dumps(one)}\n" for one in rows), encoding="utf-8")
     else:
-        rows = []
-        for name in asked.only:
-            for sensor in SENSORS[-1:] if asked.short else SENSORS:
-                for count in asked.recordings:
-                    row = measured(name, sensor, count, asked.repeats)
-                    rows.append(asdict(row))
-                    if not asked.json:
-                        print(in_words(row), flush=True)
+        # A run that is stopped has all scenes in its rows.
+        for repeat in range(asked.first, asked.first + asked.repeats):
+            for count in asked.recordings:
+                for sensor in asked.sensors:
+                    for name in asked.only:
+                        row = measured(name, sensor, count, repeat)
+                        rows.append(asdict(row))
+                        if asked.rows:
+                            with asked.rows.open("a", encoding="utf-8") as out:
+                                out.write(f"{json.dumps(rows[-1])}\n")
+                        if not asked.json:
+                            print(in_words(row), flush=True)
     made = {"date": str(date.today()), "python": platform.python_version(), "cores": os.cpu_count()}
     if asked.json:
         print(json.dumps({"rows": rows, "made": made}, indent=2))
     else:
+        if not asked.transfer:
+            print(as_markdown(rows))
         print(f"{made}, {time.monotonic() - begin:.0f} s")
+
+
+def _publish(asked: argparse.Namespace) -> None:
+    """Write the tables and the picture of rows that were measured before."""
+    rows = [json.loads(line) for line in asked.rows.read_text(encoding="utf-8").splitlines()]
+    if asked.png:
+        draw_transfer(rows, asked.png)
+    if asked.markdown and asked.transfer:
+        write_between(asked.markdown, "transfer", transfer_markdown(rows))
+    elif asked.markdown:
+        write_between(asked.markdown, "known scenes", as_markdown(rows))
 
 
 if __name__ == "__main__":

@@ -24,8 +24,12 @@ from graspsense_sim_gripper.identify.threads import in_threads
 MAX_FOLDS: Final = 5
 STRETCHES: Final = 9
 STRETCH_FOLDS: Final = 3
-STATIC_KEPT: Final = 2
+STATIC_KEPT: Final = 3
 """Static laws that are tried with every memory."""
+WORTH_REFINING: Final = 4.0
+"""A candidate whose direct fit is worse than the best by this factor is not refined."""
+MANY: Final = 4
+"""Candidates that are usually refined and judged, for the progress."""
 WORTH_TRYING: Final = 3.0
 """A candidate whose fit is worse than the best by this factor is not judged by held-out data."""
 LEAST_ERROR: Final = 1e-3
@@ -61,7 +65,7 @@ def choose(
     direct = evolve(model, direct=True)
     statics = static_candidates(scale)
     with_memory = memories(scale) if has_memory else []
-    counter = _Counter(len(statics) + 2 * (STATIC_KEPT + 1) * (1 + len(with_memory)), progress)
+    counter = _Counter(len(statics) + (STATIC_KEPT + 1) * (1 + len(with_memory)) + 2 * MANY, progress)
     roughly = [one.joined(with_memory[1]) if with_memory else one for one in statics]
     rough = in_threads(lambda one: fit(direct, one, squeezes), roughly, counter.done)
     order = np.argsort([one.cost for one in rough], kind="stable")[:STATIC_KEPT].tolist()
@@ -72,25 +76,44 @@ def choose(
         for k in kept
         for joined in (statics[k], *(statics[k].joined(one) for one in with_memory))
     ]
-    fits = in_threads(lambda one: fit(model, one, squeezes), candidates, counter.done)
-    least = min(one.rms for one in fits)
-    worth = [one for one in fits if one.rms <= WORTH_TRYING * max(least, LEAST_ERROR)]
+    directly = in_threads(lambda one: fit(direct, one, squeezes), candidates, counter.done)
+    least_directly = max(min(one.rms for one in directly), LEAST_ERROR)
+    near = [one for one in directly if one.rms <= WORTH_REFINING * least_directly]
+    fits = in_threads(lambda one: fit(model, one.candidate, squeezes, start=one), near, counter.done)
+    least = max(min(one.rms for one in fits), LEAST_ERROR)
+    worth = [one for one in fits if one.rms <= WORTH_TRYING * least and not _adds_nothing(one, fits)]
     judged = in_threads(lambda one: _judged(model, one, squeezes), worth, counter.done)
     best = _simplest(judged)
-    scores = [_score(one, best, judged) for one in fits]
+    refined = {one.candidate.name for one in fits}
+    only_directly = [one for one in directly if one.candidate.name not in refined]
+    only_directly += [one for k, one in enumerate(rough) if k not in kept]
+    scores = [_score(one, best, judged, fits) for one in fits]
     dropped = [
         CandidateScore(
             terms=one.candidate.name,
             parameters=len(one.values),
             error=math.nan,
             fit_error=one.rms,
-            verdict="fitted directly only",
+            verdict=f"its direct fit is {one.rms / least_directly:.1f} times worse",
         )
-        for k, one in enumerate(rough)
-        if k not in kept
+        for one in only_directly
     ]
-    ranked = sorted(scores, key=_rank)
-    return Choice(fitted=best.fitted, scores=(*ranked, *dropped))
+    return Choice(fitted=best.fitted, scores=(*sorted(scores, key=_rank), *sorted(dropped, key=_rank)))
+
+
+def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
+    """Return whether a simpler candidate, whose terms are among those of this one, fits as well."""
+    return any(_contains(fitted, one) and _error(fitted) > (1.0 - LEAST_GAIN) * _error(one) for one in fits)
+
+
+def _contains(fitted: Fitted, simpler: Fitted) -> bool:
+    free, fewer = ({(one.slot, one.name) for one in each.candidate.free} for each in (fitted, simpler))
+    return fewer < free
+
+
+def _error(fitted: Fitted) -> float:
+    """Return the rms residual, in which those below `LEAST_ERROR` hardly differ."""
+    return math.hypot(fitted.rms, LEAST_ERROR)
 
 
 def _rank(score: CandidateScore) -> tuple[bool, float, float]:
@@ -172,12 +195,16 @@ def _logarithms(judged: _Judged) -> NDArray[np.float64]:
     return result
 
 
-def _score(fitted: Fitted, best: _Judged, judged: Sequence[_Judged]) -> CandidateScore:
+def _score(
+    fitted: Fitted, best: _Judged, judged: Sequence[_Judged], fits: Sequence[Fitted]
+) -> CandidateScore:
     own = next((one for one in judged if one.fitted is fitted), None)
     error = math.nan if own is None else float(np.sqrt(np.mean(own.errors**2)))
     least = float(np.sqrt(np.mean(best.errors**2)))
     if own is best:
         verdict = "chosen"
+    elif own is None and _adds_nothing(fitted, fits):
+        verdict = "fits no better than with fewer terms"
     elif own is None:
         verdict = f"its fit is {fitted.rms / best.fitted.rms:.1f} times worse"
     elif len(fitted.values) > len(best.fitted.values):

@@ -12,14 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense_sim_gripper.identify.forward import ForwardModel
+from graspsense_sim_gripper.identify.forward import ForwardModel, Runs
 from graspsense_sim_gripper.identify.laws import CandidateLaw
 from graspsense_sim_gripper.identify.prepare import Squeeze
 
@@ -33,13 +32,13 @@ WIDTH_STEP_SHARE: Final = 1e-5
 FACTOR_WEIGHT: Final = 1e-3
 """Weight with which the logarithms of the factors are held to zero, so that the common stiffness is their mean."""
 FACTOR_RANGE: Final = math.log(10.0)
-WIDTH_RANGE: Final = 0.25
+WIDTH_RANGE: Final = 0.7
 """The width may differ from the first estimate by this share of the compression."""
 NO_FORCE: Final = 10.0
 """Relative residual where a law gives no finite force."""
 MAX_EVALUATIONS: Final = 40
 TOLERANCE: Final = 1e-6
-STARTS: Final = 2
+STARTS: Final = 3
 """The best starts, which are optimised."""
 
 
@@ -77,12 +76,21 @@ class _Problem:
     def __init__(
         self, model: ForwardModel, candidate: CandidateLaw, squeezes: Sequence[Squeeze], masks: Sequence[Mask]
     ) -> None:
-        self.model, self.candidate, self.squeezes, self.masks = model, candidate, squeezes, masks
+        self.model, self.candidate, self.squeezes = model, candidate, squeezes
         self.p, self.n = len(candidate.free), len(squeezes)
         self.has_factors = self.n > 1
-        edges = np.cumsum([0, *(int(mask.sum()) for mask in masks)])
-        self.rows = [slice(int(a), int(b)) for a, b in pairwise(edges)]
-        self.size = int(edges[-1])
+        self.paths = model.paths(squeezes)
+        self.first_widths = np.array([one.width_m for one in squeezes])
+        self.depths = np.array([one.depth_m for one in squeezes])
+        sizes = [int(mask.sum()) for mask in masks]
+        self.size = sum(sizes)
+        self.of_squeeze = np.repeat(np.arange(self.n), sizes)
+        kept = list(zip(squeezes, masks, strict=True))
+        self.at_node = np.concatenate([one.sample[mask] for one, mask in kept])
+        self.measured = np.concatenate([one.force_n[mask] for one, mask in kept])
+        self.peaks = np.repeat([one.peak_n for one in squeezes], sizes)
+        self._last: tuple[Floats, Floats] | None = None
+        """The last vector, and its residuals."""
 
     def bounds(self) -> tuple[Floats, Floats]:
         low = [math.log(one.low) for one in self.candidate.free]
@@ -95,46 +103,46 @@ class _Problem:
         )
 
     def split(self, x: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the values, widths and factors of a vector, or of each row of a table."""
         p, n = self.p, self.n
-        shares = x[p : p + n]
-        widths = np.array(
-            [one.width_m + share * one.depth_m for one, share in zip(self.squeezes, shares, strict=True)]
-        )
-        factors = np.exp(x[p + n :]) if self.has_factors else np.ones(n)
-        return np.exp(x[:p]), widths, factors
+        widths = self.first_widths + x[..., p : p + n] * self.depths
+        factors = np.exp(x[..., p + n :]) if self.has_factors else np.ones_like(widths)
+        return np.exp(x[..., :p]), widths, factors
 
-    def of_all(self, x: Floats) -> Floats:
-        values, widths, factors = self.split(x)
-        out = np.empty(self.size)
-        for i, squeeze in enumerate(self.squeezes):
-            forces = self.model.forces(squeeze, self.candidate, values.tolist(), widths[i], float(factors[i]))
-            out[self.rows[i]] = ((forces - squeeze.force_n) / squeeze.peak_n)[self.masks[i]]
-        return np.nan_to_num(out, nan=NO_FORCE, posinf=NO_FORCE, neginf=-NO_FORCE)
+    def of_all(self, xs: Floats) -> Floats:
+        """Return the residuals of each row of a table of vectors, without those that hold the factors."""
+        values, widths, factors = self.split(xs)
+        numbers = self.candidate.numbers(np.repeat(values, self.n, axis=0), factors.ravel())
+        path = np.tile(np.arange(self.n), len(xs))
+        forces = self.model.run(self.paths, Runs(path, widths.ravel(), numbers, self.candidate.active))
+        by_vector = forces.reshape(len(xs), self.n, -1)
+        out: Floats = (by_vector[:, self.of_squeeze, self.at_node] - self.measured) / self.peaks
+        np.nan_to_num(out, copy=False, nan=NO_FORCE, posinf=NO_FORCE, neginf=-NO_FORCE)
+        return out
 
     def residuals(self, x: Floats) -> Floats:
+        if self._last is None or not np.array_equal(self._last[0], x):
+            self._last = x.copy(), self.of_all(x[np.newaxis])[0]
         held = FACTOR_WEIGHT * math.sqrt(self.size / self.n) * x[self.p + self.n :]
-        return np.concatenate([self.of_all(x), held])
+        return np.concatenate([self._last[1], held])
 
     def jacobian(self, x: Floats) -> Floats:
-        here = self.of_all(x)
-        out = np.zeros((self.size + (self.n if self.has_factors else 0), len(x)))
-        for k in range(self.p):
-            moved = x.copy()
-            moved[k] += STEP
-            out[: self.size, k] = (self.of_all(moved) - here) / STEP
+        here = self.residuals(x)[: self.size]
         blocks = [(self.p, WIDTH_STEP_SHARE)]
         if self.has_factors:
             blocks.append((self.p + self.n, STEP))
-        for first, step in blocks:
-            moved = x.copy()
-            moved[first : first + self.n] += step
-            change = (self.of_all(moved) - here) / step
-            for i, rows in enumerate(self.rows):
-                out[rows, first + i] = change[rows]
+        moved = np.tile(x, (self.p + len(blocks), 1))
+        moved[range(self.p), range(self.p)] += STEP
+        for row, (first, step) in enumerate(blocks, self.p):
+            moved[row, first : first + self.n] += step
+        there = self.of_all(moved)
+        out = np.zeros((self.size + (self.n if self.has_factors else 0), len(x)))
+        out[: self.size, : self.p] = ((there[: self.p] - here) / STEP).T
+        for row, (first, step) in enumerate(blocks, self.p):
+            out[np.arange(self.size), first + self.of_squeeze] = (there[row] - here) / step
         if self.has_factors:
-            weight = FACTOR_WEIGHT * math.sqrt(self.size / self.n)
-            for i in range(self.n):
-                out[self.size + i, self.p + self.n + i] = weight
+            own = np.arange(self.n)
+            out[self.size + own, self.p + self.n + own] = FACTOR_WEIGHT * math.sqrt(self.size / self.n)
         return out
 
 
@@ -219,5 +227,5 @@ def _starts(problem: _Problem, start: Fitted | None) -> list[Floats]:
     vectors = [np.concatenate([np.log(one), np.zeros(n), factors]) for one in problem.candidate.starts()]
     if len(vectors) <= STARTS:
         return vectors
-    costs = [float(np.sum(problem.of_all(one) ** 2)) for one in vectors]
+    costs = np.sum(problem.of_all(np.array(vectors)) ** 2, axis=1)
     return [vectors[int(k)] for k in np.argsort(costs)[:STARTS]]

@@ -1,7 +1,8 @@
 """The forward model: the force of an object on a recorded path of the gap, through the fingertips and the sensor.
 
 The object's law and the fingertips are those of the simulator (`dynamics.contact.solve_contact`), compiled where numba
-is installed. A direct fit uses the same function with rigid fingertips, on a path of the compression.
+is installed. One call computes many paths, so that the interpreter costs little beside them. A direct fit uses the same
+function with rigid fingertips, on a path of the compression.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache, cached_property
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import frozen
@@ -32,13 +33,12 @@ from graspsense_sim_gripper.dynamics.contact import (
     solve_contact,
 )
 from graspsense_sim_gripper.dynamics.state import ContactState
-from graspsense_sim_gripper.identify.laws import SLOTS, CandidateLaw
+from graspsense_sim_gripper.identify.laws import N_NUMBERS, SLOTS, CandidateLaw, terms_of
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.terms.registry import active_laws, laws_of
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
 Floats = NDArray[np.float64]
-PathForces = Callable[[ObjectModel, ContactState, Any, Any, Any, Any], None]
 
 RIGID_PADS: Final = PadCompliance(math.inf, 0.0, 0.0, 1.0)
 TABLE: Final = 400
@@ -48,24 +48,54 @@ SHORTEST_S: Final = 1e-6
 """The shortest time since a contact in the node after it."""
 
 
-def forces_along(
-    model: ObjectModel, at_rest: ContactState, closure_m: Any, speed_m_s: Any, step_s: Any, force_n: Any
-) -> None:
-    """Write the force at each node of a path of the closure to `force_n`; arrays or lists of equal length.
+class Paths(NamedTuple):
+    """The paths of several squeezes, one after another in each array; `first` is where each begins, and the end."""
+
+    gap_m: Any
+    speed_m_s: Any
+    step_s: Any
+    first: Any
+
+
+class Runs(NamedTuple):
+    """What is computed: a row for each run, which follows a path with a width and numbers of the terms."""
+
+    path: Any
+    """Number of the path."""
+    width_m: Any
+    numbers: Any
+    """(runs, `N_NUMBERS`), as `terms_of` reads them."""
+    active: Any
+    """Whether each of the slots is active (1), the same in all runs."""
+
+
+PathForces = Callable[[PadCompliance, ContactState, Paths, Runs, Any], None]
+
+
+def forces_along(pads: PadCompliance, at_rest: ContactState, paths: Paths, runs: Runs, force_n: Any) -> None:
+    """Write the force at each node of the path of each run to its row of `force_n`.
 
     The object is at rest until the closure is positive. The contact lies where the closure, at the closing speed of
     that node, was zero.
     """
-    now, touched = at_rest, 0
-    for i in range(len(closure_m)):
-        closure, h = closure_m[i], step_s[i]
-        if touched == 0 and closure > 0.0:
-            touched = 1
-            if speed_m_s[i] > 0.0:
-                h = min(h, max(closure / speed_m_s[i], SHORTEST_S))
-        if touched == 1:
-            now, _ = solve_contact(model, now, closure, speed_m_s[i], h)
-        force_n[i] = now.force_n
+    for r in range(len(runs.path)):
+        width = float(runs.width_m[r])
+        model = ObjectModel(width, 0.0, pads, terms_of(runs.active, runs.numbers, r), 0, 1)
+        begin, end = paths.first[runs.path[r]], paths.first[runs.path[r] + 1]
+        now, touched = at_rest, 0
+        for i in range(begin, end):
+            closure, speed, h = (
+                width - float(paths.gap_m[i]),
+                float(paths.speed_m_s[i]),
+                float(paths.step_s[i]),
+            )
+            if touched == 0 and closure > 0.0:
+                touched = 1
+                if speed > 0.0:
+                    h = min(h, max(closure / speed, SHORTEST_S))
+            if touched == 1:
+                now, _ = solve_contact(model, now, closure, speed, h)
+            force_n[r, i - begin] = now.force_n
 
 
 @cache
@@ -79,10 +109,12 @@ def path_forces(hardens: bool) -> tuple[PathForces, bool]:
         compiled = compile_part(
             bind_reachable(forces_along, {"object_force": sum_of(laws_of(SLOTS)), **parts})
         )
-        model = ObjectModel(0.05, 0.0, RIGID_PADS, _some_terms(), 0, 1)
         path = np.linspace(-1e-4, 1e-3, 4)
+        paths = Paths(path, path, path + 1.0, np.array([0, 4]))
+        active = np.zeros(len(SLOTS), np.int64)
+        runs = Runs(np.zeros(1, np.int64), np.full(1, 0.05), np.ones((1, N_NUMBERS)), active)
         with first_call():
-            compiled(model, uncompressed(SLOTS), path, path, path + 1.0, np.zeros(4))
+            compiled(RIGID_PADS, uncompressed(SLOTS), paths, runs, np.zeros((1, 4)))
         return entry_point(compiled), True
     except NotCompilable:
         force = sum_of_active(active_laws(SLOTS))
@@ -92,13 +124,6 @@ def path_forces(hardens: bool) -> tuple[PathForces, bool]:
 @cache
 def _at_rest() -> ContactState:
     return uncompressed(SLOTS)
-
-
-def _some_terms() -> tuple[Any, ...]:
-    from graspsense_sim_gripper.identify.laws import ELASTIC, FreeParameter
-
-    k1 = FreeParameter(slot=ELASTIC, name="k1_n_m", low=1.0, high=2.0, starts=(1.0,))
-    return CandidateLaw(free=(k1,)).terms((1.0,))
 
 
 @frozen(kw_only=True, eq=False)
@@ -139,6 +164,37 @@ class ForwardModel:
             return force_n / self.pads.stiffness_n_m
         return np.interp(force_n, *self._table)
 
+    def paths(self, squeezes: Sequence[Squeeze]) -> Paths:
+        """Return the paths of these squeezes: of the gap, or of the compression in a direct fit."""
+        gaps, speeds = [], []
+        for squeeze in squeezes:
+            gap, speed = squeeze.gap_m, squeeze.speed_m_s
+            if self.direct and math.isfinite(self.pads.stiffness_n_m):
+                force, rate = squeeze.measured_path
+                gap = gap + self.compressed_m(force)
+                speed = speed - rate * np.interp(force, *self._compliance)
+            gaps.append(gap)
+            speeds.append(speed)
+        first = np.cumsum([0, *(len(one.t_s) for one in squeezes)])
+        steps = np.concatenate([one.step_s for one in squeezes])
+        return Paths(np.concatenate(gaps), np.concatenate(speeds), steps, first)
+
+    def run(self, paths: Paths, runs: Runs) -> Floats:
+        """Return the force (N) at the nodes of the path of each run, a row for each; NaN where a law has none."""
+        follow, compiled = path_forces(self._hardens and not self.direct)
+        pads = RIGID_PADS if self.direct else self.pads
+        out = np.zeros((len(runs.path), int(np.max(np.diff(paths.first)))))
+        if compiled:
+            follow(pads, _at_rest(), paths, runs, out)
+            return out
+        for r in range(len(runs.path)):
+            alone = Runs(runs.path[r : r + 1], runs.width_m[r : r + 1], runs.numbers[r : r + 1], runs.active)
+            try:
+                follow(pads, _at_rest(), paths, alone, out[r : r + 1])
+            except LAW_ERRORS:
+                out[r] = math.nan
+        return out
+
     def forces(
         self,
         squeeze: Squeeze,
@@ -148,24 +204,7 @@ class ForwardModel:
         factor: float,
     ) -> Floats:
         """Return the force (N) at the samples of a squeeze; NaN where a law has none."""
-        run, compiled = path_forces(self._hardens and not self.direct)
-        closure, speed, pads = width_m - squeeze.gap_m, squeeze.speed_m_s, self.pads
-        if self.direct:
-            if math.isfinite(pads.stiffness_n_m):
-                force, rate = squeeze.measured_path
-                closure = closure - self.compressed_m(force)
-                speed = speed - rate * np.interp(force, *self._compliance)
-            pads = RIGID_PADS
-        model = ObjectModel(width_m, 0.0, pads, candidate.terms(values, factor), 0, 1)
-        out: Any = np.zeros(len(closure))
-        try:
-            if compiled:
-                run(model, _at_rest(), closure, speed, squeeze.step_s, out)
-            else:
-                out = out.tolist()
-                run(model, _at_rest(), closure.tolist(), speed.tolist(), squeeze.step_s.tolist(), out)
-                out = np.array(out)
-        except LAW_ERRORS:
-            out = np.full(len(closure), math.nan)
-        forces: Floats = out[squeeze.sample]
+        numbers = candidate.numbers(np.array([values]), np.array([factor]))
+        runs = Runs(np.zeros(1, np.int64), np.array([width_m]), numbers, candidate.active)
+        forces: Floats = self.run(self.paths([squeeze]), runs)[0][squeeze.sample]
         return forces

@@ -7,18 +7,26 @@ from functools import cached_property
 from itertools import product
 from typing import Any, Final, NamedTuple
 
+import numpy as np
 from attrs import evolve, field, frozen
+from numpy.typing import NDArray
 
+from graspsense_sim_gripper.terms.elastic import Elastic
+from graspsense_sim_gripper.terms.foam import Foam
+from graspsense_sim_gripper.terms.loss import Loss
 from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
+from graspsense_sim_gripper.terms.maxwell import Maxwell
 from graspsense_sim_gripper.terms.registry import find_term
+from graspsense_sim_gripper.terms.rigid import Rigid
+from graspsense_sim_gripper.terms.snap import Snap
 from graspsense_sim_gripper.terms.switchable import Switchable
+
+Floats = NDArray[np.float64]
 
 SLOTS: Final = ("elastic", "rigid", "maxwell", "maxwell", "loss", "foam", "snap")
 """The terms of the compiled law, of which a candidate switches some on. All candidates share its code."""
 ELASTIC, RIGID, MAXWELL, SECOND, LOSS, FOAM, SNAP = range(len(SLOTS))
-NOT_TRIED: Final = ("gas", "liquid", "slosh", "surface", "worn")
-"""The terms whose parameters a force beside a gap does not separate."""
-MAX_STARTS: Final = 16
+MAX_STARTS: Final = 40
 
 
 class DataScale(NamedTuple):
@@ -99,42 +107,34 @@ class CandidateLaw:
         return of_slot
 
     @cached_property
-    def _layout(self) -> tuple[tuple[type[Any], tuple[tuple[int, float, bool], ...]] | None, ...]:
-        """For each slot the class of the parameters, and for each parameter: the index of the free one (or -1), its
-        sign or fixed value, and whether it is a stiffness; None for a term that the candidate does not have."""
-        places = {(one.slot, one.name): (i, one.sign) for i, one in enumerate(self.free)}
-        layout: list[tuple[type[Any], tuple[tuple[int, float, bool], ...]] | None] = []
-        for slot, kind in enumerate(SLOTS):
-            term = find_term(kind)[1]
-            if slot not in self.slots:
-                layout.append(None)
-                continue
-            params: Any = term.params
-            defaults = {**params._field_defaults, **{n: v for (s, n), v in self.fixed.items() if s == slot}}
-            layout.append(
-                (
-                    params,
-                    tuple(
-                        (*(places.get((slot, name)) or (-1, float(defaults[name]))), name in term.stiffnesses)
-                        for name in params._fields
-                    ),
-                )
-            )
-        return tuple(layout)
+    def active(self) -> NDArray[np.int64]:
+        """Whether each of the slots is active (1)."""
+        return np.array([int(slot in self.slots) for slot in range(len(SLOTS))])
 
-    def terms(self, values: Sequence[float], factor: float = 1.0) -> tuple[Switchable, ...]:
-        """Return the parameters as the compiled law takes them, with every stiffness times `factor`."""
-        terms: list[Switchable] = [_NOTHING_LUMPED]
-        for filler, own in zip(_FILLERS, self._layout, strict=True):
-            if own is None:
-                terms.append(filler)
-                continue
-            numbers = [
-                (number if i < 0 else number * values[i]) * (factor if stiff else 1.0)
-                for i, number, stiff in own[1]
-            ]
-            terms.append(Switchable(1, own[0](*numbers)))
-        return tuple(terms)
+    @cached_property
+    def _numbers(self) -> tuple[Floats, list[int], list[float], list[int]]:
+        """The numbers of all terms, of which the free ones are 1, the columns and signs of the free ones, and the
+        columns of stiffnesses."""
+        numbers, stiff = np.ones(N_NUMBERS), []
+        for slot in self.slots:
+            term = find_term(SLOTS[slot])[1]
+            fixed = {name: value for (own, name), value in self.fixed.items() if own == slot}
+            for name, value in {**_defaults(term.params), **fixed}.items():
+                numbers[_column(slot, name)] = value
+            stiff += [_column(slot, name) for name in term.stiffnesses]
+        columns = [_column(one.slot, one.name) for one in self.free]
+        return numbers, columns, [one.sign for one in self.free], stiff
+
+    def numbers(self, values: Floats, factors: Floats) -> Floats:
+        """Return the numbers of the terms, as `terms_of` reads them, with every stiffness times the factor of its row.
+
+        `values`: (n, free parameters); `factors`: (n,). The result has shape (n, `N_NUMBERS`).
+        """
+        base, columns, signs, stiff = self._numbers
+        numbers = np.tile(base, (len(values), 1))
+        numbers[:, columns] = values * np.array(signs)
+        numbers[:, stiff] *= factors[:, np.newaxis]
+        return numbers
 
     def starts(self) -> list[tuple[float, ...]]:
         """Return combinations of the values to start from."""
@@ -151,14 +151,58 @@ class CandidateLaw:
         return evolve(self, free=free)
 
 
-def _filler(kind: str) -> Switchable:
-    """Return the parameters of a term that is switched off; compiled code distinguishes types, so they are floats."""
-    params: Any = find_term(kind)[1].params
-    return Switchable(0, params(*(1.0 for _ in params._fields)))
+def _defaults(params: Any) -> dict[str, float]:
+    return dict(params._field_defaults)
 
 
-_FILLERS: Final = tuple(_filler(kind) for kind in SLOTS)
-_NOTHING_LUMPED: Final = Switchable(0, LumpedSpringDamper(0.0, 0.0))
+def _column(slot: int, name: str) -> int:
+    """Return the column of a parameter among the numbers of all terms."""
+    fields: tuple[str, ...] = _PARAMS[slot]._fields
+    return _FIRST[slot] + fields.index(name)
+
+
+_PARAMS: Final[tuple[Any, ...]] = tuple(find_term(kind)[1].params for kind in SLOTS)
+_FIRST: Final = tuple(sum(len(one._fields) for one in _PARAMS[:slot]) for slot in range(len(SLOTS)))
+"""The first column of each slot."""
+N_NUMBERS: Final = sum(len(one._fields) for one in _PARAMS)
+"""The number of parameters of the terms of all slots."""
+
+
+def terms_of(active: Any, numbers: Any, r: int) -> tuple[Switchable, ...]:
+    """Return the parameters of the terms of all slots from row r of the numbers. Runs compiled, so it spells them out.
+
+    The first is the lumped spring of `terms.registry.laws_of`, which is switched off.
+    """
+    return (
+        Switchable(0, LumpedSpringDamper(0.0, 0.0)),
+        Switchable(int(active[0]), Elastic(float(numbers[r, 0]), float(numbers[r, 1]))),
+        Switchable(int(active[1]), Rigid(float(numbers[r, 2]), float(numbers[r, 3]), float(numbers[r, 4]))),
+        Switchable(int(active[2]), Maxwell(float(numbers[r, 5]), float(numbers[r, 6]))),
+        Switchable(int(active[3]), Maxwell(float(numbers[r, 7]), float(numbers[r, 8]))),
+        Switchable(int(active[4]), Loss(float(numbers[r, 9]))),
+        Switchable(
+            int(active[5]),
+            Foam(
+                float(numbers[r, 10]),
+                float(numbers[r, 11]),
+                float(numbers[r, 12]),
+                float(numbers[r, 13]),
+                float(numbers[r, 14]),
+                float(numbers[r, 15]),
+                float(numbers[r, 16]),
+            ),
+        ),
+        Switchable(
+            int(active[6]),
+            Snap(
+                float(numbers[r, 17]),
+                float(numbers[r, 18]),
+                float(numbers[r, 19]),
+                float(numbers[r, 20]),
+                float(numbers[r, 21]),
+            ),
+        ),
+    )
 
 
 def static_candidates(scale: DataScale) -> list[CandidateLaw]:
@@ -186,13 +230,13 @@ def static_candidates(scale: DataScale) -> list[CandidateLaw]:
         FreeParameter(slot=FOAM, name="exponent", low=0.3, high=6.0, starts=(1.2, 2.0)),
     )
     snap = (
-        FreeParameter(slot=SNAP, name="k1_n_m", low=0.05 * k, high=100.0 * k, starts=(2.0 * k,)),
+        FreeParameter(slot=SNAP, name="k1_n_m", low=0.05 * k, high=100.0 * k, starts=(1.2 * k, 2.0 * k)),
         FreeParameter(
             slot=SNAP,
             name="critical_m",
             low=0.03 * depth,
             high=depth,
-            starts=(0.3 * depth, 0.5 * depth, 0.8 * depth),
+            starts=tuple(share * depth for share in (0.25, 0.4, 0.55, 0.7, 0.85)),
         ),
         FreeParameter(slot=SNAP, name="drop_n", low=0.01 * force, high=3.0 * force, starts=(0.2 * force,)),
         FreeParameter(
@@ -238,4 +282,4 @@ def memories(scale: DataScale) -> list[CandidateLaw]:
     )
     fast = branch(MAXWELL, 0.2, (0.04 * scale.memory_s,))
     slow = branch(SECOND, 0.2, (0.4 * scale.memory_s,))
-    return [loss, one, fast.joined(slow)]
+    return [loss, one, fast.joined(slow), one.joined(loss)]

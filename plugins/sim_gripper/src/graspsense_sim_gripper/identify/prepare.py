@@ -20,16 +20,20 @@ Floats = NDArray[np.float64]
 
 MAX_NODES: Final = 320
 """Nodes of the path of a squeeze, besides the times of the samples."""
-MAX_SAMPLES: Final = 240
+MAX_SAMPLES: Final = 160
 """Samples of the force of a squeeze; more are averaged in blocks."""
 CONTACT_SHARE: Final = 0.03
 """The share of the peak force above which the object counts as touched."""
 NOISE_FACTOR: Final = 5.0
 """Multiple of the noise above which the object counts as touched."""
 BEFORE_S: Final = 0.05
-"""Time before the contact at which the path begins."""
+"""The path begins at least this long before the force exceeds the threshold."""
+BEFORE_SHARE: Final = 0.8
+"""And where the gap is wider by this share of the compression, which is more than a fit moves the contact."""
 HOLD_SHARE: Final = 0.01
 """A gap that changes by less than this share of the compression is held."""
+BREAK_SHARE: Final = 0.5
+"""A force that falls by this share between two measurements, while the fingers close, is a break of the object."""
 MIN_SAMPLES: Final = 8
 """Fewer samples in contact determine nothing."""
 
@@ -73,6 +77,8 @@ class Squeeze:
     stretches: Stretches
     share: float = 1.0
     """The share of the force that the pads measure."""
+    broken_n: float | None = None
+    """The force at the last node, right after the object broke, where the squeeze is cut; None if it did not break."""
 
     @cached_property
     def measured_path(self) -> tuple[Floats, Floats]:
@@ -111,11 +117,14 @@ def prepared(squeeze: RecordedSqueeze, delay_s: float) -> Squeeze:
             "needed: squeeze more slowly, or measure at a higher rate"
         )
     first = int(touching[0])
-    # The contact lies between the last sample without force and the first one with it.
-    begin = times[max(first - 1, 0)] - BEFORE_S
-    window = (times >= begin) & (times <= times[touching[-1]])
-    times, forces = _in_blocks(times[window], forces[window], MAX_SAMPLES)
-    nodes = np.union1d(np.linspace(times[0], times[-1], MAX_NODES), times)
+    begin = min(times[max(first - 1, 0)] - BEFORE_S, _begin(trace, times[first]))
+    last, broken = _end(trace, times, forces, first, int(touching[-1]))
+    window = (times >= begin) & (np.arange(len(times)) <= last)
+    after = times[last + 1 : last + 2] if broken is not None else times[:0]
+    course = _course(trace, np.append(times[window], after))
+    times, forces = _in_blocks(times[window], forces[window], course)
+    nodes, sample = _nodes(np.append(times, after), course)
+    sample = sample[: len(times)]
     gap = _smooth_gap(trace, nodes)
     width = float(np.interp(times[max(int(np.argmax(forces > threshold)) - 1, 0)], nodes, gap))
     return Squeeze(
@@ -126,8 +135,9 @@ def prepared(squeeze: RecordedSqueeze, delay_s: float) -> Squeeze:
         gap_m=gap,
         speed_m_s=-np.gradient(gap, nodes),
         step_s=np.diff(nodes, prepend=nodes[0] - BEFORE_S),
-        sample=np.searchsorted(nodes, times),
+        sample=sample,
         force_n=forces,
+        broken_n=broken,
         width_m=width,
         noise_n=noise,
         stretches=_stretches(nodes, gap, width, has_approach=first > 1),
@@ -154,13 +164,57 @@ def _samples(name: str, trace: Trace, delay_s: float) -> tuple[Floats, Floats]:
     return times[finite], force[finite]
 
 
-def _in_blocks(times: Floats, values: Floats, limit: int) -> tuple[Floats, Floats]:
-    """Return at most `limit` means of neighbouring samples."""
-    if len(times) <= limit:
+def _course(trace: Trace, times: Floats) -> tuple[Floats, Floats]:
+    """Return times of a squeeze, and a measure from 0 to 1 that rises by half with the time and by half with the way of
+    the fingers: nodes at equal distances in it are dense where the force changes, and follow a long hold too."""
+    t = np.linspace(times[0], times[-1], MAX_NODES)
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(_smooth_gap(trace, t))))])
+    return t, 0.5 * (t - t[0]) / (t[-1] - t[0]) + 0.5 * way / max(float(way[-1]), 1e-12)
+
+
+def _begin(trace: Trace, touched_s: float) -> float:
+    """Return the time before `touched_s` from which on the contact may lie: the fingers were further apart before.
+
+    A force that rises slowly exceeds the threshold long after the contact.
+    """
+    before = np.flatnonzero((trace.t_s <= touched_s) & np.isfinite(trace.gap_m))
+    if not len(before):
+        return touched_s
+    gap = trace.gap_m[before]
+    wider = np.flatnonzero(gap > gap[-1] + BEFORE_SHARE * (gap[-1] - float(np.nanmin(trace.gap_m))))
+    return float(trace.t_s[before[wider[-1] if len(wider) else 0]])
+
+
+def _end(trace: Trace, times: Floats, forces: Floats, first: int, last: int) -> tuple[int, float | None]:
+    """Return the last sample of a squeeze, and the force after it if the object broke there."""
+    gap = np.interp(times[first : last + 1], trace.t_s, trace.gap_m)
+    for i in range(first + MIN_SAMPLES, first + int(np.argmin(gap))):
+        if forces[i + 1] < (1.0 - BREAK_SHARE) * forces[i] and forces[i] > BREAK_SHARE * float(
+            np.max(forces)
+        ):
+            return i, float(forces[i + 1])
+    return last, None
+
+
+def _in_blocks(times: Floats, values: Floats, course: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Return at most `MAX_SAMPLES` means of neighbouring samples, which are evenly spaced along the course."""
+    if len(times) <= MAX_SAMPLES:
         return times, values
-    edges = np.linspace(0, len(times), limit + 1).astype(np.int64)
-    counts = np.diff(edges)
-    return np.add.reduceat(times, edges[:-1]) / counts, np.add.reduceat(values, edges[:-1]) / counts
+    block = np.minimum(np.interp(times, *course) * MAX_SAMPLES, MAX_SAMPLES - 1).astype(np.int64)
+    edges = np.flatnonzero(np.diff(block, prepend=-1))
+    counts = np.diff(edges, append=len(times))
+    return np.add.reduceat(times, edges) / counts, np.add.reduceat(values, edges) / counts
+
+
+def _nodes(times: Floats, course: tuple[Floats, Floats]) -> tuple[Floats, NDArray[np.int64]]:
+    """Return the nodes of a path, and which of them are the times of the samples.
+
+    Between two samples they are evenly spaced, so that no step is much shorter than those beside it.
+    """
+    pieces = np.ceil(np.diff(np.interp(times, *course)) * MAX_NODES).astype(np.int64)
+    pieces = np.maximum(pieces, 1)
+    sample = np.concatenate([[0], np.cumsum(pieces)])
+    return np.interp(np.arange(sample[-1] + 1), sample, times), sample
 
 
 def _smooth_gap(trace: Trace, nodes: Floats) -> Floats:

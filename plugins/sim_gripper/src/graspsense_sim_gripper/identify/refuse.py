@@ -10,7 +10,7 @@ import numpy as np
 
 from graspsense.plugin_api import Undetermined
 from graspsense_sim_gripper.identify.fit import Fitted
-from graspsense_sim_gripper.identify.laws import NOT_TRIED
+from graspsense_sim_gripper.identify.laws import SNAP
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.identify.spread import LEAST_INSTANCES, Uncertainty
 
@@ -23,8 +23,37 @@ WIDE: Final = 4.0
 HOLD_TIMES: Final = 5.0
 """A hold of this many relaxation times determines one."""
 
-RUPTURE_SHARE: Final = 0.25
-"""A fall of the force by this share of the peak between two samples is a rupture."""
+FALL_SHARE: Final = 0.25
+"""A fall of the force by this share of the peak between two samples needs a term of its own."""
+
+_NOT_FITTED: Final = (
+    (
+        "gas",
+        "trapped gas feels as a stiffening shell with a memory: area, volume and bulge are not separated",
+        "squeeze once sealed and once open, measure the volume, and write the term by hand",
+    ),
+    (
+        "liquid",
+        "a column that follows is a spring, and one that stands is a wall: its lengths are not separated",
+        "measure area, neck and level, and write the term by hand",
+    ),
+    (
+        "slosh",
+        "an oscillation after the contact is small beside the force, and slower sensors do not show it",
+        "measure the mass of the contents, and the frequency on a free container, and write the term by hand",
+    ),
+    (
+        "surface",
+        "a slow squeeze shows its springs in series only, not its mass",
+        "tap the surface, measure its frequency and decay, and write the term by hand",
+    ),
+    (
+        "worn",
+        "wear is a trend over the squeezes of one object, and recordings have no number of uses",
+        "record one object many times in a row, and identify the first and the last ten apart",
+    ),
+)
+"""The terms that are not fitted, why, and what would determine them."""
 
 _REMEDIES: Final = {
     "k3_n_m3": "squeeze deeper",
@@ -51,7 +80,7 @@ def undetermined(
     """Return what these squeezes leave open. `shares`: those of each squeeze, `cells`: whether cells measured them."""
     open_ = _memory(fitted, squeezes) if not shows_memory(squeezes) else []
     open_ += _parameters(fitted, found, squeezes)
-    open_ += _ruptures(squeezes)
+    open_ += _falls(fitted, squeezes)
     open_ += _spreads(found, squeezes)
     if cells and not any(math.isfinite(share) for share in shares):
         open_.append(
@@ -69,34 +98,30 @@ def undetermined(
                 remedy="record from before the contact",
             )
         )
-    open_.append(
-        Undetermined(
-            what=", ".join(NOT_TRIED),
-            reason="a force beside a gap shows the sum of shell and contents, not their areas, volumes and masses",
-            remedy="write the term by hand, with its volume, pressure or mass measured",
-        )
-    )
+    open_ += [Undetermined(what=what, reason=reason, remedy=remedy) for what, reason, remedy in _NOT_FITTED]
     return open_
 
 
-def _ruptures(squeezes: Sequence[Squeeze]) -> list[Undetermined]:
-    """Return the fracture of the objects that broke during the compression, with the forces at which they did."""
+def _falls(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
+    """Return the falls of the force that are too small for a break, if no term of the candidate describes them."""
+    if SNAP in fitted.candidate.slots:
+        return []
     forces = []
     for squeeze in squeezes:
         gap = squeeze.gap_m[squeeze.sample]
         loading = slice(0, int(np.argmin(gap)) + 1)
         drops = -np.diff(squeeze.force_n[loading])
-        if len(drops) and float(np.max(drops)) > RUPTURE_SHARE * squeeze.peak_n:
+        if len(drops) and float(np.max(drops)) > FALL_SHARE * squeeze.peak_n:
             forces.append(float(squeeze.force_n[loading][int(np.argmax(drops))]))
     if not forces:
         return []
     return [
         Undetermined(
-            what="fracture",
-            reason=f"the force of {len(forces)} squeezes drops at {min(forces):.3g} to {max(forces):.3g} N while the "
-            "fingers close, and a fracture is not fitted",
-            remedy='cut the recordings there (cut = "rupture" in a manifest), and write the term fracture by hand '
-            f"with force_n = {float(np.mean(forces)):.3g}",
+            what="a fall of the force",
+            reason=f"the force of {len(forces)} squeezes falls at {min(forces):.3g} to {max(forces):.3g} N while the "
+            "fingers close, by less than half: neither a break nor a snap describes it",
+            remedy='cut the recordings there (cut = "rupture" in a manifest), or squeeze more slowly, so that the '
+            "fall has several measurements",
         )
     ]
 

@@ -25,6 +25,7 @@ from graspsense_sim_gripper.identify.check import predictive_checks
 from graspsense_sim_gripper.identify.choose import choose
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel
+from graspsense_sim_gripper.identify.fracture import fracture_of
 from graspsense_sim_gripper.identify.laws import DataScale
 from graspsense_sim_gripper.identify.prepare import Squeeze, prepared
 from graspsense_sim_gripper.identify.refuse import shows_memory, undetermined
@@ -80,6 +81,9 @@ def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: P
     found = uncertainty(model, choice.fitted, ready, _scale_error(config, drive, ready) if cells else 0.0)
     open_ = undetermined(choice.fitted, found, ready, shares, cells)
     values, parameters = _values(choice.fitted, found, share, shares, cells)
+    fracture = fracture_of(model, choice.fitted, ready)
+    if fracture is not None:
+        open_, parameters = [*open_, *fracture.undetermined], [*parameters, *fracture.parameters]
     label = next((one.label for one in squeezes if one.label), "")
     facts = SceneFacts(
         label=label,
@@ -90,6 +94,7 @@ def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: P
         squeezes=ready,
         candidates=choice.scores,
         undetermined=open_,
+        fracture=fracture,
     )
     return Identification(
         label=label,
@@ -151,7 +156,9 @@ def _scale_error(config: SimConfig, drive: Drive, squeezes: Sequence[Squeeze]) -
 
 def _with_share(squeeze: Squeeze, share: float) -> Squeeze:
     """Return the squeeze with the whole force in place of the measured share."""
-    return evolve(squeeze, force_n=squeeze.force_n / share, noise_n=squeeze.noise_n / share, share=share)
+    broken = None if squeeze.broken_n is None else squeeze.broken_n / share
+    force, noise = squeeze.force_n / share, squeeze.noise_n / share
+    return evolve(squeeze, force_n=force, noise_n=noise, share=share, broken_n=broken)
 
 
 def _scale(squeezes: Sequence[Squeeze]) -> DataScale:

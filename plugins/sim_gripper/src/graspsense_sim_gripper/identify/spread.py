@@ -32,7 +32,7 @@ BOOTSTRAPS: Final = 24
 BLOCKS: Final = 12
 """Blocks of neighbouring residuals of a squeeze, which are drawn again together."""
 DRAWS: Final = 200
-PATH_ERROR: Final = 3e-3
+PATH_ERROR: Final = 1e-3
 """Standard deviation of the logarithm of a value that the finite number of nodes of a path causes: the median error
 with ideal sensors (`benchmarks/identify.py`)."""
 

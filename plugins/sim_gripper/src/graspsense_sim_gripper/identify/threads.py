@@ -15,8 +15,11 @@ def in_threads(
     function: Callable[[ItemT], ResultT], items: Sequence[ItemT], done: Callable[[], None] = lambda: None
 ) -> list[ResultT]:
     """Return the results in the order of the items; `done` is called after each, in this thread."""
+    from threadpoolctl import threadpool_limits
+
     results = []
-    with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+    # Each fit is on one core. Threads of the linear algebra inside it would wait for each other most of the time.
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         for result in pool.map(function, items):
             results.append(result)
             done()

@@ -10,6 +10,7 @@ from attrs import frozen
 
 from graspsense.plugin_api import CandidateScore, IdentifiedParameter, Undetermined
 from graspsense_sim_gripper.identify.fit import Fitted
+from graspsense_sim_gripper.identify.fracture import FractureFit
 from graspsense_sim_gripper.identify.laws import SLOTS
 from graspsense_sim_gripper.identify.prepare import Squeeze
 
@@ -28,6 +29,7 @@ class SceneFacts:
     squeezes: Sequence[Squeeze]
     candidates: Sequence[CandidateScore]
     undetermined: Sequence[Undetermined]
+    fracture: FractureFit | None = None
 
 
 def scene_text(facts: SceneFacts) -> str:
@@ -49,7 +51,16 @@ def scene_text(facts: SceneFacts) -> str:
             interval = intervals.get(labels.get(name, ""))
             comment = "not fitted" if interval is None else _interval(interval)
             lines.append(f"{name} = {_number(value)}  # {comment}")
+    if facts.fracture is not None:
+        lines += _fracture(facts.fracture, intervals)
     return "\n".join([*lines, "", *_identified(facts)]) + "\n"
+
+
+def _fracture(fit: FractureFit, intervals: Mapping[str, IdentifiedParameter]) -> list[str]:
+    interval = _interval(intervals[f"fracture.{fit.name}"])
+    lines = ["", "[[terms]]", 'type = "fracture"', f"{fit.name} = {_number(fit.value)}  # {interval}"]
+    lines.append(f"left = {_number(fit.left)}")
+    return lines if math.isnan(fit.spread) else [*lines, f"spread = {{ {fit.name} = {_number(fit.spread)} }}"]
 
 
 def _identified(facts: SceneFacts) -> list[str]:

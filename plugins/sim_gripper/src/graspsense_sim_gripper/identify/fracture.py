@@ -1,0 +1,148 @@
+"""The fracture of objects that broke while the fingers closed: at which force or compression, and how it differs.
+
+The force at a break lies between the last measurement before it and what the unbroken object would have borne at the
+first measurement after it. Objects that did not break say that theirs is larger. Both are used by maximum likelihood of
+a lognormal distribution with censored observations (Lawless, Statistical Models and Methods for Lifetime Data, 2003,
+section 5.2).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+from graspsense.plugin_api import IdentifiedParameter, Undetermined
+from graspsense_sim_gripper.identify.fit import Fitted
+from graspsense_sim_gripper.identify.forward import ForwardModel, Runs
+from graspsense_sim_gripper.identify.prepare import Squeeze
+
+Floats = NDArray[np.float64]
+
+LEAST_BROKEN: Final = 3
+"""Objects that have to break before their spread is identified."""
+SMALLEST_SPREAD: Final = 1e-4
+MOST_LEFT: Final = 1.0
+
+
+@frozen(kw_only=True)
+class FractureFit:
+    """The parameters of the term `fracture`: its limit by force or by compression, with its spread."""
+
+    name: str
+    """`force_n` or `compression_m`."""
+    value: float
+    low: float
+    high: float
+    spread: float
+    """Standard deviation of the logarithm between objects; NaN if fewer than three broke."""
+    left: float
+    broken: int
+    whole: int
+
+    @property
+    def parameters(self) -> list[IdentifiedParameter]:
+        """The identified parameters."""
+        unit = "N" if self.name == "force_n" else "m"
+        basis = f"{self.broken} of {self.broken + self.whole} squeezes broke the object"
+        return [
+            IdentifiedParameter(
+                name=f"fracture.{self.name}",
+                unit=unit,
+                value=self.value,
+                low=self.low,
+                high=self.high,
+                basis=basis,
+            ),
+            IdentifiedParameter(
+                name="fracture.left", unit="", value=self.left, low=math.nan, high=math.nan, basis="median"
+            ),
+        ]
+
+    @property
+    def undetermined(self) -> list[Undetermined]:
+        """What the breaks leave open."""
+        if self.broken >= LEAST_BROKEN:
+            return []
+        return [
+            Undetermined(
+                what="fracture by force or by compression, and its spread",
+                reason=f"{self.broken} squeezes broke the object",
+                remedy=f"break {LEAST_BROKEN} objects or more",
+            )
+        ]
+
+
+def fracture_of(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> FractureFit | None:
+    """Return the fracture of these squeezes; None if none of them broke the object."""
+    breaks: dict[str, list[float]] = {"force_n": [], "compression_m": []}
+    survived: dict[str, list[float]] = {"force_n": [], "compression_m": []}
+    left = []
+    for i, squeeze in enumerate(squeezes):
+        forces, compressions = _whole(model, fitted, squeeze, i)
+        if squeeze.broken_n is None:
+            survived["force_n"].append(float(np.max(forces)))
+            survived["compression_m"].append(float(np.max(compressions)))
+            continue
+        last = squeeze.sample[-1]
+        breaks["force_n"].append(0.5 * float(forces[last] + forces[-1]))
+        breaks["compression_m"].append(0.5 * float(compressions[last] + compressions[-1]))
+        left.append(squeeze.broken_n / max(float(forces[-1]), 1e-9))
+    if not left:
+        return None
+    fits = {name: _lognormal(np.array(breaks[name]), np.array(survived[name])) for name in breaks}
+    name = "force_n"
+    if len(left) >= LEAST_BROKEN and fits["compression_m"][1] < fits["force_n"][1]:
+        name = "compression_m"
+    mean, spread = fits[name]
+    half = _student(len(left) - 1) * spread / math.sqrt(len(left)) if len(left) > 1 else math.nan
+    return FractureFit(
+        name=name,
+        value=math.exp(mean),
+        low=math.exp(mean - half),
+        high=math.exp(mean + half),
+        spread=spread if len(left) >= LEAST_BROKEN else math.nan,
+        left=min(max(float(np.median(left)), 0.0), MOST_LEFT),
+        broken=len(left),
+        whole=len(squeezes) - len(left),
+    )
+
+
+def _whole(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> tuple[Floats, Floats]:
+    """Return the forces and compressions that the object would have had at the nodes, if it had not broken."""
+    numbers = fitted.candidate.numbers(np.array([fitted.values]), np.array([fitted.factors[i]]))
+    width = fitted.widths_m[i]
+    runs = Runs(np.zeros(1, np.int64), np.array([width]), numbers, fitted.candidate.active)
+    forces = model.run(model.paths([squeeze]), runs)[0]
+    return forces, width - squeeze.gap_m - model.compressed_m(forces)
+
+
+def _lognormal(breaks: Floats, survived: Floats) -> tuple[float, float]:
+    """Return mean and standard deviation of the logarithm; the deviation is 0 for a single break."""
+    from scipy.optimize import minimize
+    from scipy.stats import norm
+
+    logs, beyond = np.log(breaks), np.log(np.maximum(survived, 1e-12))
+    mean = float(np.mean(logs))
+    if len(logs) < 2:
+        return mean, 0.0
+    first = max(float(np.std(logs, ddof=1)), SMALLEST_SPREAD)
+    if not len(beyond) or float(np.max(beyond)) < mean - 4.0 * first:
+        return mean, first
+
+    def negative(x: Floats) -> float:
+        spread = math.exp(x[1])
+        return -float(np.sum(norm.logpdf(logs, x[0], spread)) + np.sum(norm.logsf(beyond, x[0], spread)))
+
+    found = minimize(negative, np.array([mean, math.log(first)]), method="Nelder-Mead")
+    return float(found.x[0]), math.exp(float(found.x[1]))
+
+
+def _student(degrees: int) -> float:
+    from scipy.stats import t
+
+    return float(t.ppf(0.95, degrees))
