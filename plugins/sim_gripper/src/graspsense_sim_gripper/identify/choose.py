@@ -65,9 +65,21 @@ def choose(
     direct = evolve(model, direct=True)
     statics = static_candidates(scale)
     with_memory = memories(scale) if has_memory else []
-    counter = _Counter(len(statics) + (STATIC_KEPT + 1) * (1 + len(with_memory)) + 2 * MANY, progress)
-    roughly = [one.joined(with_memory[1]) if with_memory else one for one in statics]
-    rough = in_threads(lambda one: fit(direct, one, squeezes), roughly, counter.done)
+    counter = _Counter(
+        (3 if with_memory else 1) * len(statics) + (STATIC_KEPT + 1) * (1 + len(with_memory)) + 2 * MANY,
+        progress,
+    )
+    alone = in_threads(lambda one: fit(direct, one, squeezes), statics, counter.done)
+    rough = alone
+    if with_memory:
+        # From its own starts, and from the fit without a memory, which has found the corners of the law.
+        roughly = [one.joined(with_memory[1]) for one in statics]
+        roughly += [one.starting_at(_values(own)) for one, own in zip(roughly, alone, strict=True)]
+        tried = in_threads(lambda one: fit(direct, one, squeezes), roughly, counter.done)
+        rough = [
+            min(pair, key=lambda one: one.cost)
+            for pair in zip(tried[: len(statics)], tried[len(statics) :], strict=True)
+        ]
     order = np.argsort([one.cost for one in rough], kind="stable")[:STATIC_KEPT].tolist()
     # The simplest law stays among the candidates, so that the table shows what it costs to leave the others out.
     kept = sorted({0, *(int(k) for k in order)})
@@ -102,8 +114,19 @@ def choose(
 
 
 def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
-    """Return whether a simpler candidate, whose terms are among those of this one, fits as well."""
-    return any(_contains(fitted, one) and _error(fitted) > (1.0 - LEAST_GAIN) * _error(one) for one in fits)
+    """Return whether a simpler candidate fits as well.
+
+    A parameter more has to reduce the residual by more than it would reduce that of noise (Bayesian information
+    criterion, Schwarz 1978), and by `LEAST_GAIN` where the terms of the simpler candidate are among those of this one.
+    """
+    n = len(fitted.residuals)
+    for one in fits:
+        more = len(fitted.values) - len(one.values)
+        if more > 0 and n * math.log(_error(one) / _error(fitted)) < 0.5 * more * math.log(n):
+            return True
+        if _contains(fitted, one) and _error(fitted) > (1.0 - LEAST_GAIN) * _error(one):
+            return True
+    return False
 
 
 def _contains(fitted: Fitted, simpler: Fitted) -> bool:
