@@ -272,6 +272,23 @@ def test_compiled_code_is_kept_in_the_users_cache_and_nowhere_else(tmp_path):
 
 
 @pytest.mark.usefixtures("_numba")
+def test_what_an_earlier_process_compiled_is_known_to_be_on_disk(tmp_path):
+    program, asks = tmp_path / "compose.py", tmp_path / "asks.py"
+    program.write_text(textwrap.dedent(COMPOSE))
+    asks.write_text(
+        "import sys\nsys.argv[1:] = []\nfrom compose import laws\nfrom graspsense.plugin_api import is_on_disk\n"
+        "print([is_on_disk(*law) for law in laws.values()], 'numba' in sys.modules)\n"
+    )
+    cache = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "NUMBA_CACHE_DIR": ""}
+
+    assert run(asks, tmp_path, **cache) == ["[False, False, False] False"]
+    compiles = tmp_path / "compiles.py"
+    compiles.write_text("import sys\nsys.argv[1:] = ['hard']\nimport compose\n")
+    run(compiles, tmp_path, **cache)
+    assert run(asks, tmp_path, **cache) == ["[False, True, False] False"]
+
+
+@pytest.mark.usefixtures("_numba")
 def test_where_nothing_can_be_kept_functions_are_compiled_all_the_same(tmp_path):
     program = tmp_path / "compose.py"
     program.write_text(textwrap.dedent(COMPOSE))

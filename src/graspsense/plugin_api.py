@@ -179,7 +179,14 @@ _TABLE: Final[Table] = {
     },
     "Compiling a function with all that it calls": {
         "call_graph": ("NotCompilable", "fingerprint"),
-        "compiling": ("CompileOptions", "Inlining", "compile_function", "entry_point", "first_call"),
+        "compiling": (
+            "CompileOptions",
+            "Inlining",
+            "compile_function",
+            "entry_point",
+            "first_call",
+            "is_on_disk",
+        ),
     },
     "Building other components, collecting what other plugins bring, and where to keep files": {
         "config": ("create", "recipe_of"),

@@ -209,6 +209,7 @@ from graspsense.core.compiling import Inlining as Inlining
 from graspsense.core.compiling import compile_function as compile_function
 from graspsense.core.compiling import entry_point as entry_point
 from graspsense.core.compiling import first_call as first_call
+from graspsense.core.compiling import is_on_disk as is_on_disk
 
 # Building other components, collecting what other plugins bring, and where to keep files
 from graspsense.core.config import create as create

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from graspsense_c45 import Attribute, Options, Schema, Table, class_indices, fit, make_table
-from graspsense_c45.engines import choose_fast
+from graspsense_c45.engines import Fits, choose_fast
 
 pytest.importorskip("numba", reason="the extra 'fast' (numba) is not installed: there is one engine only")
 
@@ -95,3 +95,15 @@ def test_auto_compiles_only_what_pays() -> None:
     assert not choose_fast("auto", 6_000)
     assert choose_fast("auto", 6_000_000)
     assert choose_fast("fast", 1)
+
+
+def test_many_small_fits_load_compiled_code_that_is_on_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("graspsense")
+    from graspsense_c45.depthfirst import compiled
+
+    for on_disk, expected in ((True, [False] * 9 + [True]), (False, [False] * 10)):
+        monkeypatch.setattr(compiled, "kept", lambda on_disk=on_disk: on_disk)
+        fits = Fits()
+        assert [fits.choose_fast("auto", 6_000) for _ in range(10)] == expected
+        assert not fits.choose_fast("numpy", 6_000)
+    assert [fits.choose_fast("auto", 900_000) for _ in range(4)] == [False, False, False, True]

@@ -17,12 +17,13 @@ by name for this.
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import types
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -111,6 +112,28 @@ def compile_function(
     return _Compilation(numba, options, copies).outermost(plain)
 
 
+def is_on_disk(function: Callable[..., Any], options: CompileOptions | None = None) -> bool:
+    """Return whether an earlier process has kept the machine code of `compile_function(function, options)` on disk.
+
+    That is answered without numba. The code may be for arguments of other types. Raises NotCompilable as
+    `compile_function` does for the function.
+    """
+    plain = plain_function(function)
+    folder = os.environ.get("NUMBA_CACHE_DIR") or compiled_code_folder()
+    if folder is None:
+        return False
+    copies = copies_if_inlined(plain, (options or CompileOptions()).replacements)
+    try:
+        digest = _Compilation(None, options or CompileOptions(), copies).digest(plain)
+    except PackageNotFoundError:
+        return False
+    # numba has a folder for each folder of sources, and names the index of a function after its qualified name, which
+    # ends with the digest.
+    sources = os.path.dirname(os.path.abspath(plain.__code__.co_filename))
+    kept = Path(folder) / f"{Path(sources).name}_{hashlib.sha1(sources.encode()).hexdigest()}"
+    return any(kept.glob(f"*_{digest}-*.nbi"))
+
+
 @contextmanager
 def first_call(*, slp_vectorize: bool = False) -> Iterator[None]:
     """Call a compiled function for the first time inside this context, which compiles it.
@@ -154,7 +177,8 @@ def entry_point(compiled: Callable[..., Any]) -> Callable[..., Any]:
 class _Compilation:
     """One call of `compile_function`."""
 
-    numba: types.ModuleType
+    numba: Any
+    """The module; None where nothing is compiled and only the key is asked for."""
     options: CompileOptions
     copies: Counter[types.CodeType]
     """How often the code of each function would occur if all calls were inlined."""
@@ -194,13 +218,17 @@ class _Compilation:
         return named
 
     def _key(self, function: types.FunctionType, role: str) -> str:
+        return f"{self.digest(function)} {role}"
+
+    def digest(self, function: types.FunctionType) -> str:
+        """Return 16 hexadecimal digits that the name of the machine code of this function ends with."""
         digest = hashlib.sha256(fingerprint(function, self.options.replacements).encode())
         inlining = self.options.inlining
         hints = () if inlining is None else (inlining.short_code, inlining.long_code)
         versions = [version(name) for name in ("numba", "llvmlite", "numpy")]
         uncounted = sorted(code.co_qualname for code in self.options.uncounted)
         digest.update(f"{self._flags(function)} {hints} {uncounted} {versions}".encode())
-        return f"{digest.hexdigest()[:16]} {role}"
+        return digest.hexdigest()[:16]
 
     def _flags(self, function: types.FunctionType) -> dict[str, Any]:
         flags = {"nogil": True, "no_cfunc_wrapper": True, "error_model": self.options.error_model}

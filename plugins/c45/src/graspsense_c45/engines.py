@@ -9,7 +9,12 @@ from typing import get_args
 from graspsense_c45.options import Engine
 
 WORTH_COMPILING = 1_000_000
-"""Values (rows x attributes) from which "auto" chooses the compiled engine, because importing it then pays."""
+"""Values (rows x attributes) of one table from which "auto" chooses the compiled engine."""
+WORTH_COMPILING_FOR_MANY = 3_000_000
+"""Values of all fits of a process from which it does so for small tables, each of which takes twenty times as long with
+numpy. Until then numpy has taken as long as compiling takes."""
+WORTH_LOADING_FOR_MANY = 60_000
+"""The same where an earlier process has compiled it: loading takes a second."""
 
 _NEEDED = ("numba", "graspsense")
 """numba compiles; graspsense keeps the compiled code on disk, under a fingerprint of the code."""
@@ -30,6 +35,30 @@ def choose_fast(engine: Engine, n_values: int) -> bool:
             "install graspsense-c45[fast] or use engine='numpy'"
         )
     return engine == "fast" or (engine == "auto" and n_values >= WORTH_COMPILING and not missing_for_fast())
+
+
+class Fits:
+    """The fits of this process, by which "auto" chooses the engine of the next one."""
+
+    def __init__(self) -> None:
+        self._n_values = 0
+        self._kept: bool | None = None
+
+    def choose_fast(self, engine: Engine, n_values: int) -> bool:
+        """Return whether to fit a table of so many values by the compiled engine. Raises as `choose_fast` does."""
+        if choose_fast(engine, n_values):
+            return True
+        self._n_values += n_values
+        if engine != "auto" or self._n_values < WORTH_LOADING_FOR_MANY or missing_for_fast():
+            return False
+        return self._n_values >= WORTH_COMPILING_FOR_MANY or self._is_kept()
+
+    def _is_kept(self) -> bool:
+        if self._kept is None:
+            from graspsense_c45.depthfirst.compiled import kept
+
+            self._kept = kept()
+        return self._kept
 
 
 @cache

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from graspsense_c45.arrays import Indices, Reals
-from graspsense_c45.engines import choose_fast
+from graspsense_c45.engines import Fits
 from graspsense_c45.levelwise.builder import LevelwiseTreeBuilder
 from graspsense_c45.levelwise.reduced_error import prune_reduced_error
 from graspsense_c45.options import J48, Engine, Options
@@ -16,6 +16,8 @@ from graspsense_c45.table import MISSING_CLASS, Table
 from graspsense_c45.training_set import TrainingSet, make_training_set
 from graspsense_c45.tree import Tree, finish
 from graspsense_c45.weka_folds import hold_out
+
+_FITS = Fits()
 
 
 class TreeBuilder(Protocol):
@@ -74,7 +76,7 @@ def _fit_held_out(table: Table, options: Options, held_out: Indices | None, engi
 
 def _builder(training: TrainingSet, engine: Engine) -> TreeBuilder:
     """Return the builder of the compiled engine where it is wanted and can build this tree, else that of numpy."""
-    if choose_fast(engine, training.values.size):
+    if _FITS.choose_fast(engine, training.values.size):
         from graspsense_c45.depthfirst.builder import DepthFirstTreeBuilder
 
         if DepthFirstTreeBuilder.can_build(training):

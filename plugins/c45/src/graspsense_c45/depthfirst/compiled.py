@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from graspsense.plugin_api import CompileOptions, Inlining, compile_function
+from graspsense.plugin_api import CompileOptions, Inlining, compile_function, is_on_disk
 from graspsense_c45 import arithmetic, criteria
 from graspsense_c45.arrays import Indices, Mask, Reals
 from graspsense_c45.depthfirst import growing, pruning, routing, scanning
@@ -60,6 +60,11 @@ _OPTIONS = CompileOptions(
 @cache
 def _compiled(function: Any) -> Any:
     return compile_function(function, _OPTIONS)
+
+
+def kept() -> bool:
+    """Return whether the machine code of this engine is on disk, so that its first fit takes a second."""
+    return all(is_on_disk(function, _OPTIONS) for function in (growing.grow, pruning.collapse, pruning.prune))
 
 
 def grow(columns: Columns, averaged: Mask, rules: Rules) -> Nodes:
