@@ -9,6 +9,7 @@ from attrs import evolve, frozen
 from parts import CHANNELS_OF_HAND, Hand, HandConfig
 
 from graspsense import load_pipeline
+from graspsense.core.config import resolve
 from graspsense.core.errors import ConfigError
 from graspsense.core.plugins import IsolatedPlugins
 from graspsense.plugin_api import (
@@ -20,11 +21,12 @@ from graspsense.plugin_api import (
     hookimpl,
     setting,
 )
-from graspsense.sources.simulated import Group, plan_trials
+from graspsense.sources.simulated import Group, plan_trials, simulated
 from graspsense.store.dataset import labelled_store
 from graspsense.store.labels import labels_of
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
+from graspsense_sim_gripper.backend import SimBackend
 
 HERE = sys.modules[__name__]
 
@@ -85,3 +87,24 @@ def test_a_gripper_without_default_objects_names_those_that_can_be_given(monkeyp
         ConfigError, match="no kind of object of this gripper is a default: name --objects, any of foam"
     ):
         plan_trials(settings, [Group(instances=2, trials=1)], 0)
+
+
+def test_many_trials_are_run_in_parts_of_equal_size_and_only_their_numbers_are_kept(monkeypatch):
+    settings = resolve("default", options=["gripper.sensor=ideal"])
+    group = Group(objects=("block",), instances=1, trials=5)
+    whole = simulated(settings, groups=[group])
+
+    sizes, run_many = [], SimBackend.run_many
+
+    def counted(self, controller, scenes, seeds, **options):
+        sizes.append(len(scenes))
+        return run_many(self, controller, scenes, seeds, **options)
+
+    monkeypatch.setattr(SimBackend, "run_many", counted)
+    monkeypatch.setattr("graspsense.sources.simulated.BATCH_WITHOUT_TRACES", 2)
+    in_parts = simulated(settings, groups=[group])
+
+    assert sizes == [2, 2, 1]
+    assert in_parts.table.values.tobytes() == whole.table.values.tobytes()
+    assert in_parts.before_contact.table.values.tobytes() == whole.before_contact.table.values.tobytes()
+    assert (in_parts.labels, in_parts.table.names) == (whole.labels, whole.table.names)

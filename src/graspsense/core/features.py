@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -97,7 +98,35 @@ class FeatureTable:
         return Features(names=self.names, values=values, units=self.units, reasons=absent)
 
 
-def table_of(rows: Sequence[Features]) -> FeatureTable:
+class FeatureRows:
+    """Collects the features of trials for a table, and keeps their numbers only."""
+
+    def __init__(self) -> None:
+        self._first: Features | None = None
+        self._values = array("d")
+        self._n = 0
+
+    def add(self, features: Features) -> None:
+        """Add a trial. Raises ValueError if its features differ from those of the first one in names or units."""
+        first = self._first = self._first or features
+        if features.names != first.names or features.units != first.units:
+            raise ValueError(
+                f"trials disagree: {features.names} in {features.units} beside {first.names} in {first.units}"
+            )
+        self._values.extend(features.values)
+        self._n += 1
+
+    def table(self) -> FeatureTable:
+        """Return the table of the trials added so far. Raises ValueError if there are none."""
+        import numpy as np
+
+        if self._first is None:
+            raise ValueError("a table needs at least one trial")
+        values = np.array(self._values, dtype=np.float64).reshape(self._n, len(self._first.names))
+        return FeatureTable(names=self._first.names, units=self._first.units, values=values)
+
+
+def table_of(rows: Iterable[Features]) -> FeatureTable:
     """Return the table of these features, one row for each; a classifier explains one trial by a table of one row.
 
     Raises ValueError if they differ in names or units.
@@ -105,18 +134,10 @@ def table_of(rows: Sequence[Features]) -> FeatureTable:
     >>> table_of([Features(names=("p_first",), values=(0.05,), units=("m",))]).values
     array([[0.05]])
     """
-    import numpy as np
-
-    if not rows:
-        raise ValueError("a table needs at least one trial")
-    first = rows[0]
+    collected = FeatureRows()
     for row in rows:
-        if row.names != first.names or row.units != first.units:
-            raise ValueError(
-                f"trials disagree: {row.names} in {row.units} beside {first.names} in {first.units}"
-            )
-    values = np.array([row.values for row in rows], dtype=np.float64)
-    return FeatureTable(names=first.names, units=first.units, values=values)
+        collected.add(row)
+    return collected.table()
 
 
 def _texts(items: Iterable[str]) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
+from math import ceil
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from attrs import Attribute, evolve, field, frozen
@@ -18,7 +19,7 @@ from attrs import Attribute, evolve, field, frozen
 from graspsense.core.checkpoints import with_checkpoints
 from graspsense.core.compiled_features import CompiledExtraction, both, compiled_extraction
 from graspsense.core.errors import ComponentFailed, ConfigError, named
-from graspsense.core.features import Features, table_of
+from graspsense.core.features import FeatureRows, Features
 from graspsense.core.labelled import Labelled, class_of
 from graspsense.core.roles import BatchBackend, DeviceInfo, FeatureSet
 from graspsense.core.runner import run_grasp
@@ -39,7 +40,9 @@ if TYPE_CHECKING:
 OBJECTS_PER_SEED: Final = 1000
 TRIALS_PER_SEED: Final = 1_000_000
 BATCH: Final = 500
-"""Grasps per call if their traces are wanted: enough to be worth compiling for, at most 250 MB."""
+"""Most grasps per call if their traces are wanted: enough to be worth compiling for, at most 250 MB."""
+BATCH_WITHOUT_TRACES: Final = 20_000
+"""Most grasps per call otherwise, whose results take 30 MB."""
 
 Progress = Callable[[int, int], None]
 OnTrace = Callable[[int, str, "Trace"], None]
@@ -175,26 +178,26 @@ def simulated(
     plan = plan_trials(settings, groups, seed)
     if progress is not None:
         progress(0, len(plan.scenes))
-    rows: list[Features] = []
-    before: list[Features] = []
+    rows, before = FeatureRows(), FeatureRows()
     feature_set = with_checkpoints(settings.features.create(), checkpoints_s)
     extract = _Extraction(
         settings.features.component.qualified, feature_set, contact_force_of(settings.values)
     )
     wanted = on_trace is not None
-    for features, features_before, trace in _grasps(settings, plan, progress, extract, traces=wanted):
+    grasps = _grasps(settings, plan, progress, extract, traces=wanted)
+    for number, (features, features_before, trace) in enumerate(grasps):
         if on_trace is not None and trace is not None:
-            on_trace(len(rows), plan.labels[len(rows)], trace)
-        rows.append(features)
-        before.append(features_before)
-    table = table_of(rows)
+            on_trace(number, plan.labels[number], trace)
+        rows.add(features)
+        before.add(features_before)
+    table = rows.table()
     return Labelled(
         source="simulated grasps",
         table=table,
         labels=plan.labels,
         instances=plan.instances,
         no_order="simulated trials are independent, so they have no order of recording",
-        **controls(table, table_of(before)),
+        **controls(table, before.table()),
         notes=("every figure here is simulated: it comes from a model of gripper and objects",),
         provenance={
             "simulated": True,
@@ -288,8 +291,8 @@ def _grasps(
     backend, controller = settings.gripper.create(), settings.controller.create()
     total = len(plan.scenes)
     if isinstance(backend, BatchBackend):
-        # A trace has half a megabyte, so traces come in batches.
-        size = BATCH if traces else total
+        # Parts of equal size, so that none is too small to be worth compiling for.
+        size = ceil(total / ceil(total / (BATCH if traces else BATCH_WITHOUT_TRACES)))
         for start in range(0, total, size):
             part = slice(start, start + size)
             for grasped in backend.run_many(
