@@ -310,7 +310,7 @@ def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> 
     recorded = {
         name: squeezes_of(name, name, pads, [str(i // 3) for i in seeds], seeds)
         for name in CONTAINERS
-        for seeds in [range(max(counts) + tested)]
+        for seeds in [range(max(TRANSFER_COUNTS) + tested)]
     }
     test = [(extract(one.trace), name) for name in CONTAINERS for one in recorded[name][-tested:]]
     rows = []
@@ -400,7 +400,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="number of the first repeat")
     parser.add_argument("--only", nargs="+", choices=list(SCENES), default=list(SCENES))
     parser.add_argument("--sensors", nargs="+", choices=list(SENSORS), default=list(SENSORS))
-    parser.add_argument("--recordings", nargs="+", type=int, default=list(COUNTS))
+    parser.add_argument("--recordings", nargs="+", type=int, help="the numbers of recordings")
     parser.add_argument("--transfer", action="store_true")
     parser.add_argument("--rows", type=Path, help="append the rows to this file (JSON lines)")
     parser.add_argument(
@@ -421,13 +421,14 @@ def main() -> None:
     begin = time.monotonic()
     rows: list[Any] = []
     if asked.transfer:
-        rows = transfer(TRANSFER_COUNTS, TESTED)
+        rows = transfer(asked.recordings or TRANSFER_COUNTS, TESTED)
         if asked.rows:
-            asked.rows.write_text("".join(f"{json.dumps(one)}\n" for one in rows), encoding="utf-8")
+            with asked.rows.open("a", encoding="utf-8") as out:
+                out.writelines(f"{json.dumps(one)}\n" for one in rows)
     else:
         # A run that is stopped has all scenes in its rows.
         for repeat in range(asked.first, asked.first + asked.repeats):
-            for count in asked.recordings:
+            for count in asked.recordings or COUNTS:
                 for sensor in asked.sensors:
                     for name in asked.only:
                         row = measured(name, sensor, count, repeat)

@@ -223,6 +223,26 @@ def test_mistakes_in_a_file(tmp_path, text, said):
         read_experiment(str(path))
 
 
+def test_identified_scenes_of_an_experiment_bring_their_fingertips(tmp_path):
+    scene = 'width_m = 0.05\n[identified]\nlabel = "{0}"\n[identified.gripper]\npad_stiffness_n_m = {1}\n'
+    (tmp_path / "cup.toml").write_text(scene.format("cup", 8000.0))
+    (tmp_path / "mug.toml").write_text(scene.format("mug", 8000.0))
+    (tmp_path / "other.toml").write_text(scene.format("mug", 9000.0))
+    path = tmp_path / "one.toml"
+    source = f"identified:{tmp_path}/cup.toml,{tmp_path}/mug.toml"
+    text = f'title = "t"\nquestion = "q"\nseeds = 1\n[data]\nsource = "{source}"\ninstances = 3\n[judge]\nfolds = 2\n'
+    path.write_text(text)
+    (case,) = read_experiment(str(path)).cases
+    assert case.settings.gripper.config.pad_stiffness_n_m == 8000.0
+    # What the file says itself holds: it may be what the experiment varies.
+    path.write_text(f"{text}[sweep]\n'gripper.pad_stiffness_n_m' = [2000.0, 4000.0]\n")
+    stiff = [one.settings.gripper.config.pad_stiffness_n_m for one in read_experiment(str(path)).cases]
+    assert stiff == [2000.0, 4000.0]
+    path.write_text(f'{text}[test]\nsource = "identified:{tmp_path}/other.toml"\n')
+    with pytest.raises(ConfigError, match="different fingertips"):
+        read_experiment(str(path))
+
+
 def test_options_are_laid_over_the_file(file):
     planned = read_experiment(str(file), ["seeds=[7]", "data.only=a", "controller.probing_force_n=17"])
 

@@ -19,6 +19,7 @@ from graspsense.core.plugins import installed
 from graspsense.core.strict import InvalidValue, ValidationFailed, plain, structured
 from graspsense.experiments.kinds import kind_of
 from graspsense.experiments.task import Task
+from graspsense.sources.identified import IDENTIFIED, identified_scenes
 from graspsense.sources.simulated import plan_trials, simulated_objects
 from graspsense.sources.trial_source import SIMULATED, TrialSource, groups_of, labelled_trials
 
@@ -316,7 +317,13 @@ class _Plan:
         values = merged.values
         for path, value in point:
             _put(values, path, value)
+        data = self._keys(values.get("data", {}), TrialSource, "data")
+        test = self._keys(values["test"], TrialSource, "test") if values.get("test") else None
         over = {table: values[table] for table in PIPELINE_TABLES if values.get(table)}
+        fingertips = self._fingertips(data, test)
+        if fingertips:
+            # What the file says of the gripper stays: it may be what the experiment varies.
+            over["gripper"] = {**fingertips, **over.get("gripper", {})}
         settings = resolve(
             pipeline.pipeline,
             experiment=Layer(label=self.layer.label, values=over, lines=self.layer.lines),
@@ -326,8 +333,6 @@ class _Plan:
             str(value) if key in ("pipeline", "variant") else in_a_name(key, value)
             for key, value in at.items()
         )
-        data = self._keys(values.get("data", {}), TrialSource, "data")
-        test = self._keys(values["test"], TrialSource, "test") if values.get("test") else None
         if any(source is not None and source.kind == SIMULATED for source in (data, test)):
             simulated_objects(settings)
         judge = self._keys(values.get("judge", {}), kind_of(one.kind).keys_class(), "judge")
@@ -343,6 +348,23 @@ class _Plan:
             judge=judge,
             kind=one.kind,
         )
+
+    def _fingertips(self, data: TrialSource | None, test: TrialSource | None) -> dict[str, float]:
+        """Return the settings of the fingertips that the scenes of `identified:` were recorded with."""
+        found: dict[str, dict[str, float]] = {}
+        for table, source in (("data", data), ("test", test)):
+            if source is None or not source.source.startswith(IDENTIFIED):
+                continue
+            try:
+                found[table] = dict(identified_scenes(source.source)[0].gripper)
+            except GraspsenseError as error:
+                self.complaints.append(f"{self.layer.where((table,))}: {error}")
+        if len(found) > 1 and found["data"] != found["test"]:
+            self.complaints.append(
+                f"{self.layer.where(('test',))}: the scenes of [data] and [test] were identified with different "
+                "fingertips ([identified.gripper]): their squeezes cannot be compared"
+            )
+        return next(iter(found.values()), {})
 
     def _check_folds(self, settings: Settings, data: TrialSource, judge: Any) -> None:
         """Add an error if there are more folds than trials, because every task of the case would fail."""

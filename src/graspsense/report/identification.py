@@ -95,7 +95,7 @@ def _fits(fits: Sequence[SqueezeFit]) -> str:
 
 def _fit_picture(fit: SqueezeFit) -> str:
     """Return force over time, measured and fitted, above the residual."""
-    picture = Picture(height=250.0)
+    picture = Picture(height=268.0)
     t = fit.t_s - fit.t_s[0]
     residual = fit.measured_n - fit.fitted_n
     x = reaching(t.tolist(), LEFT, RIGHT)
@@ -110,8 +110,8 @@ def _fit_picture(fit: SqueezeFit) -> str:
         picture.y_axis(below, LEFT, RIGHT, "measured − fitted, N")
         picture.x_axis(x, 178.0, 215.0, "time, s")
         picture.dots(_points(x, below, t, residual), INKS[0], "residual")
-    picture.text(RIGHT - 56.0, 14.0, "● measured", at="end", ink=INKS[0])
-    picture.text(RIGHT, 14.0, "— fitted", at="end", ink=INKS[1])
+    picture.text(RIGHT - 56.0, 262.0, "● measured", at="end", ink=INKS[0])
+    picture.text(RIGHT, 262.0, "— fitted", at="end", ink=INKS[1])
     return picture.svg(f"Force over time of {fit.name}, measured and fitted, and the residual", "s")
 
 

@@ -20,8 +20,12 @@ Floats = NDArray[np.float64]
 
 MAX_NODES: Final = 320
 """Nodes of the path of a squeeze, besides the times of the samples."""
+LEAST_NODES: Final = 120
 MAX_SAMPLES: Final = 160
 """Samples of the force of a squeeze; more are averaged in blocks."""
+LEAST_SAMPLES: Final = 50
+MANY: Final = 10
+"""With more squeezes than these, each has fewer nodes and samples, so that a fit takes no longer."""
 CONTACT_SHARE: Final = 0.03
 """The share of the peak force above which the object counts as touched."""
 NOISE_FACTOR: Final = 5.0
@@ -97,7 +101,23 @@ class Squeeze:
         return float(self.width_m - np.min(self.gap_m))
 
 
-def prepared(squeeze: RecordedSqueeze, delay_s: float) -> Squeeze:
+class Resolution(NamedTuple):
+    """Into how many nodes and samples a squeeze is divided."""
+
+    nodes: int = MAX_NODES
+    samples: int = MAX_SAMPLES
+
+
+FULL: Final = Resolution()
+
+
+def resolution(squeezes: int) -> Resolution:
+    """Return the resolution for a number of squeezes."""
+    share = min(MANY / squeezes, 1.0)
+    return Resolution(max(int(share * MAX_NODES), LEAST_NODES), max(int(share * MAX_SAMPLES), LEAST_SAMPLES))
+
+
+def prepared(squeeze: RecordedSqueeze, delay_s: float, parts: Resolution = FULL) -> Squeeze:
     """Return the squeeze of a recording; `delay_s`: from the time of an image until it arrives.
 
     Raises ConfigError if it has no gap, no force, no contact, or too few samples in contact.
@@ -122,8 +142,8 @@ def prepared(squeeze: RecordedSqueeze, delay_s: float) -> Squeeze:
     window = (times >= begin) & (np.arange(len(times)) <= last)
     after = times[last + 1 : last + 2] if broken is not None else times[:0]
     course = _course(trace, np.append(times[window], after))
-    times, forces = _in_blocks(times[window], forces[window], course)
-    nodes, sample = _nodes(np.append(times, after), course)
+    times, forces = _in_blocks(times[window], forces[window], course, parts.samples)
+    nodes, sample = _nodes(np.append(times, after), course, parts.nodes)
     sample = sample[: len(times)]
     gap = _smooth_gap(trace, nodes)
     width = float(np.interp(times[max(int(np.argmax(forces > threshold)) - 1, 0)], nodes, gap))
@@ -196,22 +216,24 @@ def _end(trace: Trace, times: Floats, forces: Floats, first: int, last: int) -> 
     return last, None
 
 
-def _in_blocks(times: Floats, values: Floats, course: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-    """Return at most `MAX_SAMPLES` means of neighbouring samples, which are evenly spaced along the course."""
-    if len(times) <= MAX_SAMPLES:
+def _in_blocks(
+    times: Floats, values: Floats, course: tuple[Floats, Floats], samples: int
+) -> tuple[Floats, Floats]:
+    """Return at most this number of means of neighbouring samples, which are evenly spaced along the course."""
+    if len(times) <= samples:
         return times, values
-    block = np.minimum(np.interp(times, *course) * MAX_SAMPLES, MAX_SAMPLES - 1).astype(np.int64)
+    block = np.minimum(np.interp(times, *course) * samples, samples - 1).astype(np.int64)
     edges = np.flatnonzero(np.diff(block, prepend=-1))
     counts = np.diff(edges, append=len(times))
     return np.add.reduceat(times, edges) / counts, np.add.reduceat(values, edges) / counts
 
 
-def _nodes(times: Floats, course: tuple[Floats, Floats]) -> tuple[Floats, NDArray[np.int64]]:
+def _nodes(times: Floats, course: tuple[Floats, Floats], nodes: int) -> tuple[Floats, NDArray[np.int64]]:
     """Return the nodes of a path, and which of them are the times of the samples.
 
     Between two samples they are evenly spaced, so that no step is much shorter than those beside it.
     """
-    pieces = np.ceil(np.diff(np.interp(times, *course)) * MAX_NODES).astype(np.int64)
+    pieces = np.ceil(np.diff(np.interp(times, *course)) * nodes).astype(np.int64)
     pieces = np.maximum(pieces, 1)
     sample = np.concatenate([[0], np.cumsum(pieces)])
     return np.interp(np.arange(sample[-1] + 1), sample, times), sample

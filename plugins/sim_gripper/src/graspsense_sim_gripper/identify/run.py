@@ -27,13 +27,16 @@ from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.fracture import fracture_of
 from graspsense_sim_gripper.identify.laws import DataScale
-from graspsense_sim_gripper.identify.prepare import Squeeze, prepared
+from graspsense_sim_gripper.identify.prepare import Squeeze, prepared, resolution
 from graspsense_sim_gripper.identify.refuse import shows_memory, undetermined
 from graspsense_sim_gripper.identify.share import measured_share
 from graspsense_sim_gripper.identify.spread import Uncertainty, uncertainty
 from graspsense_sim_gripper.identify.write import SceneFacts, scene_text
 
 Progress = Callable[[str, int, int], None]
+
+MAX_SQUEEZES: Final = 30
+"""More recordings hardly narrow the intervals, and a fit of all takes minutes."""
 
 UNITS: Final = {
     "n_m": "N/m",
@@ -62,7 +65,10 @@ def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: P
     drive, pads = drive_and_pads(config)
     model = ForwardModel(pads=pads)
     model.compile()
-    ready = [prepared(one, config.pad_delay_s) for one in squeezes]
+    squeezes, left_out = _used(squeezes)
+    notes += left_out
+    parts = resolution(len(squeezes))
+    ready = [prepared(one, config.pad_delay_s, parts) for one in squeezes]
     cells = _has_cells(config, squeezes)
     shares = [
         measured_share(one.trace, two, drive) if cells else 1.0
@@ -127,6 +133,26 @@ def _own_settings(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> tup
         f"the fingertips are taken as {stiffness:.3g} N/m each: -o gripper.pad_stiffness_n_m=VALUE (inf: rigid). "
         "The scene is of the object behind these fingertips"
     ]
+
+
+def _used(squeezes: Sequence[RecordedSqueeze]) -> tuple[Sequence[RecordedSqueeze], list[str]]:
+    """Return at most `MAX_SQUEEZES` squeezes, of as many objects as possible, and what to say about it."""
+    if len(squeezes) <= MAX_SQUEEZES:
+        return squeezes, []
+    turn: dict[str, int] = {}
+    turns = []
+    for i, one in enumerate(squeezes):
+        turn[one.instance] = turn.get(one.instance, -1) + 1
+        turns.append((turn[one.instance], i))
+    # The first squeeze of every object, then the second ones; among these evenly over the whole order.
+    order = [i for _, i in sorted(turns)]
+    last = turns[order[MAX_SQUEEZES - 1]][0]
+    first = [i for i in order if turns[i][0] < last]
+    same = [i for i in order if turns[i][0] == last]
+    missing = MAX_SQUEEZES - len(first)
+    chosen = sorted(first + [same[k * len(same) // missing] for k in range(missing)])
+    note = f"{MAX_SQUEEZES} of the {len(squeezes)} recordings are used, of as many objects as possible"
+    return [squeezes[i] for i in chosen], [note]
 
 
 def _has_cells(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> bool:
