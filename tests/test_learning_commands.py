@@ -155,6 +155,16 @@ def test_the_picture_of_the_confusion(run, csv, tmp_path):
             2,
             "--instances is for a simulated source; this one is a CSV",
         ),
+        (
+            ["evaluate", "x.csv", "--states-per-instance", "one"],
+            2,
+            "--states-per-instance is for a simulated source; this one is a CSV",
+        ),
+        (
+            ["evaluate", "simulated", "--instances", "2", "--states-per-instance", "one"],
+            2,
+            "2 instances cannot be in one of 4 states each: give at least 4 instances",
+        ),
         (["evaluate", "x.csv", "--label", "y", "--classifier", "treee"], 2, "no classifier named 'treee'"),
         (
             ["evaluate", "x.csv", "--label", "y", "-o", "controller.ramp_s=1"],
@@ -222,6 +232,29 @@ def test_simulated_trials_small_and_whole(run):
     assert found["protocol"] == "instance_held_out"
     assert found["controls"]["before_contact"]["rate"]["n"] == 12
     assert any("simulated" in note for note in found["notes"])
+    assert "each instance is grasped in all of its states" in found["notes"]
+
+
+def test_simulated_trials_with_each_instance_in_one_state_only(run, tmp_path):
+    code, out, _ = run(
+        *("evaluate", "simulated", "--objects", "can:full_open,can:empty_open", "--instances", "4"),
+        *(
+            "--trials",
+            "1",
+            "--folds",
+            "2",
+            "--states-per-instance",
+            "one",
+            "--keep",
+            tmp_path / "t.csv",
+            "--json",
+        ),
+    )
+
+    assert code == 0
+    assert any("in one of its states only" in note for note in json.loads(out)["notes"])
+    rows = [line.split(",") for line in (tmp_path / "t.csv").read_text().splitlines()[1:]]
+    assert len(rows) == len({row[1] for row in rows}) == 4
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from importlib.resources import files
 
+import numpy as np
 import pytest
 from attrs import evolve, fields, frozen
 from hypothesis import given
@@ -25,11 +26,13 @@ from graspsense.experiments.paper.rows import RateComparison, rows
 from graspsense.experiments.results import EXPERIMENT, Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import Summary, summarise
+from graspsense.plugin_api import create
 from graspsense.sources.simulated import Group, plan_trials, simulated_objects
 from graspsense.sources.trial_source import groups_of
 
 pytest.importorskip("graspsense_sim_gripper", reason="the paper is done again in simulation")
 pytest.importorskip("graspsense_c45", reason="the paper's classifier")
+from graspsense_sim_gripper.batch import run_many
 
 
 def test_printed_matrices_have_the_truth_where_it_is_said_to_be():
@@ -88,6 +91,8 @@ def test_the_number_of_fitted_parameters_is_that_of_the_catalogue():
         ("table_3", "table_3", "fitted"),
         ("fig_5", "fig_6_contact", "fitted"),  # the width of the block was set by it
         ("controllers", "egg", "predicted"),
+        ("stiction", "stiction", "built in"),
+        ("one_finger_first", "one_finger_first", "built in"),
     ],
 )
 def test_whether_a_result_is_predicted_follows_from_the_origins_of_the_figures(experiment, about, expected):
@@ -115,6 +120,57 @@ def test_a_result_that_a_setting_of_the_gripper_was_fitted_to_is_not_predicted()
         patch.setattr("graspsense.experiments.paper.basis.simulated_objects", lambda _: ())
         assert basis(with_gripper(FittedConfig()), "table_4", "table_4_17") == "fitted"
         assert basis(with_gripper(FittedConfig(friction_n=6.0)), "table_4", "table_4_17") == "predicted"
+
+
+def test_a_claim_is_built_in_only_where_a_figure_that_gives_it_is_not_zero():
+    planned = read_experiment("stiction")
+    frictionless = tuple(
+        evolve(
+            case,
+            settings=evolve(
+                case.settings,
+                gripper=evolve(
+                    case.settings.gripper,
+                    config=evolve(case.settings.gripper.config, coulomb_n=0.0, breakaway_n=0.0),
+                ),
+            ),
+        )
+        for case in planned.cases
+    )
+    summary = Summary(
+        planned=evolve(planned, cases=frictionless),
+        conditions=(),
+        results={},
+        failed=(),
+        missing=0,
+        seconds=0.0,
+    )
+    assert basis(summary, "stiction", "stiction") == "predicted"
+
+
+def test_without_the_figures_that_give_them_the_claims_do_not_hold():
+    """Static friction holds the gripper, and an object that is off the centre meets one finger first."""
+    ours = read_experiment("stiction").cases[0].settings.gripper.config
+
+    def closed(**friction):
+        gripper = evolve(ours, coulomb_spread_n=0.0, **friction)
+        (done,) = run_many(gripper, create("controller", "force", probing_force_n=7.5), ["block"], [0])
+        return float(np.ptp(done.trace.gap_m))
+
+    assert closed() == 0.0
+    assert closed(coulomb_n=0.0, breakaway_n=0.0, load_friction_coefficient=0.0) > 0.01
+
+    def lead_s(offset_m):
+        gripper = evolve(ours, spread=False, sensor="ideal")
+        scene = f"width_m = 0.05\noffset_m = {offset_m}\n[[terms]]\ntype = 'elastic'\nk1_n_m = 2000.0\n"
+        (done,) = run_many(gripper, create("controller", "hybrid"), [scene], [0])
+        left, right = (
+            np.argmax(force > 0.1) for force in (done.trace.force_left_n, done.trace.force_right_n)
+        )
+        return abs(int(left) - int(right)) * 0.001
+
+    assert lead_s(0.0) == 0.0
+    assert lead_s(0.002) > 0.1
 
 
 def test_every_number_of_the_model_of_the_gripper_has_an_origin():

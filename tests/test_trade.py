@@ -13,7 +13,8 @@ from graspsense.experiments.page import findings_of
 from graspsense.experiments.results import Results
 from graspsense.experiments.run import run_experiment
 from graspsense.experiments.summary import ConditionResult, summarise
-from graspsense.experiments.task_results import ClassifierResult
+from graspsense.experiments.task_results import ClassifierResult, TrialValues
+from graspsense.experiments.trade.costs import mean_seconds
 from graspsense.experiments.trade.next_squeeze import (
     Decision,
     ForceChoices,
@@ -157,3 +158,51 @@ def test_each_trade_runs_and_gives_advice(tmp_path, kind, more, trials):
     if kind == "early":
         at = {row[0]: float(row[2]) for row in found.tables[0].rows}
         assert at["0 s"] == 0.0 < at["1 s"] < 1.0  # at rest before a second is over
+
+
+def test_a_grasp_lasts_until_the_rest_window_has_shown_the_rest():
+    trials = TrialValues(
+        features=(("p_first", "m"), ("delta_t", "s")),
+        labels=("can:full", "can:full"),
+        instances=None,
+        values=((0.066, 0.3), (0.066, None)),
+    )
+    settings = {
+        "gripper": {"open_gap_m": 0.086},
+        "controller": {"closing_speed_m_s": 0.01, "rest_window_s": 0.2},
+    }
+    assert mean_seconds(settings, trials) == pytest.approx(2.0 + 0.3 + 0.2)
+
+
+def test_the_joint_trade_varies_speed_force_rest_and_squeezes_on_bottles_held_out():
+    planned = read_experiment("trade_joint")
+    assert planned.experiment.kind == "squeezes"  # whole instances are held out
+    assert set(planned.experiment.sweep) == {
+        "controller.closing_speed_m_s",
+        "controller.probing_force_n",
+        "controller.rest_window_s",
+    }
+    assert planned.cases[0].judge.most > 1
+
+
+@pytest.mark.slow
+def test_controls_stand_beside_the_rates_of_a_trade(tmp_path):
+    pytest.importorskip("graspsense_sim_gripper")
+    pytest.importorskip("graspsense_c45")
+    trade = COMMON.format(trials=2) + "controls = true\ngrasps = 0\nfolds = 2\n"
+    sweep = '[sweep]\n"controller.closing_speed_m_s" = [0.02, 0.04]\n'
+    (tmp_path / "small.toml").write_text(f'kind = "trade"\n{trade}{sweep}')
+    planned = read_experiment(str(tmp_path / "small.toml"))
+    results = Results(tmp_path / "out")
+    run_experiment(planned, results, Serial)
+    found = findings_of(summarise(planned, results))
+    (controls,) = (table for table in found.tables if table.id == "controls")
+    assert len(controls.rows) == 2
+    assert controls.header[-5:] == (
+        "most frequent label",
+        "shuffled labels",
+        "before contact",
+        "width alone",
+        "new bottles",
+    )
+    assert all("%" in cell for row in controls.rows for cell in (*row[3:5], *row[6:8])), controls.rows

@@ -22,6 +22,8 @@ from graspsense.core.setting import CHANGES_NO_RESULT as CHANGES_NO_RESULT
 from graspsense.core.setting import NAMES_INPUT as NAMES_INPUT
 from graspsense.core.setting import setting as setting
 from graspsense.core.figure_origins import fitted_results as fitted_results
+from graspsense.core.figure_origins import given_claims as given_claims
+from graspsense.core.figure_origins import gives as gives
 
 # Signals: what passes between a gripper and a controller
 from graspsense.core.signals import CHANNELS as CHANNELS

@@ -65,6 +65,13 @@ _OPTIONS: Final = (
         "--trials", type=int, default=5, show_default=True, help="simulated: grasps of each instance."
     ),
     click.option(
+        "--states-per-instance",
+        type=click.Choice(["all", "one"]),
+        default="all",
+        show_default=True,
+        help="simulated: grasp each instance in all of its states, or in one only.",
+    ),
+    click.option(
         "--pipeline", metavar="NAME|FILE", default="default", help="simulated: pipeline.  [default: default]"
     ),
     click.option("--gripper", metavar="NAME", help="simulated: another simulated gripper. (gripper.type)"),
@@ -87,7 +94,7 @@ _OPTIONS: Final = (
 _ONLY_FOR: Final = {
     "CSV": ("label", "instance", "order", "features", "before"),
     "data set": ("unreliable",),
-    SIMULATED: ("objects", "instances", "trials", "pipeline", "gripper"),
+    SIMULATED: ("objects", "instances", "trials", "states_per_instance", "pipeline", "gripper"),
 }
 
 
@@ -151,12 +158,15 @@ def trials_of(
         "objects": _names(given["objects"]),
         "instances": given["instances"],
         "trials": given["trials"],
+        "states_per_instance": given["states_per_instance"],
         "checkpoints_s": tuple(checkpoints_s),
     }
     try:
         described = structured(values, TrialSource, source)
     except ValidationFailed as misfit:
-        raise ConfigError("\n".join(f"--{one.path[0]}: {one.text}" for one in misfit.problems)) from None
+        raise ConfigError(
+            "\n".join(f"--{_dashed(one.path[0])}: {one.text}" for one in misfit.problems)
+        ) from None
     if kind == SIMULATED:
         talk("grasping; where the simulator can be compiled, the first seconds go into that")
     return labelled_trials(
@@ -202,6 +212,11 @@ def command_line(without: Sequence[str], command: str = "") -> str:
     return shlex.join(words)
 
 
+def _dashed(name: object) -> str:
+    """Return the name of an option without its dashes in front."""
+    return str(name).replace("_", "-")
+
+
 def _refuse_misplaced(kind: str) -> None:
     """Refuse options that say nothing about this kind of source. Raises UsageError."""
     context = click.get_current_context()
@@ -209,7 +224,9 @@ def _refuse_misplaced(kind: str) -> None:
         for name in names:
             from_user = context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
             if from_user and owner != kind:
-                raise click.UsageError(f"--{name} is for a {owner} source; this one is a {kind}", context)
+                raise click.UsageError(
+                    f"--{_dashed(name)} is for a {owner} source; this one is a {kind}", context
+                )
 
 
 def _settings(source: str, given: Mapping[str, Any], classifier: str | None) -> Settings:

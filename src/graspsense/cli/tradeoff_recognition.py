@@ -14,7 +14,10 @@ EXPERIMENTS: Final[Mapping[str, tuple[str, str]]] = {
     "time": ("trade_time", "Recognition against the used seconds of a grasp."),
     "force": ("trade_force", "Recognition against the probing force, and the damage it does."),
     "speed": ("trade_speed", "Recognition against the approach speed."),
-    "joint": ("trade_joint", "Recognition of new bottles against approach speed and probing force together."),
+    "joint": (
+        "trade_joint",
+        "Recognition of new bottles against approach speed, probing force, rest window and squeezes together.",
+    ),
     "squeezes": ("trade_squeezes", "Recognition against the number of squeezes."),
     "sensing": ("trade_sensing", "Recognition against frame rate, noise and number of cells."),
     "physics": ("trade_physics", "Recognition against errors of the physics in the training data."),

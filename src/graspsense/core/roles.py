@@ -53,13 +53,14 @@ class ObjectKind:
 
     Its full names are `name:state` for each of `states`, or `name` alone if it has no states. With `default` it
     belongs to the set of objects that trials are simulated with if the user names none. `fitted_to` names the published
-    results that figures of its model were fitted to.
+    results that figures of its model were fitted to, `gives` the claims that figures of it give by themselves.
     """
 
     name: str
     states: tuple[str, ...] = ()
     default: bool = False
     fitted_to: frozenset[str] = frozenset()
+    gives: frozenset[str] = frozenset()
 
     @property
     def full_names(self) -> tuple[str, ...]:

@@ -22,6 +22,7 @@ import attrs
 from attrs import frozen, validators
 
 from graspsense.core.figure_origins import fitted_results
+from graspsense.core.figure_origins import gives as _gives
 
 _DECLARATION: Final = "graspsense.setting"
 _EFFECT: Final = "graspsense.effect"
@@ -90,6 +91,7 @@ def setting(
     effect: Mapping[str, Any] | None = None,
     follows: str = "",
     origin: str = "",
+    gives: str = "",
 ) -> Any:
     """Return the attrs field of a setting.
 
@@ -99,7 +101,8 @@ def setting(
     where it is the default. `validator` is a further validator of attrs. `effect` is `CHANGES_NO_RESULT` or
     `NAMES_INPUT`; a setting without either is part of the set-up: two grasps that differ in it are not comparable.
     `follows` names the setting that owns the value (`controller.contact_force_n`): where a pipeline does not give this
-    one, and has that one, their values are equal. `origin` is that of a number of a model (`fitted_results`).
+    one, and has that one, their values are equal. `origin` is that of a number of a model (`fitted_results`). `gives`
+    is the id of a claim of the paper that the number gives by itself unless it is 0 (`given_claims`).
 
     Raises TypeError if the declaration contradicts itself.
 
@@ -132,6 +135,8 @@ def setting(
     if plausible is not None and implausible(declaration, default):
         raise TypeError(f"the default {default} is not in the plausible range {plausible}")
     metadata = {_DECLARATION: declaration, **(effect or {}), **({_FOLLOWS: follows} if follows else {})}
+    if gives:
+        metadata |= _gives(gives)
     if factory is not None:
         return attrs.field(factory=factory, validator=check, metadata=metadata)
     return attrs.field(default=default, validator=check, metadata=metadata)

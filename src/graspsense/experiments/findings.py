@@ -10,9 +10,18 @@ from typing import Any, Final
 
 from attrs import field, frozen
 
+from graspsense.experiments.summary import ConditionResult
 from graspsense.report.html import Section, bullets, paragraph, table
 
 MARKDOWN: Final = "report.md"
+CONTROLS: Final[Mapping[str, str]] = {
+    "majority_class": "most frequent label",
+    "shuffled_labels": "shuffled labels",
+    "before_contact": "before contact",
+    "width_only": "width alone",
+    "instance_held_out": "new bottles",
+}
+"""The controls in a table of rates, each with the title of its column."""
 
 
 @frozen(kw_only=True)
@@ -45,6 +54,12 @@ class FoundTable:
         for row in self.rows:
             lines.append(f"| {' | '.join(_cell(one) for one in row)} |")
         return [*lines, ""]
+
+
+def control_cells(condition: ConditionResult) -> tuple[str, ...]:
+    """Return the rate of each control of a condition, for the columns of `CONTROLS`; empty if it was not measured."""
+    controls = [condition.controls.get(name) for name in CONTROLS]
+    return tuple("" if one is None or one.rate is None else percent(one.rate.mean) for one in controls)
 
 
 @frozen(kw_only=True)

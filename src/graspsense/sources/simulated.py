@@ -198,7 +198,10 @@ def simulated(
         instances=plan.instances,
         no_order="simulated trials are independent, so they have no order of recording",
         **controls(table, before.table()),
-        notes=("every figure here is simulated: it comes from a model of gripper and objects",),
+        notes=(
+            "every figure here is simulated: it comes from a model of gripper and objects",
+            *_states_note(plan.groups, plan.labels),
+        ),
         provenance={
             "simulated": True,
             "groups": [plain(group) for group in plan.groups],
@@ -207,6 +210,18 @@ def simulated(
             "components": {t: one for t, one in settings.components.items() if t != "classifier"},
         },
     )
+
+
+def _states_note(groups: Sequence[Group], labels: Sequence[str]) -> tuple[str, ...]:
+    """Return in which of its states each instance is grasped; nothing if no class has several labels."""
+    if len(set(labels)) == len({class_of(label) for label in labels}):
+        return ()
+    ways = {group.states_per_instance for group in groups}
+    if ways == {"all"}:
+        return ("each instance is grasped in all of its states",)
+    held_out = "an instance that is both in training and in test gives its state away"
+    which = "each instance is grasped" if ways == {"one"} else "the instances of some groups are grasped"
+    return (f"{which} in one of its states only: {held_out}",)
 
 
 def simulated_objects(settings: Settings) -> Sequence[ObjectKind]:

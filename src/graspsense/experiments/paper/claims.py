@@ -427,7 +427,7 @@ def _stiction(summary: Summary) -> Claim | None:
         id="stiction",
         says="a commanded force below static friction does not move the gripper at all",
         rule="the gap does not change by one encoder tick at 4 and 7.5 N, and does at 12 N (static friction 8 N)",
-        basis="built in",
+        basis=basis(summary, "stiction", "stiction"),
         holds=moved == 0 and closed == len(above),
         number=f"moved in {_share(moved, len(below))} below, in {_share(closed, len(above))} above",
     )
@@ -447,7 +447,7 @@ def _one_finger_first(summary: Summary) -> Claim | None:
         id="one_finger_first",
         says="one fingertip may touch first; contact counts only once both do",
         rule="one pad feels the contact threshold before the other in at least one grasp, which still becomes steady",
-        basis="built in",
+        basis=basis(summary, "one_finger_first", "one_finger_first"),
         holds=bool(first) and all(row.outcome == "steady" for row in first),
         number=f"one pad first in {_share(len(first), len(rows))} grasps{words}",
     )
@@ -477,7 +477,7 @@ def _other_classifiers(summary: Summary) -> Claim | None:
         "lie between -10 and 5 points (corrected for five comparisons)",
         basis=basis(summary, "other_classifiers", "other_classifiers"),
         holds=all(gaps[name].interval[0] > -0.10 and gaps[name].interval[1] < NEGLIGIBLE for name in AS_WEKA),
-        number=", ".join(f"{name}: {_points(gap)}" for name, gap in gaps.items()),
+        number=f"{', '.join(f'{name}: {_points(gap)}' for name, gap in gaps.items())} ({len(c45.by_seed)} seeds)",
     )
 
 

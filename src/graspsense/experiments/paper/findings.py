@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 
-from graspsense.experiments.findings import Findings, FoundTable, code, percent
+from graspsense.experiments.findings import CONTROLS, Findings, FoundTable, code, control_cells, percent
 from graspsense.experiments.paper import claims as claimed
 from graspsense.experiments.paper.basis import BASES
 from graspsense.experiments.paper.cases import PROTOCOLS, condition_result, of_protocol
@@ -147,19 +147,14 @@ def _headline(held: Sequence[RateComparison], checked: Sequence[Claim]) -> str:
 
 def _controls_table(summary: Summary, held: Sequence[RateComparison]) -> FoundTable | None:
     """Return the controls of the rates of the paper; None if none was measured."""
-    names = ("majority_class", "shuffled_labels", "before_contact", "width_only", "instance_held_out")
     lines: list[tuple[str, ...]] = []
     for row in held:
         one = row.published
         condition = condition_result(of_protocol(summary, row.protocol), one.experiment, one.target, one.at)
         if condition is None or not condition.controls or one.repeats:
             continue
-        cells = []
-        for name in names:
-            control = condition.controls.get(name)
-            cells.append("" if control is None or control.rate is None else percent(control.rate.mean))
         key = (one.experiment, one.what.partition(", ")[2] if one.class_ else one.what)
-        line = (*key, PROTOCOLS[row.protocol], percent(condition.rate.mean), *cells)
+        line = (*key, PROTOCOLS[row.protocol], percent(condition.rate.mean), *control_cells(condition))
         if line not in lines:
             lines.append(line)
     if not lines:
@@ -167,17 +162,7 @@ def _controls_table(summary: Summary, held: Sequence[RateComparison]) -> FoundTa
     return FoundTable(
         id="controls",
         title="Controls",
-        header=(
-            "experiment",
-            "what",
-            "each bottle in",
-            "our mean",
-            "most frequent label",
-            "shuffled labels",
-            "before contact",
-            "width alone",
-            "new bottles",
-        ),
+        header=("experiment", "what", "each bottle in", "our mean", *CONTROLS.values()),
         rows=tuple(lines),
         note="Means over the seeds, over all containers of the experiment. Before contact and with shuffled labels, "
         "the rate should be that of the most frequent label. The last column holds out whole bottles, where every "

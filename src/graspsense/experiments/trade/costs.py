@@ -68,14 +68,15 @@ def _setting(params: Mapping[str, Any], key: str) -> float:
 
 
 def mean_seconds(settings: Mapping[str, Any], trials: TrialValues) -> float:
-    """Return the mean duration of a grasp: closing to the contact at the closing speed, then until rest.
+    """Return the mean duration of a grasp: closing to the contact at the closing speed, then until rest is shown.
 
-    Raises ConfigError if no grasp came to rest.
+    Rest is shown when the gap has not changed for the rest window. Raises ConfigError if no grasp came to rest.
     """
+    window_s = float(settings["controller"]["rest_window_s"])
     open_m = float(settings["gripper"]["open_gap_m"])
     speed_m_s = float(settings["controller"]["closing_speed_m_s"])
     pairs = zip(trials.column("p_first"), trials.column("delta_t"), strict=True)
-    durations = [(open_m - p) / speed_m_s + t for p, t in pairs if p is not None and t is not None]
+    durations = [(open_m - p) / speed_m_s + t + window_s for p, t in pairs if p is not None and t is not None]
     if not durations:
         raise ConfigError("no grasp came to rest, so there is no duration")
     return sum(durations) / len(durations)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from graspsense.experiments.findings import Findings, FoundTable
+from graspsense.experiments.findings import CONTROLS, Findings, FoundTable, control_cells, percent
 from graspsense.experiments.summary import ConditionResult, Summary
 from graspsense.experiments.trade.classifier_findings import compare_classifiers
 from graspsense.experiments.trade.cost_findings import Report, cost_report, damage_table
 from graspsense.experiments.trade.sequential_findings import compare_sequential
 from graspsense.experiments.trade.trade_point import Advice
+from graspsense.report.wording import TARGETS
 
 NOTES: Final = {
     "trade_noise": "Noise: above about 25 counts, a cell at the edge exceeds the threshold of a side impact (100 "
@@ -22,8 +23,8 @@ NOTES: Final = {
     "is in the same place and its stiffness blurs all squeezes in the same way.",
     "trade_time": "Duration: before rest, p_first is the only known feature. The rate therefore rises as more grasps "
     "come to rest.",
-    "trade_joint": "Speed and force: whole bottles are held out. The number of squeezes and the rule for rest are not "
-    "varied with them.",
+    "trade_joint": "Speed, force, rest and squeezes: whole bottles are held out. A squeeze costs a complete approach, "
+    "and ends when the speed was below its limit for the rest window.",
 }
 """Explanations that the tables do not contain, by experiment."""
 ONE_PROTOCOL: Final = (
@@ -50,6 +51,9 @@ def findings(summary: Summary) -> Findings:
         else:
             reports[part] = cost_report(part, title, conditions, case.judge)
     tables = [table for report in reports.values() for table in report.tables]
+    controls = _controls_table(summary, titles)
+    if controls is not None:
+        tables.append(controls)
     notes = [ONE_PROTOCOL, *(note for part, note in NOTES.items() if part in parts)]
     if "trade_force" in reports:
         table, reasons = damage_table()
@@ -71,6 +75,31 @@ def findings(summary: Summary) -> Findings:
 
 def _conditions_of(summary: Summary, part: str) -> list[ConditionResult]:
     return [one for one in summary.conditions if (one.case.part or summary.planned.name) == part]
+
+
+def _controls_table(summary: Summary, titles: Mapping[str, str]) -> FoundTable | None:
+    """Return the controls of every case that has them; None if none was measured."""
+    lines = []
+    for condition in summary.conditions:
+        if not condition.controls:
+            continue
+        part = condition.case.part or summary.planned.name
+        title = titles.get(part, summary.planned.experiment.title)
+        case = condition.case.name.removeprefix(condition.case.part).removeprefix(": ")
+        what = (title, case, TARGETS[condition.target])
+        lines.append((*what, percent(condition.rate.mean), *control_cells(condition)))
+    if not lines:
+        return None
+    return FoundTable(
+        id="controls",
+        title="Controls",
+        header=("trade-off", "case", "recognises", "recognised", *CONTROLS.values()),
+        rows=tuple(lines),
+        note="Means over the seeds. Before contact and with shuffled labels, the rate should be that of the most "
+        "frequent label. The width is known at the contact, before anything is paid for. The last column holds out "
+        "whole bottles. There is no control by the order of recording, because simulated trials have none.",
+        numbers=3,
+    )
 
 
 def _answer(reports: dict[str, Report]) -> str:

@@ -17,7 +17,14 @@ from typing import Final
 
 from attrs import fields_dict
 
-from graspsense.plugin_api import ConfigError, ObjectKind, UnknownName, fitted_results, suggestion
+from graspsense.plugin_api import (
+    ConfigError,
+    ObjectKind,
+    UnknownName,
+    fitted_results,
+    given_claims,
+    suggestion,
+)
 from graspsense_sim_gripper.objects.spec import (
     ObjectSpec,
     TomlTable,
@@ -69,12 +76,20 @@ def object_kinds() -> tuple[ObjectKind, ...]:
     """Return the kinds of the catalogue with their states, in its order, and then the shipped scenes."""
     states: dict[str, list[str]] = {}
     fitted_to: dict[str, frozenset[str]] = {}
+    given: dict[str, frozenset[str]] = {}
     for full_name, spec in catalogue().items():
         name, colon, state = full_name.partition(":")
         states.setdefault(name, []).extend([state] if colon else [])
         fitted_to[name] = fitted_to.get(name, frozenset()).union(spec.fitted_to)
+        given[name] = given.get(name, frozenset()) | given_claims(spec)
     kinds = [
-        ObjectKind(name=name, states=tuple(of), default=name in CONTAINERS, fitted_to=fitted_to[name])
+        ObjectKind(
+            name=name,
+            states=tuple(of),
+            default=name in CONTAINERS,
+            fitted_to=fitted_to[name],
+            gives=given[name],
+        )
         for name, of in states.items()
     ]
     return (*kinds, *(ObjectKind(name=name) for name in shipped_scenes() if name not in states))

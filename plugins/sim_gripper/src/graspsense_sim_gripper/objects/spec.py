@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 from attrs import field, fields_dict, frozen
 from attrs.validators import ge, gt, in_, le
 
-from graspsense.plugin_api import ConfigError, UnknownName, suggestion
+from graspsense.plugin_api import ConfigError, UnknownName, gives, suggestion
 from graspsense_sim_gripper.objects.identified import check_identified
 from graspsense_sim_gripper.terms.registry import find_term, in_order
 
@@ -41,8 +41,9 @@ def _positive() -> float:
     return field(validator=gt(0.0))
 
 
-def _not_negative(default: float) -> float:
-    return field(default=default, validator=ge(0.0))
+def _not_negative(default: float, claim: str = "") -> float:
+    """Return the field of a number that is not negative; `claim`: the claim of the paper that it gives by itself."""
+    return field(default=default, validator=ge(0.0), metadata=gives(claim) if claim else None)
 
 
 class ParsedTerm(NamedTuple):
@@ -75,9 +76,9 @@ class ObjectSpec:
     width_spread_m: float = _not_negative(0.0)
     stiffness_spread: float = _not_negative(0.0)
     """Standard deviation of the logarithm of the stiffness."""
-    offset_m: float = 0.0
+    offset_m: float = field(default=0.0, metadata=gives("one_finger_first"))
     """Distance from the gripper's centre line, positive towards the right finger."""
-    offset_spread_m: float = _not_negative(0.0)
+    offset_spread_m: float = _not_negative(0.0, "one_finger_first")
     share: float = field(default=1.0, validator=[gt(0.0), le(1.0)])
     """The share of the force that lands on the fifteen cells of the gripping face."""
     share_spread: float = _not_negative(0.0)
