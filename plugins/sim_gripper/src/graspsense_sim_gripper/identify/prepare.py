@@ -36,8 +36,11 @@ BEFORE_SHARE: Final = 0.8
 """And where the gap is wider by this share of the compression, which is more than a fit moves the contact."""
 HOLD_SHARE: Final = 0.01
 """A gap that changes by less than this share of the compression is held."""
-BREAK_SHARE: Final = 0.5
-"""A force that falls by this share between two measurements, while the fingers close, is a break of the object."""
+BREAK_SHARE: Final = 0.4
+"""A force that falls by this share while the fingers close is a break of the object, if it falls between two
+measurements or within `BREAK_TRAVEL`."""
+BREAK_TRAVEL: Final = 0.05
+"""Share of the compression."""
 MIN_SAMPLES: Final = 8
 """Fewer samples in contact determine nothing."""
 
@@ -140,7 +143,8 @@ def prepared(squeeze: RecordedSqueeze, delay_s: float, parts: Resolution = FULL)
     begin = min(times[max(first - 1, 0)] - BEFORE_S, _begin(trace, times[first]))
     last, broken = _end(trace, times, forces, first, int(touching[-1]))
     window = (times >= begin) & (np.arange(len(times)) <= last)
-    after = times[last + 1 : last + 2] if broken is not None else times[:0]
+    after = times[:0] if broken is None else times[broken : broken + 1]
+    broken_n = None if broken is None else float(forces[broken])
     course = _course(trace, np.append(times[window], after))
     times, forces = _in_blocks(times[window], forces[window], course, parts.samples)
     nodes, sample = _nodes(np.append(times, after), course, parts.nodes)
@@ -157,7 +161,7 @@ def prepared(squeeze: RecordedSqueeze, delay_s: float, parts: Resolution = FULL)
         step_s=np.diff(nodes, prepend=nodes[0] - BEFORE_S),
         sample=sample,
         force_n=forces,
-        broken_n=broken,
+        broken_n=broken_n,
         width_m=width,
         noise_n=noise,
         stretches=_stretches(nodes, gap, width, has_approach=first > 1),
@@ -205,14 +209,20 @@ def _begin(trace: Trace, touched_s: float) -> float:
     return float(trace.t_s[before[wider[-1] if len(wider) else 0]])
 
 
-def _end(trace: Trace, times: Floats, forces: Floats, first: int, last: int) -> tuple[int, float | None]:
-    """Return the last sample of a squeeze, and the force after it if the object broke there."""
-    gap = np.interp(times[first : last + 1], trace.t_s, trace.gap_m)
-    for i in range(first + MIN_SAMPLES, first + int(np.argmin(gap))):
-        if forces[i + 1] < (1.0 - BREAK_SHARE) * forces[i] and forces[i] > BREAK_SHARE * float(
-            np.max(forces)
-        ):
-            return i, float(forces[i + 1])
+def _end(trace: Trace, times: Floats, forces: Floats, first: int, last: int) -> tuple[int, int | None]:
+    """Return the last sample of a squeeze, and the one after the break if the object broke there."""
+    gap = np.interp(times, trace.t_s, trace.gap_m)
+    least = first + int(np.argmin(gap[first : last + 1]))
+    depth = float(gap[first] - gap[least])
+    most = BREAK_SHARE * float(np.max(forces[first : last + 1]))
+    peak = first
+    for i in range(first + 1, least + 1):
+        if forces[i] >= forces[peak]:
+            peak = i
+        within = gap[peak] - gap[i] <= BREAK_TRAVEL * depth or i == peak + 1
+        broken = forces[i] < (1.0 - BREAK_SHARE) * forces[peak]
+        if broken and within and forces[peak] > most and peak - first >= MIN_SAMPLES:
+            return peak, i
     return last, None
 
 
