@@ -37,10 +37,16 @@ BEFORE_SHARE: Final = 0.8
 HOLD_SHARE: Final = 0.01
 """A gap that changes by less than this share of the compression is held."""
 BREAK_SHARE: Final = 0.4
-"""A force that falls by this share while the fingers close is a break of the object, if it falls between two
-measurements or within `BREAK_TRAVEL`."""
+"""A force that falls by this share before the fingers open is a break of the object, if it falls between two
+measurements, or within `BREAK_S` and `BREAK_TRAVEL`: a shell that snaps through falls along its compression, and a
+memory
+relaxes with time."""
+BREAK_S: Final = 0.15
 BREAK_TRAVEL: Final = 0.05
 """Share of the compression."""
+RECOIL_SHARE: Final = 0.12
+"""Where the gap has opened by less than this share of the compression, the fingers recoil from a break or hold: an
+intact object loses less than `BREAK_SHARE` of its force there."""
 MIN_SAMPLES: Final = 8
 """Fewer samples in contact determine nothing."""
 
@@ -212,16 +218,16 @@ def _begin(trace: Trace, touched_s: float) -> float:
 def _end(trace: Trace, times: Floats, forces: Floats, first: int, last: int) -> tuple[int, int | None]:
     """Return the last sample of a squeeze, and the one after the break if the object broke there."""
     gap = np.interp(times, trace.t_s, trace.gap_m)
-    least = first + int(np.argmin(gap[first : last + 1]))
-    depth = float(gap[first] - gap[least])
-    most = BREAK_SHARE * float(np.max(forces[first : last + 1]))
-    peak = first
-    for i in range(first + 1, least + 1):
-        if forces[i] >= forces[peak]:
-            peak = i
+    least = float(np.min(gap[first : last + 1]))
+    depth = float(gap[first]) - least
+    loaded = BREAK_SHARE * float(np.max(forces[first : last + 1]))
+    pressed = np.flatnonzero(gap[: last + 1] <= least + RECOIL_SHARE * depth)
+    for i in range(first + MIN_SAMPLES, int(pressed[-1]) + 1):
+        begin = min(int(np.searchsorted(times, times[i] - BREAK_S)), i - 1)
+        peak = begin + int(np.argmax(forces[begin:i]))
         within = gap[peak] - gap[i] <= BREAK_TRAVEL * depth or i == peak + 1
-        broken = forces[i] < (1.0 - BREAK_SHARE) * forces[peak]
-        if broken and within and forces[peak] > most and peak - first >= MIN_SAMPLES:
+        falls = forces[i] < (1.0 - BREAK_SHARE) * forces[peak]
+        if falls and within and forces[peak] > loaded and peak >= first + MIN_SAMPLES:
             return peak, i
     return last, None
 
