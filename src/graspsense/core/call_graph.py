@@ -26,20 +26,34 @@ class NotCompilable(Exception):
     """A function that is outside the subset that can be compiled; the text names it and the reason."""
 
 
-def fingerprint(function: Callable[..., Any], replacements: Replacements = NO_REPLACEMENTS) -> str:
+def fingerprint(
+    function: Callable[..., Any],
+    replacements: Replacements = NO_REPLACEMENTS,
+    known: dict[int, str] | None = None,
+) -> str:
     """Return 16 hexadecimal digits that differ where the code, a constant or a called function differs.
 
     The digits depend on the Python version, on byte code, default values, constants and on the values of the globals
     that the function reads, and likewise on every function that it calls, at any depth. A global whose value cannot be
     described (an object that prints its address) gives another fingerprint in each process.
 
+    `known` keeps the fingerprints of functions by their identity, for several calls between which nothing changes.
+
     Raises NotCompilable for a closure, for recursion and for anything that is not a function written in Python.
     """
-    digest = hashlib.sha256()
-    for item in _description(plain_function(function), (), replacements):
-        digest.update(item.encode())
-        digest.update(b"\0")
-    return digest.hexdigest()[:16]
+    return _fingerprint(plain_function(function), (), replacements, {} if known is None else known)
+
+
+def _fingerprint(
+    function: types.FunctionType, callers: tuple[int, ...], replacements: Replacements, known: dict[int, str]
+) -> str:
+    if id(function) not in known:
+        digest = hashlib.sha256()
+        for item in _description(function, callers, replacements, known):
+            digest.update(item.encode())
+            digest.update(b"\0")
+        known[id(function)] = digest.hexdigest()[:16]
+    return known[id(function)]
 
 
 def plain_function(function: Callable[..., Any]) -> types.FunctionType:
@@ -102,7 +116,7 @@ def _add_copies(
 
 
 def _description(
-    function: types.FunctionType, callers: tuple[int, ...], replacements: Replacements
+    function: types.FunctionType, callers: tuple[int, ...], replacements: Replacements, known: dict[int, str]
 ) -> Iterator[str]:
     _refuse_recursion(function, callers)
     if function.__closure__:
@@ -119,7 +133,7 @@ def _description(
         yield name
         called = _replaced(value, replacements)
         if isinstance(called, types.FunctionType):
-            yield from _description(called, (*callers, id(function)), replacements)
+            yield _fingerprint(called, (*callers, id(function)), replacements, known)
         elif isinstance(value, types.ModuleType):
             yield from _module_description(value, code)
         else:

@@ -23,11 +23,12 @@ import types
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from attrs import frozen
+from attrs import field, frozen
 
 from graspsense.core.binding import bind
 from graspsense.core.call_graph import (
@@ -182,6 +183,8 @@ class _Compilation:
     options: CompileOptions
     copies: Counter[types.CodeType]
     """How often the code of each function would occur if all calls were inlined."""
+    fingerprints: dict[int, str] = field(factory=dict)
+    """Those of the functions so far, by identity."""
 
     def outermost(self, function: types.FunctionType) -> Callable[..., Any]:
         key = self._key(function, "outermost")
@@ -189,8 +192,8 @@ class _Compilation:
             named = self._named(function, key)
             # Only the outermost function is kept on disk, since the others are inside it, and only it needs the
             # wrapper for calls from the interpreter, which takes longer to compile than most functions.
-            with _cache_folder(self.numba, function) as cache:
-                _COMPILED[key] = self.numba.njit(named, cache=cache, **self._flags(function))
+            with _cache_folder(self.numba, function) as is_kept:
+                _COMPILED[key] = self.numba.njit(named, cache=is_kept, **self._flags(function))
         return _COMPILED[key]
 
     def _inner(self, function: types.FunctionType, n_places: int) -> Callable[..., Any]:
@@ -222,12 +225,11 @@ class _Compilation:
 
     def digest(self, function: types.FunctionType) -> str:
         """Return 16 hexadecimal digits that the name of the machine code of this function ends with."""
-        digest = hashlib.sha256(fingerprint(function, self.options.replacements).encode())
+        digest = hashlib.sha256(fingerprint(function, self.options.replacements, self.fingerprints).encode())
         inlining = self.options.inlining
         hints = () if inlining is None else (inlining.short_code, inlining.long_code)
-        versions = [version(name) for name in ("numba", "llvmlite", "numpy")]
         uncounted = sorted(code.co_qualname for code in self.options.uncounted)
-        digest.update(f"{self._flags(function)} {hints} {uncounted} {versions}".encode())
+        digest.update(f"{self._flags(function)} {hints} {uncounted} {_versions()}".encode())
         return digest.hexdigest()[:16]
 
     def _flags(self, function: types.FunctionType) -> dict[str, Any]:
@@ -247,6 +249,12 @@ class _Compilation:
             "forceinline": once or (n_places > 0 and size <= inlining.short_code),
             "inline": "always" if n_places == 1 and code in inlining.before_typing else "never",
         }
+
+
+@cache
+def _versions() -> tuple[str, ...]:
+    """Return the versions of what machine code depends on. Reading one takes a millisecond."""
+    return tuple(version(name) for name in ("numba", "llvmlite", "numpy"))
 
 
 @contextmanager

@@ -10,9 +10,9 @@ from graspsense_c45.options import Engine
 
 WORTH_COMPILING = 1_000_000
 """Values (rows x attributes) of one table from which "auto" chooses the compiled engine."""
-WORTH_COMPILING_FOR_MANY = 3_000_000
+WORTH_COMPILING_FOR_MANY = 500_000
 """Values of all fits of a process from which it does so for small tables, each of which takes twenty times as long with
-numpy. Until then numpy has taken as long as compiling takes."""
+numpy. An evaluation of 900 trials has 1.3 million. Compiling takes as long as four such evaluations save, once."""
 WORTH_LOADING_FOR_MANY = 60_000
 """The same where an earlier process has compiled it: loading takes a second."""
 
