@@ -28,7 +28,7 @@ from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
 from graspsense.core.signals import Outcome, Phase
 from graspsense.evaluation.checkpoints import SURE, WHOLE, checkpoint_models, early_recognition
-from graspsense.evaluation.doubt import calibrated_sets
+from graspsense.evaluation.doubt import calibrated
 from graspsense.plugin_api import create
 from graspsense.testing.model_gripper import ModelGripper
 
@@ -105,7 +105,7 @@ def learner():
 def model(trials, learner):
     *parts, whole = split_checkpoints(trials, CHECKPOINTS)
     of_whole = train(learner.component, learner.config, whole.labelled, name="test")
-    of_whole = evolve(of_whole, sets=calibrated_sets(learner, whole.labelled, 0))
+    of_whole = calibrated(of_whole, learner, whole.labelled, 0)
     return evolve(of_whole, checkpoints=checkpoint_models(of_whole, learner, parts, 0))
 
 

@@ -14,7 +14,7 @@ from graspsense.core.errors import DataDamaged
 from graspsense.core.features import UNKNOWN
 from graspsense.core.model import load_model, train, write_model
 from graspsense.core.plugins import installed
-from graspsense.evaluation.doubt import calibrated_sets
+from graspsense.evaluation.doubt import calibrated
 from graspsense.evaluation.json_codec import from_json, to_json
 from graspsense.evaluation.results import Evaluation
 
@@ -38,7 +38,7 @@ def bottles(instances=14, each=3, seed=0, spread=0.9):
 def model_of(trials, name):
     component = installed().find("classifier", name)
     model = train(component, component.config_class()(), trials, name="m")
-    return evolve(model, sets=calibrated_sets(learner(name), trials, 0))
+    return calibrated(model, learner(name), trials, 0)
 
 
 @pytest.mark.parametrize(("coverage", "needed"), [(0.9, 9), (0.95, 19), (0.8, 4), (0.99, 99)])

@@ -227,8 +227,11 @@ def _print_doubt(found: Evaluation) -> None:
                        f"lowest coverage: {percentage(sets.by_label[least].rate)} of {least}")  # fmt: skip
     if found.reliability is not None:
         error = percentage(found.reliability.calibration_error)
+        raw = found.reliability.uncalibrated_error
+        before = "" if raw is None else f" ({percentage(raw)} before calibration)"
         echo_entry(
-            "probability", f"Brier score {found.reliability.brier:.3f}, expected calibration error {error}"
+            "probability",
+            f"Brier score {found.reliability.brier:.3f}, expected calibration error {error}{before}",
         )
 
 

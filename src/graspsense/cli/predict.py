@@ -58,8 +58,7 @@ def predict(model: str, source: str, as_json: bool, **given: Any) -> None:
     if len(table) > MOST_WITH_REASONS:
         notes = (
             *notes,
-            f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons, and their certainty is the "
-            "probability of the model",
+            f"more than {MOST_WITH_REASONS} trials: the predictions have no reasons",
         )
         predictions = _without_reasons(asked, table)
     else:
@@ -133,8 +132,10 @@ def _print(predictions: Sequence[Prediction], labels: tuple[str, ...] | None) ->
 def _without_reasons(model: Model, table: FeatureTable) -> list[Prediction]:
     """Return the predictions of many trials in one call, without reasons."""
     from graspsense.core.features import Prediction
+    from graspsense.core.temperature import at_temperature
 
     labels, shares = model.answers(table)
+    calibrated = at_temperature(shares, model.temperature).tolist()
     classes = model.classifier.classes()
     warnings = model.predict(table.row(0)).warnings
     coverage = None if model.sets is None else model.sets.coverage
@@ -146,9 +147,10 @@ def _without_reasons(model: Model, table: FeatureTable) -> list[Prediction]:
             warnings=warnings,
             prediction_set=members,
             coverage=coverage if members else None,
+            calibrated=model.temperature is not None,
         )
         for label, row, members in zip(
-            labels, shares.tolist(), model.prediction_sets(table, labels, shares), strict=True
+            labels, calibrated, model.prediction_sets(table, labels, shares), strict=True
         )
     ]
 

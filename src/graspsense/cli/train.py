@@ -71,7 +71,7 @@ def train(
     from graspsense.core.model import train as trained
     from graspsense.core.model import write_model
     from graspsense.evaluation.checkpoints import checkpoint_models
-    from graspsense.evaluation.doubt import calibrated_sets
+    from graspsense.evaluation.doubt import calibrated
     from graspsense.evaluation.gathered_warnings import gathered_warnings
 
     path = _path_of_model(out, keep, overwrite)
@@ -99,7 +99,7 @@ def train(
             target=target,
             provenance={"command": command_line(("keep", "overwrite", "as_json"))},
         )
-        model = evolve(model, sets=calibrated_sets(learner, labelled, given["seed"]))
+        model = calibrated(model, learner, labelled, given["seed"])
         model = evolve(model, checkpoints=checkpoint_models(model, learner, parts[:-1], given["seed"]))
     write_model(path, model)
     if keep:

@@ -158,7 +158,8 @@ class Prediction:
     two numbers of training trials from which the probability of the label was computed: those with the label, and all
     of those in the leaf of the tree, or among the nearest. `prediction_set` has the labels that cannot be ruled out,
     the most probable first: it contains the true label of a new object with the probability `coverage`. It is empty,
-    and `coverage` None, if the model is not calibrated or the trial is unknown.
+    and `coverage` None, if the model is not calibrated or the trial is unknown. `calibrated` says whether the
+    probabilities agree with rates in held-out trials (`graspsense.core.temperature`).
     """
 
     label: str
@@ -169,6 +170,7 @@ class Prediction:
     support: tuple[float, float] | None = None
     prediction_set: tuple[str, ...] = field(default=(), converter=_texts)
     coverage: float | None = None
+    calibrated: bool = False
 
     @property
     def set_in_words(self) -> str:
@@ -181,10 +183,11 @@ class Prediction:
     def certainty(self) -> float | None:
         """How certain the label is, as a probability below 1; None without probabilities.
 
-        A share of few training trials overstates it: 6 of 6 does not mean that the next one is certain. Such a share is
-        therefore corrected by the rule of succession, (with the label + 1) / (all + 2), which gives 88 % for 6 of 6.
+        A share of few training trials overstates it: 6 of 6 does not mean that the next one is certain. Unless the
+        probabilities are calibrated, such a share is therefore corrected by the rule of succession, (with the label
+        + 1) / (all + 2), which gives 88 % for 6 of 6.
         """
-        if self.support is not None:
+        if self.support is not None and not self.calibrated:
             with_label, trials = self.support
             return (with_label + 1) / (trials + 2)
         return self.probabilities.get(self.label)
@@ -208,6 +211,7 @@ class Prediction:
             "support": None if self.support is None else list(self.support),
             "prediction_set": list(self.prediction_set),
             "coverage": self.coverage,
+            "calibrated": self.calibrated,
             "because": [one.as_json() for one in self.because],
         }
 

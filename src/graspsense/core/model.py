@@ -29,6 +29,7 @@ from graspsense.core.json_values import json_ready, settings_from_json
 from graspsense.core.novelty import Novelty, novelty_from, novelty_of
 from graspsense.core.reasons import Reason
 from graspsense.core.setting import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked
+from graspsense.core.temperature import at_temperature
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -68,6 +69,8 @@ class Model:
     provenance: Mapping[str, Any]
     sets: PredictionSets | None = None
     """Calibrated prediction sets; None in a model of an earlier version."""
+    temperature: float | None = None
+    """The temperature at which its probabilities are calibrated (`graspsense.core.temperature`); None: they are not."""
     checkpoints: tuple[tuple[float, Model], ...] = ()
     """The models for grasps that go on: each with the seconds after the contact up to which it knows them."""
 
@@ -115,13 +118,18 @@ class Model:
             because = (misfit,)
         else:
             chosen = _chosen(features, self.names)
-            prediction = self.classifier.explain(chosen)
+            explained = self.classifier.explain(chosen)
+            classes = self.classifier.classes()
+            shares = np.array([[explained.probabilities.get(name, 0.0) for name in classes]])
+            (calibrated,) = at_temperature(shares, self.temperature).tolist()
+            prediction = evolve(
+                explained,
+                probabilities=dict(zip(classes, calibrated, strict=True)),
+                calibrated=self.temperature is not None,
+            )
             warnings = (*prediction.warnings, *warnings)
             strange = self.novelty.unlike(chosen)
             if strange is None:
-                shares = np.array(
-                    [[prediction.probabilities.get(name, 0.0) for name in self.classifier.classes()]]
-                )
                 (members,) = self.prediction_sets(table_of([chosen]), [prediction.label], shares)
                 return evolve(
                     prediction,
@@ -143,10 +151,11 @@ class Model:
         )
 
     def answers(self, table: FeatureTable) -> tuple[list[str], NDArray[np.float64]]:
-        """Return the label of `predict` for each trial of a table, and the probabilities.
+        """Return the label of `predict` for each trial of a table, and the probabilities that the classifier gives.
 
-        The probabilities have shape (trials, classes), in the order of the classes of the classifier; unknown trials
-        have probabilities too. Raises ConfigError if the table does not have the features of the model.
+        The probabilities are not calibrated (`at_temperature` does that). Their shape is (trials, classes), in the
+        order of the classes of the classifier; unknown trials have probabilities too. Raises ConfigError if the table
+        does not have the features of the model.
         """
         misfit = self.misfit(table)
         if misfit:
@@ -163,7 +172,7 @@ class Model:
     def prediction_sets(
         self, table: FeatureTable, labels: Sequence[str], shares: NDArray[np.float64]
     ) -> list[tuple[str, ...]]:
-        """Return the prediction set of each trial, given the predicted labels and the probabilities.
+        """Return the prediction set of each trial, given the predicted labels and what the classifier gives.
 
         A set is empty if the trial is unknown, or if the model has no calibrated sets.
         """
@@ -230,6 +239,7 @@ class Model:
             "provenance": json_ready(self.provenance),
             "unknown": self.novelty.to_json(),
             **({} if self.sets is None else {"sets": self.sets.to_json()}),
+            **({} if self.temperature is None else {"temperature": self.temperature}),
             "model": self.classifier.to_json(),
             **(
                 {}
@@ -248,6 +258,7 @@ def _part_as_json(after_s: float, part: Model) -> dict[str, Any]:
         "by_label": json_ready(part.provenance["by_label"]),
         "unknown": part.novelty.to_json(),
         "sets": None if part.sets is None else part.sets.to_json(),
+        "temperature": part.temperature,
         "model": part.classifier.to_json(),
     }
 
@@ -273,9 +284,20 @@ def _part_from_json(whole: Model, component: Component, config: Any, kept: Mappi
         classifier=classifier,
         novelty=novelty_from(whole.names, whole.units, kept["unknown"]),
         sets=None if sets is None else sets_from(sets, classifier.classes()),
+        temperature=_temperature_from(kept),
         provenance={"trials": int(kept["trials"]), "by_label": dict(kept["by_label"])},
     )
     return checkpoint_model(whole, float(kept["after_contact_s"]), part)
+
+
+def _temperature_from(kept: Mapping[str, Any]) -> float | None:
+    """Return the stored temperature; None in a model of an earlier version. Raises TypeError or ValueError."""
+    temperature = kept.get("temperature")
+    if temperature is None:
+        return None
+    if not 0.0 < float(temperature) < math.inf:
+        raise ValueError(f"its temperature is {temperature}, not a positive number")
+    return float(temperature)
 
 
 def _not_compared(chosen: SelectedComponent) -> frozenset[str]:
@@ -383,6 +405,7 @@ def load_model(name: str, plugins: Plugins, component: Component | None = None) 
             novelty=novelty_from(names, units, content["unknown"]),
             provenance=content["provenance"],
             sets=sets_from(content["sets"], classifier.classes()) if "sets" in content else None,
+            temperature=_temperature_from(content),
         )
         parts = [_part_from_json(model, component, config, kept) for kept in content.get("checkpoints", ())]
         return evolve(model, checkpoints=tuple((float(part.after_s or 0.0), part) for part in parts))

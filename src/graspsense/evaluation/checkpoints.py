@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from attrs import evolve, frozen
+from attrs import frozen
 
 from graspsense.core.model import Model, checkpoint_model, train
 from graspsense.evaluation.crossval import Pooled, cross_validate
-from graspsense.evaluation.doubt import calibrated_sets, exchangeable_instances, held_out_members
+from graspsense.evaluation.doubt import calibrated, exchangeable_instances, held_out_members
 from graspsense.evaluation.folds import instance_held_out, stratified
 from graspsense.evaluation.intervals import RecognitionRate, rate_of
 
@@ -40,7 +40,7 @@ def checkpoint_models(
         model = train(
             learner.component, learner.config, labelled, name=whole.name, seed=seed, target=whole.target
         )
-        model = evolve(model, sets=calibrated_sets(learner, labelled, seed))
+        model = calibrated(model, learner, labelled, seed)
         models.append((part.after_s, checkpoint_model(whole, part.after_s, model)))
     return tuple(models)
 

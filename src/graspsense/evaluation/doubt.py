@@ -10,6 +10,7 @@ from attrs import evolve, field, frozen
 
 from graspsense.core.conformal import COVERAGE, PredictionSets, sets_of
 from graspsense.core.errors import ConfigError
+from graspsense.core.temperature import at_temperature, temperature_of
 from graspsense.evaluation.crossval import ClassifierFactory, FitRefused, Groups, Pooled, cross_validate
 from graspsense.evaluation.folds import instance_held_out, stratified
 from graspsense.evaluation.intervals import RecognitionRate
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from graspsense.core.labelled import Labelled
+    from graspsense.core.model import Model
     from graspsense.evaluation.folds import Folds
 
 FOLDS: Final = 10
@@ -69,10 +71,12 @@ class Reliability:
     brier: float
     calibration_error: float
     curve: tuple[ReliabilityBin, ...]
+    uncalibrated_error: float | None = None
+    """The calibration error of the probabilities that the classifier itself gives, before temperature scaling."""
 
 
-def calibrated_sets(learner: ClassifierFactory, labelled: Labelled, seed: int) -> PredictionSets:
-    """Return the prediction sets of a classifier that is trained on these trials, from cross-validation on them.
+def calibrated(model: Model, learner: ClassifierFactory, labelled: Labelled, seed: int) -> Model:
+    """Return a model of these trials with prediction sets and calibrated probabilities, from cross-validation on them.
 
     Whole instances are held out where each label has several; otherwise each trial is a unit.
     """
@@ -88,9 +92,14 @@ def calibrated_sets(learner: ClassifierFactory, labelled: Labelled, seed: int) -
         pooled = cross_validate(learner, labelled.table, labels, groups, [folds], seed=seed)
     except (FitRefused, ConfigError) as refusal:
         unit = "trials" if instances is None else "instances"
-        return PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=str(refusal))
+        none = PredictionSets(coverage=COVERAGE, unit=unit, thresholds={}, reason=str(refusal))
+        return evolve(model, sets=none)
     sets = sets_of(_of_truth(pooled, labels), pooled.right(labels), labels, instances)
-    return evolve(sets, unknown=int(pooled.unlike.sum()), trials=len(labels))
+    return evolve(
+        model,
+        sets=evolve(sets, unknown=int(pooled.unlike.sum()), trials=len(labels)),
+        temperature=temperature_of(pooled.probabilities, _columns(pooled, labels)),
+    )
 
 
 def exchangeable_instances(labelled: Labelled) -> tuple[str, ...] | None:
@@ -167,23 +176,57 @@ def set_coverage(
     )
 
 
-def reliability(pooled: Pooled, labels: Sequence[str], rate_of: RateOf) -> Reliability:
-    """Return how well the probabilities of held-out trials agree with the rate."""
-    given = np.nan_to_num(pooled.probabilities, nan=0.0)
+def held_out_probabilities(
+    pooled: Pooled, labels: Sequence[str], groups: Groups, folds: Sequence[Folds]
+) -> NDArray[np.float64]:
+    """Return the probabilities of held-out trials as a model gives them: calibrated with the trials of other folds."""
+    columns = _columns(pooled, labels)
+    calibrated = pooled.probabilities.copy()
+    for rows, of in zip(groups, folds, strict=True):
+        for fold in np.unique(of).tolist():
+            test, others = rows[of == fold], rows[of != fold]
+            temperature = temperature_of(pooled.probabilities[others], columns[others])
+            calibrated[test] = at_temperature(pooled.probabilities[test], temperature)
+    return calibrated
+
+
+def reliability(
+    pooled: Pooled, labels: Sequence[str], groups: Groups, folds: Sequence[Folds], rate_of: RateOf
+) -> Reliability:
+    """Return how well the calibrated probabilities of held-out trials agree with the rate."""
     truth = np.array(labels)[:, np.newaxis] == np.array(pooled.classes)
-    top = given.max(axis=1)
     right = pooled.right(labels)
+    given = np.nan_to_num(held_out_probabilities(pooled, labels, groups, folds), nan=0.0)
+    before = _bins(np.nan_to_num(pooled.probabilities, nan=0.0), right, rate_of)
+    curve = _bins(given, right, rate_of)
+    return Reliability(
+        brier=float(((given - truth) ** 2).sum(axis=1).mean()),
+        calibration_error=_calibration_error(curve),
+        curve=curve,
+        uncalibrated_error=_calibration_error(before),
+    )
+
+
+def _bins(
+    probabilities: NDArray[np.float64], right: Sequence[bool], rate_of: RateOf
+) -> tuple[ReliabilityBin, ...]:
+    top = probabilities.max(axis=1)
     bin_of = np.minimum((top * BINS).astype(np.int64), BINS - 1)
-    curve, error = [], 0.0
-    for number in np.unique(bin_of).tolist():
-        rows = np.flatnonzero(bin_of == number)
-        point = ReliabilityBin(float(top[rows].mean()), rate_of(right, rows.tolist()))
-        curve.append(point)
-        error += len(rows) / len(labels) * abs(point.probability - point.rate.rate)
-    return Reliability(float(((given - truth) ** 2).sum(axis=1).mean()), error, tuple(curve))
+    rows_of = [np.flatnonzero(bin_of == number) for number in np.unique(bin_of).tolist()]
+    return tuple(ReliabilityBin(float(top[rows].mean()), rate_of(right, rows.tolist())) for rows in rows_of)
+
+
+def _calibration_error(curve: Sequence[ReliabilityBin]) -> float:
+    trials = sum(point.rate.n for point in curve)
+    return sum(point.rate.n / trials * abs(point.probability - point.rate.rate) for point in curve)
 
 
 def _of_truth(pooled: Pooled, labels: Sequence[str]) -> NDArray[np.float64]:
     """Return the score of the true label of each trial."""
+    return pooled.scores[np.arange(len(labels)), _columns(pooled, labels)]
+
+
+def _columns(pooled: Pooled, labels: Sequence[str]) -> NDArray[np.int64]:
+    """Return the column of the true label of each trial."""
     column = {name: k for k, name in enumerate(pooled.classes)}
-    return pooled.scores[np.arange(len(labels)), [column[label] for label in labels]]
+    return np.array([column[label] for label in labels])

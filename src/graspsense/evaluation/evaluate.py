@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from graspsense.core.features import FeatureTable
-    from graspsense.evaluation.doubt import SetCoverage
+    from graspsense.evaluation.doubt import Reliability, SetCoverage
     from graspsense.evaluation.folds import Folds
 
 INSTANCE_HELD_OUT: Final = "instance_held_out"
@@ -97,7 +97,7 @@ def evaluate(
             name: confusion(labels, pooled.predicted) for name, pooled in evaluator.pooled_by_protocol.items()
         },
         sets=evaluator.sets(headline),
-        reliability=reliability(headline.pooled, labels, evaluator.rate_among),
+        reliability=evaluator.reliability(headline),
     )
 
 
@@ -223,6 +223,10 @@ class _Evaluator:
         return set_coverage(
             headline.pooled, self.labels, instances, self.groups, headline.folds, self.rate_among
         )
+
+    def reliability(self, headline: _Headline) -> Reliability:
+        """Return how well the probabilities of the headline's held-out trials agree with the rate."""
+        return reliability(headline.pooled, self.labels, self.groups, headline.folds, self.rate_among)
 
     def by_features(self, pooled: Pooled) -> dict[str, RecognitionRate]:
         """Return the rates among trials with features and without any; nothing if all trials have features."""

@@ -61,10 +61,12 @@ def doubt_section(sets: SetCoverage, reliability: Reliability) -> Section:
             f"labels on average; {percentage(sets.single.rate)} have a single one. The prediction is always a "
             "member, so a label is covered at least as often as it is recognised."
         )
+    raw = reliability.uncalibrated_error
+    before = "" if raw is None else f", and {percentage(raw)} before calibration"
     probabilities = (
         f"Where the probabilities are right, predictions of 80 % are correct in 80 of 100 grasps. The Brier score is "
         f"{reliability.brier:.3f} (0 is perfect, 2 the worst); the expected calibration error is "
-        f"{percentage(reliability.calibration_error)}."
+        f"{percentage(reliability.calibration_error)}{before}."
     )
     covered = rates_table("Sets that contain the true label", rows, "contain it") if rows else ""
     return Section(
