@@ -189,6 +189,7 @@ def test_pruning_against_held_out_trials_makes_a_smaller_tree():
     assert nodes(pruned) < nodes(whole)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["c45", "forest"])
 def test_scikit_learn_is_imported_when_one_of_its_own_is_fitted_and_not_before(name):
     code = f"""

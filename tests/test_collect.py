@@ -48,6 +48,7 @@ def trials_in(folder):
         return [(one.id, one.label, one.set_aside) for one in reversed(store.page(set_aside=None))]
 
 
+@pytest.mark.slow
 def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(collect, tmp_path):
     done = collect(tmp_path / "t", "\nu\n\n\n?\nr\n\n\n")
     assert done.returncode == 0, done.stderr
@@ -66,6 +67,7 @@ def test_it_prompts_counts_undoes_retakes_and_stops_when_everything_is_there(col
     assert "next: block  (1 of 2)" in done.stderr
 
 
+@pytest.mark.slow
 def test_classes_come_in_rounds_so_that_none_is_recorded_in_one_go(collect, tmp_path):
     collect(tmp_path / "t", "\n" * 9, labels="block,toy,can:full_open", each=3)
     labels = [label for _, label, _ in trials_in(tmp_path / "t")]
@@ -73,6 +75,7 @@ def test_classes_come_in_rounds_so_that_none_is_recorded_in_one_go(collect, tmp_
         assert sorted(labels[k : k + 3]) == ["block", "can:full_open", "toy"]
 
 
+@pytest.mark.slow
 def test_it_goes_on_where_it_was_with_new_draws(collect, tmp_path):
     first = json.loads(collect(tmp_path / "t", "\n\nq\n").stdout)
     assert not first["complete"]
@@ -86,6 +89,7 @@ def test_it_goes_on_where_it_was_with_new_draws(collect, tmp_path):
     assert seeds == [0, 1, 2, 3]
 
 
+@pytest.mark.slow
 def test_other_settings_are_refused_unless_told(collect, tmp_path):
     collect(tmp_path / "t", "\n")
     other = ["-o", "controller.probing_force_n=12"]
@@ -164,6 +168,7 @@ def test_another_gripper_is_refused_before_it_moves(tmp_path):
         assert collection.counts() == {"jar:full": 3}
 
 
+@pytest.mark.slow
 def test_it_takes_its_answers_from_a_pipe(tmp_path):
     command = [sys.executable, "-m", "graspsense", "collect", "--labels", "block", "--each", "1", *PLAIN]
     done = subprocess.run(
@@ -198,6 +203,7 @@ def test_nothing_there_counts_since_it_is_an_answer_of_the_gripper(collect, tmp_
     assert json.loads(done.stdout)["counts"] == {"none": 1}
 
 
+@pytest.mark.slow
 def test_the_first_trials_are_collected_for_a_model_that_does_not_exist_yet(
     graspsense, tmp_path, monkeypatch
 ):
@@ -248,6 +254,7 @@ def held(folder):
     ]
 
 
+@pytest.mark.slow
 def test_an_emulated_pr2_grasps_what_the_label_says(collect, tmp_path):
     done = collect(tmp_path / "t", "\n\n", each=1, more=EMULATED)
 
@@ -324,6 +331,7 @@ def test_run_into_a_store_with_other_settings_is_refused_before_the_grasp(grasps
     assert len(trials_in(folder)) == 2
 
 
+@pytest.mark.slow
 def test_what_is_grasped_and_what_changes_no_result_may_differ(graspsense, collect, tmp_path):
     folder = str(tmp_path / "t")
     assert graspsense(*SAVED, folder).returncode == 0
@@ -371,6 +379,7 @@ def test_a_label_with_a_space_is_refused_with_the_reason(graspsense, tmp_path, l
         assert "without spaces" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_store_and_files_with_spaces_in_their_names_work_everywhere(graspsense, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my lab.toml").write_text('extends = "default"\n[classifier]\ntype = "none"\n')

@@ -288,6 +288,7 @@ def test_what_an_earlier_process_compiled_is_known_to_be_on_disk(tmp_path):
     assert run(asks, tmp_path, **cache) == ["[False, True, False] False"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_numba")
 def test_where_nothing_can_be_kept_functions_are_compiled_all_the_same(tmp_path):
     program = tmp_path / "compose.py"

@@ -588,6 +588,7 @@ PLAIN = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(st.dictionaries(st.text(st.characters(exclude_categories=["Cs"])), PLAIN, max_size=5))
 def test_any_plain_value_survives_being_written_as_toml(values):
     text = "\n".join(f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items())
@@ -606,6 +607,7 @@ def paths(value, path=()):
             yield from paths(one, (*path, index))
 
 
+@pytest.mark.slow
 @given(st.dictionaries(st.text(st.characters(exclude_categories=["Cs"])), PLAIN, max_size=5))
 def test_every_key_has_the_line_on_which_it_stands(values):
     text = "# first\n" + "\n\n".join(

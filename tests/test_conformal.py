@@ -247,6 +247,7 @@ def called(capsys, *arguments):
     return out
 
 
+@pytest.mark.slow
 def test_the_commands_print_and_keep_the_sets(csv_file, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "300")
     model, given = str(tmp_path / "m.json"), ("--label", "label", "--instance", "bottle")

@@ -217,6 +217,7 @@ def test_the_wiring_knows_the_channels_of_the_fitted_fingers():
     assert [one.name for one in hand.declared().channels] == ["gap", "velocity"]
 
 
+@pytest.mark.slow
 def test_a_law_with_the_numbers_of_its_config_is_compiled_once_and_then_loaded(tmp_path):
     """Another process finds the machine code, although no module defines the type of the parameters."""
     (tmp_path / "lab_slow.py").write_text(

@@ -71,6 +71,7 @@ def test_what_can_be_told_apart_is_and_noise_is_not():
     assert good.headline.correct == good.confusion.correct
 
 
+@pytest.mark.slow
 def test_class_and_state_given_the_class():
     labels, width, force = four_states()
     by_width = labelled(labels, width)
@@ -182,6 +183,7 @@ def test_too_few_trials_with_a_feature_are_not_measured():
     assert found.reason == "1 of 120 trials have such features; these are too few to learn from"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("leak", [True, False])
 def test_the_first_line_of_imported_recordings_is_a_control_of_its_own(leak):
     labels, width, force = four_states()

@@ -183,6 +183,7 @@ def test_a_full_disk_ends_a_run_with_an_account_and_what_is_done_stays(
     assert results_in(out) == results_in(tmp_path / "whole")
 
 
+@pytest.mark.slow
 def test_a_task_that_fails_is_a_result_with_a_reason(run, file, tmp_path):
     file.write_text(EXPERIMENT.replace('"judge.folds" = [2, 4]', '"judge.targets" = [["both"], ["state"]]'))
     code, out, _ = run("experiment", file, "--out", tmp_path / "out", "--executor", "serial")
@@ -355,6 +356,7 @@ def test_train_here_test_there(file, tmp_path):
     assert sum(condition.confusion.counts[0]) == 15  # five labels were changed from a to b
 
 
+@pytest.mark.slow
 def test_an_experiment_on_simulated_grasps_keeps_trials_curves_and_trees(tmp_path):
     path = tmp_path / "small.toml"
     path.write_text(
@@ -420,6 +422,7 @@ def test_more_folds_than_trials_are_refused_before_any_task(file, tmp_path):
         read_experiment(str(file), ['sweep={"judge.folds"=[1000]}'])
 
 
+@pytest.mark.slow
 def test_what_there_is(run):
     code, out, _ = run("experiment", "--json")
 
@@ -464,6 +467,7 @@ def compared(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_experiments_are_compared_on_one_page(compared, run, tmp_path):
     page = tmp_path / "page.html"
     folders = [compared / name for name in ("weak", "strong", "more")]

@@ -151,6 +151,7 @@ rows_strategy = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(rows_strategy, st.floats(-0.01, 0.2), st.sampled_from([0.001, 0.02, 1.0]))
 def test_every_trace_gives_numbers_or_reasons(rows, until, dt):

@@ -35,6 +35,7 @@ def csv(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_an_honest_rate_of_ones_own_csv_in_one_command(run, csv):
     code, out, _ = run("evaluate", csv, "--label", "what", "--instance", "thing")
 
@@ -54,6 +55,7 @@ def test_an_honest_rate_of_ones_own_csv_in_one_command(run, csv):
     assert "no columns are named as known before contact (--before COLUMNS)" in out
 
 
+@pytest.mark.slow
 def test_its_json(run, csv):
     code, out, _ = run(
         "evaluate", csv, "--label", "what", "--json", "--classifier", "knn", "-o", "classifier.neighbours=3"
@@ -69,6 +71,7 @@ def test_its_json(run, csv):
     assert found["controls"]["width_only"]["rate"]["rate"] < 0.8 < found["headline"]["rate"]
 
 
+@pytest.mark.slow
 def test_states_of_one_class(run, csv):
     _, out, _ = run("evaluate", csv, "--label", "what", "--json", "--target", "state", "--only", "can")
 
@@ -113,6 +116,7 @@ def test_a_model_of_states_or_classes(run, csv, tmp_path):
     assert found["rate"]["rate"] > 0.9
 
 
+@pytest.mark.slow
 def test_features_are_kept(run, csv, tmp_path):
     kept = tmp_path / "kept.csv"
     run("evaluate", csv, "--label", "what", "--instance", "thing", "--keep", kept)
@@ -125,6 +129,7 @@ def test_features_are_kept(run, csv, tmp_path):
     assert again["controls"]["recording_order"] == first["controls"]["recording_order"]
 
 
+@pytest.mark.slow
 def test_the_picture_of_the_confusion(run, csv, tmp_path):
     pytest.importorskip("matplotlib", reason="needs matplotlib, the extra `plot`")
     picture = tmp_path / "confusion.png"
@@ -211,6 +216,7 @@ def test_other_columns_than_the_model_takes(run, csv, tmp_path):
     assert "takes p_first in m; here it is in mm" in err
 
 
+@pytest.mark.slow
 def test_simulated_trials_small_and_whole(run):
     code, out, _ = run(
         "evaluate",

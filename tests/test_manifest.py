@@ -492,6 +492,7 @@ def test_a_whole_set_is_imported_evaluated_and_replayed(tmp_path, capsys):
     assert (code, "fewer than 3 recordings" in err) == (2, True)
 
 
+@pytest.mark.slow
 def test_check_says_what_it_understood_and_draws_a_grasp_without_storing(tmp_path, capsys, monkeypatch):
     pytest.importorskip("matplotlib", reason="needs the extra plot")
     jaco(tmp_path / "000_real_life_data.csv")

@@ -27,6 +27,7 @@ def rows():
     return values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["c45", "knn", "tree", "svm"])
 def test_all_at_once_is_one_by_one(rows, name):
     labels = tuple(np.repeat(["a:x", "b:y", "c:z"], 80).tolist())

@@ -57,6 +57,7 @@ def digests(folder):
     return {one: hashlib.sha256(one.read_bytes()).hexdigest() for one in files}
 
 
+@pytest.mark.slow
 def test_recordings(tmp_path):
     """What a strict reader gives is what was written, to the byte; salvage gives ticks that were written."""
     path = tmp_path / "g.mcap"

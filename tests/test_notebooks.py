@@ -170,6 +170,7 @@ def test_two_modules_are_enough_for_what_the_documentation_shows(path):
     }
 
 
+@pytest.mark.slow
 def test_a_notebook_of_what_the_page_shows_is_executed(tmp_path, monkeypatch):
     """A kernel executes the page on notebooks; each value is shown as HTML, and the plot as a picture."""
     nbclient, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")

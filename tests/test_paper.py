@@ -259,6 +259,7 @@ controls = false
 """
 
 
+@pytest.mark.slow
 def test_parts_are_done_as_if_alone_and_the_resolved_file_means_the_same_tasks(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "fig_5.toml").write_text(FIGURE)

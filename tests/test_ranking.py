@@ -40,6 +40,7 @@ def test_intervals_are_wider_for_more_comparisons():
     assert ten[0] < one[0] < one[1] < ten[1]
 
 
+@pytest.mark.slow
 def test_the_command_names_the_best_and_refuses_feature_sets_of_a_csv(tmp_path, capsys):
     trials = bottles(12)
     lines = ["label,bottle,force [N],noise"]
@@ -88,6 +89,7 @@ def test_answers_from_outside_are_compared_like_any_other():
     assert found.candidates[1].loss.value > 0.0
 
 
+@pytest.mark.slow
 def test_the_sets_of_every_candidate_are_measured_on_the_same_folds():
     found = crossed()
 

@@ -34,6 +34,7 @@ def test_pipeline_example_is_valid(pipeline_file: Path) -> None:
     assert pipeline_file.name in done.stdout
 
 
+@pytest.mark.slow
 def test_python_example_runs_on_the_pipeline_example(pipeline_file: Path) -> None:
     command = [sys.executable, "-c", block("python")]
     done = subprocess.run(command, cwd=pipeline_file.parent, capture_output=True, text=True)

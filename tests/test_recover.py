@@ -187,6 +187,7 @@ def run(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
+@pytest.mark.slow
 def test_the_commands_say_what_they_did(store):
     keep(store)
     part(store)

@@ -363,6 +363,7 @@ def test_run_on_a_real_grasp_ends_steady_with_all_features() -> None:
     assert None not in grasp["features"].values()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [

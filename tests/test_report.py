@@ -87,6 +87,7 @@ def page(tmp_path_factory):
     return write_page(summarise(planned, results), results).read_text()
 
 
+@pytest.mark.slow
 def test_a_page_loads_nothing_and_runs_only_its_own_script(page):
     found = Reader(page)
     scripts = re.findall(r"<script>(.*?)</script>", page, flags=re.DOTALL)

@@ -60,11 +60,13 @@ def test_json_has_the_promised_keys_and_says_nothing_else_on_stdout():
     assert result["features"]["p_first"] == pytest.approx(0.0655, abs=0.001)
 
 
+@pytest.mark.slow
 def test_the_same_seed_prints_the_same_features():
     one, again = (json.loads(graspsense("run", "--json", "--seed", "3").stdout) for _ in range(2))
     assert one["features"] == again["features"]
 
 
+@pytest.mark.slow
 def test_nothing_there_is_an_outcome_with_reasons_and_exit_code_0():
     done = graspsense("run", "--json", "--object", "none")
     result = json.loads(done.stdout)
@@ -104,6 +106,7 @@ def test_a_mistake_says_what_was_found_and_what_to_do(arguments, code, says):
     assert "Traceback" not in as_json.stderr
 
 
+@pytest.mark.slow
 def test_a_dry_run_opens_nothing_and_says_what_would_be_done():
     # The PR2 is not there, so anything opened would end with 3.
     done = graspsense("run", "--gripper", "pr2", "--dry-run")
@@ -112,6 +115,7 @@ def test_a_dry_run_opens_nothing_and_says_what_would_be_done():
     assert "controller.probing_force_n = 20.0" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_trial_that_is_kept_runs_again_from_its_recording_and_from_its_settings(tmp_path):
     store = tmp_path / "kept"
     first = graspsense(
@@ -137,6 +141,7 @@ def test_a_trial_that_is_kept_runs_again_from_its_recording_and_from_its_setting
         ]
 
 
+@pytest.mark.slow
 def test_the_picture_of_a_grasp_is_a_png_of_the_grasp_that_was_printed(tmp_path):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
     picture = tmp_path / "grasp.png"
@@ -148,6 +153,7 @@ def test_the_picture_of_a_grasp_is_a_png_of_the_grasp_that_was_printed(tmp_path)
     assert picture.stat().st_size < 150_000
 
 
+@pytest.mark.slow
 def test_a_recording_is_drawn_as_the_grasp_itself_was(tmp_path):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
     first, again, store = tmp_path / "first.png", tmp_path / "again.png", tmp_path / "kept"
@@ -158,6 +164,7 @@ def test_a_recording_is_drawn_as_the_grasp_itself_was(tmp_path):
     assert again.is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [["--object", "none"], ["-o", "classifier.type=none"]])
 def test_a_grasp_without_contact_or_prediction_is_drawn_as_well(tmp_path, arguments):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
@@ -167,6 +174,7 @@ def test_a_grasp_without_contact_or_prediction_is_drawn_as_well(tmp_path, argume
     assert picture.is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["no_such_folder/grasp.png", "grasp.svg"])
 def test_a_picture_that_cannot_be_written_is_refused_before_the_grasp(tmp_path, name):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
@@ -176,6 +184,7 @@ def test_a_picture_that_cannot_be_written_is_refused_before_the_grasp(tmp_path, 
     assert "approach" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_is_found_out_before_the_grasp(tmp_path):
     (tmp_path / "file").write_text("in the way")
     done = graspsense("run", "--save", str(tmp_path / "file"))
@@ -184,6 +193,7 @@ def test_a_folder_that_cannot_be_written_is_found_out_before_the_grasp(tmp_path)
     assert "approach" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_the_grasp_with_the_gripper_let_go(number):
     # 1e5 ticks a second make this grasp long enough to be interrupted; the first row says that it is under way.
@@ -263,6 +273,7 @@ def test_a_full_disk_under_stdout_is_told_without_a_traceback(arguments):
     assert "Traceback" not in ran.stderr
 
 
+@pytest.mark.slow
 def test_a_label_and_the_object_of_a_simulated_gripper_agree(tmp_path):
     store = str(tmp_path / "kept")
     plain = ("run", "--json", "--save", store, "-o", "classifier.type=none")

@@ -167,6 +167,7 @@ def test_every_command_with_settings_refuses_an_implausible_one_and_names_force(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_force_accepts_it(capsys):
     option = ("-o", "controller.closing_speed_m_s=0.5", "-o", "classifier.type=none")
 

@@ -193,6 +193,7 @@ def test_the_recording_has_the_same_signals_to_the_last_bit(recorded):
     assert read.signals["acceleration"].lost == 5
 
 
+@pytest.mark.slow
 def test_a_replay_gives_the_same_signals_and_features(recorded):
     trial, path, plugins = recorded
     options = [f"gripper.recording={path}", "features.type=shaking", "classifier.type=none"]
@@ -215,6 +216,7 @@ def test_an_export_has_the_signals_as_arrays(recorded, tmp_path):
         assert np.array_equal(exported["signal_motor_temperature"], signals["motor_temperature"])
 
 
+@pytest.mark.slow
 def test_an_exported_grasp_comes_back_with_the_same_features_arrays_and_samples(recorded, tmp_path):
     trial, path, plugins = recorded
     write_npz(tmp_path / "grasp.npz", read_recorded(path))

@@ -321,6 +321,7 @@ def test_a_disk_that_is_full_is_told_and_what_was_kept_stays(mounted):
     assert verify_file(disk / "store.sqlite").trials == kept
 
 
+@pytest.mark.slow
 def test_a_grasp_ends_as_it_would_have_when_the_disk_fills_up_under_it(mounted):
     disk = mounted("size=200k")
     command = [sys.executable, "-m", "graspsense", "run", "-o", "classifier.type=none", "--save", str(disk)]

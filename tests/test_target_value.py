@@ -223,6 +223,7 @@ def folder(tmp_path):
     return tmp_path / "trials"
 
 
+@pytest.mark.slow
 def test_a_store_is_trained_on_predicted_and_evaluated(folder, run, tmp_path):
     code, out, err = run(
         "evaluate", f"store:{folder}", "--target-value", "fill", "--classifier", "ridge", "--json"

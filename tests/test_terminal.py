@@ -142,6 +142,7 @@ def test_a_grasp_fits_the_terminal_with_outcome_prediction_and_warning_in_colour
     assert re.search(r"about 9\d %: \d+ of \d+ training", " ".join(shown.text.split()))
 
 
+@pytest.mark.slow
 def test_one_unit_for_lengths_and_results_on_stdout_when_piped():
     ran = subprocess.run([*COMMAND, "run"], capture_output=True, text=True, check=True)
 
@@ -168,6 +169,7 @@ def csv(tmp_path):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", WIDTHS)
 def test_evaluate_says_its_verdict_first_and_fits_the_terminal(csv, width):
     shown = in_terminal(["evaluate", str(csv), "--label", "what", "--instance", "thing"], width)
@@ -185,6 +187,7 @@ def test_evaluate_says_its_verdict_first_and_fits_the_terminal(csv, width):
     assert all(len(line) <= width for line in shown.lines if str(csv) not in line)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", WIDTHS)
 def test_predictions_fit_the_terminal_and_count_their_training_trials(csv, tmp_path, width):
     model = tmp_path / "m.json"
@@ -204,6 +207,7 @@ def test_predictions_fit_the_terminal_and_count_their_training_trials(csv, tmp_p
     assert not re.search(r"[0-9] m\b", shown.text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_list_of_experiments_says_how_long_each_takes(width):
     shown = in_terminal(["experiment"], width)
@@ -217,6 +221,7 @@ def test_the_list_of_experiments_says_how_long_each_takes(width):
         assert re.match(r"\w+ +\d[\d.]* (s|min|h)  ", row), row
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_dry_run_of_an_experiment_is_a_summary(tmp_path, width):
     options = ["experiment", "probing_force", "-o", "seeds=10000", "--dry-run", "--out", str(tmp_path / "e")]
@@ -232,6 +237,7 @@ def test_a_dry_run_of_an_experiment_is_a_summary(tmp_path, width):
     assert all(len(line) <= width for line in shown.lines if str(tmp_path) not in line)
 
 
+@pytest.mark.slow
 def test_collect_shows_keys_then_what_was_felt_and_what_the_model_takes_it_for(tmp_path):
     arguments = ["collect", "--labels", "can:full_open", "--each", "1", "--save", str(tmp_path / "t")]
     shown = in_terminal(arguments, 60, typed="\n")

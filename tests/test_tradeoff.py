@@ -70,6 +70,7 @@ def test_the_page_has_the_table_with_date_and_versions():
     assert "simulated" in page
 
 
+@pytest.mark.slow
 def test_the_picture_is_drawn_with_failures_and_floors(tmp_path):
     pytest.importorskip("matplotlib", reason="drawing needs the extra `plot`")
     file = tmp_path / "trade.png"

@@ -336,6 +336,7 @@ def test_trials_are_not_collected_with_a_number_in_another_unit(store, run):
     assert "fill of other trials is in ml, and 'fill' cannot be compared with them" in " ".join(err.split())
 
 
+@pytest.mark.slow
 def test_the_page_of_a_store_has_a_section_for_a_number(store, run, tmp_path):
     for k in range(24):
         fill = 100.0 + 5.0 * k

@@ -139,6 +139,7 @@ def assert_same_answers(tree: Tree, question: Asked, variant: str) -> int:
     return compared
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SETS)
 def test_trees_and_answers(name: str) -> None:
     question = asked(name)

@@ -193,6 +193,7 @@ def tables(draw: st.DrawFn) -> Table:
     return table(values, labels, weights, n_classes=4)
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(tables(), st.randoms(use_true_random=False))
 def test_the_order_of_the_rows_does_not_matter(given_table: Table, random: Any) -> None:
@@ -204,6 +205,7 @@ def test_the_order_of_the_rows_does_not_matter(given_table: Table, random: Any) 
     assert fit(given_table) == fit(shuffled)
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(tables())
 def test_weights_add_up_and_json_is_exact(given_table: Table) -> None:

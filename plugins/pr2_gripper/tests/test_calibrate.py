@@ -104,6 +104,7 @@ def test_unreadable_readings_name_their_line(shell: Any, tmp_path: Path) -> None
     assert "readings.csv:3" in err
 
 
+@pytest.mark.slow
 def test_friction_comes_out_near_the_models_own(shell: Any) -> None:
     """Breakaway in the model is 8 N or its sliding friction, 7 N with a spread of 0.4 N, if that is more."""
     code, friction, _ = shell("calibrate friction", "--gaps", "2", "--narrowest", "0.07")

@@ -54,6 +54,7 @@ def test_only_an_emulated_gripper_can_be_given_an_object() -> None:
         real.with_object("can:full_open")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("thing", "seed"),
     [("odwalla:full_closed", 0), ("odwalla:full_open", 2), ("can:empty_open", 1), ("none", 1)],
@@ -91,6 +92,7 @@ def test_grasp_through_the_driver_is_the_direct_one(thing: str, seed: int) -> No
     assert through.report["lost"] == through.report["corrupt"] == through.report["images_lost"] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("answered")
 def test_paced_grasp_runs_by_the_clock_under_the_limits_of_a_first_use() -> None:
     """Device clock, so the first close is held to 12 N until contact has been seen; 20 N squeeze after it."""
@@ -174,6 +176,7 @@ def commanded_safely(monkeypatch: pytest.MonkeyPatch, grasps: int, seed: int) ->
     return outcomes
 
 
+@pytest.mark.slow
 def test_commands_stay_within_limits_whatever_the_wire_does(monkeypatch: pytest.MonkeyPatch) -> None:
     outcomes = commanded_safely(monkeypatch, 8, seed=11)
     assert outcomes["STEADY"] >= 2
@@ -268,6 +271,7 @@ def test_one_fault_at_a_time_is_survived_and_counted(faults: FaultConfig) -> Non
             assert report[counter] == 0
 
 
+@pytest.mark.slow
 def test_object_reaches_the_body_and_an_unknown_one_is_a_users_mistake() -> None:
     wide = load_pipeline(options=EMULATED).grasp(object="block", seed=1)
     thin = load_pipeline(options=EMULATED).grasp(object="can:empty_open", seed=1)
@@ -313,6 +317,7 @@ def test_driver_sends_no_effort_that_is_no_number(monkeypatch: pytest.MonkeyPatc
         decode_output(bytes(64))
 
 
+@pytest.mark.slow
 def test_dry_run_shows_a_first_close_that_is_slow_and_weak(monkeypatch: pytest.MonkeyPatch) -> None:
     """12 N and 15 mm/s until a contact has been seen (run.first_effort_n, run.first_speed_m_s), 20 N after it."""
     looked: list[object] = []

@@ -819,6 +819,7 @@ QUICK = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "place", "gripper"), QUICK)
 def test_the_reference_is_the_solution_of_the_equations(name, place, gripper):
     assert max(errors(name, place, gripper)) <= 3e-5

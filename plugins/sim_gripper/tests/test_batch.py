@@ -77,6 +77,7 @@ def test_what_is_drawn_may_keep_a_column_of_the_trace():
         assert one.extracted.tobytes() == other.trace.gap_m.tobytes()
 
 
+@pytest.mark.slow
 def test_features_without_traces_are_those_of_the_traces():
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
     scenes, seeds = ["odwalla:full_open", "egg", "none", "block"] * 3, range(12)
@@ -209,6 +210,7 @@ def test_odd_numbers_and_every_object_come_back_from_another_process_to_the_bit(
         assert bits(one.trace) == bits(here.trace)
 
 
+@pytest.mark.slow
 def test_no_trace_is_handed_over_where_nobody_wants_one():
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
     with PlainProcess(Scenes(job(run=run, traces=False))) as process:
@@ -260,6 +262,7 @@ def test_what_is_not_all_in_names_and_values_is_not_handed_over():
         PlainProcess(Scenes(job(Endless(HYBRID.config))))
 
 
+@pytest.mark.slow
 def test_what_fails_in_another_process_is_said():
     class Here:
         GRASPSENSE_API = (2, 0)
@@ -306,6 +309,7 @@ def test_room_is_made_on_the_way_without_beginning_again(monkeypatch):
     assert bits(run_many(SimConfig(), HYBRID, ["toy"], [3])[0].trace) == bits(whole)
 
 
+@pytest.mark.slow
 def test_traces_are_kept_only_where_they_are_asked_for():
     backend = SimBackend(SimConfig(sensor="ideal"))
     run = RunConfig(grasp_timeout_s=0.5, opening_timeout_s=0.1)

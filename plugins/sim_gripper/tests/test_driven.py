@@ -77,6 +77,7 @@ def test_a_recorded_force_gives_the_gap_that_it_came_from():
     np.testing.assert_allclose(back.gap_m[pressed], GAP_M[pressed], atol=2e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sponge", "leaking_bottle"])
 def test_a_grasp_has_its_own_forces_along_its_own_gap(name):
     gripper = create("sensor-backend", "sim", fidelity="reference", **NOMINAL)

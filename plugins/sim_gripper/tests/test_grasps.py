@@ -78,6 +78,7 @@ def test_a_force_below_breakaway_does_not_move_the_gripper_at_all(name):
     assert result.outcome is Outcome.NOTHING_THERE
 
 
+@pytest.mark.slow
 def test_closed_loop_force_settles_at_the_force_asked_for():
     controller = create("controller", "hybrid", loop="closed", probing_force_n=5.0, steady_timeout_s=8.0)
     result = grasp(controller, object="toy", spread=False)

@@ -41,6 +41,7 @@ def test_pads_that_harden_from_afar_are_linear():
     np.testing.assert_allclose(follow_many(config, PATH, [SPRING], [0])[0].force_n, linear.force_n, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_grasp_with_hard_pads_has_the_accuracy_that_is_asked_for():
     forces = []
     for settings in ({}, {"fidelity": "reference"}, {"scheme": "implicit"}):

@@ -99,6 +99,7 @@ def plain_only(params, state, reading):
     ), state
 
 
+@pytest.mark.slow
 def test_a_law_that_cannot_be_compiled_runs_plain_and_the_warning_says_why():
     class Odd(type(HYBRID)):
         step = staticmethod(plain_only)

@@ -191,6 +191,7 @@ def test_with_the_drive_off_stored_energy_never_rises(stiffness, speed, coulomb,
         before = min(before, now) if now < before else before
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(
     st.floats(3.0, 5.5).map(lambda e: 10.0**e),
@@ -212,6 +213,7 @@ def test_without_friction_a_squeeze_and_the_letting_go_create_no_energy(stiffnes
         before = now
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(
     st.floats(4.0, 6.0).map(lambda e: 10.0**e),

@@ -52,6 +52,7 @@ def again(config=CONFIG, spec=None, **settings):
     return selection.select(problem_of(config, spec or shell()), controller)
 
 
+@pytest.mark.slow
 def test_memory_finds_a_model_by_content_and_not_by_object(trials):
     first = select()
     # Another object of Python with the same content, and other settings that no model depends on.
@@ -60,6 +61,7 @@ def test_memory_finds_a_model_by_content_and_not_by_object(trials):
     assert len(trials) == 2
 
 
+@pytest.mark.slow
 def test_memory_is_bounded(monkeypatch, trials):
     monkeypatch.setattr(cache, "MAX_IN_MEMORY", 3)
     select()
@@ -74,6 +76,7 @@ def test_the_next_process_finds_what_was_selected(trials, folder):
     assert len(trials) == len(list(folder.iterdir())) == 1
 
 
+@pytest.mark.slow
 def test_another_object_accuracy_or_controller_is_tried_by_itself(trials):
     first = select()
     others = select(spec=shell(2001.0)), select(evolve(CONFIG, accuracy=0.03)), select(probing_force_n=19.0)
@@ -87,6 +90,7 @@ def test_what_decides_nothing_of_the_model_finds_it_too(trials):
     assert len(trials) == 1
 
 
+@pytest.mark.slow
 def test_edited_code_finds_nothing_of_before(trials, monkeypatch):
     made = select()
     step = type(create("controller", "hybrid")).step
@@ -95,6 +99,7 @@ def test_edited_code_finds_nothing_of_before(trials, monkeypatch):
     assert len(trials) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", [b"", b"{", b"[]", b'{"verification": null}', b"\xff\xfe"])
 def test_a_damaged_one_is_made_anew(trials, folder, damage):
     made = select()
@@ -111,6 +116,7 @@ def test_a_folder_that_cannot_be_made_costs_nothing_but_time(trials, folder):
     assert len(trials) == 2
 
 
+@pytest.mark.slow
 def test_the_older_half_makes_room(monkeypatch, folder):
     monkeypatch.setattr(cache, "MAX_FILES", 4)
     for k in range(4):

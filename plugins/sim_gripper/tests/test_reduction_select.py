@@ -57,6 +57,7 @@ def test_a_verified_model_says_what_a_trial_grasp_found(accuracy, change, part):
     assert model.as_values()["verified"].keys() == {"error", "quantity", "grasps"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["toy", "can:empty_open"])
 def test_the_model_of_a_single_instance_is_as_accurate_as_requested(name):
     config, law = SimConfig(object=name, spread=False, sensor="ideal"), create("controller", "hybrid")
@@ -80,6 +81,7 @@ def test_what_the_paths_say_too_boldly_the_trial_grasp_takes_back(monkeypatch):
     assert (model.level, model.verification.grasps) == (UNVERIFIED.at(0.1), 5)
 
 
+@pytest.mark.slow
 def test_force_and_speed_are_those_of_the_controller_unless_the_settings_say_others():
     spec = thing(SHELL)
     slow, fast = (
@@ -109,6 +111,7 @@ def ragged(params, state, d0, d1, h, v1):
     return params.k_n_m * d1 * (1.0 + 0.03 * math.log(1e-3 / h) if h > 0.0 else 1.0), state
 
 
+@pytest.mark.slow
 def test_a_law_that_hangs_on_its_steps_is_refused_by_name(monkeypatch):
     term = Term(name="ragged", summary="", params=Ragged, law=ragged)
     monkeypatch.setitem(TERMS, "ragged", term)

@@ -143,6 +143,7 @@ def test_a_fixed_model_needs_a_scheme():
         SimConfig(fidelity="fixed")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(shipped_scenes()))
 def test_every_shipped_scene_is_grasped_and_stays_steady(name):
     done = run_many(SimConfig(sensor="ideal"), HYBRID, [name], [0])[0]
@@ -233,6 +234,7 @@ def test_a_drive_that_lags_gives_its_effort_as_a_first_order_rise(scene):
     assert later[-1].effort_n == pytest.approx(2.0 * 0.9817, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_covers_that_creep_give_way_and_covers_that_damp_lower_no_force_at_rest(scene):
     hard = scene("width_m = 0.03\n[[terms]]\ntype = 'rigid'\nhertz_n_m15 = 1e10\n")
     plain = SimConfig(
@@ -292,6 +294,7 @@ def test_the_explanation_adds_up_to_the_force_that_was_felt():
     assert rows["elastic"]["expected_n"] == pytest.approx(rows["elastic"]["peak_n"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_run_explains_the_model_in_the_terminal_and_in_json():
     shown = CliRunner().invoke(cli, ["run", "--object", "leaking_bottle", "-o", "gripper.explain=true"])
     assert shown.exit_code == 0

@@ -107,6 +107,7 @@ def test_the_ideal_sensor_sees_contact_when_it_happens_the_pads_up_to_an_image_l
     assert max(delays) - min(delays) == pytest.approx(0.041, abs=0.008)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [100.0, 400.0, 5000.0])
 def test_other_tick_rates_feel_the_same_bottle(rate_hz):
     result = grasp(rate_hz=rate_hz, spread=False, sensor="ideal", object="can:empty_open")

@@ -120,6 +120,7 @@ def test_a_shell_snaps_at_its_critical_compression(scheme):
     assert forces[-1] < 5.0
 
 
+@pytest.mark.slow
 def test_a_body_may_break_while_the_fingers_stand_still():
     # The branch relaxes, so that the pads press the rigid body harder and harder.
     config = SimConfig(sensor="ideal", spread=False, open_gap_m=0.051, breakaway_n=30.0)
@@ -150,6 +151,7 @@ def test_an_egg_breaks_at_its_strength(settings):
     assert done.report["resolved"]
 
 
+@pytest.mark.slow
 def test_a_crushing_body_has_the_accuracy_that_is_asked_for(tmp_path):
     file = tmp_path / "crush.toml"
     file.write_text(CRUSH)
