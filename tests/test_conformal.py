@@ -223,8 +223,9 @@ def test_equal_probabilities_are_told_apart_by_the_closeness_of_the_training_tri
     own = np.where(np.array(trials.labels) == "full", closeness[:, 0], closeness[:, 1])
     other = np.where(np.array(trials.labels) == "full", closeness[:, 1], closeness[:, 0])
 
-    assert (own == 1.0).all()
-    assert other.mean() < 0.9
+    assert (own > other).mean() > 0.95
+    # The two at the ends of a range are equally far from its middle.
+    assert len(np.unique(own)) >= len(own) - 4
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """Prediction sets: the labels that cannot be ruled out, by conformal prediction with held-out instances.
 
 A label belongs to the set of a trial if its score reaches a threshold. The score is the probability by the classifier;
-of equal probabilities, that label is ahead whose training trials are closer (a tree gives most labels the probability
+of equal probabilities, that label is ahead whose training trials lie closer (a tree gives most labels the probability
 0). The predicted label is always a member, so its score counts as larger than any other.
 
 The threshold of a label comes from trials that were predicted without their instance, as in cross-conformal prediction

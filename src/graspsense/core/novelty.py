@@ -82,9 +82,9 @@ class Novelty:
         return unlike
 
     def closeness(self, table: FeatureTable, classes: Sequence[str]) -> NDArray[np.float64]:
-        """Return how close each trial is to the range of each of these classes, shape (trials, classes).
+        """Return how close each trial is to the middle of each of these classes, shape (trials, classes).
 
-        It is 1 / (1 + distance) of the feature that is farthest outside, in standard deviations: 1 within the range.
+        It is 1 / (1 + distance) of the feature that is farthest from the middle of the range, in standard deviations.
         Without a feature in common it is 0.
         """
         values = table.columns(self.names).values
@@ -93,19 +93,29 @@ class Novelty:
         for start in range(0, len(values), _ROWS_AT_ONCE):
             some = values[start : start + _ROWS_AT_ONCE]
             result[start : start + len(some)] = 1.0 / (
-                1.0 + _worst(self._outside(some[:, np.newaxis, :]))[:, columns]
+                1.0 + _worst(self._from_middle(some[:, np.newaxis, :]))[:, columns]
             )
         return result
 
     def _outside(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the distance of each value from the range of each class, in standard deviations; NaN if unknown."""
-        rounding = _ROUNDING * np.maximum(np.abs(values), np.finfo(np.float64).tiny / _ROUNDING)
-        scale = np.where(self.spread > 0.0, self.spread, rounding)
         with np.errstate(invalid="ignore"):
             outside: NDArray[np.float64] = np.maximum(
                 np.maximum(self.lowest - values, values - self.highest), 0.0
             )
-            return outside / scale
+            return outside / self._scale(values)
+
+    def _from_middle(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the distance of each value from the middle of the range of each class, as `_outside` does."""
+        with np.errstate(invalid="ignore"):
+            away: NDArray[np.float64] = np.abs(values - 0.5 * (self.lowest + self.highest))
+            return away / self._scale(values)
+
+    def _scale(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the standard deviations; for a feature that was constant in training, what rounding may change."""
+        rounding = _ROUNDING * np.maximum(np.abs(values), np.finfo(np.float64).tiny / _ROUNDING)
+        scale: NDArray[np.float64] = np.where(self.spread > 0.0, self.spread, rounding)
+        return scale
 
     def to_json(self) -> dict[str, Any]:
         """Return the ranges as values that JSON represents exactly; an unknown one is None."""
