@@ -66,9 +66,9 @@ class FreeParameter:
         return f"{self.term}.{self.name}"
 
     @property
-    def is_stiffness(self) -> bool:
-        """Whether it grows with the stiffness of an instance."""
-        return self.name in find_term(SLOTS[self.slot])[1].stiffnesses
+    def is_force(self) -> bool:
+        """Whether it is proportional to the scale of the force: a force, or one per length or speed."""
+        return "_n_" in f"{self.name}_"
 
 
 @frozen(kw_only=True)

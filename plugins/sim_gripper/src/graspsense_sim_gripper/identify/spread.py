@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from graspsense_sim_gripper.identify.choose import fit_residuals
 from graspsense_sim_gripper.identify.fit import Fitted, fit
 from graspsense_sim_gripper.identify.forward import ForwardModel
+from graspsense_sim_gripper.identify.laws import SNAP
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.identify.threads import in_threads
 
@@ -32,6 +33,8 @@ BOOTSTRAPS: Final = 24
 BLOCKS: Final = 12
 """Blocks of neighbouring residuals of a squeeze, which are drawn again together."""
 DRAWS: Final = 200
+MOVING_SHARE: Final = 0.3
+"""Where the gap changes by at least this share of its largest change between measurements, the fingers move."""
 PATH_ERROR: Final = 1e-3
 """Standard deviation of the logarithm of a value that the finite number of nodes of a path causes: the median error
 with ideal sensors (`benchmarks/identify.py`)."""
@@ -68,7 +71,10 @@ def uncertainty(
     if len(groups) < 2:
         again = _bootstrapped(model, fitted, squeezes[0], rng)
         covariance = np.cov(again, rowvar=False, ddof=1).reshape(len(at), len(at))
-        centre, factor, basis = at, _normal(), "within one squeeze; not between squeezes"
+        # The fit follows a part of the residuals' own errors, with as many directions as it has parameters.
+        degrees = max(BLOCKS - len(at) - 1, 1)
+        covariance = covariance * BLOCKS / degrees
+        centre, factor, basis = at, _student(degrees), "within one squeeze; not between squeezes"
     else:
         kept = [[i for i in range(len(squeezes)) if i not in group] for group in groups]
         refits = in_threads(lambda one: _refit(model, fitted, squeezes, one), kept)
@@ -79,8 +85,9 @@ def uncertainty(
         what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
         centre, factor, basis = at, _student(g - 1), f"between {g} {what if g == len(groups) else 'groups'}"
     # An error of the scale of the force is common to all squeezes, so that none of them shows it.
-    stiff = np.array([1.0 if one.is_stiffness else 0.0 for one in fitted.candidate.free])
-    own = force_scale**2 * np.outer(stiff, stiff) + PATH_ERROR**2 * np.eye(len(at))
+    scaled = np.array([1.0 if one.is_force else 0.0 for one in fitted.candidate.free])
+    own = force_scale**2 * np.outer(scaled, scaled) + PATH_ERROR**2 * np.eye(len(at))
+    own += np.diag(_corner_errors(fitted, squeezes) ** 2)
     covariance = covariance + own * (_normal() / factor) ** 2
     spread = np.sqrt(np.diag(covariance))
     low, high = np.exp(centre - factor * spread), np.exp(centre + factor * spread)
@@ -95,6 +102,26 @@ def uncertainty(
         draws=draws,
         **_spreads(fitted, squeezes),
     )
+
+
+def _corner_errors(fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
+    """Return the relative errors of the parameters of a snap-through from the distance between two measurements.
+
+    A corner of the law lies anywhere between two measurements, and a bootstrap leaves it where it is.
+    """
+    values = {one.name: value for one, value in zip(fitted.candidate.free, fitted.values, strict=True)}
+    if "critical_m" not in values:
+        return np.zeros(len(fitted.values))
+    ways = [np.abs(np.diff(one.gap_m[one.sample])) for one in squeezes]
+    moving = np.concatenate([way[way > MOVING_SHARE * np.max(way)] for way in ways])
+    error_m = float(np.median(moving)) / math.sqrt(12.0 * len(squeezes))
+    along_n = error_m * (values["k1_n_m"] + values["k2_n_m"])
+    errors = {
+        "critical_m": error_m / values["critical_m"],
+        "fall_m": math.sqrt(2.0) * error_m / values["fall_m"],
+        "drop_n": along_n / values["drop_n"],
+    }
+    return np.array([errors.get(one.name, 0.0) if one.slot == SNAP else 0.0 for one in fitted.candidate.free])
 
 
 def _normal() -> float:
