@@ -114,8 +114,6 @@ def setting(
     if not meaning.strip():
         raise TypeError("a setting needs a meaning: say in a sentence what its value does")
     _refuse_two_limits(minimum, above, maximum, below)
-    if plausible is not None and not plausible[0] < plausible[1]:
-        raise TypeError(f"the plausible range {plausible} is empty: write (smallest, largest)")
     _check_origin(origin)
     plain_number = isinstance(default, int | float) and not isinstance(default, bool)
     number = bool(unit) or plausible is not None or plain_number
@@ -132,14 +130,21 @@ def setting(
         plausible=plausible,
         origin=origin,
     )
-    if plausible is not None and implausible(declaration, default):
-        raise TypeError(f"the default {default} is not in the plausible range {plausible}")
+    _check_plausible(declaration, default)
     metadata = {_DECLARATION: declaration, **(effect or {}), **({_FOLLOWS: follows} if follows else {})}
-    if gives:
-        metadata |= _gives(gives)
+    metadata |= _gives(gives) if gives else {}
     if factory is not None:
         return attrs.field(factory=factory, validator=check, metadata=metadata)
     return attrs.field(default=default, validator=check, metadata=metadata)
+
+
+def _check_plausible(declaration: Declaration, default: Any) -> None:
+    """Raise TypeError if the plausible range is empty, or does not contain the default."""
+    plausible = declaration.plausible
+    if plausible is not None and not plausible[0] < plausible[1]:
+        raise TypeError(f"the plausible range {plausible} is empty: write (smallest, largest)")
+    if implausible(declaration, default):
+        raise TypeError(f"the default {default} is not in the plausible range {plausible}")
 
 
 def _check_origin(origin: str) -> None:
