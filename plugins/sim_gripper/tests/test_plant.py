@@ -15,7 +15,14 @@ from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
 from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, solve_contact
 from graspsense_sim_gripper.dynamics.drive import Drive, Friction, sliding_friction, stribeck_excess
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState
-from graspsense_sim_gripper.stepping.scheme import MEAN_FORCE, TR_BDF2, VERLET, PlantParams, Steps
+from graspsense_sim_gripper.stepping.scheme import (
+    BOGACKI_SHAMPINE,
+    MEAN_FORCE,
+    TR_BDF2,
+    VERLET,
+    PlantParams,
+    Steps,
+)
 from graspsense_sim_gripper.terms.elastic import Elastic, elastic
 from graspsense_sim_gripper.terms.foam import Foam
 from graspsense_sim_gripper.terms.gas import Gas
@@ -356,7 +363,7 @@ def test_the_stops_hold_at_both_ends():
 
 
 @pytest.mark.parametrize("link", [LINK, STRAIGHT])
-@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE])
+@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE, BOGACKI_SHAMPINE])
 def test_what_is_pressed_at_the_closed_end_is_pressed_as_far_as_the_travel_goes(scheme, link):
     params = PlantParams(
         drive(link=link), thing(Elastic(1e4, 0.0), width=0.002), Steps(1e-3, scheme, growth=4.0)

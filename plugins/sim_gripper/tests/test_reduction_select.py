@@ -19,9 +19,10 @@ from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.problem import GraspController
 from graspsense_sim_gripper.reduction import levels, verify
 from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
-from graspsense_sim_gripper.reduction.levels import SCENE_SCALES, UNVERIFIED, LevelScale
+from graspsense_sim_gripper.reduction.levels import PLAIN_SCALES, SCENE_SCALES, UNVERIFIED, LevelScale
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
 from graspsense_sim_gripper.reduction.select import select
+from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE
 from graspsense_sim_gripper.terms import Term
 from graspsense_sim_gripper.terms.registry import TERMS
 
@@ -74,6 +75,7 @@ def test_what_the_paths_say_too_boldly_the_trial_grasp_takes_back(monkeypatch):
     spec, config = thing(SHELL, ("maxwell", {"k_n_m": 2000.0, "tau_s": 0.2})), evolve(CONFIG, accuracy=0.1)
     rash = LevelScale(5.0)
     monkeypatch.setattr(levels, "SCENE_SCALES", (rash, UNVERIFIED))
+    monkeypatch.setattr(levels, "PLAIN_SCALES", ())
     problem = problem_of(config, spec)
     assert propose(problem, grip_of(problem), rash).decisions[-1].decision != "kept"
     model = selected(config, spec, hybrid())
@@ -118,6 +120,7 @@ def test_a_law_that_hangs_on_its_steps_is_refused_by_name(monkeypatch):
     spec = thing(SHELL, ("ragged", {"k_n_m": 1000.0}))
     # The finest levels would find the same, and take seconds in the interpreter.
     monkeypatch.setattr(levels, "SCENE_SCALES", (UNVERIFIED,))
+    monkeypatch.setattr(levels, "PLAIN_SCALES", ())
     with pytest.raises(ConfigError) as refused:
         selected(CONFIG, spec, hybrid())
     said = str(refused.value)
@@ -191,9 +194,28 @@ def test_every_object_of_the_catalogue_has_a_model_of_ordinary_steps():
         for config in (CONFIG, evolve(CONFIG, spread=True)):
             model = selected(config, spec, hybrid())
             assert model.verification is not None, spec.name
-            ordinary = [scale.at(config.accuracy) for scale in SCENE_SCALES if scale.model > 0.0]
+            scales = (*PLAIN_SCALES, *SCENE_SCALES)
+            ordinary = [scale.at(config.accuracy) for scale in scales if scale.refinement == 1.0]
             # This one comes to rest so near to a tick that a tenth of the step tolerance has to tell which tick it is.
             assert (model.level in ordinary) != (spec.name == "odwalla_worn:full_open"), spec.name
+
+
+def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_is_not():
+    soft = thing(SHELL)
+    stiff = thing(("elastic", {"k1_n_m": 5e5}), ("maxwell", {"k_n_m": 2e5, "tau_s": 0.01}))
+    tight = selected(evolve(CONFIG, accuracy=1e-4), soft, hybrid())
+    assert tight.level == PLAIN_SCALES[0].at(1e-4)
+    assert tight.verification.error <= 0.8e-4
+    # Stiffer, the same accuracy needs the third order.
+    rigid = evolve(CONFIG, accuracy=1e-4, pad_stiffness_n_m=math.inf)
+    higher = selected(rigid, thing(("elastic", {"k1_n_m": 2e5})), hybrid())
+    assert higher.steps.scheme == BOGACKI_SHAMPINE
+    assert higher.verification.error <= 0.8e-4
+    controlled = selected(rigid, stiff, hybrid())
+    assert controlled.steps.tolerance < math.inf
+    # Steps without an estimate of their error are valid for the forces that were tried.
+    assert tight.valid_for(tight.point.force_n)
+    assert not tight.valid_for(10.0 * tight.point.force_n)
 
 
 def test_forced_steps_and_contacts_beyond_the_tick_are_not_verified():

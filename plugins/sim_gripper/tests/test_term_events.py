@@ -18,7 +18,7 @@ from graspsense_sim_gripper.compiled.compose import composed_move
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.stepping.scheme import MEAN_FORCE, TR_BDF2, VERLET
+from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, MEAN_FORCE, TR_BDF2, VERLET, Steps
 from graspsense_sim_gripper.terms import Term
 from graspsense_sim_gripper.terms.registry import TERMS
 
@@ -30,7 +30,7 @@ hertz_n_m15 = 2e7
 crush_force_n = 10.0
 broken_n_m = 2000.0
 """
-FORCED = {"tolerance": math.inf, "longest_s": 1e-3}
+FORCED = {"tolerance": math.inf, "longest_s": 1e-3, "growth": math.inf}
 
 
 def pressed(terms, config=None, seconds=0.1, effort_n=60.0, held=False, **steps):
@@ -48,7 +48,7 @@ def pressed(terms, config=None, seconds=0.1, effort_n=60.0, held=False, **steps)
 
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("forced", [{}, FORCED])
-@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE])
+@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE, BOGACKI_SHAMPINE])
 @pytest.mark.parametrize("pads_n_m", [3e4, math.inf])
 def test_a_rigid_body_breaks_at_its_crush_force(scheme, forced, held, pads_n_m):
     config = SimConfig(sensor="ideal", spread=False, open_gap_m=0.051, pad_stiffness_n_m=pads_n_m)
@@ -61,7 +61,7 @@ def test_a_rigid_body_breaks_at_its_crush_force(scheme, forced, held, pads_n_m):
 
 
 @pytest.mark.parametrize("forced", [{}, FORCED])
-@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE])
+@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE, BOGACKI_SHAMPINE])
 @pytest.mark.parametrize("held", [False, True])
 def test_an_object_of_any_terms_breaks_at_a_force(scheme, forced, held):
     terms = {
@@ -77,7 +77,7 @@ def test_an_object_of_any_terms_breaks_at_a_force(scheme, forced, held):
     assert state.step.unresolved + state.contact.unbalanced == 0
 
 
-@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE])
+@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE, BOGACKI_SHAMPINE])
 def test_an_object_breaks_at_a_compression(scheme):
     terms = {"elastic": {"k1_n_m": 5e3}, "fracture": {"compression_m": 1e-3}}
     state, forces = pressed(terms, scheme=scheme)
@@ -109,7 +109,7 @@ k1_n_m = 4000.0
     assert np.sqrt(np.mean((plain[:n] - reference[:n]) ** 2) / np.mean(reference[:n] ** 2)) < 0.01
 
 
-@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE])
+@pytest.mark.parametrize("scheme", [VERLET, TR_BDF2, MEAN_FORCE, BOGACKI_SHAMPINE])
 def test_a_shell_snaps_at_its_critical_compression(scheme):
     # Pads softer than the falling part of 20 kN/m, so that the shell jumps across it.
     shell = {"snap": {"k1_n_m": 5e3, "critical_m": 2e-3, "drop_n": 8.0, "fall_m": 4e-4, "k2_n_m": 100.0}}
@@ -118,6 +118,45 @@ def test_a_shell_snaps_at_its_critical_compression(scheme):
     assert state.contact.left.states[1].part == 2
     assert state.step.unresolved + state.contact.unbalanced == 0
     assert forces[-1] < 5.0
+
+
+@pytest.mark.parametrize(("scheme", "order"), [(VERLET, 2), (TR_BDF2, 2), (BOGACKI_SHAMPINE, 3)])
+@pytest.mark.parametrize("event", ["parting", "breaking", "snapping"])
+def test_steps_of_a_tick_keep_their_order_through_an_event(scheme, order, event):
+    # A motor without friction, whose steps have the order of the scheme if the event between them is located.
+    config = SimConfig(
+        sensor="ideal",
+        spread=False,
+        open_gap_m=0.0505,
+        coulomb_n=0.0,
+        breakaway_n=0.0,
+        load_friction_coefficient=0.0,
+        pad_stiffness_n_m=math.inf,
+    )
+    terms = {
+        "parting": {"elastic": {"k1_n_m": 2e5}},
+        "breaking": {"rigid": {"hertz_n_m15": 1e7, "crush_force_n": 40.0, "broken_n_m": 2e4}},
+        "snapping": {
+            "snap": {"k1_n_m": 5e4, "critical_m": 4e-4, "drop_n": 10.0, "fall_m": 4e-4, "k2_n_m": 1e5}
+        },
+    }[event]
+    spec = ObjectSpec(name="object", width_m=0.05, terms=tuple(terms.items()))
+    setup = unverified_setup(config, spec, 0)
+    move = composed_move(composition_of(config, setup, pad=False))
+
+    def end(n):
+        state = setup.state
+        plant = setup.plant._replace(steps=Steps(math.inf, scheme, 1e-3 / n, growth=math.inf))
+        for tick in range(90 if event != "parting" else 122):
+            effort_n = 60.0 if tick < 70 or event != "parting" else 0.0
+            state = move(plant, state, effort_n, 1e-3)
+        assert (state.contact.left_n == 0.0) == (event == "parting")
+        return state.motion.gap_m
+
+    exact = end(64)
+    coarse, fine = (abs(end(n) - exact) for n in (1, 4))
+    assert coarse < 1e-6
+    assert coarse / fine > 0.6 * 4.0**order
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The levels of reduction, in the order in which they are tried: from the largest tolerances to the smallest.
+"""The levels of reduction, in the order in which they are tried: a step per tick, then from large to small tolerances.
 
 Source: the table of levels in docs/numerics.md, section "Model reduction".
 """
@@ -8,17 +8,19 @@ from __future__ import annotations
 import math
 from typing import Final, Literal, NamedTuple
 
-from graspsense_sim_gripper.stepping.scheme import Steps
+from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, VERLET, Steps
 
 STEP_SHARE: Final = 0.34
 """The tolerance of a step is (0.34 accuracy)^1.5, so that the accumulated error of many steps is proportional to the
 accuracy, and smaller."""
 GROWTH_ACCURACY: Final = 0.1
 """From this accuracy upwards, a step in contact may be twice as long as the one before."""
+BY_SCENE: Final = -1
+"""The scheme follows from the scene, and its steps from their error."""
 
 
 class Level(NamedTuple):
-    """The tolerances of one level of reduction."""
+    """The tolerances of one level of reduction, and its steps."""
 
     model_tol: float
     """Largest relative change of the force that simplifications may cause; 0: every term is kept."""
@@ -26,6 +28,10 @@ class Level(NamedTuple):
     """The accuracy for which the steps are selected; `step_tolerance` of it is the tolerance of one step."""
     min_steps: int = 1
     """Smallest number of steps per tick."""
+    scheme: int = BY_SCENE
+    """The scheme of the steps, or BY_SCENE."""
+    plain: int = 0
+    """1: each tick is one step but for events, and no error is estimated."""
 
 
 class LevelScale(NamedTuple):
@@ -36,15 +42,28 @@ class LevelScale(NamedTuple):
     refinement: float = 1.0
     """The accuracy over `step_tol`: how much more exact the steps are than what is asked for."""
     min_steps: int = 1
-    """As in `Level`."""
+    """As in `Level`, like the next two."""
+    scheme: int = BY_SCENE
+    plain: int = 0
 
     def at(self, accuracy: float) -> Level:
         """Return the level for this accuracy."""
-        return Level(self.model * accuracy, accuracy / self.refinement, self.min_steps)
+        step_tol = accuracy / self.refinement
+        return Level(self.model * accuracy, step_tol, self.min_steps, self.scheme, self.plain)
 
 
 FULL_SCALES: Final = (LevelScale(0.0), LevelScale(0.0, 10.0, 4), LevelScale(0.0, 100.0, 32))
 """All terms, with smaller and smaller steps."""
+PLAIN_SCALES: Final = (
+    LevelScale(0.0, scheme=VERLET, plain=1),
+    LevelScale(0.0, scheme=BOGACKI_SHAMPINE, plain=1),
+)
+"""All terms, with a step per tick: they cost least. Where trial grasps show that they suffice, nothing is gained by a
+simpler model or by steps whose error is controlled."""
+THIRD_ORDER: Final = LevelScale(0.0, scheme=BOGACKI_SHAMPINE)
+"""All terms, with steps of third order whose error is controlled."""
+HIGH_ACCURACY: Final = 3e-3
+"""Down from this accuracy, steps of third order cost less than those of second order."""
 UNVERIFIED: Final = LevelScale(0.05)
 """The level of a model that no trial grasp verifies."""
 SPREAD_SCALES: Final = (LevelScale(0.3), UNVERIFIED, *FULL_SCALES)
@@ -61,12 +80,19 @@ REFERENCE_SCALES: Final = {
 
 
 def scales_for(
-    fidelity: Literal["scene", "full", "reference", "fixed"], spread: bool
+    fidelity: Literal["scene", "full", "reference", "fixed"], spread: bool, accuracy: float, explicit: bool
 ) -> tuple[LevelScale, ...]:
-    """Return the scales to try, in order. `spread`: whether instances differ from the nominal object."""
-    if fidelity != "scene":
-        return FULL_SCALES
-    return SPREAD_SCALES if spread else SCENE_SCALES
+    """Return the scales to try, in order. `spread`: whether instances differ from the nominal object.
+
+    `explicit`: whether the scene is not stiff, so that explicit schemes other than its own suit it too. With spread,
+    steps without an estimate of their error are not tried, since only the nominal object is verified.
+    """
+    own: tuple[LevelScale, ...] = FULL_SCALES
+    if fidelity == "scene":
+        own = SPREAD_SCALES if spread else SCENE_SCALES
+    if spread or not explicit:
+        return own
+    return (*PLAIN_SCALES, *((THIRD_ORDER,) if accuracy <= HIGH_ACCURACY else ()), *own)
 
 
 def step_tolerance(accuracy: float) -> float:
@@ -85,5 +111,11 @@ def step_growth(accuracy: float) -> float:
 
 def steps_for(level: Level, scheme: int, dt_s: float) -> Steps:
     """Return the step control of a level with this scheme, for ticks of `dt_s` seconds."""
+    if level.plain == 1:
+        return Steps(math.inf, scheme, dt_s, growth=math.inf)
     longest_s = dt_s / level.min_steps if level.min_steps > 1 else math.inf
-    return Steps(step_tolerance(level.step_tol), scheme, longest_s, growth=step_growth(level.step_tol))
+    tolerance = step_tolerance(level.step_tol)
+    if scheme == BOGACKI_SHAMPINE:
+        # The estimate is that of the second-order formula; the accumulated error of the third-order one is like it.
+        tolerance = STEP_SHARE * level.step_tol
+    return Steps(tolerance, scheme, longest_s, growth=step_growth(level.step_tol))

@@ -78,9 +78,9 @@ class Reduction:
     def valid_for(self, peak_n: float) -> bool:
         """Return whether the reduction is valid for a grasp with this peak force (N).
 
-        A reduction without error keeps every term, and is valid for every force.
+        A reduction without error keeps every term. It is valid for every force if the error of its steps is controlled.
         """
-        return peak_n <= self.max_force_n or self.error == 0.0
+        return peak_n <= self.max_force_n or (self.error == 0.0 and self.level.plain == 0)
 
     def with_exact_discretisation(self) -> Reduction:
         """Return the same reduction for a scene that is discretised exactly, without time steps."""

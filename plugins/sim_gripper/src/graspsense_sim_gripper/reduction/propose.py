@@ -19,6 +19,7 @@ from graspsense_sim_gripper.objects.spec import TermParams
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.reduction.candidates import named, simpler_pads, without_term
 from graspsense_sim_gripper.reduction.levels import (
+    BY_SCENE,
     FULL_SCALES,
     UNVERIFIED,
     LevelScale,
@@ -28,7 +29,7 @@ from graspsense_sim_gripper.reduction.levels import (
 )
 from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction, TermDecision
 from graspsense_sim_gripper.reduction.probe import Grip, damping, stiffness
-from graspsense_sim_gripper.stepping.scheme import MEAN_FORCE, TR_BDF2, VERLET, Steps
+from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, MEAN_FORCE, TR_BDF2, VERLET, Steps
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import NO_STATE, OwnContact, WorkingPoint, no_rates
 
@@ -53,7 +54,12 @@ MAX_SWING_RAD: Final = 1.0
 one radian. Longer steps see an oscillation at a few phases only, and the error estimate does not notice it."""
 MOST_SWING_STEPS: Final = 500
 """An oscillation that needs more steps a tick is not resolved: its term is dropped, and the reduction says so."""
-SCHEMES: Final = {VERLET: "Verlet", TR_BDF2: "TR-BDF2", MEAN_FORCE: "mean force"}
+SCHEMES: Final = {
+    VERLET: "Verlet",
+    TR_BDF2: "TR-BDF2",
+    MEAN_FORCE: "mean force",
+    BOGACKI_SHAMPINE: "Bogacki-Shampine",
+}
 
 
 def grip_of(problem: Problem, force_n: float | None = None, speed_m_s: float | None = None) -> Grip:
@@ -88,7 +94,9 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = UNVERIFIED) -> Red
     treatment, decisions, error, model = _reduce(grip, level.model_tol, too_fast)
     rate = (drive.friction.damping_n_s_m + damping(grip, model, dt_s)) / grip.mass_kg
     contact = _resolution(grip, dt_s, max(too_fast.values(), default=0.0))
-    scheme = _scheme(config.accuracy, rate, contact.number / dt_s, dt_s, config.coulomb_n > 0.0)
+    scheme = level.scheme
+    if scheme == BY_SCENE:
+        scheme = _scheme(config.accuracy, rate, contact.number / dt_s, dt_s, config.coulomb_n > 0.0)
     steps = steps_for(level, scheme, dt_s)
     fastest = max(_swings(grip, model).values(), default=0.0)
     if fastest > 0.0:
@@ -101,7 +109,7 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = UNVERIFIED) -> Red
         decisions=decisions,
         scheme=TermDecision(
             term="steps",
-            decision=SCHEMES[scheme],
+            decision=f"{SCHEMES[scheme]}, a step per tick" if level.plain == 1 else SCHEMES[scheme],
             what="damping rate times tick",
             number=rate * dt_s,
             error=config.accuracy * max(1.0 - scale.model, 0.0),
@@ -175,7 +183,7 @@ def _with_settings(steps: Steps, config: SimConfig) -> Steps:
     if config.scheme != "auto":
         steps = steps._replace(scheme=(steps.scheme or TR_BDF2) if config.scheme == "implicit" else VERLET)
     if config.step_s is not None:
-        steps = steps._replace(tolerance=math.inf, longest_s=float(config.step_s))
+        steps = steps._replace(tolerance=math.inf, longest_s=float(config.step_s), growth=math.inf)
     if config.fidelity == "reference":
         steps = steps._replace(
             tolerance=min(steps.tolerance, step_tolerance(REFERENCE_ACCURACY)),

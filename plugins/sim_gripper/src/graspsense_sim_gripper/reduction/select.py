@@ -2,7 +2,8 @@
 
 The first trial grasp uses the full model. It gives the speed at the first contact and the peak force, for which models
 are proposed. Each proposed model is then simulated in a trial grasp, and compared with a trial grasp in the full model
-with finer steps. Levels are tried from the largest tolerances to the smallest.
+with finer steps. A step per tick with every term is tried first, since it costs least; then levels from the largest
+tolerances to the smallest.
 
 A model that passes is tried twice more, with a controller that reads slightly larger and slightly smaller values of
 force and travel. This finds a threshold that is met so closely that an error of this size makes the grasp continue a
@@ -35,7 +36,7 @@ from graspsense_sim_gripper.reduction.verify import (
     TrialGrasps,
     trial_grasps,
 )
-from graspsense_sim_gripper.stepping.scheme import Steps
+from graspsense_sim_gripper.stepping.scheme import TR_BDF2, Steps
 from graspsense_sim_gripper.term_failure import raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
@@ -135,7 +136,8 @@ def _first_accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reducti
     least, quantity, grasps = math.inf, "", 1
     near_threshold: Sensitivity | None = None
     tried: set[tuple[tuple[str, ...], Steps]] = set()
-    for scale in scales_for(config.fidelity, config.spread):
+    own = propose(problem, grip, FULL_SCALES[0]).steps.scheme
+    for scale in scales_for(config.fidelity, config.spread, config.accuracy, own != TR_BDF2):
         if near_threshold and scale.at(config.accuracy).step_tol >= near_threshold.step_tol:
             continue
         reduction = propose(problem, grip, scale)
@@ -148,8 +150,14 @@ def _first_accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reducti
         grasps += 1
         if error <= _accepted(config) * config.accuracy:
             grasps += 2
-            near_threshold = trial.sensitivity(reduction, expected)
-            if error + near_threshold.change <= config.accuracy:
+            sensitivity = trial.sensitivity(reduction, expected)
+            near = error + sensitivity.change > config.accuracy
+            if scale.plain == 1:
+                # Steps whose error is controlled may still tell on which side of a threshold the grasp is.
+                near = near or not sensitivity.covers
+            else:
+                near_threshold = sensitivity
+            if not near:
                 return evolve(reduction, verification=Verification(error=error, quantity=of, grasps=grasps))
         elif error < least:
             least, quantity = error, of

@@ -92,6 +92,8 @@ class Sensitivity(NamedTuple):
     """The quantity with that change."""
     step_tol: float
     """The `step_tol` of the level."""
+    covers: bool
+    """Whether the error of the forces is as large as the difference of the two models."""
 
 
 class _Stage(NamedTuple):
@@ -145,11 +147,12 @@ class TrialGrasps:
         `expected` is the grasp in the full model. The grasp is simulated twice, with errors of either sign.
         """
         exact, scale = self.record(reduction), reduction.level.step_tol
-        force_n = max(SENSITIVITY * _force_difference_n(exact, expected), MIN_FORCE_ERROR_N * scale)
+        difference_n = _force_difference_n(exact, expected)
+        force_n = max(SENSITIVITY * difference_n, MIN_FORCE_ERROR_N * scale)
         force_n, travel = min(force_n, MAX_FORCE_ERROR_N * scale), TRAVEL_ERROR * scale
         others = [self.record(reduction, sign * force_n, sign * travel) for sign in (-1.0, 1.0)]
         change, quantity = max(deviation(other, exact) for other in others)
-        return Sensitivity(force_n, travel, change, quantity, scale)
+        return Sensitivity(force_n, travel, change, quantity, scale, difference_n <= force_n)
 
     def _grasp(self, reduction: Reduction, force_n: float, travel: float) -> GraspRecord:
         """Simulate what `record` returns. Raises NotCompilable."""

@@ -9,10 +9,12 @@ from graspsense.plugin_api import gap_and_rate
 from graspsense_sim_gripper.dynamics.contact import has_event, is_touched, restarted
 from graspsense_sim_gripper.dynamics.drive import Drive, is_held
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState
+from graspsense_sim_gripper.stepping.bogacki_shampine import bogacki_shampine
 from graspsense_sim_gripper.stepping.coast import coast
 from graspsense_sim_gripper.stepping.control import (
     FREE_GROWTH,
     MAX_STEPS,
+    MIN_CONTACT_STEP_S,
     MIN_STEP_S,
     accept,
     after_contact,
@@ -20,9 +22,10 @@ from graspsense_sim_gripper.stepping.control import (
     next_length,
     relative_error,
 )
-from graspsense_sim_gripper.stepping.events import first
+from graspsense_sim_gripper.stepping.events import first, parting
 from graspsense_sim_gripper.stepping.mean_force import mean_force
 from graspsense_sim_gripper.stepping.scheme import (
+    BOGACKI_SHAMPINE,
     TR_BDF2,
     VERLET,
     Attempt,
@@ -117,10 +120,16 @@ def take_step(
     else:
         attempt = attempt_of(params, start, effort_n, h)
         changes = contact.touched == 1 and has_event(contact, attempt.contact)
-        if (changes or steps.scheme != VERLET) and h > MIN_STEP_S and not forced:
-            fraction = BISECTION if changes else first(params, start, attempt)
+        duration = attempt.duration_s
+        if duration > MIN_STEP_S and not forced:
+            fraction = BISECTION
+            if not changes:
+                # The path of Verlet is known in advance, and it ends at the other events by itself.
+                fraction = parting(params, start, attempt)
+                if fraction == 0.0 and steps.scheme != VERLET:
+                    fraction = first(params, start, attempt)
             if fraction > 0.0:
-                retry = StepState(h * fraction, step.n_steps, step.unresolved)
+                retry = StepState(duration * fraction, step.n_steps, step.unresolved)
                 return PlantState(state.motion, contact, retry, state.effort_n, state.peak_n), 0.0
         attempt = _without_reversal(start, attempt)
         # A step across an event of a term has an error only where the force jumps, and none that shorter steps reduce.
@@ -132,6 +141,9 @@ def take_step(
         meets = state.motion.gap_m > start.meeting_m >= attempt.motion.gap_m
         if (changes or meets) and steps.tolerance < math.inf:
             after_step = after_contact(steps, after_step)
+        elif changes:
+            # The force is still that of the law before the event; a step this short takes over the one after it.
+            after_step = StepState(MIN_CONTACT_STEP_S, after_step.n_steps, after_step.unresolved)
         if changes:
             attempt = _after_event(attempt)
     return _completed(params, state, start, attempt, after_step), attempt.duration_s
@@ -160,6 +172,8 @@ def attempt_of(params: PlantParams, start: Start, effort_n: float, h: float) -> 
         return verlet(params, start, effort_n, h)
     if params.steps.scheme == TR_BDF2:
         return tr_bdf2(params, start, effort_n, h)
+    if params.steps.scheme == BOGACKI_SHAMPINE:
+        return bogacki_shampine(params, start, effort_n, h)
     return mean_force(params, start, effort_n, h)
 
 

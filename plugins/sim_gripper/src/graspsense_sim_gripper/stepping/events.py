@@ -11,7 +11,7 @@ from typing import Final
 from graspsense.plugin_api import gap_and_rate
 from graspsense_sim_gripper.dynamics.contact import CONTACT_TOL_M
 from graspsense_sim_gripper.dynamics.drive import ARREST_M_S
-from graspsense_sim_gripper.dynamics.state import Motion
+from graspsense_sim_gripper.dynamics.state import ContactState, Motion
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start, end_of_travel
 
 NEWTON_ITERATIONS: Final = 4
@@ -56,8 +56,6 @@ def first(params: PlantParams, start: Start, attempt: Attempt) -> float:
     revolutions1, speed1, gap1, jacobian1 = attempt.motion
     direction, meeting = start.direction, start.meeting_m
     end = end_of_travel(params.drive, direction)
-    load = 0.5 * (start.contact.left_n + start.contact.right_n)
-    load1 = 0.5 * (attempt.contact.left_n + attempt.contact.right_n)
     fraction = 0.0
     if gap > meeting and gap1 < meeting - CONTACT_TOL_M:
         fraction = (gap - meeting) / (gap - gap1)
@@ -65,10 +63,31 @@ def first(params: PlantParams, start: Start, attempt: Attempt) -> float:
         fraction = (end - revolutions) / (revolutions1 - revolutions)
     elif speed1 * direction < 0.0 and speed != 0.0 and abs(speed1 * jacobian1) >= ARREST_M_S:
         fraction = abs(speed) / (abs(speed) + abs(speed1))
-    elif load > 0.0 and load1 == 0.0 and gap1 > gap:
-        # Released on the way: beyond the end of the recovering object nothing drives the fingers.
-        surface = params.object.width_m - attempt.contact.left.compression_m - attempt.contact.left.pad_m
-        beyond = gap1 - surface
-        if beyond > CONTACT_TOL_M:
-            fraction = max(1.0 - beyond / (gap1 - gap), MIN_FRACTION)
     return min(max(fraction, MIN_FRACTION), MAX_FRACTION) if fraction > 0.0 else 0.0
+
+
+def parting(params: PlantParams, start: Start, attempt: Attempt) -> float:
+    """Return the fraction of a step at which a finger leaves the object that it pressed, 0 if none does.
+
+    Beyond the end of the recovering object nothing drives the fingers.
+    """
+    gap, gap1 = start.motion.gap_m, attempt.motion.gap_m
+    before, after = start.contact, attempt.contact
+    left = before.left.force_n > 0.0 and after.left.force_n == 0.0
+    right = before.right.force_n > 0.0 and after.right.force_n == 0.0
+    if not (left or right) or gap1 <= gap:
+        return 0.0
+    model = params.object
+    shift = 2.0 * after.offset_m if model.held == 1 else 0.0
+    beyond = _gap_beyond(after.left, gap1 - model.width_m + shift) if left else 0.0
+    if right:
+        beyond = max(beyond, _gap_beyond(after.right, gap1 - model.width_m - shift))
+    if beyond <= CONTACT_TOL_M:
+        return 0.0
+    return min(max(1.0 - beyond / (gap1 - gap), MIN_FRACTION), MAX_FRACTION)
+
+
+def _gap_beyond(half: ContactState, opened_m: float) -> float:
+    """Return by how much (m) the fingers have opened beyond the end of this half, when they are `opened_m` wider than
+    the unloaded object."""
+    return opened_m + half.compression_m + half.pad_m

@@ -22,7 +22,8 @@ from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
 VERLET: Final = 0
 TR_BDF2: Final = 1
 MEAN_FORCE: Final = 2
-"""The schemes: velocity Verlet, TR-BDF2, and the discrete gradient (see the modules of these names)."""
+BOGACKI_SHAMPINE: Final = 3
+"""The schemes: velocity Verlet, TR-BDF2, the discrete gradient, a Runge-Kutta pair (see the modules of these names)."""
 SPEED_SCALE_M_S: Final = 1e-3
 FORCE_SCALE_N: Final = 1.0
 """Errors are relative to the speed and the force, or to these values if those are smaller."""
