@@ -6,6 +6,7 @@ import tomllib
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from graspsense.plugin_api import ConfigError, RecordedSqueeze, Trace
 from graspsense_sim_gripper.dynamics.contact import PadCompliance
@@ -16,6 +17,7 @@ from graspsense_sim_gripper.identify.fracture import fracture_of
 from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import prepared
 from graspsense_sim_gripper.identify.refuse import shows_memory
+from graspsense_sim_gripper.identify.run import _used
 from graspsense_sim_gripper.objects.spec import parse_scene
 
 PADS = PadCompliance(15000.0, 0.0, 0.0, 1.0)
@@ -58,8 +60,6 @@ def scale_of(squeeze) -> DataScale:
 
 
 def with_forces(squeeze, forces):
-    from attrs import evolve
-
     return evolve(squeeze, force_n=forces)
 
 
@@ -94,6 +94,27 @@ def test_a_path_begins_before_a_contact_whose_force_rises_slowly():
     foam = static_candidates(scale_of(squeeze))[4]
     # Begun in contact, the first sample has a force that no law explains, which biased the exponent.
     assert fit(ForwardModel(pads=RIGID_PADS), foam, [squeeze]).values[1] == pytest.approx(3.0, rel=1e-3)
+
+
+def test_every_force_has_the_error_of_the_scale_of_the_force_and_no_length_or_time_has():
+    scale = scale_of(prepared(recorded(), 0.0))
+    laws = [*static_candidates(scale), *memories(scale)]
+    of = {one.name: one.is_force for law in laws for one in law.free}
+    assert {name for name, is_force in of.items() if not is_force} == {
+        "exponent",
+        "tau_s",
+        "critical_m",
+        "fall_m",
+    }
+
+
+def test_of_many_recordings_thirty_of_as_many_objects_as_possible_are_used():
+    squeezes = [evolve(recorded(), name=str(i), instance=f"cup#{i % 20}") for i in range(80)]
+    used, (note,) = _used(squeezes)
+    assert len(used) == 30
+    assert {one.instance for one in used} == {f"cup#{i}" for i in range(20)}
+    assert "30 of the 80 recordings" in note
+    assert _used(squeezes[:30]) == (squeezes[:30], [])
 
 
 def test_a_recording_without_contact_is_refused():

@@ -174,10 +174,22 @@ def _fingertips(config: SimConfig) -> dict[str, float]:
 
 
 def _scale_error(config: SimConfig, drive: Drive, squeezes: Sequence[Squeeze]) -> float:
-    """Return the relative standard deviation of the share: that of the Coulomb friction over the mean force."""
-    mean_n = 0.5 * float(np.median([one.peak_n for one in squeezes]))
+    """Return the relative standard deviation of the share: that of the Coulomb friction over the mean force.
+
+    The mean is over the way of the fingers, as in the balance of energy that the share follows from.
+    """
+    mean_n = float(np.median([_mean_over_way(one) for one in squeezes]))
     single = config.coulomb_spread_n / ((1.0 + drive.friction.load_friction_coefficient) * mean_n)
     return float(single / math.sqrt(len(squeezes)))
+
+
+def _mean_over_way(squeeze: Squeeze) -> float:
+    """Return the mean force during the compression, over the way of the fingers."""
+    gap = squeeze.gap_m[squeeze.sample]
+    closing = slice(0, int(np.argmin(gap)) + 1)
+    force, way = squeeze.force_n[closing], gap[closing]
+    work_j = -float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(way)))
+    return max(work_j / squeeze.depth_m, 0.1 * squeeze.peak_n)
 
 
 def _with_share(squeeze: Squeeze, share: float) -> Squeeze:
