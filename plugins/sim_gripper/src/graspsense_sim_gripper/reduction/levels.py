@@ -84,7 +84,7 @@ def scales_for(
 ) -> tuple[LevelScale, ...]:
     """Return the scales to try, in order. `spread`: whether instances differ from the nominal object.
 
-    `explicit`: whether the scene is not stiff, so that explicit schemes other than its own suit it too. With spread,
+    `explicit`: whether explicit schemes suit the scene: it is neither stiff nor discretised exactly. With spread,
     steps without an estimate of their error are not tried, since only the nominal object is verified.
     """
     own: tuple[LevelScale, ...] = FULL_SCALES

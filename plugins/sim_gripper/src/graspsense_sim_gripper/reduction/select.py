@@ -21,9 +21,11 @@ from attrs import evolve
 
 from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.exact.discretise import why_not_exact
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.problem import GraspController, Problem
 from graspsense_sim_gripper.reduction.cache import ReductionCache
+from graspsense_sim_gripper.reduction.candidates import reduced
 from graspsense_sim_gripper.reduction.error import deviation
 from graspsense_sim_gripper.reduction.levels import FULL_SCALES, REFERENCE_SCALES, LevelScale, scales_for
 from graspsense_sim_gripper.reduction.model import DROPPED, Reduction, TermDecision, Verification
@@ -136,8 +138,7 @@ def _first_accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reducti
     least, quantity, grasps = math.inf, "", 1
     near_threshold: Sensitivity | None = None
     tried: set[tuple[tuple[str, ...], Steps]] = set()
-    own = propose(problem, grip, FULL_SCALES[0]).steps.scheme
-    for scale in scales_for(config.fidelity, config.spread, config.accuracy, own != TR_BDF2):
+    for scale in scales_for(config.fidelity, config.spread, config.accuracy, _suits_explicit(problem, grip)):
         if near_threshold and scale.at(config.accuracy).step_tol >= near_threshold.step_tol:
             continue
         reduction = propose(problem, grip, scale)
@@ -170,6 +171,14 @@ def _first_accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reducti
         with suppress(ConfigError):
             return evolve(_select(finer, evolve(trial)), accuracy=config.accuracy)
     raise ConfigError(_undecided(problem, near_threshold))
+
+
+def _suits_explicit(problem: Problem, grip: Grip) -> bool:
+    """Return whether explicit steps suit the full model: it is neither stiff nor linear (which takes no steps)."""
+    full = propose(problem, grip, FULL_SCALES[0])
+    if full.steps.scheme == TR_BDF2 or problem.nominal is None:
+        return False
+    return bool(why_not_exact(problem.model_config, reduced(problem.nominal, full)))
 
 
 def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:
