@@ -142,6 +142,22 @@ PRIORS: Final = (
         reason="how well a person centres a container; with more, some would not fit between the open fingers",
     ),
     Prior(
+        name="pad_stiffness_n_m",
+        unit="N/m",
+        law="loguniform",
+        args=(1e4, 1e5),
+        origin="assumed",
+        reason="the cover of a fingertip at small forces: no measurement, so a factor of ten is free",
+    ),
+    Prior(
+        name="cell_curvature",
+        unit="1",
+        law="uniform",
+        args=(-0.15, 0.3),
+        origin="assumed",
+        reason="relative error of a pad's force at 10 N, in proportion to the force: cells are nonlinear either way",
+    ),
+    Prior(
         name="one_state",
         unit="1",
         law="uniform",
@@ -175,7 +191,7 @@ EXPLANATIONS: Final = {
         0.4,
         4.0,
         "the friction of the drive varies more between trials",
-        "its effect on the features does not grow with the force",
+        "its effect on the features does not grow with the force; absent, it is that of the default gripper",
     ),
     "pressure": Explanation(
         "share_pressure",
@@ -193,6 +209,14 @@ EXPLANATIONS: Final = {
         "17, 20 and 23 N were the first, second and third squeeze of one placement",
         "share of the offset that a squeeze leaves: the fingers centre the container",
     ),
+    "hardening": Explanation(
+        "1 / pad_hardening_m",
+        "1/m",
+        0.0,
+        5000.0,
+        "the pads stiffen with the force",
+        "at full strength a pad has twice the force of a linear spring at 0.2 mm: thin rubber on metal",
+    ),
 }
 """Explanations by name. Each is one figure of the posterior, whose prior is uniform from 0 to 1."""
 
@@ -202,6 +226,8 @@ FORCES_N: Final = (17.0, 20.0, 23.0)
 PLACEMENT_NODES: Final = ((-(3.0**0.5), 1 / 6), (0.0, 2 / 3), (3.0**0.5, 1 / 6))
 """Three values with probabilities that have the first five moments of a standard normal number: stiffness differs
 between placements by these, so that a container needs three scenes."""
+REFERENCE_N: Final = 10.0
+"""Force on a pad for which `cell_curvature` is the relative error."""
 SPLIT: Final = 0.9
 """A claim that a feature separates two groups is met from this share on, as in the claims of the paper."""
 CONTAINERS: Final = tuple(TRIALS)
@@ -233,6 +259,7 @@ class Trials(NamedTuple):
 
 def config_of(values: Values) -> SimConfig:
     """Return the settings of the gripper with these figures."""
+    hardening = strength("hardening", values)
     return SimConfig(
         fidelity="fixed",
         scheme="explicit",
@@ -240,7 +267,23 @@ def config_of(values: Values) -> SimConfig:
         breakaway_n=values["coulomb_n"] + 1.0,
         load_friction_coefficient=values["load_friction_coefficient"],
         coulomb_spread_n=strength("friction", values),
+        pad_stiffness_n_m=values["pad_stiffness_n_m"],
+        pad_hardening_m=1.0 / hardening if hardening > 0.0 else None,
     )
+
+
+def with_nonlinear_cells(extract: Callable[[Trace], Any], curvature: float) -> Callable[[Trace], Any]:
+    """Return an extraction that sees the forces as cells with this nonlinearity show them."""
+
+    def shown(force_n: Any) -> Any:
+        return force_n * (1.0 + curvature / REFERENCE_N * force_n)
+
+    def extracted(trace: Trace) -> Any:
+        return extract(
+            evolve(trace, force_left_n=shown(trace.force_left_n), force_right_n=shown(trace.force_right_n))
+        )
+
+    return extracted
 
 
 def scene_of(name: str, values: Values, force_n: float, node: float) -> str:
@@ -315,7 +358,7 @@ def squeeze(
         create("controller", "hybrid", probing_force_n=force_n),
         scenes,
         [first + k for k in range(len(planned))],
-        extract=extract,
+        extract=with_nonlinear_cells(extract, values["cell_curvature"]),
         traces=False,
         compiled=True,
         workers=1,

@@ -1,20 +1,31 @@
-"""A posterior of the uncertain figures of the simulator, given the paper's results at 20 N. Simulated.
+"""A posterior of the uncertain figures of the simulator, given results of the paper. Simulated.
 
-    python benchmarks/posterior.py --out FOLDER [--particles 50] [--generations 5] [--minutes 60] [--short]
+    python benchmarks/posterior.py --out FOLDER [--particles 150] [--generations 6] [--minutes 30] [--short]
     python benchmarks/posterior.py --out FOLDER --markdown docs/posterior.md
 
 It infers the figures of `paper_model.PRIORS`, with the explanations of `paper_model.EXPLANATIONS`, by approximate
-Bayesian computation with sequential Monte Carlo (pyABC; T. Toni et al., J. R. Soc. Interface 6 (2009) 187). The data
-are Tables II and III of Chitta, Piccoli and Sturm (2010) and what the paper says of 20 N. Each simulation is one
-replicate with the numbers of trials of the paper. The distance is the root of the sum of squared differences in
-standard deviations of the published figures.
+Bayesian computation with sequential Monte Carlo (pyABC; T. Toni et al., J. R. Soc. Interface 6 (2009) 187). Each
+simulation is one replicate with the numbers of trials of the paper. The distance is the root of the sum of squared
+differences in standard deviations of the published figures.
 
-From the particles it predicts what was not used: Tables IV and V, section III.F, Figs. 4 to 6 and the splits of the
-authors' tree at 23 N. Each explanation of the rise of the rate with the force is on or off with equal prior
-probability, so the posterior odds are its Bayes factor.
+Every figure is inferred as its normal score: the quantile of a standard normal number at the probability that its
+prior gives it. All priors are then alike and unbounded. New particles are drawn from a normal distribution with the
+moments of the last generation, mixed with the prior (`NormalScores`), which keeps the weights bounded.
 
-Simulation-based calibration: each simulation from the prior is taken as the data in turn. The rank of its figures among
-those of the nearest other simulations should be uniformly distributed.
+The sample is the simulations of all generations that are nearest to the data, each weighted by its prior density over
+that of the mixture of all proposals (A. Owen and Y. Zhou, J. Am. Stat. Assoc. 95 (2000) 135). It is adjusted to the
+data by linear regression of the normal scores on the simulated figures (M. A. Beaumont, W. Zhang and D. J. Balding,
+Genetics 162 (2002) 2025).
+
+The data are Tables II and III of Chitta, Piccoli and Sturm (2010) and what the paper says of 20 N. From the particles
+it predicts what was not used: Tables IV and V, section III.F, Figs. 4 to 6 and the authors' tree at 23 N.
+Each explanation of the rise of the rate with the force is on or off with equal prior probability, so the posterior odds
+are its Bayes factor. With the rates of Table IV as data too, the odds are those of a logistic regression over the
+particles, at the printed rates (M. A. Beaumont, in Simulations, Genetics and Human Prehistory (2008) 135).
+
+Simulation-based calibration: each simulation from the prior is taken as the data in turn, and its posterior is made
+from the nearest other simulations, with the same weights and adjustment. The ranks of the true figures should be
+uniform.
 
 Every step is kept in FOLDER, and a run that was stopped continues there; `--minutes` limits the time of the inference.
 The result is `result.json`; `--markdown` writes the page from it. `--short` uses the least work, to show that it runs.
@@ -32,8 +43,10 @@ import platform
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
-from datetime import date, timedelta
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from datetime import date
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -45,7 +58,9 @@ except ModuleNotFoundError:
     print("not run: needs pyabc (pip install graspsense[inference])")
     sys.exit(0)
 
+import pandas as pd
 from attrs import frozen
+from normal_scores import NormalScores, adjusted
 from paper_model import (
     EXPLANATIONS,
     NAMES,
@@ -58,7 +73,10 @@ from paper_model import (
     predictions,
     rates_at_20_n,
 )
+from scipy.stats import norm
+from sklearn.linear_model import LogisticRegression
 
+from graspsense.evaluation.intervals import Z
 from graspsense.experiments.paper.published import published
 from graspsense.inference import (
     Prior,
@@ -76,6 +94,11 @@ NEAREST: Final = 0.2
 BINS: Final = 5
 """Parts of a rank histogram."""
 SEEDS: Final = 1_000_000
+SIMULATIONS: Final = "simulations.jsonl"
+BOOTSTRAPS: Final = 400
+"""Resamplings of the particles for the interval of a logistic regression."""
+FARTHEST: Final = 5.0
+"""Normal scores beyond this count as this, so that no figure is at the end of an unbounded prior."""
 
 Simulate = Callable[[Mapping[str, float]], dict[str, float]]
 
@@ -86,6 +109,7 @@ class Size(NamedTuple):
     particles: int
     generations: int
     minutes: float
+    """Limit of the time of the inference."""
     predicted: int
     """Particles that are predicted from, at most."""
     alone: int
@@ -113,30 +137,98 @@ def prior_of(name: str) -> Prior:
     return Prior(name=name, unit="1", law="uniform", args=(0.0, 1.0), origin="assumed", reason=reason)
 
 
-def abc_of(simulate: Simulate, size: Size) -> pyabc.ABCSMC:
-    """Return the inference, which is the same for the simulator and for its calibration."""
-    priors = {name: pyabc.RV(prior_of(name).law, *prior_of(name).args) for name in NAMES}
-    weights = {name: 1.0 / one.deviation for name, one in observed().items()}
+def values_at(scores: Mapping[str, float]) -> dict[str, float]:
+    """Return the figures with these normal scores."""
+    return {
+        name: float(_LAWS[name].ppf(norm.cdf(np.clip(scores[name], -FARTHEST, FARTHEST)))) for name in NAMES
+    }
+
+
+_LAWS: Final = {name: prior_of(name).distribution() for name in NAMES}
+
+
+def abc_of(
+    simulate: Simulate, names: Sequence[str], wanted: Mapping[str, Observed], particles: int
+) -> pyabc.ABCSMC:
+    """Return the inference of normal scores with these names, given these data."""
     return pyabc.ABCSMC(
         simulate,
-        pyabc.Distribution(priors),
-        pyabc.PNormDistance(p=2, fixed_weights=weights),
-        population_size=size.particles,
+        pyabc.Distribution({name: pyabc.RV("norm", 0.0, 1.0) for name in names}),
+        pyabc.PNormDistance(p=2, fixed_weights={name: 1.0 / one.deviation for name, one in wanted.items()}),
+        population_size=particles,
+        transitions=NormalScores(),
         eps=pyabc.MedianEpsilon(),
         sampler=pyabc.SingleCoreSampler(),
     )
 
 
-def sample_of(history: pyabc.History) -> Weighted:
-    """Return the particles of the last generation."""
-    frame, weights = history.get_distribution()
-    rows = [{name: float(row[name]) for name in NAMES} for _, row in frame.iterrows()]
-    return Weighted(rows, [float(w) for w in weights])
+class Sample(NamedTuple):
+    """The accepted simulations: normal scores adjusted to the data, and before, weights, figures and distances."""
+
+    scores: Any
+    before: Any
+    weights: Any
+    statistics: list[dict[str, float]]
+    distances: Any
+
+
+def mixture_weights(scores: Any, proposed_in: Any, history: pyabc.History, names: Sequence[str]) -> Any:
+    """Return the weight of each simulation: the density of the prior over that of the mixture of all proposals.
+
+    `scores` has the shape (simulations, figures). `proposed_in` is 0 for a simulation from the prior, and k for one
+    that was proposed from the moments of generation k - 1.
+    """
+    prior = norm.logpdf(scores).sum(axis=1)
+    density = np.zeros(len(scores))
+    for k in sorted(set(proposed_in.tolist())):
+        share = float(np.mean(proposed_in == k))
+        if k == 0:
+            density += share
+            continue
+        frame, w = history.get_distribution(t=k - 1)
+        proposal = NormalScores()
+        proposal.fit(frame[list(names)], np.asarray(w))
+        density += share * proposal.pdf(pd.DataFrame(scores, columns=list(names))) / np.exp(prior)
+    return 1.0 / density
+
+
+def nearest(
+    simulations: Sequence[Mapping[str, Any]],
+    history: pyabc.History,
+    names: Sequence[str],
+    wanted: Mapping[str, Observed],
+    accepted: int,
+) -> Sample:
+    """Return the simulations that are nearest to the data, weighted and adjusted."""
+    scores = np.array([[one["scores"][name] for name in names] for one in simulations])
+    weights = mixture_weights(scores, np.array([one["t"] for one in simulations]), history, names)
+    off = np.array(
+        [[(s["statistics"][k] - o.value) / o.deviation for k, o in wanted.items()] for s in simulations]
+    )
+    distances = np.linalg.norm(off, axis=1)
+    # By chance among each other, so that any part of them is a sample too.
+    near = np.random.default_rng(0).permutation(np.argsort(distances)[:accepted])
+    return Sample(
+        scores=adjusted(scores[near], off[near], weights[near]),
+        before=scores[near],
+        weights=weights[near],
+        statistics=[dict(simulations[i]["statistics"]) for i in near],
+        distances=distances[near],
+    )
+
+
+def sample_of(scores: Any, w: Any) -> Weighted:
+    """Return the figures of particles with these normal scores."""
+    rows = [values_at(dict(zip(NAMES, row, strict=True))) for row in scores]
+    return Weighted(rows, [float(one) for one in w])
 
 
 def least_epsilon() -> float:
-    """Return the distance that two replicates of the same model have on average; less is not to be asked for."""
-    return math.sqrt(len(observed()))
+    """Return the distance of two replicates of the same model: the root mean square; less is not to be asked for.
+
+    Claims without a number do not count: where they are met, they add nothing.
+    """
+    return math.sqrt(2.0 * sum(one.value > 0.0 for one in observed().values()))
 
 
 @frozen
@@ -157,42 +249,48 @@ class Folder:
             file.write(json.dumps(line) + "\n")
 
 
+class OutOfTime(Exception):
+    """The time of the inference is over."""
+
+
 def infer(folder: Folder, size: Size, say: Callable[[str], None]) -> pyabc.History:
     """Run the inference, or continue it, until it has its generations or its time is over."""
+    wanted = observed()
 
     # Another state of the generators after each start, so that a continued run does not repeat its seeds.
-    state = len(folder.lines("simulations.jsonl")) + 1
+    state = len(folder.lines(SIMULATIONS)) + 1
     rng = np.random.default_rng(state)
     np.random.seed(state)  # noqa: NPY002 (pyABC draws from it)
 
-    def simulate(values: Mapping[str, float]) -> dict[str, float]:
-        plain = {name: float(values[name]) for name in NAMES}
-        statistics = rates_at_20_n(plain, int(rng.integers(SEEDS)))
-        folder.add("simulations.jsonl", {"values": plain, "statistics": statistics})
+    end = time.monotonic() + 60.0 * size.minutes
+
+    def simulate(scores: Mapping[str, float]) -> dict[str, float]:
+        if time.monotonic() > end:
+            raise OutOfTime
+        plain = {name: float(scores[name]) for name in NAMES}
+        statistics = rates_at_20_n(values_at(plain), int(rng.integers(SEEDS)))
+        folder.add(SIMULATIONS, {"t": int(abc.history.max_t) + 1, "scores": plain, "statistics": statistics})
         return statistics
 
-    abc = abc_of(simulate, size)
+    abc = abc_of(simulate, NAMES, wanted, size.particles)
     database = folder.path / "abc.db"
     begun = database.exists()
-    wanted = {name: one.value for name, one in observed().items()}
+    published = {name: one.value for name, one in wanted.items()}
     url = f"sqlite:///{database}"
-    history = abc.load(url, 1, wanted) if begun else abc.new(url, wanted)
+    history = abc.load(url, 1, published) if begun else abc.new(url, published)
     left = size.generations - (history.n_populations if begun else 0)
     if left > 0:
-        history = abc.run(
-            minimum_epsilon=least_epsilon(),
-            max_nr_populations=left,
-            max_walltime=timedelta(minutes=size.minutes),
-        )
+        with suppress(OutOfTime):
+            history = abc.run(minimum_epsilon=least_epsilon(), max_nr_populations=left)
     say(f"{history.n_populations} generations, {history.total_nr_simulations} simulations")
     return history
 
 
 def predict(
-    folder: Folder, sample: Weighted, generation: int, most: int, say: Callable[[str], None]
+    folder: Folder, sample: Weighted, simulations: int, most: int, say: Callable[[str], None]
 ) -> list[dict[str, float]]:
     """Return one replicate of the predictions of each particle, or of the first `most`, whose order is by chance."""
-    name = f"predictions-{generation}.jsonl"
+    name = f"predictions-{simulations}.jsonl"
     done = folder.lines(name)
     for k in range(len(done), min(len(sample.values), most)):
         done.append(predictions(sample.values[k], SEEDS + k))
@@ -202,40 +300,46 @@ def predict(
     return done
 
 
-def gains_alone(folder: Folder, sample: Weighted, generation: int, draws: int) -> dict[str, list[float]]:
-    """Return how much each explanation alone, at full strength, raises the rate from 17 to 23 N, and `none` of them.
+def gains_alone(folder: Folder, sample: Weighted, simulations: int, draws: int) -> dict[str, list[float]]:
+    """Return how much each explanation alone, at full strength, raises the rate from 17 to 23 N, `none` and `all`.
 
     Each list has one replicate for each of `draws` particles, which are drawn by their weights.
     """
-    name = f"alone-{generation}.jsonl"
+    name = f"alone-{simulations}.jsonl"
     done = folder.lines(name)
     drawn = np.random.default_rng(0).choice(len(sample.values), draws, p=sample.weight)
+    cases = {
+        "none": {},
+        **{one: {one: 1.0} for one in EXPLANATIONS},
+        "all": dict.fromkeys(EXPLANATIONS, 1.0),
+    }
     for k in range(len(done), draws):
         none = {**sample.values[drawn[k]], **dict.fromkeys(EXPLANATIONS, 0.0)}
-        gains = {"none": gain(none, SEEDS + k)}
-        gains.update({one: gain({**none, one: 1.0}, SEEDS + k) for one in EXPLANATIONS})
-        folder.add(name, gains)
-        done.append(gains)
-    return {one: [gains[one] for gains in done] for one in ("none", *EXPLANATIONS)}
+        done.append({case: gain({**none, **on}, SEEDS + k) for case, on in cases.items()})
+        folder.add(name, done[-1])
+    return {case: [gains[case] for gains in done] for case in cases}
 
 
-def calibrate(simulations: list[dict[str, Any]]) -> dict[str, list[float]]:
+def calibrate(simulations: list[dict[str, Any]], weights: Any) -> dict[str, list[float]]:
     """Return the rank of the true figures of each simulation in their posterior, given its statistics as data.
 
-    The simulations are draws from the prior. The posterior of one is the share `NEAREST` of all others that are nearest
-    to it, which is rejection at that tolerance.
+    The true ones are those that were drawn from the prior. The posterior of one is the share `NEAREST` of all others
+    that are nearest to it, weighted and adjusted as the sample is.
     """
     deviations = {name: one.deviation for name, one in observed().items()}
-    data = np.array([[s["statistics"][name] / d for name, d in deviations.items()] for s in simulations])
-    values = {name: np.array([s["values"][name] for s in simulations]) for name in NAMES}
+    seen = np.array([[s["statistics"][name] / d for name, d in deviations.items()] for s in simulations])
+    scores = np.array([[s["scores"][name] for name in NAMES] for s in simulations])
     ranks: dict[str, list[float]] = {name: [] for name in NAMES}
     accepted = max(2, round(NEAREST * (len(simulations) - 1)))
-    for k, row in enumerate(data):
-        distances = np.linalg.norm(data - row, axis=1)
+    for k, row in enumerate(seen):
+        if simulations[k]["t"] != 0:
+            continue
+        distances = np.linalg.norm(seen - row, axis=1)
         distances[k] = np.inf
         near = np.argsort(distances)[:accepted]
-        for name, of in ranks.items():
-            of.append(rank_of(values[name][k], values[name][near], np.ones(accepted)))
+        posterior = adjusted(scores[near], seen[near] - row, weights[near])
+        for i, name in enumerate(NAMES):
+            ranks[name].append(rank_of(scores[k, i], posterior[:, i], weights[near]))
     return ranks
 
 
@@ -274,55 +378,51 @@ def summarise(
     folder: Folder, history: pyabc.History, size: Size, say: Callable[[str], None]
 ) -> dict[str, Any]:
     """Return the result as JSON values."""
-    sample = sample_of(history)
-    generation = int(history.max_t)
-    predicted = predict(folder, sample, generation, size.predicted, say)
-    alone = gains_alone(folder, sample, generation, size.alone)
+    simulations = folder.lines(SIMULATIONS)
+    nearby = nearest(simulations, history, NAMES, observed(), size.particles)
+    w = nearby.weights
+    sample = sample_of(nearby.scores, w)
+    predicted = predict(folder, sample, len(simulations), size.predicted, say)
+    alone = gains_alone(folder, sample, len(simulations), size.alone)
     say("explanations alone")
+    from_each = Counter(one["t"] for one in simulations)
+    scores = np.array([[one["scores"][name] for name in NAMES] for one in simulations])
+    every = mixture_weights(scores, np.array([one["t"] for one in simulations]), history, NAMES)
     populations = history.get_all_populations()
-    used = populations[populations["t"] >= 0]
-    from_prior = int(populations[populations["t"] <= 0]["samples"].sum())
-    ranks = calibrate(folder.lines("simulations.jsonl")[:from_prior])
-    w = sample.weight
-    distances = history.get_weighted_distances(generation)
+    w_predicted = sample.weight[: len(predicted)]
     return {
         "simulated": True,
         "date": date.today().isoformat(),
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}",
         "pyabc": pyabc.__version__,
-        "particles": len(sample.values),
-        "generations": history.n_populations,
-        "simulations": int(history.total_nr_simulations),
+        "particles": len(w),
+        "simulations": len(simulations),
         "effective_sample_size": effective_sample_size(w),
-        "epsilon": [float(one) for one in used["epsilon"]],
-        "simulations_by_generation": [int(one) for one in used["samples"]],
+        "generation_epsilon": [float(one) for one in populations["epsilon"][populations["t"] >= 0]],
+        "simulations_by_proposal": [from_each[t] for t in sorted(from_each)],
+        "epsilon": float(nearby.distances.max()),
         "least_epsilon": least_epsilon(),
-        "median_distance": weighted_quantiles(distances["distance"], distances["w"], (0.5,))[0],
+        "median_distance": weighted_quantiles(nearby.distances, w, (0.5,))[0],
+        "moved": float(np.average(np.abs(nearby.scores - nearby.before).mean(axis=1), weights=w)),
         "conditioned_on": {name: one._asdict() for name, one in observed().items()},
-        "fitted": _fitted(history),
+        "accepted": {
+            name: list(weighted_quantiles([one[name] for one in nearby.statistics], w, LEVELS))
+            for name in observed()
+        },
         "figures": _figures(sample),
         "predicted_particles": len(predicted),
-        "predicted_effective_sample_size": effective_sample_size(w[: len(predicted)]),
-        "predictions": _predictions(predicted, w[: len(predicted)]),
-        "explanations": _explanations(sample, predicted, alone),
-        "calibration": _calibration(ranks),
-    }
-
-
-def _fitted(history: pyabc.History) -> dict[str, list[float]]:
-    """Return the interval of each statistic among the accepted simulations."""
-    weights, statistics = history.get_weighted_sum_stats()
-    return {
-        name: list(weighted_quantiles([float(one[name]) for one in statistics], weights, LEVELS))
-        for name in observed()
+        "predicted_effective_sample_size": effective_sample_size(w_predicted) if predicted else 0.0,
+        "predictions": _predictions(predicted, w_predicted),
+        "explanations": _explanations(sample, sample_of(nearby.before, w), predicted, alone),
+        "calibration": _calibration(calibrate(simulations, every)),
     }
 
 
 def _figures(sample: Weighted) -> dict[str, Any]:
     found = {}
     for name in NAMES:
-        one = contraction(prior_of(name), [v[name] for v in sample.values], sample.weight)
         prior = prior_of(name)
+        one = contraction(prior, [v[name] for v in sample.values], sample.weight)
         found[name] = {
             "unit": prior.unit,
             "origin": prior.origin,
@@ -336,7 +436,7 @@ def _figures(sample: Weighted) -> dict[str, Any]:
 
 def _predictions(predicted: list[dict[str, float]], w: Any) -> dict[str, Any]:
     found = {}
-    for name, (what, printed) in PREDICTED.items():
+    for name, (what, printed) in PREDICTED.items() if predicted else ():
         values = np.array([one[name] for one in predicted], dtype=np.float64)
         known = ~np.isnan(values)
         found[name] = {
@@ -350,47 +450,76 @@ def _predictions(predicted: list[dict[str, float]], w: Any) -> dict[str, Any]:
 
 
 def _explanations(
-    sample: Weighted, predicted: list[dict[str, float]], alone: Mapping[str, list[float]]
+    sample: Weighted,
+    before: Weighted,
+    predicted: list[dict[str, float]],
+    alone: Mapping[str, list[float]],
 ) -> dict[str, Any]:
-    """Return the Bayes factor of each explanation, without and with Table IV, and the points that it gives."""
+    """Return the Bayes factors of the explanations, without and with Table IV, and the points that they give."""
     every, w = sample.weight, sample.weight[: len(predicted)]
-    printed = {one.id: one for one in published().rates}
-    likelihood = np.zeros(len(w))
-    for name in ("table_4_17", "table_4_23"):
-        one = printed[name]
-        assert one.n is not None
-        deviation = math.sqrt(one.rate * (1.0 - one.rate) / one.n)
-        rates = np.array([p[name] for p in predicted])
-        likelihood -= 0.5 * ((rates - one.rate) / deviation) ** 2
-    both = w * np.exp(likelihood - likelihood.max())
-    both /= both.sum()
-    gains = np.array([p["gain"] for p in predicted])
-    found: dict[str, Any] = {
-        "none": {
-            "says": "none of them",
-            "alone": _mean_of(alone["none"]),
-        }
-    }
+    gains = np.array([one["gain"] for one in predicted])
+    rates = np.array([[one["table_4_17"], one["table_4_23"]] for one in predicted])
+    printed = {one.id: one.rate for one in published().rates}
+    at = np.array([printed["table_4_17"], printed["table_4_23"]])
+    found: dict[str, Any] = {}
     for name, one in EXPLANATIONS.items():
-        on_of_all = np.array([is_on(name, v) for v in sample.values])
-        on = on_of_all[: len(predicted)]
+        on = np.array([is_on(name, v) for v in sample.values])
+        of_predicted = on[: len(predicted)]
         found[name] = {
             "says": one.says,
-            "reason": one.reason,
             "figure": one.figure,
             "full_strength": one.limit,
             "unit": one.unit,
-            "at_20_n": _odds(on_of_all, every),
-            "with_table_4": _odds(on, both),
-            "gain_if_on": _mean(gains[on], w[on]) if on.any() else None,
-            "gain_if_off": _mean(gains[~on], w[~on]) if (~on).any() else None,
+            "at_20_n": _odds(on, every),
+            "before_adjustment": _odds(np.array([is_on(name, v) for v in before.values]), every),
+            "with_table_4": _regressed_odds(of_predicted, w, rates, at),
+            "gain_if_on": _mean(gains, w, of_predicted),
+            "gain_if_off": _mean(gains, w, ~of_predicted),
             "alone": _mean_of(alone[name]),
+            "explains": _mean_of(_differences(alone[name], alone["none"])),
         }
     return {
-        "effective_sample_size_with_table_4": effective_sample_size(both),
-        "gain_with_table_4": _mean(gains, both),
+        "gain": _mean(gains, w, np.ones(len(gains), dtype=bool)),
+        "greatest_gain": float(gains.max()) if predicted else None,
+        "none": _mean_of(alone["none"]),
+        "all": {
+            "alone": _mean_of(alone["all"]),
+            "explains": _mean_of(_differences(alone["all"], alone["none"])),
+        },
         "of": found,
     }
+
+
+def _regressed_odds(on: Any, w: Any, rates: Any, at: Any) -> dict[str, float] | None:
+    """Return the odds that an explanation is on at the rates `at`, by logistic regression on the simulated rates.
+
+    The interval is that of resampled particles. None if the particles do not have both answers.
+    """
+    if not len(on) or on.all() or not on.any():
+        return None
+    spread = rates.std(axis=0) + 1e-9
+    centred = (rates - at) / spread
+    size = max(round(effective_sample_size(w)), 4)
+    rng, found = np.random.default_rng(0), []
+    for _ in range(BOOTSTRAPS):
+        drawn = rng.choice(len(on), size, p=w / w.sum())
+        if len(set(on[drawn])) == 2:
+            found.append(LogisticRegression().fit(centred[drawn], on[drawn]).intercept_[0])
+    if not found:
+        return None
+    middle = float(LogisticRegression().fit(centred, on, sample_weight=w * size / w.sum()).intercept_[0])
+    low, high = np.quantile(found, (0.025, 0.975))
+    return dict(
+        zip(
+            ("bayes_factor", "bayes_factor_low", "bayes_factor_high"),
+            (math.exp(one) for one in (middle, float(low), float(high))),
+            strict=True,
+        )
+    )
+
+
+def _differences(ones: Sequence[float], others: Sequence[float]) -> list[float]:
+    return [a - b for a, b in zip(ones, others, strict=True)]
 
 
 def _odds(on: Any, w: Any) -> dict[str, float]:
@@ -398,8 +527,6 @@ def _odds(on: Any, w: Any) -> dict[str, float]:
 
     The interval is Wilson's of a share of as many independent particles as the effective sample size.
     """
-    from graspsense.evaluation.intervals import Z
-
     p, n = float(w[on].sum()), effective_sample_size(w)
     centre = (p + Z * Z / (2 * n)) / (1 + Z * Z / n)
     half = Z / (1 + Z * Z / n) * math.sqrt(p * (1 - p) / n + Z * Z / (4 * n * n))
@@ -415,12 +542,18 @@ def _odds(on: Any, w: Any) -> dict[str, float]:
     }
 
 
-def _mean(values: Any, w: Any) -> dict[str, Any]:
-    """Return the weighted mean and the 95 % interval of one replicate."""
-    v = np.asarray(values, dtype=np.float64)
+def _mean(values: Any, w: Any, of: Any) -> dict[str, Any] | None:
+    """Return the weighted mean of those values, its 95 % interval, and that of one replicate; None without any."""
+    if not of.any():
+        return None
+    v, w = np.asarray(values, dtype=np.float64)[of], w[of]
+    mean, n = float(np.average(v, weights=w)), effective_sample_size(w)
+    half = Z * math.sqrt(float(np.average((v - mean) ** 2, weights=w)) / n)
     return {
-        "mean": float(np.average(v, weights=w)),
+        "mean": mean,
+        "interval_of_mean": [mean - half, mean + half],
         "interval": list(weighted_quantiles(v, w, (0.025, 0.975))),
+        "effective_sample_size": n,
     }
 
 
@@ -457,11 +590,11 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--out", type=Path, help="folder of the run; it is continued if it exists")
-    parser.add_argument("--particles", type=int, default=50)
-    parser.add_argument("--generations", type=int, default=5)
-    parser.add_argument("--minutes", type=float, default=60.0, help="limit of the time of the inference")
+    parser.add_argument("--particles", type=int, default=150)
+    parser.add_argument("--generations", type=int, default=6, help="at most")
+    parser.add_argument("--minutes", type=float, default=30.0, help="limit of the time of the inference")
     parser.add_argument("--predicted", type=int, default=1000, help="particles to predict from, at most")
-    parser.add_argument("--alone", type=int, default=20, help="replicates of each explanation alone")
+    parser.add_argument("--alone", type=int, default=40, help="replicates of each explanation alone")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     parser.add_argument(
         "--markdown", type=Path, help="write the page from the result of FOLDER, and run nothing"
@@ -489,8 +622,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place:
         folder = Folder(given.out or Path(place))
         folder.path.mkdir(parents=True, exist_ok=True)
-        history = infer(folder, size, say)
-        result = summarise(folder, history, size, say)
+        result = summarise(folder, infer(folder, size, say), size, say)
         text = json.dumps(result, indent=2)
         (folder.path / "result.json").write_text(text + "\n", encoding="utf-8")
     print(text)

@@ -166,8 +166,8 @@ def _controls_table(summary: Summary, held: Sequence[RateComparison]) -> FoundTa
         rows=tuple(lines),
         note="Means over the seeds, over all containers of the experiment. Before contact and with shuffled labels, "
         "the rate should not be above that of the most frequent label. The last column holds out whole bottles, where "
-        "every label has at least two. With each bottle in one state, that takes trials of the tested label out of training, "
-        "so that rates without information fall below that of the most frequent label.",
+        "every label has at least two. With each bottle in one state, that takes trials of the tested label out of "
+        "training, so that rates without information fall below that of the most frequent label.",
         numbers=3,
     )
 

@@ -96,8 +96,8 @@ def _controls_table(summary: Summary, titles: Mapping[str, str]) -> FoundTable |
         header=("trade-off", "case", "recognises", "recognised", *CONTROLS.values()),
         rows=tuple(lines),
         note="Means over the seeds. Before contact and with shuffled labels, the rate should not be above that of the "
-        "most frequent label. The width is known at the contact, before anything is paid for. The last column holds out "
-        "whole bottles. There is no control by the order of recording, because simulated trials have none.",
+        "most frequent label. The width is known at the contact, before anything is paid for. The last column holds "
+        "out whole bottles. There is no control by the order of recording, because simulated trials have none.",
         numbers=3,
     )
 
