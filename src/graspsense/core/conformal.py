@@ -231,7 +231,9 @@ def _threshold(scores: NDArray[np.float64], units: NDArray[np.str_], coverage: f
     ranks = (larger - own) / (len(names) - 1)
     order = np.argsort(ranks, kind="stable")
     reached = np.cumsum(weights[order]) / len(names)
-    level = ranks[order[int(np.searchsorted(reached, coverage - _ROUNDING))]]
+    # A new trial is one more, as in split conformal prediction with a unit for each trial.
+    share = min(coverage * (1.0 + 1.0 / len(scores)), 1.0)
+    level = ranks[order[int(np.searchsorted(reached, share - _ROUNDING))]]
     return float(scores[larger / len(names) <= level + _ROUNDING].min())
 
 
