@@ -613,7 +613,7 @@ def main() -> None:
     logging.getLogger("ABC").setLevel(logging.WARNING)
     size = Size(given.particles, given.generations, given.minutes, given.predicted, given.alone)
     if given.short:
-        size = Size(particles=4, generations=1, minutes=1.0, predicted=4, alone=2)
+        size = Size(particles=4, generations=1, minutes=30.0, predicted=4, alone=2)
     began = time.time()
 
     def say(text: str) -> None:
