@@ -185,7 +185,7 @@ def test_the_picture_of_the_confusion(run, csv, tmp_path):
         (
             ["train", "x.csv", "--label", "y", "--out", "model.pkl"],
             2,
-            "the name of a model's file must end in .json",
+            "model.pkl: the name of the file must end in .json",
         ),
         (
             ["train", "x.csv", "--label", "y", "--out", "gone/model.json"],

@@ -59,6 +59,7 @@ def test_the_command_names_the_best_and_refuses_feature_sets_of_a_csv(tmp_path, 
     for option, says in (
         ("--feature-sets", "not for a CSV"),
         ("--target-value", "compare is for classifiers"),
+        ("--out", "curve: the name of the file must end in .html"),
     ):
         with pytest.raises(SystemExit) as ended:
             main([*arguments, option, "curve"])

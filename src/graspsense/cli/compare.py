@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import echo_json, file_to_write
+from graspsense.cli.output import echo_json, file_to_write_as
 from graspsense.cli.sources import SOURCES, command_line, is_csv, learner_of, source_options, trials_of
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 )
 @click.option("--feature-sets", metavar="NAMES", help="Comma-separated feature sets; not for a CSV. [chitta]")
 @click.option("--folds", type=int, default=10, show_default=True, help="Number of folds.")
-@click.option("--out", metavar="FILE", callback=file_to_write, help="Write a page (.html) as well.")
+@click.option("--out", metavar="FILE.html", callback=file_to_write_as(".html"), help="Write a page as well.")
 @source_options
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def compare(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from graspsense.cli.output import echo_json, file_to_write
+from graspsense.cli.output import echo_json, file_to_write_as
 from graspsense.cli.terminal import Style, echo, echo_table
 
 DEFAULT_PAGE = "comparison.html"
@@ -15,7 +15,12 @@ DEFAULT_PAGE = "comparison.html"
 @click.command(short_help="Compare the results of several experiments.")
 @click.argument("folders", metavar="A B ...", nargs=-1)
 @click.option(
-    "--out", metavar="FILE", default=DEFAULT_PAGE, show_default=True, callback=file_to_write, help="The page."
+    "--out",
+    metavar="FILE.html",
+    default=DEFAULT_PAGE,
+    show_default=True,
+    callback=file_to_write_as(".html"),
+    help="The page.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the comparison as JSON.")
 def compare(folders: tuple[str, ...], out: str, as_json: bool) -> None:

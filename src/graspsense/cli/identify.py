@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from graspsense.cli.options import force_option
-from graspsense.cli.output import echo_json, file_to_write, refuse_existing
+from graspsense.cli.output import echo_json, file_to_write_as, refuse_existing
 from graspsense.cli.terminal import Style, echo, echo_entry, echo_table, talk
 
 if TYPE_CHECKING:
@@ -21,12 +21,14 @@ if TYPE_CHECKING:
 @click.command(short_help="Identify an object from recorded squeezes, as a scene of the simulator.")
 @click.argument("sources", nargs=-1, required=True, metavar="RECORDING|store:DIR...")
 @click.option(
-    "--out", metavar="FILE.toml", callback=file_to_write, required=True, help="File of the scene (.toml)."
+    "--out", metavar="FILE.toml", callback=file_to_write_as(".toml"), required=True, help="File of the scene."
 )
 @click.option(
     "--class", "name", metavar="NAME", help="Use only the recordings with this label, or of this class."
 )
-@click.option("--page", metavar="FILE.html", callback=file_to_write, help="Write the report page.")
+@click.option(
+    "--page", metavar="FILE.html", callback=file_to_write_as(".html"), help="Write the report page."
+)
 @click.option("--overwrite", is_flag=True, help="Replace the files of --out and --page if they exist.")
 @click.option(
     "--pipeline",
@@ -71,8 +73,6 @@ def identify(
     from graspsense.recording.atomic_file import write_or_replace
     from graspsense.sources.squeezes import recorded_squeezes
 
-    if not out.endswith(".toml"):
-        raise ConfigError(f"--out {out}: a scene is a .toml file: name it so")
     if not overwrite:
         refuse_existing(out, page)
     flags = [Flag("--gripper", "gripper.type", gripper)] if gripper else []

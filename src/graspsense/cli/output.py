@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -39,6 +40,17 @@ def file_to_write(ctx: click.Context, param: click.Parameter, value: str | None)
         except OSError as error:
             raise click.BadParameter(f"{value} cannot be written: {error.strerror}", ctx, param) from error
     return value
+
+
+def file_to_write_as(ending: str) -> Callable[[click.Context, click.Parameter, str | None], str | None]:
+    """Return the callback of an option that names a file of one format, given by its ending such as `.html`."""
+
+    def checked(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+        if value is not None and Path(value).suffix.lower() != ending:
+            raise click.BadParameter(f"{value}: the name of the file must end in {ending}", ctx, param)
+        return file_to_write(ctx, param, value)
+
+    return checked
 
 
 def refuse_existing(*paths: str | None) -> None:

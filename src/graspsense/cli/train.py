@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from graspsense.cli.output import echo_json, file_to_write, refuse_existing
+from graspsense.cli.output import echo_json, file_to_write, file_to_write_as, refuse_existing
 from graspsense.cli.sources import (
     SOURCES,
     checkpoints_option,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 )
 @click.argument("source")
 @click.option(
-    "--out", metavar="FILE", callback=file_to_write, required=True, help="File of the model (.json)."
+    "--out", metavar="FILE.json", callback=file_to_write_as(".json"), required=True, help="File of the model."
 )
 @click.option(
     "--keep", metavar="FILE", callback=file_to_write, help="Write the features of all trials as a CSV file."
@@ -115,11 +115,7 @@ def train(
 
 
 def _path_of_model(out: str, keep: str | None, overwrite: bool) -> Path:
-    """Return the path of the model. Raises ConfigError for another ending, or for a file that must not be replaced."""
-    from graspsense.core.errors import ConfigError
-
-    if not out.endswith(".json"):
-        raise ConfigError(f"--out {out}: the name of a model's file must end in .json")
+    """Return the path of the model. Raises ConfigError for a file that must not be replaced."""
     if not overwrite:
         refuse_existing(out, keep)
     return Path(out)
