@@ -32,9 +32,10 @@ from graspsense.plugin_api import (
     TactileArray,
     hookimpl,
 )
-from graspsense.recording.export_trace import write_csv, write_npz
+from graspsense.recording.export_trace import write_csv, write_npz, write_parquet
 from graspsense.recording.reader import read_recorded
-from graspsense.sources.exported_npz import read_exported
+from graspsense.sources.exported_grasp import read_exported
+from graspsense.sources.replay import read_named
 from graspsense.store.record_grasp import record_grasp
 from graspsense.store.store import Store
 from graspsense.testing.model_gripper import ModelGripper
@@ -238,6 +239,27 @@ def test_an_exported_grasp_comes_back_with_the_same_features_arrays_and_samples(
     assert acceleration.values.tobytes() == before.signals["acceleration"].values.tobytes()
     assert acceleration.t_s == pytest.approx(before.signals["acceleration"].t_s, abs=1e-3)
     assert acceleration.lost == 0
+
+
+@pytest.mark.parametrize(("ending", "write"), [("csv", write_csv), ("parquet", write_parquet)])
+def test_columns_of_an_exported_grasp_come_back_as_its_arrays_do(recorded, tmp_path, ending, write):
+    _, path, _ = recorded
+    grasp = read_recorded(path)
+    write_npz(tmp_path / "grasp.npz", grasp)
+    write(tmp_path / f"grasp.{ending}", grasp)
+    before = read_exported(str(tmp_path / "grasp.npz"))
+    now = read_named(ending, str(tmp_path / f"grasp.{ending}"))
+    # Texts, in which NaN equals NaN and every number has all its digits.
+    assert repr(now.readings) == repr(before.readings)
+    assert (now.rate_hz, now.units, now.commands) == (before.rate_hz, before.units, before.commands)
+    assert (now.channels, now.has_release) == (before.channels, before.has_release)
+
+    (tmp_path / f"grasp-palm.{ending}").unlink()
+    with pytest.raises(ConfigError, match=f"grasp-palm.{ending} cannot be read"):
+        read_exported(str(tmp_path / f"grasp.{ending}"))
+    (tmp_path / f"grasp.{ending}.json").unlink()
+    with pytest.raises(ConfigError, match=rf"grasp\.{ending}\.json is missing"):
+        read_exported(str(tmp_path / f"grasp.{ending}"))
 
 
 def test_an_npz_file_that_is_not_an_export_is_refused(tmp_path):

@@ -29,10 +29,13 @@ def write_csv(path: Path, grasp: RecordedGrasp) -> None:
     """Write one line per tick, with an empty cell for a missing channel.
 
     Images of the fingertips go to `NAME-pads.csv`, and each other topic to a file that is named after it. That of a
-    fast channel has one line per sample, with the time and each axis.
+    fast channel has one line per sample, with the time and each axis. `FILE.json` has the channels, units and
+    rate of the gripper, so that `import csv:FILE` reads the grasp back.
     """
-    for name, (rows, fields) in _tables(grasp):
-        write_new(_beside(path, name), _csv(rows, fields))
+    tables = dict(_tables(grasp))
+    for name, (rows, fields) in tables.items():
+        write_new(beside(path, name), _csv(rows, fields))
+    _write_declared(path, grasp, list(tables))
     write_new(path, _csv(grasp.ticks.tolist(), TICK_FIELDS))
 
 
@@ -46,15 +49,7 @@ def write_npz(path: Path, grasp: RecordedGrasp) -> None:
     trace, out = grasp.trace(), io.BytesIO()
     columns = {name: getattr(trace, name) for name in (*TICK_COLUMNS, *PAD_COLUMNS)}
     columns["dt_s"] = grasp.ticks["dt_s"]
-    recording = grasp.recording()
-    declared = {
-        "device": grasp.device.name,
-        "rate_hz": recording.rate_hz,
-        "units": recording.units,
-        "has_release": recording.has_release,
-        "channels": [as_json(channel) for channel in recording.channels],
-    }
-    columns["declared"] = np.array(json.dumps(declared))
+    columns["declared"] = np.array(json.dumps(_declared(grasp)))
     for name, signal in trace.signals.items():
         if isinstance(signal, np.ndarray):
             columns[f"signal_{name}"] = signal
@@ -71,11 +66,13 @@ def write_npz(path: Path, grasp: RecordedGrasp) -> None:
 def write_parquet(path: Path, grasp: RecordedGrasp) -> None:
     """Write one row per tick, and the other topics as `write_csv` does. Raises PluginUnavailable without pyarrow."""
     ticks = parquet({name: (grasp.ticks[name], "") for name in TICK_FIELDS})
-    for name, (rows, fields) in _tables(grasp):
+    tables = dict(_tables(grasp))
+    for name, (rows, fields) in tables.items():
         columns = zip(*rows, strict=True)
         write_new(
-            _beside(path, name), parquet({n: (np.array(c), "") for n, c in zip(fields, columns, strict=True)})
+            beside(path, name), parquet({n: (np.array(c), "") for n, c in zip(fields, columns, strict=True)})
         )
+    _write_declared(path, grasp, list(tables))
     write_new(path, ticks)
 
 
@@ -141,5 +138,30 @@ def _csv(rows: Sequence[tuple[Any, ...]], fields: tuple[str, ...]) -> bytes:
     return out.getvalue().encode()
 
 
-def _beside(path: Path, topic: str) -> Path:
+def _declared(grasp: RecordedGrasp) -> dict[str, Any]:
+    """Return what the gripper declared, as plain values."""
+    recording = grasp.recording()
+    return {
+        "device": grasp.device.name,
+        "rate_hz": recording.rate_hz,
+        "units": recording.units,
+        "has_release": recording.has_release,
+        "channels": [as_json(channel) for channel in recording.channels],
+    }
+
+
+def _write_declared(path: Path, grasp: RecordedGrasp, tables: Sequence[str]) -> None:
+    """Write what the gripper declared, with the topics that have a file of their own."""
+    cells = grasp.trace().pad_left.shape[1]
+    text = json.dumps({**_declared(grasp), "cells": cells, "tables": list(tables)}, indent=1)
+    write_new(declared_beside(path), (text + "\n").encode())
+
+
+def declared_beside(path: Path) -> Path:
+    """Return the file beside an exported grasp that says what its gripper declared."""
+    return path.with_name(f"{path.name}.json")
+
+
+def beside(path: Path, topic: str) -> Path:
+    """Return the file of a topic beside an exported grasp."""
     return path.with_name(f"{path.stem}-{topic.rpartition('/')[2]}{path.suffix}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from math import inf
+from pathlib import Path
 from typing import Final, final
 
 from attrs import Attribute, frozen
@@ -39,8 +40,13 @@ def _stored(name: str) -> Recording:
 
 
 def _csv(name: str) -> Recording:
+    """Read a CSV file: with columns that the name lists, or an exported grasp, which declares its own."""
+    from graspsense.recording.export_trace import declared_beside
     from graspsense.sources.grasp_csv import read_squeeze
 
+    file, _, columns = name.partition("?")
+    if not columns and declared_beside(Path(file).expanduser()).exists():
+        return _exported(file)
     return read_squeeze(name)
 
 
@@ -51,7 +57,7 @@ def _bag(name: str) -> Recording:
 
 
 def _exported(name: str) -> Recording:
-    from graspsense.sources.exported_npz import read_exported
+    from graspsense.sources.exported_grasp import read_exported
 
     return read_exported(name)
 
@@ -61,6 +67,7 @@ KINDS: Final[Mapping[str, Callable[[str], Recording]]] = {
     "icub": read_recording,
     "mcap": _mcap,
     "npz": _exported,
+    "parquet": _exported,
     "rosbag": _bag,
     "store": _stored,
 }

@@ -1,4 +1,4 @@
-"""The NPZ file of one grasp that `graspsense export` writes, as a recording: frames, fingertips, further channels.
+"""One grasp that `graspsense export` wrote as NPZ, CSV or Parquet: frames, fingertips and further channels.
 
 Images and samples are delivered in the first tick that is not before their time. Which samples were lost is not in such
 a file; the recording itself (.mcap) keeps it.
@@ -19,6 +19,7 @@ from graspsense.core.entries import Channel, FastChannel, TactileArray
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.signals import Frame, Image, Pads, Reading, Samples, no_pads
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
+from graspsense.sources.exported_grasp_tables import TABLE_SUFFIXES, read_exported_tables
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,25 +31,19 @@ DECLARED: Final = "declared"
 
 
 def read_exported(name: str) -> Recording:
-    """Return the grasp in an NPZ file of `graspsense export`.
+    """Return the grasp in an .npz, .csv or .parquet file of `graspsense export`.
 
-    Raises ConfigError if there is no such file, DataDamaged if it was not written by `graspsense export`.
+    Raises ConfigError if there is no such file, DataDamaged if it was not written by `graspsense export`, and
+    PluginUnavailable for Parquet without pyarrow.
     """
     path = Path(name).expanduser()
+    if path.suffix in TABLE_SUFFIXES:
+        arrays, declared = read_exported_tables(path)
+    else:
+        arrays = _archive(path)
+        declared = str(arrays.get(DECLARED, "no JSON"))
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {key: archive[key] for key in archive.files}
-    except FileNotFoundError:
-        raise ConfigError(f"there is no file {path}") from None
-    except OSError as error:
-        raise DataDamaged(f"{path} cannot be read as an NPZ file: {error}") from error
-    except (ValueError, zipfile.BadZipFile, EOFError) as error:
-        # NumPy's own text would advise loading the file with pickle.
-        raise DataDamaged(
-            f"{path} cannot be read as an NPZ file: write one with graspsense export DIR#12 --to FILE.npz"
-        ) from error
-    try:
-        about = json.loads(str(arrays[DECLARED]))
+        about = json.loads(declared)
         channels = tuple(from_json(one) for one in about["channels"])
         return Recording(
             name=f"export {path.name} of {about['device']}",
@@ -64,6 +59,22 @@ def read_exported(name: str) -> Recording:
         raise DataDamaged(
             f"{path} is not a grasp that this version of `graspsense export` wrote ({type(error).__name__}: {error}). "
             "Arrays of other programs are imported by a manifest (docs/import.md)"
+        ) from error
+
+
+def _archive(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the arrays of an NPZ file. Raises ConfigError, DataDamaged."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {key: archive[key] for key in archive.files}
+    except FileNotFoundError:
+        raise ConfigError(f"there is no file {path}") from None
+    except OSError as error:
+        raise DataDamaged(f"{path} cannot be read as an NPZ file: {error}") from error
+    except (ValueError, zipfile.BadZipFile, EOFError) as error:
+        # NumPy's own text would advise loading the file with pickle.
+        raise DataDamaged(
+            f"{path} cannot be read as an NPZ file: write one with graspsense export DIR#12 --to FILE.npz"
         ) from error
 
 

@@ -1,0 +1,97 @@
+"""The CSV or Parquet files of one grasp that `graspsense export` writes, as the arrays of its NPZ file."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from graspsense.core.channels import from_json, further
+from graspsense.core.entries import Channel, FastChannel, TactileArray
+from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.recording.export_trace import beside, declared_beside
+from graspsense.recording.layout import PADS_TOPIC, SCALARS_TOPIC, SIGNAL_TOPIC, TICK_FIELDS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Columns = dict[str, NDArray[Any]]
+
+TABLE_SUFFIXES: Final = (".csv", ".parquet")
+
+
+def read_exported_tables(path: Path) -> tuple[Columns, str]:
+    """Return the arrays of an exported grasp, with the names of its NPZ file, and the JSON text that declares them.
+
+    Raises ConfigError if a file is missing, DataDamaged if one is not as `graspsense export` writes it, and
+    PluginUnavailable for Parquet without pyarrow.
+    """
+    declared = declared_beside(path)
+    if path.exists() and not declared.exists():
+        raise ConfigError(
+            f"{declared.name} is missing beside {path}: `graspsense export` writes it together with the columns. For a "
+            "file of another program name its columns, or write a manifest (docs/import.md)"
+        )
+    ticks = _columns(path)
+    missing = [name for name in TICK_FIELDS if name not in ticks]
+    if missing:
+        raise DataDamaged(f"{path} is not an exported grasp: it has no column {missing[0]!r}")
+    try:
+        text = declared.read_text(encoding="utf-8")
+        about = json.loads(text)
+        channels = further(tuple(from_json(one) for one in about["channels"]))
+        tables = frozenset(about["tables"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataDamaged(f"{declared} is damaged: {type(error).__name__}: {error}") from error
+    pads = _columns(beside(path, PADS_TOPIC)) if PADS_TOPIC in tables else {"t_s": np.empty(0)}
+    ticks["pad_t_s"] = pads["t_s"]
+    for side in ("left", "right"):
+        ticks[f"pad_{side}"] = _numbered(pads, f"{side}_", int(about["cells"]))
+    scalars = _columns(beside(path, SCALARS_TOPIC)) if SCALARS_TOPIC in tables else {}
+    for channel in channels:
+        _add_channel(ticks, path, channel, scalars, SIGNAL_TOPIC + channel.name in tables)
+    return ticks, text
+
+
+def _add_channel(arrays: Columns, path: Path, channel: Channel, scalars: Columns, has_table: bool) -> None:
+    """Add the arrays of a further channel."""
+    name = f"signal_{channel.name}"
+    if not isinstance(channel, (TactileArray, FastChannel)):
+        arrays[name] = scalars[channel.name]
+        return
+    table = _columns(beside(path, SIGNAL_TOPIC + channel.name)) if has_table else {"t_s": np.empty(0)}
+    arrays[f"{name}_t_s"] = table["t_s"]
+    if isinstance(channel, TactileArray):
+        arrays[name] = _numbered(table, "cells_", channel.cells)
+    elif has_table:
+        arrays[name] = np.column_stack([table[axis] for axis in channel.axes])
+    else:
+        arrays[name] = np.empty((0, len(channel.axes)))
+
+
+def _numbered(table: Columns, prefix: str, number: int) -> NDArray[np.float64]:
+    """Return the columns `prefix00`, `prefix01`, ... side by side: (rows, number)."""
+    if len(table["t_s"]) == 0:
+        return np.empty((0, number))
+    return np.column_stack([table[f"{prefix}{i:02d}"] for i in range(number)])
+
+
+def _columns(path: Path) -> Columns:
+    """Return the columns of one file. Raises ConfigError, DataDamaged, PluginUnavailable."""
+    if path.suffix == ".parquet":
+        from graspsense.sources.manifest.parquet_format import read_parquet
+
+        return dict(read_parquet(path)[0].numbers)
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            names, *rows = csv.reader(file)
+        values = [[float(cell) if cell else float("nan") for cell in row] for row in rows]
+        table = np.array(values, dtype=np.float64).reshape(len(rows), len(names))
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be read: {error.strerror}") from error
+    except (ValueError, csv.Error) as error:
+        raise DataDamaged(f"{path} is not as `graspsense export` writes it: {error}") from error
+    return {name: table[:, i] for i, name in enumerate(names)}
