@@ -17,6 +17,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: E
 
 from graspsense import load_pipeline  # noqa: E402
 from graspsense.core.errors import ConfigError, DataDamaged  # noqa: E402
+from graspsense.core.trace import signals_of  # noqa: E402
 from graspsense.sources.rosbag import read_bag  # noqa: E402
 
 PRESSURE_NOW = (
@@ -132,6 +133,41 @@ CASES = {
     },
     "ros2-2009": {"ros": 2, "source": "/pr2_gripper_controller/state", "kind": PRESSURE_2009},
 }
+
+
+@pytest.mark.parametrize(("ros", "definitions"), [(1, True), (2, False)])
+def test_the_accelerometer_of_a_bag_is_a_fast_channel_with_every_sample(ros, definitions, tmp_path):
+    path = tmp_path / ("grasp.bag" if ros == 1 else "grasp")
+    bag = Bag(path, ros, definitions)
+    kind = "pr2_msgs/msg/AccelerometerState", "std_msgs/Header header\ngeometry_msgs/Vector3[] samples\n"
+    rest = dict.fromkeys(("set_point", "error", "time_step", "p", "i", "d", "i_clamp"), 0.0)
+    sampled = 0
+    for tick in range(100):
+        t_s = BEGAN_S + 0.001 * tick
+        if tick % 40 == 0:
+            pressure(bag, t_s, np.full(22, ZERO), np.full(22, ZERO), PRESSURE_NOW)
+        if tick % 10 == 0:
+            bag.add("/r_gripper_controller/state", CONTROLLER_STATE, t_s, header=bag.header(t_s),
+                    process_value=0.05, process_value_dot=0.0, command=0.0, **rest)  # fmt: skip
+        vector = bag.store.types["geometry_msgs/msg/Vector3"]
+        new = 2 if tick % 4 == 3 else 3
+        samples = [vector(float(sampled + k), -1.0, 9.81) for k in range(new)]
+        sampled += new
+        bag.add("/accelerometer/r_gripper_motor", kind, t_s, header=bag.header(t_s), samples=samples)
+    bag.close()
+
+    recording = read_bag(str(path))
+    (channel,) = recording.channels
+    assert (channel.name, channel.unit, channel.axes) == ("acceleration", "m/s2", ("x", "y", "z"))
+    assert channel.rate_hz == pytest.approx(2750.0, rel=0.02)
+    signal = signals_of([reading.signals for reading in recording.readings])["acceleration"]
+    # The first message came with the first position, and nine messages came after the last one. Of the ninety between,
+    # 22 have two samples.
+    assert signal.values[:, 0].tolist() == list(range(3, signal.values.shape[0] + 3))
+    assert signal.values.shape[0] == 3 * 90 - 22
+    assert signal.values[0].tolist() == [3.0, -1.0, 9.81]
+    assert signal.lost == 0
+    assert signal.t_s[-1] == pytest.approx(recording.readings[-1].frame.t_s, abs=1e-6)
 
 
 @pytest.mark.parametrize("case", CASES)

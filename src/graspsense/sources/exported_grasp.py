@@ -17,9 +17,10 @@ import numpy as np
 from graspsense.core.channels import from_json, further, signal_type
 from graspsense.core.entries import Channel, FastChannel, TactileArray
 from graspsense.core.errors import ConfigError, DataDamaged
-from graspsense.core.signals import Frame, Image, Pads, Reading, Samples, no_pads
+from graspsense.core.signals import Frame, Image, Pads, Reading, no_pads
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
 from graspsense.sources.exported_grasp_tables import TABLE_SUFFIXES, read_exported_tables
+from graspsense.sources.fast_samples import sample_blocks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -112,7 +113,7 @@ def _series(times: NDArray[np.float64], arrays: Arrays, channel: Channel) -> lis
         ]
         return _latest(times, at, images, Image(0.0, 0, (float("nan"),) * channel.cells))
     if isinstance(channel, FastChannel):
-        return _blocks(times, arrays[f"signal_{channel.name}_t_s"], values, channel)
+        return sample_blocks(times, arrays[f"signal_{channel.name}_t_s"], values, channel)
     return list(values.tolist())
 
 
@@ -122,18 +123,3 @@ def _latest(
     """Return the last of the values in each tick; `nothing` before the first."""
     counts = np.searchsorted(at, times, side="right").tolist()
     return [values[count - 1] if count else nothing for count in counts]
-
-
-def _blocks(
-    times: NDArray[np.float64], at: NDArray[np.float64], values: NDArray[np.float64], channel: FastChannel
-) -> list[Samples]:
-    """Return the samples that are new in each tick, at most as many as the channel declares."""
-    none = (float("nan"),) * len(channel.axes)
-    blocks, done = [], 0
-    for there in np.searchsorted(at, times, side="right").tolist():
-        new = min(there - done, channel.samples)
-        done += new
-        rows = [tuple(row) for row in values[done - new : done].tolist()]
-        t_s = float(at[done - 1]) if done else 0.0
-        blocks.append(Samples(t_s, done, new, (*rows, *[none] * (channel.samples - new))))
-    return blocks

@@ -8,11 +8,14 @@ These topics of the left (`l`) or right (`r`) gripper are read:
 | `/joint_states` | sensor_msgs/JointState | gap, its rate, effort |
 | `/{l,r}_gripper_controller/state` | pr2_controllers_msgs/JointControllerState | if there are no joint states |
 | `/pr2_gripper_controller/state` | pr2_msgs/GripperControllerState (2009) | if there is neither |
+| `/accelerometer/{l,r}_gripper_motor` | pr2_msgs/AccelerometerState | the fast channel `acceleration`, if present |
 
 The driver stores the unsigned 16-bit cells in signed fields, so values above 32767 appear as negative numbers. The
 fields of the two tips are l_finger_tip and r_finger_tip, or data0 and data1 in 2009. A message without a header, or
 with a stamp of zero, has the time at which it was recorded (pr2_ethercat_drivers, pr2_common, and personalrobots-pkg of
-September 2009). In ROS a positive effort opens the gripper; here it squeezes.
+September 2009). The accelerometer of the palm takes about 3000 samples a second, in m/s2; a message has those since the
+one before, about three, and its time is that of the last (wiki.ros.org/ethercat_hardware/Tutorials/
+GripperAccelerometer). In ROS a positive effort opens the gripper; here it squeezes.
 """
 
 from __future__ import annotations
@@ -23,10 +26,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+import numpy as np
+
 from graspsense.core.calibration import Cells, edge_force, masked, pad_force, tare, zero_of
+from graspsense.core.channels import signal_type
+from graspsense.core.entries import Channel, FastChannel
 from graspsense.core.errors import ConfigError, DataDamaged, PluginUnavailable, TareRefused
 from graspsense.core.signals import Frame, Pads, Reading, no_pads
 from graspsense.recording.replayable import Recording
+from graspsense.sources.fast_samples import sample_blocks
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
@@ -47,10 +55,14 @@ EDGE_COUNTS_PER_N: Final = (600.0, 400.0, 600.0, 600.0, 600.0, 600.0, 400.0)
 PRESSURE: Final = "/pressure/{}_gripper_motor"
 JOINT_STATES: Final = "/joint_states"
 CONTROLLER_STATE: Final = "/{}_gripper_controller/state"
+ACCELERATION: Final = "/accelerometer/{}_gripper_motor"
+MOST_SAMPLES: Final = 1000
+"""Limit on the samples of the accelerometer that one tick delivers; others follow in the next ticks."""
 STATE_2009: Final = "/pr2_gripper_controller/state"
 
 DEFINITIONS: Final[Mapping[str, str]] = {
     "pr2_msgs/msg/PressureState": "std_msgs/Header header\nint16[] l_finger_tip\nint16[] r_finger_tip\n",
+    "pr2_msgs/msg/AccelerometerState": "std_msgs/Header header\ngeometry_msgs/Vector3[] samples\n",
     "pr2_controllers_msgs/msg/JointControllerState": (
         "std_msgs/Header header\nfloat64 set_point\nfloat64 process_value\nfloat64 process_value_dot\nfloat64 error\n"
         "float64 time_step\nfloat64 command\nfloat64 p\nfloat64 i\nfloat64 d\nfloat64 i_clamp\n"
@@ -66,6 +78,13 @@ class _Motion(NamedTuple):
     gap_m: float
     velocity_m_s: float
     effort_n: float
+
+
+class _Sampled(NamedTuple):
+    """The samples of a message of the accelerometer, and the time of the last."""
+
+    t_ns: int
+    values: tuple[tuple[float, float, float], ...]
 
 
 class _Image(NamedTuple):
@@ -89,12 +108,16 @@ def read_bag(name: str) -> Recording:
         raise ConfigError(f"{name!r}: write l or r after #, for the left or the right gripper")
     images: list[_Image] = []
     motions: list[_Motion] = []
+    samples: list[_Sampled] = []
     with _bag(path) as reader:
         topics = frozenset(reader.topics)
         side = _side(path, side, topics)
         pressure, source = PRESSURE.format(side), _source(path, side, topics)
-        for topic, t_ns, message in _messages(path, reader, (pressure, source)):
-            if topic == pressure:
+        acceleration = ACCELERATION.format(side)
+        for topic, t_ns, message in _messages(path, reader, (pressure, source, acceleration)):
+            if topic == acceleration:
+                samples.append(_Sampled(t_ns, tuple((one.x, one.y, one.z) for one in message.samples)))
+            elif topic == pressure:
                 image = _image(path, t_ns, message)
                 # A message can repeat the previous image, because it does not contain the clock of the board.
                 if not images or image[1:] != images[-1][1:]:
@@ -112,9 +135,14 @@ def read_bag(name: str) -> Recording:
     if duration_s <= 0.0:
         raise DataDamaged(f"{path}: all positions on {source} have the same time")
     notes = [f"recorded on a PR2, {SIDES[side]} gripper: gap from {source}, cells from {pressure}"]
+    readings = tuple(_readings(motions, images, notes))
+    channels: tuple[Channel, ...] = ()
+    if any(one.values for one in samples):
+        channels, readings = _with_acceleration(readings, motions[0].t_ns, samples)
     return Recording(
         name=f"{path.name}, {SIDES[side]} gripper",
-        readings=tuple(_readings(motions, images, notes)),
+        readings=readings,
+        channels=channels,
         rate_hz=(len(motions) - 1) / duration_s,
         notes=tuple(notes),
     )
@@ -246,6 +274,39 @@ def _readings(motions: Sequence[_Motion], images: Sequence[_Image], notes: list[
             seen,
         )  # fmt: skip
         before = motion
+
+
+def _with_acceleration(
+    readings: Sequence[Reading], began_ns: int, messages: Sequence[_Sampled]
+) -> tuple[tuple[Channel, ...], tuple[Reading, ...]]:
+    """Return the channel of the accelerometer, and the readings with its samples.
+
+    The samples of a message are taken as equally spaced since the one before. Those before the first reading are left
+    out.
+    """
+    at: list[float] = []
+    values: list[tuple[float, float, float]] = []
+    before_ns: int | None = None
+    for t_ns, rows in sorted(messages, key=lambda one: one.t_ns):
+        if before_ns is not None and before_ns >= began_ns:
+            step_ns = (t_ns - before_ns) / max(len(rows), 1)
+            at += [(before_ns - began_ns + step_ns * k) * 1e-9 for k in range(1, len(rows) + 1)]
+            values += rows
+        before_ns = t_ns
+    times = np.array([reading.frame.t_s for reading in readings])
+    there = np.searchsorted(at, times, side="right")
+    most = int(np.diff(there, prepend=0).max())
+    if most == 0:
+        return (), tuple(readings)
+    rate_hz = (len(at) - 1) / (at[-1] - at[0]) if at[-1] > at[0] else 0.0
+    channel = FastChannel(
+        "acceleration", "m/s2", rate_hz, samples=min(most, MOST_SAMPLES), axes=("x", "y", "z"), clock="sensor"
+    )
+    make = signal_type((channel,))._make  # type: ignore[attr-defined]
+    blocks = sample_blocks(times, np.array(at), np.array(values), channel)
+    return (channel,), tuple(
+        reading._replace(signals=make((block,))) for reading, block in zip(readings, blocks, strict=True)
+    )
 
 
 def _forces(cells: Cells, zero: Cells) -> tuple[float, float]:
