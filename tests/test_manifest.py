@@ -13,6 +13,7 @@ from scipy.io import savemat
 
 from graspsense.cli.main import main
 from graspsense.core.errors import ConfigError, DataDamaged
+from graspsense.core.trace import signals_of
 from graspsense.recording.reader import read_recorded
 from graspsense.sources.dataset_recordings import recordings_of
 from graspsense.store.store import Store
@@ -164,6 +165,47 @@ def test_matrices_of_a_mat_file_become_columns_and_arrays(tmp_path):
     assert second.recording.readings[5].signals.left_electrodes.cells == tuple(
         5.0 + 300.0 * k for k in range(19)
     )
+
+
+@pytest.mark.parametrize("ending", ["npz", "mat"])
+def test_images_and_blocks_of_samples_become_arrays_with_their_shape_and_fast_channels(tmp_path, ending):
+    gap, force = squeezing()
+    taxels = np.arange(300.0 * 28).reshape(300, 7, 4)
+    shaken = np.arange(300.0 * 9).reshape(300, 3, 3)
+    shaken[10, 2] = np.nan  # a tick with two samples
+    sound = np.arange(300.0 * 5).reshape(300, 5)
+    arrays = {"gap": gap, "force": force, "taxels": taxels, "acc": shaken, "sound": sound}
+    if ending == "npz":
+        np.savez(tmp_path / "cup.npz", **arrays)
+    else:
+        savemat(tmp_path / "cup.mat", {**arrays, "taxels": np.moveaxis(taxels, 0, -1)})
+    text = f"""
+        files = "{{label}}.{ending}"
+        rate_hz = 1000
+        gap = "gap"
+        force = "force"
+        channels = {{ palm = "taxels*0.5 [N]", acceleration = "acc [m/s2]", sound = "sound [Pa]" }}
+        fast = ["acceleration", "sound"]
+        """
+
+    (one,) = recordings(tmp_path, text)
+
+    palm, acceleration, heard = one.recording.channels
+    assert (palm.rows, palm.columns, palm.unit) == (7, 4, "N")
+    assert (acceleration.samples, acceleration.axes, acceleration.unit) == (3, ("x", "y", "z"), "m/s2")
+    assert acceleration.rate_hz == pytest.approx(3000.0)
+    assert (heard.samples, heard.axes) == (5, ("value",))
+    signals = signals_of([reading.signals for reading in one.recording.readings])
+    assert np.array_equal(signals["palm"].cells, 0.5 * taxels.reshape(300, 28))
+    rows = shaken.reshape(900, 3)
+    assert np.array_equal(signals["acceleration"].values, rows[np.isfinite(rows[:, 0])])
+    assert np.array_equal(signals["sound"].values[:, 0], sound.reshape(-1))
+    assert signals["acceleration"].lost == 0
+
+    with pytest.raises(ConfigError, match="'sounds' is not among the channels"):
+        recordings(tmp_path, text.replace('"sound"]', '"sounds"]'))
+    with pytest.raises(ConfigError, match="fast channels cannot be resampled"):
+        recordings(tmp_path, text + "resample_hz = 100")
 
 
 STABILITY = shipped("biotac_sp")

@@ -10,9 +10,9 @@ import numpy as np
 from attrs import evolve, field, frozen
 
 from graspsense.core.channels import signal_type
-from graspsense.core.entries import Channel, TactileArray
+from graspsense.core.entries import Channel, FastChannel, TactileArray
 from graspsense.core.errors import DataDamaged
-from graspsense.core.signals import NO_PADS, Frame, Image, Reading
+from graspsense.core.signals import NO_PADS, Frame, Image, Reading, Samples
 from graspsense.recording.replayable import Recording
 
 if TYPE_CHECKING:
@@ -47,6 +47,10 @@ class GraspColumns:
     velocity_m_s: Numbers | None = None
     scalars: Mapping[str, Numbers] = field(factory=dict)
     arrays: Mapping[str, Numbers] = field(factory=dict)
+    shapes: Mapping[str, tuple[int, int]] = field(factory=dict)
+    """Rows and columns of the cells of an array, or samples and axes of a fast channel; else there is one row."""
+    fast: frozenset[str] = frozenset()
+    """Those of `arrays` that are the samples of a fast channel."""
     units: Mapping[str, str] = field(factory=dict)
     notes: tuple[str, ...] = ()
     lines: NDArray[np.int64] | None = None
@@ -170,11 +174,27 @@ def _units(units: Mapping[str, str]) -> dict[str, str]:
 
 def _channels(columns: GraspColumns) -> tuple[Channel, ...]:
     scalars = [Channel(name, columns.units.get(name, "1")) for name in columns.scalars]
-    arrays = [
-        TactileArray(name, columns.units.get(name, "counts"), finger=name, rows=1, columns=values.shape[1])
-        for name, values in columns.arrays.items()
-    ]
-    return (*scalars, *arrays)
+    return (*scalars, *(_array(columns, name, values) for name, values in columns.arrays.items()))
+
+
+def _array(columns: GraspColumns, name: str, values: Numbers) -> Channel:
+    """Return the tactile array or the fast channel that several columns are."""
+    width = values.shape[1]
+    first, second = columns.shapes.get(name, (1, width))
+    if name not in columns.fast:
+        if first * second != width:  # an expression took some of the cells
+            first, second = 1, width
+        return TactileArray(name, columns.units.get(name, "counts"), finger=name, rows=first, columns=second)
+    samples, axes = (first, second) if name in columns.shapes and first * second == width else (width, 1)
+    names = (
+        ("value",)
+        if axes == 1
+        else ("x", "y", "z")[:axes]
+        if axes <= 3
+        else tuple(f"axis_{k}" for k in range(axes))
+    )
+    rate_hz = samples / float(np.median(np.diff(columns.t_s))) if len(columns) > 1 else 0.0
+    return FastChannel(name, columns.units.get(name, "1"), rate_hz, samples=samples, axes=names)
 
 
 def _readings(
@@ -189,11 +209,13 @@ def _readings(
         make = signal_type(channels)._make  # type: ignore[attr-defined]
         series: list[list[Any]] = [values.tolist() for values in columns.scalars.values()]
         series += [
-            [
+            _blocks(times, values, channel)
+            if isinstance(channel, FastChannel)
+            else [
                 Image(t_s, k, tuple(cells))
                 for k, (t_s, cells) in enumerate(zip(times, values.tolist(), strict=True), 1)
             ]
-            for values in columns.arrays.values()
+            for channel, values in zip(channels[len(columns.scalars) :], columns.arrays.values(), strict=True)
         ]
         further = list(map(make, zip(*series, strict=True)))
     frames = zip(
@@ -201,3 +223,14 @@ def _readings(
         columns.right_n.tolist(), absent, absent, [0] * n, strict=True,
     )  # fmt: skip
     return [Reading(Frame(*frame), NO_PADS, signals) for frame, signals in zip(frames, further, strict=True)]
+
+
+def _blocks(times: Sequence[float], values: Numbers, channel: FastChannel) -> list[Samples]:
+    """Return the samples of each tick. Rows of NaN at the end of a tick stand for samples that were not taken."""
+    blocks, taken = [], 0
+    for t_s, tick in zip(times, values.reshape(len(times), channel.samples, -1), strict=True):
+        known = np.flatnonzero(np.isfinite(tick).any(axis=1))
+        new = int(known[-1]) + 1 if len(known) else 0
+        taken += new
+        blocks.append(Samples(t_s, taken, new, tuple(map(tuple, tick.tolist()))))
+    return blocks

@@ -21,11 +21,7 @@ def read_npy(path: Path) -> list[ColumnTable]:
     """
     array = _loaded(path)
     if array.dtype.names:
-        return [
-            ColumnTable(
-                source=path.name, numbers={name: _float(path, array[name]) for name in array.dtype.names}
-            )
-        ]
+        return [_of_arrays(path, {name: _float(path, array[name]) for name in array.dtype.names})]
     values = _float(path, array)
     if values.ndim == 3:
         return [
@@ -92,27 +88,34 @@ def _of_arrays(path: Path, arrays: Mapping[str, Any]) -> ColumnTable:
         for name, array in arrays.items()
         if isinstance(array, np.ndarray)
         and array.dtype.kind in "fiub"
-        and array.ndim in (1, 2)
+        and array.ndim in (1, 2, 3)
         and array.size > 1
     }
     if not numeric:
         raise DataDamaged(
-            f"{path} has no array of numbers with one or two dimensions. It has: {', '.join(arrays)}"
+            f"{path} has no array of numbers with one to three dimensions. It has: {', '.join(arrays)}"
         )
-    lengths = Counter(length for array in numeric.values() for length in set(array.shape) if length > 1)
+    # The rows of an array of three dimensions are along its first axis, or along its last one as MATLAB users write it.
+    lengths = Counter(
+        length for array in numeric.values() for length in {array.shape[0], array.shape[-1]} if length > 1
+    )
     rows = max(lengths, key=lambda length: (lengths[length], length))
-    columns = {}
+    columns, shapes = {}, {}
     for name, array in numeric.items():
-        if rows in array.shape:
-            values = array if array.shape[0] == rows else array.T
-            values = np.asarray(values, dtype=np.float64).reshape(rows, -1)
+        if rows in (array.shape[0], array.shape[-1]):
+            values = np.asarray(
+                array if array.shape[0] == rows else np.moveaxis(array, -1, 0), dtype=np.float64
+            )
+            if values.ndim == 3:
+                shapes[name] = (values.shape[1], values.shape[2])
+            values = values.reshape(rows, -1)
             columns[name] = values[:, 0] if values.shape[1] == 1 else values
     scalars = {
         name: str(array.reshape(-1)[0])
         for name, array in arrays.items()
         if isinstance(array, np.ndarray) and array.size == 1 and array.dtype.kind in "fiubU"
     }
-    return ColumnTable(source=path.name, numbers=columns, fields=scalars)
+    return ColumnTable(source=path.name, numbers=columns, shapes=shapes, fields=scalars)
 
 
 def _columns(values: Numbers) -> dict[str, Numbers]:

@@ -72,6 +72,10 @@ class Manifest:
     channels: Mapping[str, str] = setting(
         factory=dict, meaning='Further channels: a name and an expression with its unit, `f1 = "F1 [N]"`.'
     )
+    fast: Text = setting(
+        default=(),
+        meaning="Names of those `channels` whose columns are samples of a row in the order of time, not cells.",
+    )
     zero: str = setting(
         default="",
         validator=_is_amount,
@@ -108,6 +112,8 @@ class ReadManifest:
     expressions: Mapping[str, tuple[Expression, ...]]
     channels: Mapping[str, Expression]
     values: Mapping[str, Expression]
+    fast: frozenset[str] = frozenset()
+    """Names of the channels that are fast channels."""
     beside: Mapping[str, str]
     """Values that are in a file beside the recording: name to the name of that file."""
 
@@ -151,6 +157,7 @@ def read_manifest(place: Path) -> ReadManifest:
         channels=channels,  # type: ignore[arg-type]
         values=values,  # type: ignore[arg-type]
         beside=beside,
+        fast=frozenset(_texts(keys.fast)),
     )
 
 
@@ -169,6 +176,11 @@ def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
         found.append((("left",) if keys.left else ("right",), "give left and right, or force for both pads"))
     if not keys.force and not keys.left:
         found.append((("force",), "a grasp needs its force: force, or left and right"))
+    unknown = [name for name in _texts(keys.fast) if name not in keys.channels]
+    if unknown:
+        found.append((("fast",), f"{unknown[0]!r} is not among the channels: name it there with its columns"))
+    elif keys.fast and keys.resample_hz:
+        found.append((("resample_hz",), "fast channels cannot be resampled: leave out fast or resample_hz"))
     if (
         not keys.label
         and not keys.list
@@ -180,7 +192,11 @@ def _contradictions(keys: Manifest) -> list[tuple[tuple[str, ...], str]]:
 
 
 def _patterns(keys: Manifest) -> tuple[str, ...]:
-    return (keys.files,) if isinstance(keys.files, str) else keys.files
+    return _texts(keys.files)
+
+
+def _texts(value: Text) -> tuple[str, ...]:
+    return (value,) if isinstance(value, str) else value
 
 
 def samples_of(amount: str, t_s: Any) -> int:

@@ -34,7 +34,7 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
     if zero:
         notes.append(f"zero of the forces: the mean of the first {zero} samples")
         for name, values in (*scalars.items(), *arrays.items()):
-            if units.get(name, "") in ("N", "counts"):
+            if name not in manifest.fast and units.get(name, "") in ("N", "counts"):
                 values -= values[:zero].mean(axis=0)
     found.update(scalars)
     found.update(arrays)
@@ -66,6 +66,8 @@ def samples(manifest: ReadManifest, table: ColumnTable) -> GraspColumns:
         velocity_m_s=None if velocity is None else velocity[0],
         scalars=scalars,
         arrays=arrays,
+        shapes=_shapes(manifest, table, found),
+        fast=manifest.fast,
         units={
             **units,
             "gap": gap[1],
@@ -132,6 +134,20 @@ def _channels(
                 "and underscores, a letter first, and no name of a channel of every gripper"
             )
         values = found.computed(f"channels.{name}", lambda one=expression: one.values(found, len(table)))  # type: ignore[misc]
+        if name in manifest.fast:
+            values = values.reshape(len(values), -1)
         (scalars if values.ndim == 1 else arrays)[name] = values
         units[name] = expression.unit or "1"
     return scalars, arrays, units
+
+
+def _shapes(
+    manifest: ReadManifest, table: ColumnTable, found: AvailableColumns
+) -> dict[str, tuple[int, int]]:
+    """Return the shape of each channel that is computed from a column with a shape, such as an image."""
+    shapes = {}
+    for name, expression in manifest.channels.items():
+        for column in expression.columns(tuple(found)):
+            if column in table.shapes:
+                shapes[name] = table.shapes[column]
+    return shapes
