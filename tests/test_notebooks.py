@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import pytest
 from attrs import evolve
 
-from graspsense import Evaluation, Features, Prediction
+from graspsense import Evaluation, Features, Prediction, load_pipeline
 from graspsense.core.errors import PluginUnavailable
 from graspsense.evaluation.confusion import Confusion
 from graspsense.evaluation.intervals import RecognitionRate
@@ -101,9 +101,9 @@ def test_a_trace_shows_a_curve_also_without_forces_and_without_ticks():
     assert re.fullmatch(r"<Trace: \d+ ticks, [\d.]+ s, forces to [\d.]+ N, gap .* mm to .* mm>", repr(whole))
     blind = with_channels(whole, {"gap"})
     for trace in (whole, blind, with_channels(whole, set()), whole.until(-1.0)):
-        svg = re.search(r"<svg.*</svg>", trace._repr_html_(), re.DOTALL)[0]
-        picture = ElementTree.fromstring(svg)
-        assert "nan" not in svg
+        svgs = re.findall(r"<svg.*?</svg>", trace._repr_html_(), re.DOTALL)
+        picture, *_ = [ElementTree.fromstring(svg) for svg in svgs]
+        assert "nan" not in "".join(svgs)
         assert picture.get("aria-label") in repr(trace)
         shown(trace)
     assert "forces" not in repr(blind)
@@ -143,6 +143,27 @@ def test_a_plot_is_that_of_run_and_can_be_added_to(monkeypatch):
     assert gap.get_ylabel() == "gap, mm"
     assert gap.get_xlabel() == "time since contact, s"
     pyplot.close(forces.figure)
+
+
+def test_a_plot_and_a_notebook_show_arrays_at_their_moments_and_fast_channels(monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    grasp = load_pipeline(options=["gripper.acceleration=true"]).grasp(object="odwalla:full_open", seed=1)
+
+    forces, _ = grasp.trace.plot()
+
+    _, _, acceleration, left, right = forces.figure.axes[:5]
+    assert acceleration.get_ylabel() == "acceleration"
+    assert len(acceleration.lines) == 3
+    for axes, name in ((left, "left fingertip"), (right, "right fingertip")):
+        assert axes.get_title(loc="left") == f"{name}: change since before contact, by cell"
+        assert [label.get_text() for label in axes.get_yticklabels()] == ["contact", "peak", "rest"]
+        assert axes.images[0].get_array().shape == (3, 22)
+    pyplot.close(forces.figure)
+    for html in (grasp.trace._repr_html_(), grasp._repr_html_()):
+        assert "acceleration, 3 axes" in html
+        assert "left fingertip: change since before contact, by cell" in html
+        assert html.count(">rest</text>") == 2
 
 
 def test_a_plot_without_matplotlib_says_what_to_install(monkeypatch):

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from graspsense.core.features import percent
+from graspsense.core.moments import array_images, images_at, moments
+from graspsense.core.trace import SampleTrace
 from graspsense.core.trace_plot import contact_time, phase_spans, shown_from
-from graspsense.core.units import display_unit, in_words
+from graspsense.core.units import display_unit, in_words, without_underscores
 
 if TYPE_CHECKING:
     from graspsense.core.features import Features, Prediction
@@ -81,7 +83,12 @@ def trial_html(trial: Trial) -> str:
     labels = ", ".join(f"{key} {value}" for key, value in trial.run.labels.items())
     reason = f": {trial.reason}" if trial.reason else ""
     parts = [sentence(f"{trial.outcome.words}{reason}" + f" ({labels})" * bool(labels), strong=True)]
-    parts += [trace_svg(trial.trace), features_html(trial.features)]
+    parts += [
+        trace_svg(trial.trace),
+        samples_html(trial.trace),
+        arrays_html(trial.trace),
+        features_html(trial.features),
+    ]
     if trial.prediction is not None:
         parts.append(prediction_html(trial.prediction))
     components = ", ".join(trial.run.components.values())
@@ -113,6 +120,61 @@ def trace_svg(trace: Trace) -> str:
     )
 
 
+def arrays_html(trace: Trace) -> str:
+    """Return the cells of every tactile array at contact, peak and rest: a row for each moment, darker for more."""
+    times = moments(trace)
+    parts = []
+    for name, images in array_images(trace).items():
+        shown = images_at(images, 1.0, times)
+        known = np.concatenate(
+            [cells[np.isfinite(cells)] for cells in shown.values.values()] or [np.empty(0)]
+        )
+        if not len(known):
+            continue
+        low, high = float(known.min()), float(known.max())
+        cell = min(16.0, (WIDTH - LEFT_MARGIN) / images.cells.shape[1])
+        change = "change since before contact" if shown.relative else "values"
+        words = f"{name}: {change}, by cell, {low:.4g} to {high:.4g}"
+        drawn = [f'<text x="0" y="11" fill="currentColor">{escape(words)}</text>']
+        for row, (moment, cells) in enumerate(shown.values.items()):
+            y = 18.0 + 14.0 * row
+            drawn.append(f'<text x="0" y="{y + 10:g}" fill="currentColor">{moment}</text>')
+            drawn += [
+                f'<rect x="{LEFT_MARGIN + k * cell:.1f}" y="{y:g}" width="{cell:.1f}" height="13" fill="{INKS[0]}" '
+                f'fill-opacity="{(value - low) / ((high - low) or 1.0):.2f}" stroke="#8a8a8a" stroke-width="0.3"/>'
+                for k, value in enumerate(cells.tolist())
+                if math.isfinite(value)
+            ]
+        parts.append(_svg(drawn, 18.0 + 14.0 * len(shown.values) + 2.0, words))
+    return "".join(parts)
+
+
+def samples_html(trace: Trace) -> str:
+    """Return each fast channel over time, a line for each axis."""
+    parts = []
+    start = float(trace.t_s[shown_from(trace)]) if len(trace) else 0.0
+    for name, signal in trace.signals.items():
+        if isinstance(signal, SampleTrace) and len(signal.t_s):
+            shown = signal.t_s >= start
+            t, values = signal.t_s[shown] - (contact_time(trace) or 0.0), signal.values[shown]
+            if len(t):
+                words = f"{without_underscores(name)}, {signal.values.shape[1]} axes"
+                drawn = [f'<text x="{LEFT_MARGIN}" y="14" fill="currentColor">{escape(words)}</text>']
+                drawn += _panel(
+                    t, list(values.T), [INKS[k % len(INKS)] for k in range(values.shape[1])], 24.0
+                )
+                parts.append(_svg(drawn, 24.0 + PANEL + 6.0, words))
+    return "".join(parts)
+
+
+def _svg(drawn: Sequence[str], height: float, words: str) -> str:
+    return (
+        f'<svg viewBox="0 0 {WIDTH:g} {height:g}" role="img" aria-label="{escape(words)}" '
+        f'style="display:block;max-width:{WIDTH:g}px;font:11px sans-serif" xmlns="http://www.w3.org/2000/svg">'
+        f"{''.join(drawn)}</svg>"
+    )
+
+
 def trace_words(trace: Trace) -> str:
     """Return a trace in a line: its ticks, its time, its largest force and its range of gaps."""
     if len(trace) == 0:
@@ -141,7 +203,7 @@ def _panel(
     for value, y in ((high, top + 8.0), (low, top + PANEL)):
         yield f'<text x="{LEFT_MARGIN - 5}" y="{y:g}" text-anchor="end" fill="currentColor">{value:.3g}</text>'
     every = np.linspace(0, len(t) - 1, min(len(t), POINTS)).round().astype(int)
-    for line, ink, dash in zip(lines, inks, ("", ' stroke-dasharray="5 3"'), strict=False):
+    for line, ink, dash in zip(lines, inks, ("", ' stroke-dasharray="5 3"', ""), strict=False):
         points = [
             f"{_x(t, float(t[k])):.1f},{top + PANEL * (high - float(line[k])) / ((high - low) or 1.0):.1f}"
             for k in every

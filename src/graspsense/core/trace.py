@@ -103,13 +103,14 @@ class Trace:
         return f"<Trace: {trace_words(self)}>"
 
     def _repr_html_(self) -> str:
-        from graspsense.core.notebook import sentence, trace_svg, trace_words
+        from graspsense.core.notebook import arrays_html, samples_html, sentence, trace_svg, trace_words
 
-        return sentence(trace_words(self)) + trace_svg(self)
+        return sentence(trace_words(self)) + trace_svg(self) + samples_html(self) + arrays_html(self)
 
     def plot(self) -> tuple[Any, Any]:
-        """Draw the trace as `graspsense run --plot` does, and return the axes of the forces and of the gap.
+        """Draw the trace and return the axes of the forces and of the gap.
 
+        Below them are the fast channels over time, and the cells of every tactile array at contact, peak and rest.
         These are matplotlib's, so that a notebook shows them and a script can add to them: `axes[0].figure` is the
         figure. Raises PluginUnavailable without matplotlib, which the extra `plot` installs.
         """

@@ -1,4 +1,4 @@
-"""The drawing of a trace with matplotlib: pad forces and gap over time, with the phases behind them."""
+"""The drawing of a trace with matplotlib: forces, gap and fast channels over time, and the tactile arrays."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import numpy as np
 
 from graspsense.core.errors import PluginUnavailable
 from graspsense.core.signals import Phase
-from graspsense.core.units import display_unit
+from graspsense.core.trace import SampleTrace
+from graspsense.core.units import display_unit, without_underscores
 
 if TYPE_CHECKING:
-    from graspsense.core.trace import Floats, Integers, Trace
+    from graspsense.core.trace import Floats, ImageTrace, Integers, Trace
 
 MATPLOTLIB_HINT: Final = (
     'a picture needs matplotlib: pip install "graspsense[plot]", or pip install matplotlib'
@@ -31,9 +32,50 @@ def plot(trace: Trace) -> tuple[Any, Any]:
         from matplotlib import pyplot
     except ImportError as error:
         raise PluginUnavailable(f"{MATPLOTLIB_HINT} ({error})") from error
-    _, (force, gap) = pyplot.subplots(2, 1, sharex=True, figsize=(6.4, 4.4), layout="constrained")
+    from graspsense.core.moments import array_images
+
+    arrays = array_images(trace)
+    fast = {
+        name: signal
+        for name, signal in trace.signals.items()
+        if isinstance(signal, SampleTrace) and len(signal.t_s)
+    }
+    heights = [2.2, 2.2, *[1.6] * len(fast), *[1.1] * len(arrays)]
+    figure, rows = pyplot.subplots(
+        len(heights), 1, figsize=(6.4, sum(heights)), layout="constrained", height_ratios=heights
+    )
+    force, gap, *others = rows
+    gap.sharex(force)
     draw_trace(trace, force, gap)
+    for axes, (name, signal) in zip(others, fast.items(), strict=False):
+        axes.sharex(force)
+        _draw_samples(trace, axes, name, signal)
+    for axes, (name, images) in zip(others[len(fast) :], arrays.items(), strict=True):
+        figure.colorbar(_draw_array(trace, axes, name, images), ax=axes)
     return force, gap
+
+
+def _draw_samples(trace: Trace, axes: Any, name: str, signal: SampleTrace) -> None:
+    """Draw each axis of a fast channel over time."""
+    zero = contact_time(trace) or 0.0
+    begin = trace.t_s[shown_from(trace)]
+    shown = signal.t_s >= begin
+    axes.plot(signal.t_s[shown] - zero, signal.values[shown], lw=0.6)
+    axes.set_ylabel(without_underscores(name), fontsize=8)
+
+
+def _draw_array(trace: Trace, axes: Any, name: str, images: ImageTrace) -> Any:
+    """Draw the cells of an array at contact, peak and rest, a row each; return the picture for its colour bar."""
+    from graspsense.core.moments import images_at, moments
+
+    shown = images_at(images, 1.0, moments(trace))
+    values = np.array(list(shown.values.values())) if shown.values else images.cells[-1:]
+    picture = axes.imshow(values, aspect="auto", interpolation="nearest", cmap="Blues")
+    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.set_yticks(range(len(values)), list(shown.values) or ["last"])
+    change = "change since before contact, by cell" if shown.relative else "values, by cell"
+    axes.set_title(f"{name}: {change}", fontsize=8, loc="left")
+    return picture
 
 
 def draw_trace(trace: Trace, force: Any, gap: Any) -> None:

@@ -12,9 +12,8 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.core.entries import Channel, TactileArray
-from graspsense.core.signals import Phase
+from graspsense.core.moments import images_at, moments
 from graspsense.core.trace import ImageTrace
-from graspsense.core.trace_plot import contact_time
 from graspsense.core.units import display_unit, without_underscores
 from graspsense.report.heat import COLOURS, HeatScale
 from graspsense.report.html import figure
@@ -81,28 +80,11 @@ def tactile_figures(trace: Trace, channels: Sequence[Channel]) -> list[str]:
     return [_figure(title, of, shape, moments(trace)) for title, of, shape in arrays]
 
 
-def moments(trace: Trace) -> dict[str, float]:
-    """Return the times of contact, of the greatest pad force, and of rest or else of the end, as far as they exist."""
-    closing = np.flatnonzero(trace.phase < int(Phase.RELEASE))
-    if not len(closing):
-        return {}
-    found: dict[str, float] = {}
-    contact = contact_time(trace)
-    if contact is not None:
-        found["contact"] = contact
-    force = (trace.force_left_n[closing] + trace.force_right_n[closing]) / 2.0
-    if not np.isnan(force).all():
-        found["peak"] = float(trace.t_s[closing[int(np.nanargmax(force))]])
-    held = np.flatnonzero(trace.phase == int(Phase.HOLD))
-    found["rest" if len(held) else "end"] = float(trace.t_s[held[0] if len(held) else closing[-1]])
-    return found
-
-
 def _figure(
     title: str, images: Mapping[str, ImageTrace], shape: TactileArray, times: Mapping[str, float]
 ) -> str:
     unit, factor = display_unit(shape.unit)
-    shown = {side: _images_at(of, factor, times) for side, of in images.items()}
+    shown = {side: images_at(of, factor, times) for side, of in images.items()}
     relative = all(at.relative for at in shown.values())
     facing = list(shape.facing) or [True] * shape.cells
     scale = HeatScale.over(
@@ -146,29 +128,6 @@ def _figure(
     if any(math.isnan(x) for place in shape.positions_m for x in place):
         caption += " Below the face are the cells that are elsewhere on the fingertip."
     return figure(picture.svg(words), caption)
-
-
-@frozen
-class _Shown:
-    """The images at the moments, and whether they are relative to the image before contact."""
-
-    values: dict[str, Floats]
-    relative: bool
-
-
-def _images_at(images: ImageTrace, factor: float, times: Mapping[str, float]) -> _Shown:
-    def last(t_s: float) -> int:
-        return int(np.searchsorted(images.t_s, t_s, side="right")) - 1
-
-    before = int(np.searchsorted(images.t_s, times["contact"], side="left")) - 1 if "contact" in times else -1
-    # The image shortly before contact can already show it, so the zero is one image earlier where there is one.
-    zero = images.cells[max(before - 1, 0)] if before >= 0 else np.zeros(images.cells.shape[1])
-    missing = np.full(images.cells.shape[1], np.nan)
-    values = {
-        moment: factor * (images.cells[last(t)] - zero) if last(t) >= 0 else missing
-        for moment, t in times.items()
-    }
-    return _Shown(values, before >= 0)
 
 
 def layout_of(shape: TactileArray) -> _Layout:
