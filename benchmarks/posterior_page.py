@@ -19,6 +19,8 @@ TITLES: Final = {
     "p_first_does_not_separate": "section III.F: what p_first separates above 90 % of Odwalla and Naked",
     "f_steady_separates": "section III.F: what f_steady lacks to separate 90 % of Odwalla and Naked",
 }
+MIN_PARTICLES: Final = 5
+"""Effective sample size below which no mean over particles is given."""
 PINNED: Final = 0.5
 """Contraction from which on a figure counts as determined by the data."""
 LEAST_SAMPLE: Final = 50.0
@@ -326,8 +328,12 @@ def _replicates(explanations: Mapping[str, Any]) -> int:
 
 
 def _mean(one: Mapping[str, Any] | None) -> str:
-    """Return a mean over particles with the interval of the mean."""
-    return "not simulated" if one is None else _interval({**one, "interval": one["interval_of_mean"]})
+    """Return a mean over particles with the interval of the mean, if there are enough of them."""
+    if one is None:
+        return "not simulated"
+    if one["effective_sample_size"] < MIN_PARTICLES:
+        return f"too few particles ({one['effective_sample_size']:.0f})"
+    return _interval({**one, "interval": one["interval_of_mean"]})
 
 
 def _factor(one: Mapping[str, float] | None) -> str:
