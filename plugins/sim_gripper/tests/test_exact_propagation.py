@@ -396,13 +396,13 @@ def test_a_very_light_surface_is_not_penetrated():
 
 @pytest.mark.slow
 def test_the_report_names_the_exact_discretisation(tmp_path):
-    """And that steps do if friction is greater at rest."""
+    """And that steps do if friction is greater at rest: a step per tick where trial grasps allow it."""
     law = create("controller", "hybrid", probing_force_n=5.0)
     rests = {"coulomb_n": 1.0, "breakaway_n": 2.0}
     for change, scheme in (
         ({}, "exact discretisation"),
-        (rests, "Verlet"),
-        ({**rests, "fidelity": "full"}, "Verlet"),
+        (rests, "Verlet, a step per tick"),
+        ({**rests, "fidelity": "full"}, "Verlet, a step per tick"),
     ):
         config = evolve(PEERS, **change)
         report = run_grasp(SimBackend(config), law, RunConfig(seed=1)).report
