@@ -22,7 +22,7 @@ from typing import Any, Final
 
 from attrs import evolve, frozen
 
-from graspsense.core.config import to_toml, toml_key, toml_value
+from graspsense.core.config import to_toml, toml_key, toml_value, without_followers
 from graspsense.core.errors import ConfigError
 from graspsense.core.strict import plain
 from graspsense.experiments.experiment import PipelineOf, Planned, read_experiment
@@ -72,7 +72,11 @@ class Results:
 
     def begin(self, planned: Planned, command: str) -> None:
         """Write the experiment, its pipelines and its provenance next to the results. Raises SaveFailed."""
-        texts = {f"{name}.toml": to_toml(one) for name, one in planned.pipelines.items()}
+        # Without the settings that follow another one, since a sweep may change that.
+        texts = {
+            f"{name}.toml": to_toml(evolve(one, values=without_followers(one.values)))
+            for name, one in planned.pipelines.items()
+        }
         for name, text in texts.items():
             _write(self.folder / PIPELINES / name, text)
         _write(self.folder / EXPERIMENT, resolved(planned))
