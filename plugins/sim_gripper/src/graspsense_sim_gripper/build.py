@@ -29,7 +29,7 @@ from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance
 from graspsense_sim_gripper.dynamics.drive import Drive, Friction
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
 from graspsense_sim_gripper.fingertip import CELLS
-from graspsense_sim_gripper.objects.instance import Instance, cell_weights, central_cells, sample
+from graspsense_sim_gripper.objects.instance import PAD_CELLS, Instance, cell_weights, central_cells, sample
 from graspsense_sim_gripper.objects.library import find, split_number
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.objects.spec import ObjectSpec
@@ -275,8 +275,9 @@ def _sensor(config: SimConfig, instance: Instance | None, rng: np.random.Generat
     mean, spread = CELL_OFFSET
     offsets: Sequence[Sequence[float]] = (mean + spread * rng.standard_normal((2, CELLS))).tolist()
     weights = cell_weights(instance.spec.patch, instance.patch_row) if instance else EVEN_WEIGHTS
-    present = central_cells(config.pad_cells)
-    weights = tuple([weight if cell in present else 0.0 for cell, weight in enumerate(weights)])
+    if config.pad_cells < PAD_CELLS:
+        present = central_cells(config.pad_cells)
+        weights = tuple([weight if cell in present else 0.0 for cell, weight in enumerate(weights)])
     left, right = (PadCells(weights, tuple(offset)) for offset in offsets)
     return SensorParams(
         ideal=0,

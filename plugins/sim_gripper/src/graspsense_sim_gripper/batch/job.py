@@ -137,6 +137,8 @@ class Scenes:
     job: Job
     _scenes: dict[tuple[str, bool], tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
     """By `scene_key`."""
+    _problems: dict[str, tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
+    """By the name of the scene, with the number of the instance."""
 
     def add(self, scene: str, *, compiled: bool = False) -> None:
         """Select the model of a scene. `compiled`: run the trial grasps compiled, not in the interpreter.
@@ -154,13 +156,16 @@ class Scenes:
 
         Raises as `add` and `instantiate` do.
         """
-        key = scene_key(scene)
-        if key not in self._scenes:
-            self.add(scene)
-        problem, reduction = self._scenes[key]
-        if key[1]:
-            problem = evolve(problem, number=split_number(scene)[1])
-        return instantiate(problem, reduction, seed)
+        known = self._problems.get(scene)
+        if known is None:
+            key = scene_key(scene)
+            if key not in self._scenes:
+                self.add(scene)
+            problem, reduction = self._scenes[key]
+            if key[1]:
+                problem = evolve(problem, number=split_number(scene)[1])
+            known = self._problems[scene] = problem, reduction
+        return instantiate(*known, seed)
 
 
 def scene_key(scene: str) -> tuple[str, bool]:

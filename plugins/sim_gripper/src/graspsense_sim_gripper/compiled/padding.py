@@ -12,7 +12,6 @@ from functools import cache, lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
-from attrs import evolve
 
 from graspsense_sim_gripper.compiled.compose import Composition, composition
 from graspsense_sim_gripper.config import SimConfig
@@ -100,7 +99,19 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
         both_same = state.contact.right is state.contact.left
         right = left if both_same else _padded_state(state.contact.right, layout)
         state = state._replace(contact=state.contact._replace(left=left, right=right))
-    return evolve(setup, kinds=layout.kinds, plant=plant, state=state, sensor=sensor)
+    # `evolve` would take a quarter of the time of this function.
+    return GraspSetup(
+        kinds=layout.kinds,
+        terms=setup.terms,
+        plant=plant,
+        state=state,
+        sensor=sensor,
+        sensor_state=setup.sensor_state,
+        dt_s=setup.dt_s,
+        rng=setup.rng,
+        palm=setup.palm,
+        palm_state=setup.palm_state,
+    )
 
 
 def unpadded(state: PlantState, setup: GraspSetup) -> PlantState:

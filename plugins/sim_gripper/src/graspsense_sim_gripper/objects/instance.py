@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, lru_cache
 from typing import Final
 
 import numpy as np
 from attrs import frozen
 
 from graspsense_sim_gripper.objects.spec import NominalTerm, ObjectSpec, TermParams
-from graspsense_sim_gripper.terms.registry import find_term
 
 GRAVITY_M_S2: Final = 9.80665
 PAD_CELLS: Final = 15
@@ -46,20 +45,18 @@ def sample(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None
     With a number it is one particular object. Its stiffness, its width and the parameters with a spread of their own
     then depend on the class and the number only, and are the same in every trial; `rng` draws its placement.
     """
-    n_own = sum(value > 0.0 for term in spec.nominal_terms for value in term.spread)
-    draws = rng.standard_normal(5).tolist() if rng is not None else [0.0] * 5
-    # Drawn last, so that parameters with a spread of their own change no other draw.
-    own_draws = rng.standard_normal(n_own).tolist() if rng is not None and n_own else [0.0] * n_own
+    n_own = spec.n_own_spreads
+    # Those of parameters with a spread of their own are drawn last, so that they change no other draw.
+    draws = rng.standard_normal(5 + n_own).tolist() if rng is not None else [0.0] * (5 + n_own)
     if rng is not None and number is not None:
-        letters = spec.name.partition(":")[0].encode()
-        of_number = np.random.default_rng([number, *letters]).standard_normal(2 + n_own).tolist()
-        draws[:2], own_draws = of_number[:2], of_number[2:]
+        of_number = _draws_of_number(spec.name.partition(":")[0], number, 2 + n_own)
+        draws[:2], draws[5:] = of_number[:2], of_number[2:]
     # The stiffness is lognormal, and never negative. All other values are clipped at two standard deviations.
     stiffness_factor = math.exp(spec.stiffness_spread * draws[0])
-    clipped = [min(max(draw, -2.0), 2.0) for draw in draws]
-    own = iter(own_draws)
-    terms = tuple(_sampled_term(term, stiffness_factor, own) for term in spec.nominal_terms)
-    dents = (find_term(kind)[1].dent(params) for kind, params in zip(spec.kinds, terms, strict=True))
+    clipped = [min(max(draw, -2.0), 2.0) for draw in draws[:5]]
+    own = iter(draws[5:])
+    terms = tuple([_sampled_term(term, stiffness_factor, own) for term in spec.nominal_terms])
+    dents = [dent(terms[i]) for i, dent in spec.dents]
     return Instance(
         spec=spec,
         width_m=spec.width_m + spec.width_spread_m * clipped[1] - max(dents, default=0.0),
@@ -72,6 +69,13 @@ def sample(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None
     )
 
 
+@lru_cache(maxsize=1024)
+def _draws_of_number(name: str, number: int, count: int) -> tuple[float, ...]:
+    """Return the draws of the object with this number, of the class with this name."""
+    rng = np.random.default_rng([number, *name.encode()])
+    return tuple(rng.standard_normal(count).tolist())
+
+
 def _sampled_term(term: NominalTerm, stiffness_factor: float, draws: Iterator[float]) -> TermParams:
     """Return the parameters of a term of an instance; each with a spread of its own takes one of the `draws`."""
     params, is_stiffness, spread = term
@@ -79,12 +83,12 @@ def _sampled_term(term: NominalTerm, stiffness_factor: float, draws: Iterator[fl
         value * stiffness_factor if stiff else value
         for value, stiff in zip(params, is_stiffness, strict=True)
     ]
-    return params._make(
-        [
+    if any(spread):
+        values = [
             value * math.exp(own * next(draws)) if own > 0.0 else value
             for value, own in zip(values, spread, strict=True)
         ]
-    )
+    return tuple.__new__(type(params), values)
 
 
 def cell_weights(patch: str, row: float) -> tuple[float, ...]:
@@ -94,17 +98,16 @@ def cell_weights(patch: str, row: float) -> tuple[float, ...]:
     of an upright bottle, and its pressure falls off over about one row. A face loads all cells equally. A point loads
     the cells around it.
     """
-    weights = []
-    for i in range(PAD_CELLS):
-        r, c = i // 3 - 2 - row, i % 3 - 1
-        if patch == "face":
-            weights.append(1.0)
-        elif patch == "line":
-            weights.append(math.exp(-r * r))
-        else:
-            weights.append(math.exp(-(r * r + c * c) / 0.5))
+    if patch == "face":
+        weights = [1.0] * PAD_CELLS
+    elif patch == "line":
+        along = [math.exp(-(r - row) * (r - row)) for r in range(-2, 3)]
+        weights = [weight for weight in along for _ in range(3)]
+    else:
+        places = [(r - row, c) for r in range(-2, 3) for c in range(-1, 2)]
+        weights = [math.exp(-(r * r + c * c) / 0.5) for r, c in places]
     total = sum(weights)
-    return tuple(weight / total for weight in weights)
+    return tuple([weight / total for weight in weights])
 
 
 @cache

@@ -17,6 +17,7 @@ from attrs.validators import ge, gt, in_, le
 from graspsense.plugin_api import ConfigError, UnknownName, gives, suggestion
 from graspsense_sim_gripper.objects.identified import check_identified
 from graspsense_sim_gripper.terms.registry import find_term, in_order
+from graspsense_sim_gripper.terms.term import not_dented
 
 PATCHES: Final = ("line", "face", "point")
 
@@ -115,6 +116,17 @@ class ObjectSpec:
             own = tuple(spread.get(name, 0.0) for name in params._fields)
             nominal.append(NominalTerm(params, stiff, own))
         return tuple(nominal)
+
+    @cached_property
+    def n_own_spreads(self) -> int:
+        """The number of parameters with a spread of their own."""
+        return sum(value > 0.0 for term in self.nominal_terms for value in term.spread)
+
+    @cached_property
+    def dents(self) -> tuple[tuple[int, Callable[[TermParams], float]], ...]:
+        """The terms that earlier use may have dented: the index of each, and its `Term.dent`."""
+        dents = [find_term(kind)[1].dent for kind in self.kinds]
+        return tuple((i, dent) for i, dent in enumerate(dents) if dent is not not_dented)
 
     @cached_property
     def content(self) -> str:

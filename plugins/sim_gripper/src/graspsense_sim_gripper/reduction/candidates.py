@@ -33,7 +33,7 @@ def without_term(
     `i` counts the terms in `kinds`, without the lumped spring and damper. A limit that is the term itself is skipped.
     """
     params = model.terms[i + 1].params
-    yield DROPPED, _with(model, i, Switchable(0, params), 0.0, 0.0)
+    yield DROPPED, _dropped(model, i)
     for limit in find_term(kinds[i])[1].limits(params, point):
         if limit.params == params and limit.spring_n_m == 0.0 and limit.damper_n_s_m == 0.0:
             continue
@@ -76,11 +76,18 @@ def reduce_plant(plant: PlantParams, kinds: Sequence[str], reduction: Reduction)
 def reduce_model(model: ObjectModel, kinds: Sequence[str], reduction: Reduction) -> ObjectModel:
     """Return the reduced model of an instance; `model` has all its terms."""
     for i, treatment in enumerate(reduction.treatment[:-1]):
-        if treatment != KEPT:
+        if treatment == DROPPED:
+            model = _dropped(model, i)
+        elif treatment != KEPT:
             model = named(treatment, without_term(model, kinds, i, reduction.point))
     if reduction.treatment[-1] != KEPT:
         model = named(reduction.treatment[-1], simpler_pads(model))
     return model._replace(overshoots=1 if reduction.oscillates else 0)
+
+
+def _dropped(model: ObjectModel, i: int) -> ObjectModel:
+    """Return the model without term `i`."""
+    return _with(model, i, Switchable(0, model.terms[i + 1].params), 0.0, 0.0)
 
 
 def _with(
