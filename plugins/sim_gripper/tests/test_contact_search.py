@@ -12,6 +12,7 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, solve_contact
 from graspsense_sim_gripper.dynamics.state import ContactState
 from graspsense_sim_gripper.objects.library import find
+from graspsense_sim_gripper.reduction.levels import balance_rtol
 from graspsense_sim_gripper.terms.foam import Foam, foam
 from graspsense_sim_gripper.terms.term import NoState
 from graspsense_sim_gripper.terms.worn import Worn, WornState, worn
@@ -69,6 +70,29 @@ def test_a_power_law_with_a_steep_end_is_balanced(exponent):
         now, unbalanced = search(body, now, closure, 0.0, 1e-3)
         assert unbalanced == 0
         assert now.force_n == pytest.approx(1.5e4 * (closure - now.compression_m), rel=1e-5, abs=1e-6)
+
+
+@pytest.mark.parametrize(("accuracy", "rtol"), [(0.3, 5e-9), (1e-2, 5e-9), (1e-3, 5e-10), (1e-9, 1e-11)])
+def test_a_coarser_balance_is_within_its_tolerance_and_evaluates_the_law_less_often(accuracy, rtol):
+    evaluated = 0
+
+    def counted(params, state, d0, d1, h, v1):
+        nonlocal evaluated
+        evaluated += 1
+        return foam(params, state, d0, d1, h, v1)
+
+    assert balance_rtol(accuracy) == pytest.approx(rtol)
+    counts, search = [], solver(counted)
+    for tolerance in (rtol, 1e-11):
+        body = ObjectModel(0.06, 0.0, PadCompliance(1.5e4), (Foam(10.0, 0.01, 3.0),), balance_rtol=tolerance)
+        now, evaluated = untouched(uncompressed(["foam"]).states[1]), 0
+        for closure in (1e-4, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3):
+            now, unbalanced = search(body, now, closure, 0.0, 1e-3)
+            assert unbalanced == 0
+            miss_n = abs(now.force_n - 1.5e4 * (closure - now.compression_m))
+            assert miss_n <= tolerance * (100.0 + now.force_n) + 1e-12
+        counts.append(evaluated)
+    assert counts[0] < counts[1] or rtol == 1e-11
 
 
 def jumps(params, state, d0, d1, h, v1):

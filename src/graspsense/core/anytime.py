@@ -94,12 +94,12 @@ class Anytime:
         self._switch_s = sys.getswitchinterval()
 
     def begin(self, recorder: TraceRecorder, info: DeviceInfo, tell: Tell) -> None:
-        """Prepare, before the gripper moves: what is imported or compiled at the first use is used once."""
+        """Prepare before the gripper moves: on a device, what is imported or compiled at first use is used once."""
         self._recorder, self._info, self._tell = recorder, info, tell
-        with suppress(Exception):  # it is reported at the first checkpoint
-            for _, model in self._left:
-                model.predict(self._feature_set.extract(trace_of([], [], [], [])), None, None)
         if info.clock == "device":
+            with suppress(Exception):  # it is reported at the first checkpoint
+                for _, model in self._left:
+                    model.predict(self._feature_set.extract(trace_of([], [], [], [])), None, None)
             self._pool = ThreadPoolExecutor(1, "checkpoints")
             self._pool.submit(int).result()  # starts the thread
             sys.setswitchinterval(SWITCH_S)

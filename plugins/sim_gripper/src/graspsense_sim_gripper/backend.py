@@ -203,6 +203,8 @@ class SimBackend(BatchBackend[SimConfig]):
         constants = GraspParams(self._plant, setup.sensor, params, setup.dt_s, first + most)
         at = FreeProgress(first, 0, effort, self._state, self._sensor, state)
         at = self._free_ticks(constants, at, frame, table, self._phases)
+        if at.ticks == first:
+            return FreeRun(0, [], [], state)
         self._ticks, n, self._effort_n, self._state, self._sensor, state = at
         t, gap, velocity, efforts, left, right, edge_left, edge_right, commands = (row[:n] for row in table)
         columns = t, repeat(setup.dt_s), gap, velocity, efforts, left, right, edge_left, edge_right, repeat(0)

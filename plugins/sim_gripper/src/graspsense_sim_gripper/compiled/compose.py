@@ -19,6 +19,7 @@ from graspsense_sim_gripper.dynamics.contact import (
     ObjectModel,
     PadLoad,
     hardening,
+    no_event,
     solve_contact,
 )
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
@@ -150,15 +151,21 @@ def sum_of_active(laws: Sequence[Law | OnSum]) -> Law:
     """
     from_last = tuple([(i, law) for i, law in reversed(list(enumerate(laws))) if not isinstance(law, OnSum)])
 
+    # The active terms of the last parameters, which a grasp does not change: one tuple, so that threads may share it.
+    active_of: tuple[TermsParams, Sequence[tuple[int, Law, Any]]] = ((), ())
+
     def force_of_active(
         params: TermsParams, states: TermsStates, d0: float, d1: float, h: float, v1: float
     ) -> tuple[float, TermsStates]:
+        nonlocal active_of
+        known, active = active_of
+        if known is not params:
+            active = [(i, law, params[i].params) for i, law in from_last if params[i].active == 1]
+            active_of = params, active
         total, after = 0.0, list(states)
-        for i, law in from_last:
-            active, term = params[i]
-            if active == 1:
-                force, after[i] = law(term, after[i], d0, d1, h, v1)
-                total = force + total
+        for i, law, term in active:
+            force, after[i] = law(term, after[i], d0, d1, h, v1)
+            total = force + total
         return total, tuple(after)
 
     last = laws[-1] if laws else None
@@ -273,7 +280,8 @@ def plant_move(
     over_a_tick: PlantMove = refine_until_converged if converges else advance
     if lags:
         over_a_tick = bind(move, advance=over_a_tick)
-    parts = {"object_force": sum_of(laws), "object_phase": phase_of_all(phases), **pad_parts(hardens)}
+    events = {"object_phase": phase_of_all(phases)} if phases else {"has_event": no_event}
+    parts = {"object_force": sum_of(laws), **events, **pad_parts(hardens)}
     return bind_reachable(over_a_tick, parts)
 
 

@@ -19,9 +19,10 @@ from graspsense_sim_gripper.dynamics.roots import MAX_ITERATIONS, bracketed_seca
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState
 from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
 
-FORCE_ATOL_N: Final = 1e-9
-FORCE_RTOL: Final = 1e-11
-"""Absolute and relative tolerance of the balance of forces."""
+BALANCE_RTOL: Final = 1e-11
+"""The least relative tolerance of the balance of forces, which a reference has."""
+BALANCE_SCALE_N: Final = 100.0
+"""The tolerance is relative to the force and to this one together, so that it has an absolute part."""
 LENGTH_RTOL: Final = 1e-14
 """Additional tolerance for the rounding of lengths, relative to the force of the pads against a rigid object."""
 ARGUMENT_RTOL: Final = 4e-16
@@ -72,6 +73,8 @@ class ObjectModel(NamedTuple):
     """1: the object is held fast. The finger that touches first then presses it instead of pushing it."""
     overshoots: int = 1
     """0: a released object recovers its shape without overshoot, so it cannot touch the fingers again meanwhile."""
+    balance_rtol: float = BALANCE_RTOL
+    """Relative tolerance of the balance of forces."""
 
 
 class PadLoad(NamedTuple):
@@ -170,6 +173,11 @@ def has_event(before: Contact, after: Contact) -> bool:
     return object_phase(before.left.states) != object_phase(after.left.states) or object_phase(
         before.right.states
     ) != object_phase(after.right.states)
+
+
+def no_event(before: Contact, after: Contact) -> bool:
+    """Return False: `has_event` of an object whose terms have no events."""
+    return False
 
 
 def is_touched(contact: Contact, gap_m: float, reach_m: float) -> int:
@@ -306,6 +314,11 @@ def _press_through_pads(
     return ContactState(d1, force, slope, states, pad, branch, rate, span), unbalanced
 
 
+def balance_tolerance(model: ObjectModel, force_n: float) -> float:
+    """Return how far (N) the forces of object and pads may be apart at this force."""
+    return model.balance_rtol * (BALANCE_SCALE_N + abs(force_n))
+
+
 def _creep(pads: PadCompliance, now: ContactState, h: float) -> _Creep:
     """Return how the pads' damper and branch act over a step of `h`."""
     x = h / pads.branch_tau_s
@@ -335,17 +348,18 @@ def _balance(
             slope = max((force - last_n) / (d1 - last), 0.0)
             total = max(k + slope + excess_slope, MIN_SLOPE_SHARE * k, MIN_SLOPE_N_M)
         n += 1
-        tolerance = FORCE_ATOL_N + FORCE_RTOL * abs(force) + LENGTH_RTOL * abs(c)
+        tolerance = balance_tolerance(model, force) + LENGTH_RTOL * abs(c)
         if n >= MAX_ITERATIONS or not abs(miss) > tolerance:
             break
         if miss > 0.0:
             upper = d1
         else:
             lower = d1
-        reach = max(FIRST_REACH_M, REACH_FACTOR * abs(d1 - d0))
         if lower == -math.inf or upper == math.inf:
             d2 = bracketed_secant(d1, miss, last, total, lower, upper)
-            d2 = min(max(d2, d1 - reach), d1 + reach)
+            reach = max(FIRST_REACH_M, REACH_FACTOR * abs(d1 - d0))
+            if abs(d2 - d1) > reach:
+                d2 = d1 + reach if d2 > d1 else d1 - reach
         elif n > SECANT_ITERATIONS:
             d2 = 0.5 * (lower + upper)
         else:

@@ -27,6 +27,7 @@ from graspsense_sim_gripper.compiled.compose import (
 )
 from graspsense_sim_gripper.compiled.jit import compile_part
 from graspsense_sim_gripper.dynamics.contact import (
+    BALANCE_RTOL,
     ObjectModel,
     PadCompliance,
     pad_compression,
@@ -80,7 +81,7 @@ def forces_along(pads: PadCompliance, at_rest: ContactState, paths: Paths, runs:
     """
     for r in range(len(runs.path)):
         width = float(runs.width_m[r])
-        model = ObjectModel(width, 0.0, pads, terms_of(runs.active, runs.numbers, r), 0, 1)
+        model = ObjectModel(width, 0.0, pads, terms_of(runs.active, runs.numbers, r), 0, 1, BALANCE_RTOL)
         begin, end = paths.first[runs.path[r]], paths.first[runs.path[r] + 1]
         now, touched = at_rest, 0
         for i in range(begin, end):

@@ -10,6 +10,7 @@ from attrs import evolve
 
 from graspsense_sim_gripper.dynamics.contact import ObjectModel
 from graspsense_sim_gripper.problem import GraspSetup
+from graspsense_sim_gripper.reduction.levels import balance_rtol
 from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
@@ -70,7 +71,10 @@ def reduced(setup: GraspSetup, reduction: Reduction) -> GraspSetup:
 
 def reduce_plant(plant: PlantParams, kinds: Sequence[str], reduction: Reduction) -> PlantParams:
     """Return the plant of an instance with the reduced model and its steps; `plant` has all terms."""
-    return PlantParams(plant.drive, reduce_model(plant.object, kinds, reduction), reduction.steps)
+    steps, model = reduction.steps, reduce_model(plant.object, kinds, reduction)
+    if steps.settle == 0.0:
+        model = model._replace(balance_rtol=balance_rtol(reduction.level.step_tol))
+    return PlantParams(plant.drive, model, steps)
 
 
 def reduce_model(model: ObjectModel, kinds: Sequence[str], reduction: Reduction) -> ObjectModel:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from typing import Final, Literal, NamedTuple
 
+from graspsense_sim_gripper.dynamics.contact import BALANCE_RTOL
 from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, VERLET, Steps
 
 STEP_SHARE: Final = 0.34
@@ -15,6 +16,10 @@ STEP_SHARE: Final = 0.34
 accuracy, and smaller."""
 GROWTH_ACCURACY: Final = 0.1
 """From this accuracy upwards, a step in contact may be twice as long as the one before."""
+BALANCE_SHARE: Final = 5e-7
+"""The tolerance of the balance of forces, relative to the accuracy of the steps."""
+MAX_BALANCE_RTOL: Final = 5e-9
+"""With a larger one, a search that has ended could not be told from one that has not converged."""
 BY_SCENE: Final = -1
 """The scheme follows from the scene, and its steps from their error."""
 
@@ -102,6 +107,15 @@ def step_tolerance(accuracy: float) -> float:
     makes the accumulated error proportional to the accuracy.
     """
     return float((STEP_SHARE * accuracy) ** 1.5)
+
+
+def balance_rtol(step_tol: float) -> float:
+    """Return the relative tolerance of the balance of forces in a contact for this accuracy of the steps.
+
+    The error that it causes is small beside that of the steps, and the search for the balance ends an evaluation of
+    the forces earlier than at the tolerance of a reference.
+    """
+    return min(max(BALANCE_SHARE * step_tol, BALANCE_RTOL), MAX_BALANCE_RTOL)
 
 
 def step_growth(accuracy: float) -> float:

@@ -72,10 +72,12 @@ def parting(params: PlantParams, start: Start, attempt: Attempt) -> float:
     Beyond the end of the recovering object nothing drives the fingers.
     """
     gap, gap1 = start.motion.gap_m, attempt.motion.gap_m
+    if gap1 <= gap:
+        return 0.0
     before, after = start.contact, attempt.contact
     left = before.left.force_n > 0.0 and after.left.force_n == 0.0
     right = before.right.force_n > 0.0 and after.right.force_n == 0.0
-    if not (left or right) or gap1 <= gap:
+    if not (left or right):
         return 0.0
     model = params.object
     shift = 2.0 * after.offset_m if model.held == 1 else 0.0

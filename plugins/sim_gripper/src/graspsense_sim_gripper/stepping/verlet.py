@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from graspsense_sim_gripper.dynamics.contact import FORCE_ATOL_N, FORCE_RTOL, pad_forces
+from graspsense_sim_gripper.dynamics.contact import balance_tolerance, pad_forces
 from graspsense_sim_gripper.dynamics.drive import acceleration, sliding_friction
 from graspsense_sim_gripper.dynamics.state import Contact, Motion
 from graspsense_sim_gripper.stepping.events import drift
@@ -50,25 +50,25 @@ def _errors(
     params: PlantParams, start: Start, contact1: Contact, rate1: float, speed1: float, t: float
 ) -> tuple[float, float]:
     """Return the errors of speed (m/s) and force (N)."""
-    jacobian = start.motion.jacobian_m_rev
-    load = 0.5 * (start.contact.left_n + start.contact.right_n)
+    (_, speed, _, jacobian), contact, _, rate, _, _ = start
+    left1, right1 = contact1.left, contact1.right
+    load = 0.5 * (contact.left_n + contact.right_n)
     load1 = 0.5 * (contact1.left_n + contact1.right_n)
-    change = rate1 - start.acceleration
+    change = rate1 - rate
     # A difference of forces that is rounding says nothing about the step.
     noise_n = ROUNDING * max(
-        contact1.left.slope_n_m * abs(contact1.left.compression_m),
-        contact1.right.slope_n_m * abs(contact1.right.compression_m),
+        left1.slope_n_m * abs(left1.compression_m), right1.slope_n_m * abs(right1.compression_m)
     )
-    noise_n += SEARCH_ROUNDING * (FORCE_ATOL_N + FORCE_RTOL * max(load, load1))
+    noise_n += SEARCH_ROUNDING * balance_tolerance(params.object, max(load, load1))
     if abs(change) * params.drive.inertia <= noise_n * abs(jacobian):
         change = 0.0
     speed_error = force_error = 0.0
     # In most ticks nothing is touched and so little changes that the errors are negligible.
-    if start.contact.touched == 1 or abs(t * change * jacobian) > params.steps.tolerance * SPEED_SCALE_M_S:
-        largest = max(abs(start.acceleration), abs(rate1))
+    if contact.touched == 1 or abs(t * change * jacobian) > params.steps.tolerance * SPEED_SCALE_M_S:
+        largest = max(abs(rate), abs(rate1))
         if largest > 0.0:
             speed_error = abs(t * change * change / (12.0 * largest) * jacobian)
-        fastest = max(abs(start.motion.speed_rev_s), abs(speed1))
+        fastest = max(abs(speed), abs(speed1))
         if fastest > 0.0:
             force_error = abs((load1 - load) * t * change / (6.0 * fastest))
     return speed_error, force_error
