@@ -26,7 +26,7 @@ def pipeline():
     "name", ["odwalla:full_closed", "odwalla:full_open", "can:full_closed", "water:full_open"]
 )
 def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
-    said = pipeline.grasp(object=name, seed=5).prediction
+    said = pipeline.grasp(object=name, seed=4).prediction
 
     assert said.label == name
     assert said.prediction_set[0] == name

@@ -15,7 +15,7 @@ from graspsense_sim_gripper.build import instantiate, problem_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import find
 from graspsense_sim_gripper.objects.spec import ObjectSpec
-from graspsense_sim_gripper.reduction.levels import SPREAD_SCALES
+from graspsense_sim_gripper.reduction.levels import PLAIN_SCALES
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
 
 CONFIG = SimConfig(sensor="ideal", spread=False)
@@ -117,7 +117,7 @@ def test_run_reports_each_decision_with_its_number_and_its_error():
     report = json.loads(done.stdout)["report"]
     selection = report["selection"]
     assert (selection["accuracy"], selection["fidelity"], report["resolved"]) == (0.01, "scene", True)
-    assert selection["level"] == SPREAD_SCALES[0].at(0.01)._asdict()
+    assert selection["level"] == PLAIN_SCALES[0].at(0.01)._asdict()
     assert selection["verified"]["error"] <= 0.005
     # The probing force less friction, and what the controller is set to.
     assert 10.0 < selection["expected_force_n"] < 25.0

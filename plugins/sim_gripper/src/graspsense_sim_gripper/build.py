@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
+from contextlib import suppress
+from functools import lru_cache, partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -55,6 +56,8 @@ UNLOADED: Final = (CELL_OFFSET[0],) * CELLS
 """The counts of the unloaded cells of an ideal sensor."""
 EVEN_WEIGHTS: Final = (1.0 / 15.0,) * 15
 """The share of each cell of the gripping face in the force, if there is no object."""
+EXAMPLES: Final = 4
+"""Number of instances whose trial grasps verify a model whose steps have no estimate of their error."""
 _SENSOR_SETTINGS: Final = ("noise_counts", "pad_period_s", "pad_cells", "pad_delay_s")
 _NOT_OF_THE_MODEL: Final[dict[str, Any]] = {
     field.name: field.default
@@ -110,7 +113,22 @@ def problem_of(config: SimConfig, spec: ObjectSpec | None, number: int | None = 
         model_config=model_config,
         device=device_info(model_config),
         nominal=nominal,
+        examples=partial(_examples, model_config, spec),
     )
+
+
+def _examples(config: SimConfig, spec: ObjectSpec | None) -> tuple[GraspSetup, ...]:
+    """Return what `Problem.examples` returns. An instance that does not fit between the open fingers is left out."""
+    if spec is None or not config.spread:
+        return ()
+    setups = []
+    for seed in range(EXAMPLES):
+        rng = np.random.default_rng(seed)
+        instance = sample(spec, rng)
+        with suppress(ConfigError):
+            _check_fit(config, instance)
+            setups.append(_setup(config, instance, rng))
+    return tuple(setups)
 
 
 def instantiate(problem: Problem, reduction: Reduction | None, seed: int) -> GraspSetup:

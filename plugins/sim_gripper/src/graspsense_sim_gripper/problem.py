@@ -110,3 +110,6 @@ class Problem:
     """The properties of the gripper with ideal sensors, for the controller of a trial grasp."""
     nominal: GraspSetup | None
     """The grasp of the nominal object with all its terms, with `model_config`; None if there is no object."""
+    examples: Callable[[], tuple[GraspSetup, ...]]
+    """Returns grasps of some instances with all their terms and ideal sensors, always the same ones; none if there is
+    no object or if instances do not differ."""

@@ -64,7 +64,7 @@ PLAIN_SCALES: Final = (
     LevelScale(0.0, scheme=BOGACKI_SHAMPINE, plain=1),
 )
 """All terms, with a step per tick: they cost least. Where trial grasps show that they suffice, nothing is gained by a
-simpler model or by steps whose error is controlled."""
+simpler model or by steps whose error is controlled. With spread, several instances are grasped to show it."""
 THIRD_ORDER: Final = LevelScale(0.0, scheme=BOGACKI_SHAMPINE)
 """All terms, with steps of third order whose error is controlled."""
 HIGH_ACCURACY: Final = 3e-3
@@ -72,8 +72,9 @@ HIGH_ACCURACY: Final = 3e-3
 UNVERIFIED: Final = LevelScale(0.05)
 """The level of a model that no trial grasp verifies."""
 SPREAD_SCALES: Final = (LevelScale(0.3), UNVERIFIED, *FULL_SCALES)
-"""The levels with spread. The two with the largest tolerances are left out: trial grasps use the nominal object, and a
-level that is just accurate enough for it may be too coarse for another instance."""
+"""The levels with spread whose steps follow from their error. The two with the largest tolerances are left out: their
+trial grasps use the nominal object, and a level that is just accurate enough for it may be too coarse for another
+instance."""
 SCENE_SCALES: Final = (LevelScale(10.0), LevelScale(3.0), *SPREAD_SCALES)
 """The levels without spread."""
 REFERENCE_SCALES: Final = {
@@ -89,13 +90,12 @@ def scales_for(
 ) -> tuple[LevelScale, ...]:
     """Return the scales to try, in order. `spread`: whether instances differ from the nominal object.
 
-    `explicit`: whether explicit schemes suit the scene: it is neither stiff nor discretised exactly. With spread,
-    steps without an estimate of their error are not tried, since only the nominal object is verified.
+    `explicit`: whether explicit schemes suit the scene: it is neither stiff nor discretised exactly.
     """
     own: tuple[LevelScale, ...] = FULL_SCALES
     if fidelity == "scene":
         own = SPREAD_SCALES if spread else SCENE_SCALES
-    if spread or not explicit:
+    if not explicit:
         return own
     return (*PLAIN_SCALES, *((THIRD_ORDER,) if accuracy <= HIGH_ACCURACY else ()), *own)
 

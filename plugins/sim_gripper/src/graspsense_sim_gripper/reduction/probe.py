@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from typing import Final
 
 from attrs import evolve, frozen
@@ -60,8 +61,12 @@ class Grip:
         self.model, self.kinds = model, kinds
         self.mass_kg = mass_kg
         self.paths, self.point = _paths(model, kinds, force_n, max(speed_m_s, MIN_SPEED_M_S), mass_kg)
-        self.forces = [list(forces_along(model, kinds, path)) for path in self.paths]
         self._alternatives: list[list[tuple[str, float]]] | None = None
+
+    @cached_property
+    def forces(self) -> list[list[float]]:
+        """The forces (N) of the full model on each path."""
+        return [list(forces_along(self.model, self.kinds, path)) for path in self.paths]
 
     def alternatives(self) -> list[list[tuple[str, float]]]:
         """Return for each term the names of its simplifications, each with the error that it causes alone."""

@@ -59,7 +59,7 @@ MIN_CLOSING_M_S: Final = 0.01
 """The remaining time of an approach is estimated with this closing speed, or with a higher present one."""
 MAX_HOLD_S: Final = 0.3
 """A longer hold is shortened to this in a trial grasp."""
-TICKS_AT_ONCE: Final = 50
+TICKS_AT_ONCE: Final = 200
 """Largest number of ticks of the approach between two checks of the distance."""
 CAPACITY: Final = 512
 """Largest number of ticks in a buffer; after each buffer the work is counted."""
@@ -124,6 +124,8 @@ class TrialGrasps:
     compiled: bool
     padding: tuple[str, ...] | None
     """The kinds of terms in compiled code, see `compiled.padding`; None: those of a batch."""
+    only_near: bool = False
+    """Whether they begin `NEAR_M` from the object, and the approach is simulated once for all steps."""
     _records: dict[Any, GraspRecord] = field(factory=dict, init=False)
     _starts: dict[float, _Stage] = field(factory=dict, init=False)
     """The grasp shortly before the first contact, by the step tolerance of the approach."""
@@ -157,7 +159,7 @@ class TrialGrasps:
     def _grasp(self, reduction: Reduction, force_n: float, travel: float) -> GraspRecord:
         """Simulate what `record` returns. Raises NotCompilable."""
         setup = reduced(self.setup, reduction)
-        tolerance = setup.plant.steps.tolerance
+        tolerance = math.inf if self.only_near else setup.plant.steps.tolerance
         if tolerance not in self._starts:
             self._starts[tolerance] = self._approach(setup)
         start = self._starts[tolerance]
@@ -167,11 +169,22 @@ class TrialGrasps:
         end = self._runner(setup, start.from_open)(setup.plant.steps, start, until)
         return _record(end, bias, setup.dt_s)
 
+    def of(self, setup: GraspSetup) -> TrialGrasps:
+        """Return trial grasps of another instance of the object, which begin near it and share one approach.
+
+        Their work is added to that of these.
+        """
+        other = evolve(self, setup=setup, only_near=True)
+        other.work = self.work
+        return other
+
     def _max_ticks(self) -> int:
         return math.ceil(min(MAX_SECONDS, seconds_at_most(self.controller.run)) / self.setup.dt_s)
 
     def _approach(self, setup: GraspSetup) -> _Stage:
         """Return the grasp shortly before the first contact; it begins near the object if it would take too long."""
+        if self.only_near:
+            return self._closed_in(setup, from_open=False)[0]
         stage, came_near = self._closed_in(setup, from_open=True)
         if not came_near and not has_ended(stage.progress.controller):
             stage, _ = self._closed_in(setup, from_open=False)
