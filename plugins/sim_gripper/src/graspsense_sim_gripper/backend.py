@@ -46,7 +46,7 @@ from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.palm import PalmBuffers, PalmSignals, channel, palm_signals
 from graspsense_sim_gripper.perturbed import perturbed
-from graspsense_sim_gripper.problem import GraspController
+from graspsense_sim_gripper.problem import IMAGES_PER_BLOCK, GraspController
 from graspsense_sim_gripper.reduction.propose import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N, PadBuffers, apply_tare, sense
@@ -144,7 +144,7 @@ class SimBackend(BatchBackend[SimConfig]):
         self._state, self._sensor = setup.state, setup.sensor_state
         self._ticks = 0
         zero = (CELL_OFFSET[0],) * CELLS
-        self._blocks = setup.noise()
+        self._noise = setup.noise()
         self._buffers = PadBuffers(zero, zero, [], [])
         self._palm, self._palm_state = setup.palm, setup.palm_state
         self._palm_noise = setup.palm_noise() if setup.has_palm else None
@@ -272,7 +272,7 @@ class SimBackend(BatchBackend[SimConfig]):
     def _draw_noise(self) -> None:
         """Draw the noise of the next images, and extend the buffer of images by as many."""
         noise, images = self._buffers.noise, self._buffers.images
-        noise.extend(next(self._blocks).tolist())
+        noise.extend(self._noise.standard_normal((IMAGES_PER_BLOCK, 2 * CELLS)).tolist())
         images.extend(([0.0] * CELLS, [0.0] * CELLS) for _ in range(len(noise) - len(images)))
 
     def variants(self) -> tuple[SimulationVariant, ...]:

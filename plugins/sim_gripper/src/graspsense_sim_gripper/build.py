@@ -175,6 +175,7 @@ def _setup(
         sensor_state=initial_sensor(sensor, state),
         dt_s=1.0 / config.rate_hz,
         rng=rng,
+        noise_state=rng.bit_generator.state,
         **palm,
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -50,7 +50,13 @@ from graspsense_sim_gripper.loop import (
 from graspsense_sim_gripper.objects.library import split_number
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers, sample_trace
-from graspsense_sim_gripper.problem import GraspController, GraspSetup, PalmNoise, Problem
+from graspsense_sim_gripper.problem import (
+    IMAGES_PER_BLOCK,
+    GraspController,
+    GraspSetup,
+    PalmNoise,
+    Problem,
+)
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sensing import PadBuffers
@@ -61,8 +67,8 @@ TICKS: Final = 8200
 """Ticks that the buffers hold at first; a grasp that needs more continues with longer ones. It is not a power of two,
 because all columns would then share one set of the processor's cache and evict each other."""
 IMAGES: Final = 128
-"""Cell images that the buffers hold at first, a multiple of a block of noise. A grasp that needs more draws more noise
-then: drawing is a sixth of the time of a grasp."""
+"""Cell images that the buffers hold at first. A grasp that needs more draws more noise then: drawing is a tenth of the
+time of a grasp."""
 
 Extracted = Any
 """What `Job.extract` returns, such as features."""
@@ -293,10 +299,10 @@ def _run(
     job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage, on_arrays: bool
 ) -> tuple[SimulationState, Buffers]:
     """Run the loop to the end of the grasp, with longer buffers where those of the storage do not suffice."""
-    blocks, ideal = setup.noise(), setup.sensor.ideal == 1
+    noise, ideal = setup.noise(), setup.sensor.ideal == 1
     buffers = storage.buffers
     if not ideal:
-        _draw_noise(buffers.pads.noise, blocks)
+        noise.standard_normal(out=buffers.pads.noise)
     buffers.pads.images[-1] = math.nan
     zeros = np.full((2, CELLS), CELL_OFFSET[0])
     buffers = buffers._replace(pads=buffers.pads._replace(left_zero=zeros[0], right_zero=zeros[1]))
@@ -328,20 +334,11 @@ def _run(
         if has_ended(progress.controller) or progress.loop.ticks >= most_ticks:
             return progress, buffers
         if not ideal and progress.sensor.images == len(buffers.pads.images):
-            buffers = _with_more_images(buffers, next(blocks))
+            buffers = _with_more_images(buffers, noise.standard_normal((IMAGES_PER_BLOCK, 2 * CELLS)))
         else:
             buffers = _with_more_ticks(buffers, palm_noise)
         if not on_arrays:
             buffers = _as_lists(buffers)
-
-
-def _draw_noise(noise: NDArray[np.float64], blocks: Iterator[NDArray[np.float64]]) -> None:
-    """Fill `noise` with whole blocks."""
-    begin = 0
-    while begin < len(noise):
-        block = next(blocks)
-        noise[begin : begin + len(block)] = block
-        begin += len(block)
 
 
 def _as_lists(buffers: Buffers) -> Buffers:

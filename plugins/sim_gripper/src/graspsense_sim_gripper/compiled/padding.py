@@ -109,6 +109,7 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
         sensor_state=setup.sensor_state,
         dt_s=setup.dt_s,
         rng=setup.rng,
+        noise_state=setup.noise_state,
         palm=setup.palm,
         palm_state=setup.palm_state,
     )
