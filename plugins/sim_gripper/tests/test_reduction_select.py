@@ -105,6 +105,14 @@ def test_a_slow_approach_is_taken_up_near_the_object(monkeypatch):
     assert model.point.speed_m_s == pytest.approx(0.002, rel=0.05)
 
 
+def test_selecting_that_takes_long_reports_how_far_it_is(monkeypatch, caplog):
+    selected(CONFIG, thing(SHELL), hybrid())
+    assert caplog.messages == []
+    monkeypatch.setattr(verify, "PROGRESS_S", 0.0)
+    selected(CONFIG, thing(SHELL, ("loss", {"damping_n_s_m": 1.0})), hybrid())
+    assert "selecting the model of the object: 1 % of the limit of trial grasps" in caplog.messages
+
+
 class Ragged(NamedTuple):
     k_n_m: float
 
@@ -288,3 +296,27 @@ def test_trial_grasps_end_at_a_limit_of_work_and_the_full_model_runs(monkeypatch
     assert set(reduction.treatment) == {"kept"}
     told = next(d for d in reduction.decisions if d.term == "trial grasps")
     assert "limit" in told.decision
+
+
+@pytest.mark.parametrize(
+    ("terms", "further", "unsure"),
+    [
+        ("k1_n_m = 1000.0", {}, []),
+        ("k1_n_m = 1000.0", {"expected_force_n": 5.0}, ["peak", "trace", "features"]),
+        ("k1_n_m = 1000.0", {"step_s": 1e-3}, ["peak", "trace", "features"]),
+        ("k1_n_m = 1000.0", {"fidelity": "reference"}, []),
+        ("k1_n_m = 1e7", {"pad_stiffness_n_m": math.inf}, ["trace", "features"]),
+        (
+            'k1_n_m = 1000.0\n[[terms]]\ntype = "slosh"\nmass_kg = 1.0\nfrequency_hz = 1e5',
+            {},
+            ["peak", "trace", "features"],
+        ),
+    ],
+    ids=["soft", "beyond its force", "forced steps", "reference", "bounces", "term dropped"],
+)
+def test_the_report_says_which_quantities_are_not_verified(terms, further, unsure, tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(f'width_m = 0.05\n[[terms]]\ntype = "elastic"\n{terms}\n')
+    config = evolve(CONFIG, object=str(scene), open_gap_m=0.052, **further)
+    report = run_grasp(SimBackend(config), create("controller", "hybrid"), RunConfig()).report
+    assert report["not_verified"] == unsure

@@ -126,6 +126,10 @@ def test_a_parameter_with_a_spread_varies_between_instances_and_alone():
             'type = "foam"\nforce_n = 1.0\nat_m = 0.01\nexponent = 50',
             "exponent = 50 is too large.*at most 20",
         ),
+        (
+            'type = "foam"\nforce_n = 1.0\nat_m = 0.01\nexponent = 0.05',
+            "exponent = 0.05 is too small.*at least 0.2",
+        ),
         ('type = "elastic"\nk1_n_m = -100', "k1_n_m: -100 is negative"),
         ('type = "elastic"\nk1_n_m = 100\nspread = { k = 1 }', "no such parameter 'k'"),
         ('type = "elastic"\nk1_n_m = 100\nspread = { k1_n_m = 5 }', "spread.k1_n_m: 5 is too large"),

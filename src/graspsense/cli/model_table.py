@@ -36,6 +36,13 @@ def print_model(model: Mapping[str, Any]) -> None:
     echo_table(header, rows)
 
 
+def print_not_verified(report: Mapping[str, Any]) -> None:
+    """Print for which quantities a simulated gripper does not guarantee its accuracy; nothing if there is none."""
+    names = report.get("not_verified")
+    if names:
+        echo_entry("simulation", f"accuracy not verified for: {', '.join(names)} (reasons: --explain-model)")
+
+
 def print_selection(selection: Mapping[str, Any]) -> None:
     """Print what a simulated gripper reports as `selection`: what became of each term, why, and the error of that."""
     echo()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from graspsense.cli.live_rows import LiveRows
-from graspsense.cli.model_table import print_model, print_selection
+from graspsense.cli.model_table import print_model, print_not_verified, print_selection
 from graspsense.cli.options import contradiction, names_object, pipeline_options, settings_of
 from graspsense.cli.output import echo_json
 from graspsense.cli.terminal import (
@@ -106,6 +106,7 @@ def run(
         echo_json({**trial_as_json(trial), **({} if kept is None else {"kept": kept}), **further})
     else:
         print_trial(trial)
+        print_not_verified(trial.report)
         _print_model(trial, condition)
     if plot is not None:
         draw_grasp(trial, Path(plot))

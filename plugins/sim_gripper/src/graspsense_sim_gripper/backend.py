@@ -47,6 +47,7 @@ from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.palm import PalmBuffers, PalmSignals, channel, palm_signals
 from graspsense_sim_gripper.perturbed import perturbed
 from graspsense_sim_gripper.problem import IMAGES_PER_BLOCK, GraspController
+from graspsense_sim_gripper.reduction.model import QUANTITIES
 from graspsense_sim_gripper.reduction.propose import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N, PadBuffers, apply_tare, sense
@@ -265,6 +266,8 @@ class SimBackend(BatchBackend[SimConfig]):
                 "steps": self._state.step.n_steps,
                 "within": valid,
             }
+            doubtful = not valid or not report["resolved"] or report["beyond"] != ""
+            report["not_verified"] = list(QUANTITIES if doubtful else reduction.not_verified)
         if self.config.explain:
             report["model"] = explain(setup, self._compressions)
         return report

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 from attrs import asdict, evolve, frozen
@@ -12,6 +13,8 @@ from graspsense_sim_gripper.terms.term import WorkingPoint
 
 KEPT: Final = "kept"
 DROPPED: Final = "dropped"
+QUANTITIES: Final = ("peak", "trace", "features")
+"""What the accuracy is guaranteed for."""
 FORCE_MARGIN: Final = 1.5
 """A reduction is valid for peak forces up to the expected force times this factor."""
 
@@ -81,6 +84,18 @@ class Reduction:
         A reduction without error keeps every term. It is valid for every force if the error of its steps is controlled.
         """
         return peak_n <= self.max_force_n or (self.error == 0.0 and self.level.plain == 0)
+
+    @property
+    def not_verified(self) -> tuple[str, ...]:
+        """Those of `QUANTITIES` whose accuracy no trial grasp has verified; none for a reference.
+
+        The peak force of a contact that bounces within a tick is right, unless a term was dropped as too fast.
+        """
+        if self.verification is not None or self.steps.settle > 0.0:
+            return ()
+        if math.isinf(self.contact.error) and all(math.isfinite(one.error) for one in self.decisions):
+            return QUANTITIES[1:]
+        return QUANTITIES
 
     def with_exact_discretisation(self) -> Reduction:
         """Return the same reduction for a scene that is discretised exactly, without time steps."""

@@ -6,7 +6,9 @@ The approach depends on the steps, but not on the reduced model. It is therefore
 
 from __future__ import annotations
 
+import logging
 import math
+import time
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
@@ -51,6 +53,7 @@ from graspsense_sim_gripper.sensing import Bias, PadBuffers
 from graspsense_sim_gripper.stepping.scheme import VERLET, Steps
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick
 
+_LOG: Final = logging.getLogger(__name__)
 MAX_SECONDS: Final = 40.0
 """Longest simulated time of an approach, and of the grasp after it."""
 NEAR_M: Final = 3e-3
@@ -66,6 +69,8 @@ CAPACITY: Final = 512
 MOST_WORK: Final = 1_000_000
 """Largest number of ticks and steps of all trial grasps of one object together: about a minute in the interpreter. It
 counts work and not time, so that the model that is chosen does not depend on the machine."""
+PROGRESS_S: Final = 3.0
+"""Trial grasps that take longer report how far they are, and again after as long."""
 SENSITIVITY: Final = 10.0
 MIN_FORCE_ERROR_N: Final = 0.01
 MAX_FORCE_ERROR_N: Final = 0.25
@@ -131,6 +136,8 @@ class TrialGrasps:
     """The grasp shortly before the first contact, by the step tolerance of the approach."""
     work: int = field(default=0, init=False)
     """Ticks and steps of all trial grasps so far."""
+    _reported_s: float = field(factory=time.monotonic, init=False)
+    """When progress was reported last."""
 
     def record(self, reduction: Reduction, force_n: float = 0.0, travel: float = 0.0) -> GraspRecord:
         """Return the grasp in this model; the controller reads values with these errors (see `Sensitivity`)."""
@@ -264,6 +271,12 @@ class TrialGrasps:
         self.work += after.plant.step.n_steps - before.plant.step.n_steps
         if self.work > MOST_WORK:
             raise TooMuchWork
+        if time.monotonic() - self._reported_s > PROGRESS_S:
+            _LOG.warning(
+                "selecting the model of the object: %d %% of the limit of trial grasps",
+                100 * self.work // MOST_WORK,
+            )
+            self._reported_s = time.monotonic()
 
     def _loop(
         self, setup: GraspSetup

@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
 from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, WorkingPoint
 
+LEAST_EXPONENT: Final = 0.2
 MOST_EXPONENT: Final = 20.0
 
 
@@ -93,6 +94,11 @@ def refusal(params: Foam) -> str:
         return (
             f"exponent = {params.exponent:g} is too large, since the force then overflows within the width of an "
             f"object: at most {MOST_EXPONENT:g} (sponges have 1.5 to 3)"
+        )
+    if params.exponent < LEAST_EXPONENT:
+        return (
+            f"exponent = {params.exponent:g} is too small, since the force then jumps at the first touch, where no "
+            f"step resolves it: at least {LEAST_EXPONENT:g} (sponges have 1.5 to 3)"
         )
     return ""
 
