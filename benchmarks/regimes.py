@@ -424,7 +424,7 @@ def main() -> None:
     given = parser.parse_args()
     first = given.first if given.first is not None else secrets.randbelow(2**31)
     if given.short:
-        given.scenes = 1
+        given.scenes, first = 1, 1  # a scene drawn anew may take minutes
     with tempfile.TemporaryDirectory() as folder:
         bench = Interpreted() if given.short or given.interpreter else Bench()
         rows = run(bench, given.rows or Path(folder) / "rows.jsonl", given.scenes, first)

@@ -19,8 +19,11 @@ from graspsense.cli.terminal import echo
     metavar="FILE",
     help="File to write. Its suffix is the format: .csv .npz .arff .parquet .mcap .toml",
 )
+@click.option(
+    "--pictures", is_flag=True, help="Add the tactile images as pictures for Foxglove (.mcap of one grasp)."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def export(source: str, target: str, as_json: bool) -> None:
+def export(source: str, target: str, pictures: bool, as_json: bool) -> None:
     """Write the trials of the store DIR as a table (.csv .npz .arff .parquet), or one recorded grasp, tick by tick.
 
     One grasp is a trial of a store, DIR#NUMBER, or a FILE.mcap. Its formats are .csv, .npz, .parquet,
@@ -38,6 +41,10 @@ def export(source: str, target: str, as_json: bool) -> None:
     if path.suffix not in writers:
         what = "the table of a store" if table else "one grasp"
         raise ConfigError(f"{target!r}: {what} can be written as {', '.join(writers)}")
+    if pictures and (table or path.suffix != ".mcap"):
+        raise ConfigError(
+            f"{target!r}: --pictures is for one grasp as .mcap: graspsense export DIR#12 --to g.mcap --pictures"
+        )
     if table:
         trials = export_table.trial_table(source)
         export_table.WRITERS[path.suffix](path, trials)
@@ -48,7 +55,10 @@ def export(source: str, target: str, as_json: bool) -> None:
         }
     else:
         grasp = read_recorded(source) if source.endswith(".mcap") else stored_grasp(source)
-        export_trace.WRITERS[path.suffix](path, grasp)
+        if pictures:
+            export_trace.write_pictures(path, grasp)
+        else:
+            export_trace.WRITERS[path.suffix](path, grasp)
         written = {"ticks": len(grasp), "images": len(grasp.pads)}
     if as_json:
         echo_json({"file": target, **written})

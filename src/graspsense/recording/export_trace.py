@@ -81,6 +81,13 @@ def write_mcap(path: Path, grasp: RecordedGrasp) -> None:
     write_new(path, grasp.path.read_bytes())
 
 
+def write_pictures(path: Path, grasp: RecordedGrasp) -> None:
+    """Copy the recording, with its tactile images as pictures for Foxglove. Raises ConfigError if it has none."""
+    from graspsense.recording.foxglove import with_pictures
+
+    write_new(path, with_pictures(grasp))
+
+
 def write_toml(path: Path, grasp: RecordedGrasp) -> None:
     """Write the settings of the grasp as a complete pipeline file."""
     write_new(path, grasp.record().settings_text.encode())

@@ -1,0 +1,181 @@
+"""A copy of a recording with its tactile images as pictures, which Foxglove's Image panel shows.
+
+A picture is a message `foxglove_msgs/msg/RawImage` (https://docs.foxglove.dev/docs/sdk/schemas/raw-image) in CDR. It
+follows the message whose image it shows, on a topic of its own. Everything else is copied as it is, so that the copy
+can be replayed like the recording.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from attrs import define, frozen
+from mcap.records import Channel, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
+
+from graspsense import __version__
+from graspsense.core.entries import TactileArray
+from graspsense.core.errors import ConfigError
+from graspsense.recording.layout import CDR_HEADER, PADS_TOPIC, SIGNAL_TOPIC
+from graspsense.recording.reader import LARGEST_RECORD
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.recording.reader import RecordedGrasp
+
+PICTURE_TOPIC: Final = "/grasp/pictures/"
+"""Before the name of an array; the fingertips are `pads_left` and `pads_right`."""
+CELL_PIXELS: Final = 16
+"""Side of a cell in a picture: panels smooth a picture that they enlarge, so that smaller cells would run together."""
+RAW_IMAGE: Final = "foxglove_msgs/msg/RawImage"
+DEFINITION: Final = f"""builtin_interfaces/Time timestamp
+string frame_id
+uint32 width
+uint32 height
+string encoding
+uint32 step
+uint8[] data
+{"=" * 80}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+NS: Final = 1_000_000_000
+
+
+@frozen(eq=False)
+class _Grid:
+    """Where the cells of an array are in its picture: their numbers, rows and columns."""
+
+    cells: NDArray[np.int64]
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+
+    def picture(self, brightness: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the picture, given the brightness of every cell of the array."""
+        small = np.zeros((int(self.rows.max()) + 1, int(self.columns.max()) + 1), np.uint8)
+        small[self.rows, self.columns] = brightness[self.cells]
+        return small.repeat(CELL_PIXELS, axis=0).repeat(CELL_PIXELS, axis=1)
+
+
+@define(eq=False)
+class _Pictures:
+    """The pictures of one array: their topic, and the brightness of the cells in each image."""
+
+    topic: str
+    frame_id: str
+    grid: _Grid
+    images: Iterator[NDArray[np.uint8]]
+    channel: int = 0
+    number: int = 0
+
+
+def with_pictures(grasp: RecordedGrasp) -> bytes:
+    """Return the recording of this grasp with a picture after each tactile image.
+
+    A cell is black at its value in the first image and white at the largest rise of any cell of the array (of both
+    fingertips together); cells without a position are left out. Raises ConfigError if there is no tactile image.
+    """
+    of_topic = _pictures(grasp)
+    if not of_topic:
+        raise ConfigError(f"{grasp.path} has no tactile images: export it without --pictures")
+    out = io.BytesIO()
+    writer = Writer(out, compression=CompressionType.ZSTD, enable_data_crcs=True)
+    writer.start(profile="ros2", library=f"graspsense {__version__}")
+    schemas: dict[int, int] = {}
+    channels: dict[int, tuple[int, str]] = {}
+    raw_image = writer.register_schema(RAW_IMAGE, "ros2msg", DEFINITION.encode())
+    with grasp.path.open("rb") as file:
+        for record in StreamReader(file, validate_crcs=True, record_size_limit=LARGEST_RECORD).records:
+            if isinstance(record, Metadata):
+                writer.add_metadata(record.name, dict(record.metadata))
+            elif isinstance(record, Schema) and record.id not in schemas:
+                schemas[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+            elif isinstance(record, Channel) and record.id not in channels:
+                schema = schemas[record.schema_id]
+                number = writer.register_channel(record.topic, record.message_encoding, schema)
+                channels[record.id] = number, record.topic
+                for pictures in of_topic.get(record.topic, ()):
+                    pictures.channel = writer.register_channel(pictures.topic, "cdr", raw_image)
+            elif isinstance(record, Message):
+                number, topic = channels[record.channel_id]
+                at = record.log_time
+                writer.add_message(number, at, record.data, record.publish_time, record.sequence)
+                for pictures in of_topic.get(topic, ()):
+                    picture = pictures.grid.picture(next(pictures.images))
+                    data = raw_image_message(at, pictures.frame_id, picture)
+                    writer.add_message(pictures.channel, at, data, at, pictures.number)
+                    pictures.number += 1
+    writer.finish()  # type: ignore[no-untyped-call]
+    return out.getvalue()
+
+
+def raw_image_message(time_ns: int, frame_id: str, picture: NDArray[np.uint8]) -> bytes:
+    """Return a RawImage with the encoding `mono8` in CDR, given its pixels, shape (height, width)."""
+    height, width = picture.shape
+    body = struct.pack("<iI", time_ns // NS, time_ns % NS) + _text(frame_id)
+    body += struct.pack("<II", width, height) + _text("mono8")
+    return CDR_HEADER + body + struct.pack("<II", width, picture.size) + picture.tobytes()
+
+
+def _text(value: str) -> bytes:
+    """Return a string in CDR, followed by what aligns the next number of 4 bytes."""
+    data = value.encode() + b"\0"
+    return struct.pack("<I", len(data)) + data + bytes(-len(data) % 4)
+
+
+def _pictures(grasp: RecordedGrasp) -> Mapping[str, Sequence[_Pictures]]:
+    """Return what is to be drawn of each topic with tactile images."""
+    declared = {channel.name: channel for channel in grasp.channels if isinstance(channel, TactileArray)}
+    drawn: dict[str, Sequence[_Pictures]] = {}
+    for name, found in grasp.topics.items():
+        fields = found.rows.dtype.names or ()
+        if name == PADS_TOPIC:
+            values = np.array([list(row)[2:] for row in found.rows.tolist()], dtype=float)
+            cells = values.shape[1] // 2
+            array = declared.get("pads")
+            if array is None or array.cells != cells:
+                array = TactileArray("pads", "unknown", rows=1, columns=cells)
+            left, right = np.split(_brightness(values), 2, axis=1)
+            grid = _grid_of(array)
+            drawn[name] = (
+                _Pictures(f"{PICTURE_TOPIC}pads_left", "left", grid, iter(left)),
+                _Pictures(f"{PICTURE_TOPIC}pads_right", "right", grid, iter(right)),
+            )
+        elif name.startswith(SIGNAL_TOPIC) and "cells" in fields:
+            array = declared[name.removeprefix(SIGNAL_TOPIC)]
+            images = iter(_brightness(np.asarray(found.rows["cells"], dtype=float)))
+            picture = _Pictures(
+                PICTURE_TOPIC + array.name, array.finger or array.name, _grid_of(array), images
+            )
+            drawn[name] = (picture,)
+    return drawn
+
+
+def _brightness(values: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Return the brightness of each cell in each image, given the values, shape (images, cells)."""
+    rise = np.nan_to_num(values - values[0], nan=0.0, posinf=0.0, neginf=0.0)
+    most = float(rise.max())
+    scale = 255.0 / most if most > 0.0 else 0.0
+    brightness: NDArray[np.uint8] = np.clip(np.rint(rise * scale), 0, 255).astype(np.uint8)
+    return brightness
+
+
+def _grid_of(array: TactileArray) -> _Grid:
+    """Return where the cells are drawn: by row and column, or by position with the far end of the finger at the top."""
+    numbers = np.arange(array.cells)
+    if array.rows * array.columns:
+        return _Grid(numbers, numbers // array.columns, numbers % array.columns)
+    placed = [i for i, place in enumerate(array.positions_m) if not any(map(math.isnan, place))]
+    if not placed:
+        return _Grid(numbers, np.zeros_like(numbers), numbers)
+    along, across = np.array([array.positions_m[i] for i in placed]).T
+    rows = np.unique(-along, return_inverse=True)[1]
+    return _Grid(np.array(placed), rows, np.unique(across, return_inverse=True)[1])
