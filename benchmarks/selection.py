@@ -42,6 +42,7 @@ from graspsense_sim_gripper.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.select import select
+from graspsense_sim_gripper.sampled_loop import instability
 from graspsense_sim_gripper.terms.registry import in_order
 
 ACCURACIES: Final = (0.1, 0.01, 0.001)
@@ -132,27 +133,8 @@ def scene_of(number: int) -> Scene:
 
 
 def controller_is_stable(setup: GraspSetup, reduction: Reduction) -> bool:
-    """Return whether the sampled velocity loop is stable, on the free mass and on the stiffest contact of the scene.
-
-    The eigenvalues lie within the unit circle, for closure, speed and integral from tick to tick with a constant effort
-    in between.
-    """
-    loop = create("controller", "hybrid").config
-    dt, damping = setup.dt_s, setup.plant.drive.friction.damping_n_s_m
-    mass = setup.plant.drive.inertia / setup.state.motion.jacobian_m_rev**2
-    gain, integral = loop.velocity_gain_n_s_m, loop.integral_gain_n_m * setup.dt_s
-    for stiffness in (0.0, mass * (reduction.contact.number / dt) ** 2):
-        rates = np.array([[0.0, 1.0, 0.0], [-stiffness / mass, -damping / mass, 1.0 / mass], [0.0, 0.0, 0.0]])
-        ahead = np.eye(3)
-        for k in range(30, 0, -1):
-            ahead = np.eye(3) + rates @ ahead * (dt / k)
-        # The effort is -gain v + I, with I already less what this tick adds to it.
-        given = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -gain - integral, 1.0]])
-        onward = ahead @ given
-        onward[2] = [0.0, -integral, 1.0]
-        if np.max(np.abs(np.linalg.eigvals(onward))) > 1.0 + 1e-9:
-            return False
-    return True
+    """Return whether the sampled loop of the hybrid controller is stable, see `sampled_loop.growth_per_tick`."""
+    return not instability(setup, GraspController(create("controller", "hybrid"), RunConfig()), reduction)
 
 
 def record_of(grasp: FinishedGrasp, dt_s: float) -> GraspRecord:

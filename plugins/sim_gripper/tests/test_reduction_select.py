@@ -12,7 +12,7 @@ from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import HOLD, ConfigError, Controller, Outcome, RunConfig, create
 from graspsense_sim_gripper.backend import SimBackend, default_controller
 from graspsense_sim_gripper.batch import run_many
-from graspsense_sim_gripper.build import problem_of
+from graspsense_sim_gripper.build import instantiate, problem_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue, find
 from graspsense_sim_gripper.objects.spec import ObjectSpec
@@ -22,6 +22,7 @@ from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
 from graspsense_sim_gripper.reduction.levels import PLAIN_SCALES, SCENE_SCALES, UNVERIFIED, LevelScale
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
 from graspsense_sim_gripper.reduction.select import select
+from graspsense_sim_gripper.sampled_loop import instability
 from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, VERLET
 from graspsense_sim_gripper.terms import Term
 from graspsense_sim_gripper.terms.registry import TERMS
@@ -320,3 +321,34 @@ def test_the_report_says_which_quantities_are_not_verified(terms, further, unsur
     config = evolve(CONFIG, object=str(scene), open_gap_m=0.052, **further)
     report = run_grasp(SimBackend(config), create("controller", "hybrid"), RunConfig()).report
     assert report["not_verified"] == unsure
+
+
+@pytest.mark.parametrize(
+    ("gripper", "gain", "growth"),
+    [
+        ({}, 15000.0, ""),
+        # On a free mass of 1 kg, the gain times the tick may be at most 2 kg: 1 - 4 is -3.
+        ({"transmission": "straight", "moving_mass_kg": 1.0}, 1900.0, ""),
+        ({"transmission": "straight", "moving_mass_kg": 1.0}, 4000.0, "factor of 2.99 in each tick of 1 ms"),
+        ({"transmission": "straight", "moving_mass_kg": 1.0, "drive_lag_s": 1e-3}, 4000.0, "factor of 1.19"),
+    ],
+)
+def test_an_unstable_sampled_loop_is_named_in_the_report(gripper, gain, growth, tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text('width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 1000.0\n')
+    config = evolve(
+        CONFIG, object=str(scene), open_gap_m=0.052, fidelity="fixed", scheme="explicit", **gripper
+    )
+    law = create("controller", "hybrid", velocity_gain_n_s_m=gain)
+    report = run_grasp(SimBackend(config), law, RunConfig()).report
+    assert growth in report["unstable_loop"]
+    assert bool(growth) == bool(report["unstable_loop"])
+
+
+def test_no_object_of_the_catalogue_has_an_unstable_loop():
+    for spec in catalogue().values():
+        problem = problem_of(CONFIG, spec)
+        model = propose(problem, grip_of(problem))
+        for name in ("hybrid", "velocity", "force"):
+            controller = GraspController(create("controller", name), RunConfig())
+            assert instability(instantiate(problem, model, 0), controller, model) == "", (spec.name, name)

@@ -37,7 +37,9 @@ def print_model(model: Mapping[str, Any]) -> None:
 
 
 def print_not_verified(report: Mapping[str, Any]) -> None:
-    """Print for which quantities a simulated gripper does not guarantee its accuracy; nothing if there is none."""
+    """Print for which quantities a simulated gripper does not guarantee its accuracy, if any, and an unstable loop."""
+    if report.get("unstable_loop"):
+        echo_entry("simulation", report["unstable_loop"])
     names = report.get("not_verified")
     if names:
         echo_entry("simulation", f"accuracy not verified for: {', '.join(names)} (reasons: --explain-model)")

@@ -50,6 +50,7 @@ from graspsense_sim_gripper.problem import IMAGES_PER_BLOCK, GraspController
 from graspsense_sim_gripper.reduction.model import QUANTITIES
 from graspsense_sim_gripper.reduction.propose import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.reduction.select import select
+from graspsense_sim_gripper.sampled_loop import instability
 from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N, PadBuffers, apply_tare, sense
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick, raised_in_term
@@ -266,7 +267,10 @@ class SimBackend(BatchBackend[SimConfig]):
                 "steps": self._state.step.n_steps,
                 "within": valid,
             }
-            doubtful = not valid or not report["resolved"] or report["beyond"] != ""
+            controller = self._controller or default_controller(self.config)
+            report["unstable_loop"] = instability(setup, controller, reduction)
+            problems = report["beyond"] or report["unstable_loop"]
+            doubtful = not valid or not report["resolved"] or problems != ""
             report["not_verified"] = list(QUANTITIES if doubtful else reduction.not_verified)
         if self.config.explain:
             report["model"] = explain(setup, self._compressions)
