@@ -237,3 +237,17 @@ def test_an_export_of_an_earlier_version_still_opens(folder, export, tmp_path):
     assert found.table.names == ("p_first", "f_steady")
     assert (found.labels, found.order) == (("can:full_open", "can:it's open"), (0, 1))
     assert found.before_contact is None
+
+
+@pytest.mark.parametrize("ending", ["csv", "npz", "parquet"])
+def test_the_table_of_a_store_is_no_grasp_to_import(folder, tmp_path, capsys, ending):
+    for command in (
+        ["export", str(folder), "--to", str(tmp_path / f"t.{ending}")],
+        ["import", str(tmp_path / f"t.{ending}"), "--save", str(tmp_path / "other")],
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main(command)
+    assert ended.value.code == 2
+    err = capsys.readouterr().err
+    assert f"t.{ending} is the table of a store, with one row for each grasp" in err
+    assert f"graspsense export DIR#12 --to FILE.{ending}" in err

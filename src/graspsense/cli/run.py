@@ -106,7 +106,6 @@ def run(
         echo_json({**trial_as_json(trial), **({} if kept is None else {"kept": kept}), **further})
     else:
         print_trial(trial)
-        print_not_verified(trial.report)
         _print_model(trial, condition)
     if plot is not None:
         draw_grasp(trial, Path(plot))
@@ -130,9 +129,10 @@ def _condition(settings: Settings) -> Conditions | None:
 
 
 def _print_model(trial: Trial, condition: Conditions | None) -> None:
-    """Print what each term of the simulated object contributed, how it was selected, and the condition of features."""
+    """Print what is known of the simulator's model: what is not verified, and where asked for, terms and condition."""
     from graspsense.cli.condition_table import print_conditions
 
+    print_not_verified(trial.report)
     if "model" in trial.report:
         print_model(trial.report["model"])
         if "selection" in trial.report:

@@ -19,7 +19,11 @@ from graspsense.core.entries import Channel, FastChannel, TactileArray
 from graspsense.core.errors import ConfigError, DataDamaged
 from graspsense.core.signals import Frame, Image, Pads, Reading, no_pads
 from graspsense.recording.replayable import REPLAY_NOTE, Recording
-from graspsense.sources.exported_grasp_tables import TABLE_SUFFIXES, read_exported_tables
+from graspsense.sources.exported_grasp_tables import (
+    TABLE_SUFFIXES,
+    read_exported_tables,
+    refuse_table_of_store,
+)
 from graspsense.sources.fast_samples import sample_blocks
 
 if TYPE_CHECKING:
@@ -42,6 +46,7 @@ def read_exported(name: str) -> Recording:
         arrays, declared = read_exported_tables(path)
     else:
         arrays = _archive(path)
+        refuse_table_of_store(path, arrays)
         declared = str(arrays.get(DECLARED, "no JSON"))
     try:
         about = json.loads(declared)

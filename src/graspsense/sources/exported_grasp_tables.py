@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -31,6 +32,7 @@ def read_exported_tables(path: Path) -> tuple[Columns, str]:
     """
     declared = declared_beside(path)
     if path.exists() and not declared.exists():
+        refuse_table_of_store(path, _names(path))
         raise ConfigError(
             f"{declared.name} is missing beside {path}: `graspsense export` writes it together with the columns. For a "
             "file of another program name its columns, or write a manifest (docs/import.md)"
@@ -72,11 +74,44 @@ def _add_channel(arrays: Columns, path: Path, channel: Channel, scalars: Columns
         arrays[name] = np.empty((0, len(channel.axes)))
 
 
+def refuse_table_of_store(path: Path, names: Iterable[str]) -> None:
+    """Raise ConfigError if these are the columns of the table of a store, which has no ticks."""
+    if set(_ABOUT_TRIALS) <= set(names):
+        raise ConfigError(
+            f"{path} is the table of a store, with one row for each grasp, so there is no grasp to import. Learn from "
+            "it as FILE.csv: graspsense train FILE.csv --out MODEL.json. Or export single grasps: "
+            f"graspsense export DIR#12 --to FILE{path.suffix}"
+        )
+
+
+_ABOUT_TRIALS: Final = ("trial", "made_at", "outcome", "recording")
+"""Columns of every table of a store."""
+
+
 def _numbered(table: Columns, prefix: str, number: int) -> NDArray[np.float64]:
     """Return the columns `prefix00`, `prefix01`, ... side by side: (rows, number)."""
     if len(table["t_s"]) == 0:
         return np.empty((0, number))
     return np.column_stack([table[f"{prefix}{i:02d}"] for i in range(number)])
+
+
+def _names(path: Path) -> Sequence[str]:
+    """Return the names of the columns of a file."""
+    if path.suffix == ".parquet":
+        from graspsense.sources.manifest.parquet_format import read_parquet
+
+        table = read_parquet(path)[0]
+        return (*table.numbers, *table.texts)
+    return header_of(path)
+
+
+def header_of(path: Path) -> Sequence[str]:
+    """Return the names in the first line of a CSV file; none if it cannot be read."""
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            return next(csv.reader(file), ())
+    except (OSError, ValueError, csv.Error):
+        return ()
 
 
 def _columns(path: Path) -> Columns:

@@ -16,6 +16,7 @@ from urllib.parse import parse_qsl, urlencode
 
 from graspsense.core.errors import ConfigError, DataDamaged, suggestion
 from graspsense.recording.replayable import Recording
+from graspsense.sources.exported_grasp_tables import header_of, refuse_table_of_store
 from graspsense.sources.grasp_columns import checked_recording
 from graspsense.sources.manifest.description import QUANTITIES as MAPPED
 from graspsense.sources.manifest.description import Manifest, ReadManifest
@@ -47,6 +48,7 @@ def read_squeeze(name: str) -> Recording:
         columns_of.setdefault(quantity, []).append(column)
     missing = [quantity for quantity in REQUIRED if quantity not in columns_of]
     if missing:
+        refuse_table_of_store(Path(file or name), header_of(Path(file or name).expanduser()))
         raise ConfigError(
             f"which column of {file or name} is {' and which '.join(missing)}? Write FILE.csv?time=COLUMN&gap=COLUMN"
             "&force=COLUMN, or give --time, --gap and --force to `import`. If a column is not in s, m or N, add a "

@@ -20,6 +20,8 @@ from graspsense.sources.replay import KINDS, kind_and_name, read_named
 from graspsense.store.labels import labels_of
 
 CSV_SUFFIXES = (".csv", ".tsv", ".txt")
+KIND_OF = {".npz": "npz", ".parquet": "parquet", ".mcap": "mcap", ".bag": "rosbag"}
+"""The kind of a file whose name has no kind before it, by its ending."""
 
 
 @frozen(kw_only=True, eq=False)
@@ -81,7 +83,10 @@ def _named_by(
                 continue
             yield ImportedRecording(source=source, name=f"{kind}:{place}#{number}", labelled=known)
         return
+    ending = Path(source).suffix.lower()
     name = f"csv:{named(source, columns)}" if is_csv(source) else source
+    if ":" not in source and ending in KIND_OF:
+        name = f"{KIND_OF[ending]}:{source}"
     kind, file = kind_and_name(name)
     if is_recording_number(kind, file):
         numbered = numbered_recording(kind, file)
@@ -90,8 +95,8 @@ def _named_by(
     if kind not in KINDS:
         kinds = ", ".join(f"{one}:" for one in dict.fromkeys((*KINDS, *datasets_with_recordings())))
         raise ConfigError(
-            f"{source!r} is not a source of recordings: name a FILE.csv, a manifest FILE.toml, or write one of {kinds} "
-            "before a file"
+            f"{source!r} is not a source of recordings: name a FILE.csv, {', '.join(KIND_OF)}, a "
+            f"manifest FILE.toml, or write one of {kinds} before a file"
         )
     recording = LabelledRecording(recording=read_named(kind, file), source=source)
     yield ImportedRecording(source=source, name=name, labelled=_relabelled(recording, label))
