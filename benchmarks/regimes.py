@@ -250,6 +250,7 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
         f"{len(unstable)} have an unstable sampled velocity loop, {len(rows) - len(done)} have no reference, "
         f"{sum(not row['reference_resolved'] for row in done)} have a reference that is not resolved. "
         f"{where_measured()}.",
+        "A report of the simulator names an unstable loop (`unstable_loop`); the flags counted here leave it out.",
         "",
         *([f"![Regimes]({picture})", ""] if picture else []),
     ]
@@ -348,7 +349,10 @@ def _fixed(rows: Sequence[Row]) -> Iterator[str]:
                 row["0.01"]["error"] > 0.01 and "refused" not in row["0.01"] and not row["0.01"]["flags"]
                 for row in mine
             )
-            yield f"| {what} | {least:g} to {most:g} | {len(mine)} | {beyond[0]} | {beyond[1]} | {silent} |"
+            within = f"below {most:g}" if math.isinf(least) else f"from {least:g}"
+            if math.isfinite(least) and math.isfinite(most):
+                within = f"{least:g} to {most:g}"
+            yield f"| {what} | {within} | {len(mine)} | {beyond[0]} | {beyond[1]} | {silent} |"
 
 
 def _misses(rows: Sequence[Row]) -> Iterator[str]:

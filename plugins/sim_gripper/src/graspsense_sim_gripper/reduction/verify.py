@@ -271,11 +271,10 @@ class TrialGrasps:
         self.work += after.plant.step.n_steps - before.plant.step.n_steps
         if self.work > MOST_WORK:
             raise TooMuchWork
-        if time.monotonic() - self._reported_s > PROGRESS_S:
-            _LOG.warning(
-                "selecting the model of the object: %d %% of the limit of trial grasps",
-                100 * self.work // MOST_WORK,
-            )
+        percent = 100 * self.work // MOST_WORK
+        # Compiling takes seconds too, but no work.
+        if percent > 0 and time.monotonic() - self._reported_s > PROGRESS_S:
+            _LOG.warning("selecting the model of the object: %d %% of the limit of trial grasps", percent)
             self._reported_s = time.monotonic()
 
     def _loop(
