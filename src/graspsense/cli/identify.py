@@ -27,6 +27,13 @@ if TYPE_CHECKING:
     "--class", "name", metavar="NAME", help="Use only the recordings with this label, or of this class."
 )
 @click.option(
+    "--block",
+    "blocks",
+    metavar="RECORDING|store:DIR",
+    multiple=True,
+    help="Squeezes of a rigid block, from which the fingertips are identified first. Can be repeated.",
+)
+@click.option(
     "--page", metavar="FILE.html", callback=file_to_write_as(".html"), help="Write the report page."
 )
 @click.option("--overwrite", is_flag=True, help="Replace the files of --out and --page if they exist.")
@@ -50,6 +57,7 @@ def identify(
     sources: tuple[str, ...],
     out: str,
     name: str | None,
+    blocks: tuple[str, ...],
     page: str | None,
     overwrite: bool,
     pipeline: str,
@@ -84,7 +92,7 @@ def identify(
         )
     squeezes = recorded_squeezes(sources, name)
     with ProgressLine() as progress:
-        result = backend.identify(squeezes, progress)
+        result = backend.identify(squeezes, progress, recorded_squeezes(blocks) if blocks else ())
     write_or_replace(Path(out), result.scene.encode())
     if page:
         from graspsense.report.identification import identification_page

@@ -272,12 +272,18 @@ class BatchBackend(SensorBackend[ConfigT]):
         """Return the variants that trade accuracy for time; empty if there are none."""
         return ()
 
-    def identify(self, squeezes: Sequence[RecordedSqueeze], progress: Progress) -> Identification:
+    def identify(
+        self,
+        squeezes: Sequence[RecordedSqueeze],
+        progress: Progress,
+        block: Sequence[RecordedSqueeze] = (),
+    ) -> Identification:
         """Return the object that recorded squeezes are of, as a scene of this simulator.
 
+        `block` are squeezes of a rigid block by the same gripper, from which its fingertips are identified first.
         Raises ConfigError if the simulator cannot identify objects, or if the squeezes determine none.
         """
-        del squeezes, progress
+        del squeezes, progress, block
         raise ConfigError(
             f"{type(self).__name__} cannot identify an object from recordings. --gripper sim can"
         )

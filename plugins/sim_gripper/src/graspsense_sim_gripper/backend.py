@@ -288,12 +288,17 @@ class SimBackend(BatchBackend[SimConfig]):
 
         return variants()
 
-    def identify(self, squeezes: Sequence[RecordedSqueeze], progress: Progress) -> Identification:
+    def identify(
+        self,
+        squeezes: Sequence[RecordedSqueeze],
+        progress: Progress,
+        block: Sequence[RecordedSqueeze] = (),
+    ) -> Identification:
         """Return the object that recorded squeezes are of. Raises ConfigError."""
         # Imported here, since only this needs the optimiser.
         from graspsense_sim_gripper.identify.run import identify
 
-        return identify(self.config, squeezes, progress)
+        return identify(self.config, squeezes, progress, block)
 
     def perturbed(self, scenes: Sequence[str], share: float) -> Mapping[str, SimBackend]:
         """Return this gripper, and this gripper with each parameter larger by this share, see `perturbed`."""

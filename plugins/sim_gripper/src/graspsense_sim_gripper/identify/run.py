@@ -21,6 +21,7 @@ from graspsense_sim_gripper.build import drive_and_pads
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.drive import Drive
 from graspsense_sim_gripper.fingertip import CELLS
+from graspsense_sim_gripper.identify.block import with_fingertips_of_block
 from graspsense_sim_gripper.identify.check import predictive_checks
 from graspsense_sim_gripper.identify.choose import choose
 from graspsense_sim_gripper.identify.fit import Fitted
@@ -55,13 +56,19 @@ OF_FINGERTIPS: Final = (
 """The settings of the gripper with which an object is identified, and has to be simulated."""
 
 
-def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: Progress) -> Identification:
+def identify(
+    config: SimConfig,
+    squeezes: Sequence[RecordedSqueeze],
+    progress: Progress,
+    block: Sequence[RecordedSqueeze] = (),
+) -> Identification:
     """Return the object of these squeezes; `config` is that of a gripper whose recordings say nothing of their own.
 
-    Raises ConfigError if a squeeze has no contact or too few measurements of the force.
+    `block` are squeezes of a rigid block, from which the fingertips are identified before. Raises ConfigError if a
+    squeeze has no contact or too few measurements of the force.
     """
     begin = time.monotonic()
-    config, notes = _own_settings(config, squeezes)
+    config, notes = _settings(config, squeezes, block)
     drive, pads = drive_and_pads(config)
     model = ForwardModel(pads=pads)
     model.compile()
@@ -114,6 +121,26 @@ def identify(config: SimConfig, squeezes: Sequence[RecordedSqueeze], progress: P
         notes=tuple(notes),
         seconds=time.monotonic() - begin,
     )
+
+
+def _shares(config: SimConfig, block: Sequence[RecordedSqueeze]) -> list[float]:
+    """Return the share of the force that the cells measure in squeezes of a block: one for all of them."""
+    if not _has_cells(config, block):
+        return [1.0] * len(block)
+    drive, _ = drive_and_pads(config)
+    shares = [measured_share(one.trace, prepared(one, config.pad_delay_s), drive) for one in block]
+    return [_share(shares)] * len(block)
+
+
+def _settings(
+    config: SimConfig, squeezes: Sequence[RecordedSqueeze], block: Sequence[RecordedSqueeze]
+) -> tuple[SimConfig, list[str]]:
+    """Return the settings of the gripper with the fingertips of the block, if there is one, and notes on them."""
+    config, notes = _own_settings(config, squeezes)
+    if not block:
+        return config, notes
+    config, said = with_fingertips_of_block(config, block, _shares(config, block))
+    return config, [said]
 
 
 def _own_settings(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> tuple[SimConfig, list[str]]:
