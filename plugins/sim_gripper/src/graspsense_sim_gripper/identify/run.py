@@ -72,15 +72,10 @@ def identify(
     drive, pads = drive_and_pads(config)
     model = ForwardModel(pads=pads)
     model.compile()
-    squeezes, left_out = _used(squeezes)
-    notes += left_out
-    parts = resolution(len(squeezes))
-    ready = [prepared(one, config.pad_delay_s, parts) for one in squeezes]
+    squeezes = _used(squeezes, notes)
+    ready = [prepared(one, config.pad_delay_s, resolution(len(squeezes))) for one in squeezes]
     cells = _has_cells(config, squeezes)
-    shares = [
-        measured_share(one.trace, two, drive) if cells else 1.0
-        for one, two in zip(squeezes, ready, strict=True)
-    ]
+    shares = _measured_shares(squeezes, ready, drive) if cells else [1.0] * len(ready)
     share = _share(shares) if cells else 1.0
     ready = [_with_share(one, share) for one in ready]
     choice = choose(
@@ -128,8 +123,15 @@ def _shares(config: SimConfig, block: Sequence[RecordedSqueeze]) -> list[float]:
     if not _has_cells(config, block):
         return [1.0] * len(block)
     drive, _ = drive_and_pads(config)
-    shares = [measured_share(one.trace, prepared(one, config.pad_delay_s), drive) for one in block]
-    return [_share(shares)] * len(block)
+    ready = [prepared(one, config.pad_delay_s) for one in block]
+    return [_share(_measured_shares(block, ready, drive))] * len(block)
+
+
+def _measured_shares(
+    recorded: Sequence[RecordedSqueeze], ready: Sequence[Squeeze], drive: Drive
+) -> list[float]:
+    """Return the share of each squeeze by itself; NaN where it cannot be measured."""
+    return [measured_share(one.trace, two, drive) for one, two in zip(recorded, ready, strict=True)]
 
 
 def _settings(
@@ -162,10 +164,10 @@ def _own_settings(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> tup
     ]
 
 
-def _used(squeezes: Sequence[RecordedSqueeze]) -> tuple[Sequence[RecordedSqueeze], list[str]]:
-    """Return at most `MAX_SQUEEZES` squeezes, of as many objects as possible, and what to say about it."""
+def _used(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> Sequence[RecordedSqueeze]:
+    """Return at most `MAX_SQUEEZES` squeezes, of as many objects as possible; a note says so where some are left out."""
     if len(squeezes) <= MAX_SQUEEZES:
-        return squeezes, []
+        return squeezes
     turn: dict[str, int] = {}
     turns = []
     for i, one in enumerate(squeezes):
@@ -178,8 +180,8 @@ def _used(squeezes: Sequence[RecordedSqueeze]) -> tuple[Sequence[RecordedSqueeze
     same = [i for i in order if turns[i][0] == last]
     missing = MAX_SQUEEZES - len(first)
     chosen = sorted(first + [same[k * len(same) // missing] for k in range(missing)])
-    note = f"{MAX_SQUEEZES} of the {len(squeezes)} recordings are used, of as many objects as possible"
-    return [squeezes[i] for i in chosen], [note]
+    notes.append(f"{MAX_SQUEEZES} of the {len(squeezes)} recordings are used, of as many objects as possible")
+    return [squeezes[i] for i in chosen]
 
 
 def _has_cells(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> bool:
