@@ -19,6 +19,7 @@ from graspsense.evaluation.json_codec import to_json
 from graspsense.recording.recording_info import RecordingInfo
 from graspsense.recording.trial_record import FeatureValues
 from graspsense.sources.features_csv import read_labelled
+from graspsense.sources.import_sources import recordings_to_import
 from graspsense.store.changes import set_aside
 from graspsense.store.dataset import labelled_store
 from graspsense.store.export_table import ABOUT_BEFORE
@@ -241,6 +242,8 @@ def test_an_export_of_an_earlier_version_still_opens(folder, export, tmp_path):
 
 @pytest.mark.parametrize("ending", ["csv", "npz", "parquet"])
 def test_the_table_of_a_store_is_no_grasp_to_import(folder, tmp_path, capsys, ending):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
     for command in (
         ["export", str(folder), "--to", str(tmp_path / f"t.{ending}")],
         ["import", str(tmp_path / f"t.{ending}"), "--save", str(tmp_path / "other")],
@@ -251,3 +254,41 @@ def test_the_table_of_a_store_is_no_grasp_to_import(folder, tmp_path, capsys, en
     err = capsys.readouterr().err
     assert f"t.{ending} is the table of a store, with one row for each grasp" in err
     assert f"graspsense export DIR#12 --to FILE.{ending}" in err
+
+
+def test_the_table_of_a_store_is_learned_from_as_the_message_says(folder, export, tmp_path, capsys):
+    assert export(folder, tmp_path / "t.csv")[0] == 0
+    with pytest.raises(SystemExit):
+        main(["import", str(tmp_path / "t.csv"), "--save", str(tmp_path / "other")])
+    command = capsys.readouterr().err.partition("graspsense train ")[2].partition(". ")[0]
+    model = tmp_path / "model.json"
+    words = {"FILE.csv": str(tmp_path / "t.csv"), "MODEL.json": str(model)}
+    with pytest.raises(SystemExit) as ended:
+        main(["train", *(words.get(word, word) for word in command.split())])
+    assert ended.value.code == 0
+    assert model.exists()
+
+
+@pytest.mark.parametrize("ending", ["npz", "arff"])
+@pytest.mark.parametrize("command", ["train", "evaluate"])
+def test_a_table_that_is_no_csv_is_refused_as_trials(folder, export, tmp_path, capsys, ending, command):
+    table = tmp_path / f"t.{ending}"
+    assert export(folder, table)[0] == 0
+    with pytest.raises(SystemExit) as ended:
+        main([command, str(table), *(["--out", str(tmp_path / "m.json")] if command == "train" else [])])
+    assert ended.value.code == 2
+    assert "name the store as store:DIR, or a table of it as FILE.csv" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ending", ["npz", "parquet", "NPZ", "PARQUET"])
+def test_an_exported_grasp_is_imported_without_a_kind_before_its_name(folder, export, tmp_path, ending):
+    if ending.lower() == "parquet":
+        pytest.importorskip("pyarrow.parquet", reason="needs the extra parquet")
+    assert export(f"{folder}#1", tmp_path / f"one.{ending.lower()}")[0] == 0
+    for file in list(tmp_path.glob(f"one*.{ending.lower()}*")):
+        file.rename(file.with_name(file.name.replace(ending.lower(), ending)))
+    (imported,), refused = recordings_to_import([str(tmp_path / f"one.{ending}")], {}, None)
+    assert not refused
+    assert imported.name == f"{ending.lower()}:{tmp_path / f'one.{ending}'}"
+    recording = imported.labelled.recording
+    assert [reading.frame.gap_m for reading in recording.readings] == [frame(k).gap_m for k in range(120)]

@@ -42,7 +42,7 @@ def read_exported(name: str) -> Recording:
     PluginUnavailable for Parquet without pyarrow.
     """
     path = Path(name).expanduser()
-    if path.suffix in TABLE_SUFFIXES:
+    if path.suffix.lower() in TABLE_SUFFIXES:
         arrays, declared = read_exported_tables(path)
     else:
         arrays = _archive(path)

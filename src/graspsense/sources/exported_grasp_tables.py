@@ -79,8 +79,8 @@ def refuse_table_of_store(path: Path, names: Iterable[str]) -> None:
     if set(_ABOUT_TRIALS) <= set(names):
         raise ConfigError(
             f"{path} is the table of a store, with one row for each grasp, so there is no grasp to import. Learn from "
-            "it as FILE.csv: graspsense train FILE.csv --out MODEL.json. Or export single grasps: "
-            f"graspsense export DIR#12 --to FILE{path.suffix}"
+            "it as FILE.csv: graspsense train FILE.csv --label label --out MODEL.json. Or export single grasps: "
+            f"graspsense export DIR#12 --to FILE{path.suffix.lower()}"
         )
 
 
@@ -97,7 +97,7 @@ def _numbered(table: Columns, prefix: str, number: int) -> NDArray[np.float64]:
 
 def _names(path: Path) -> Sequence[str]:
     """Return the names of the columns of a file."""
-    if path.suffix == ".parquet":
+    if path.suffix.lower() == ".parquet":
         from graspsense.sources.manifest.parquet_format import read_parquet
 
         table = read_parquet(path)[0]
@@ -116,7 +116,7 @@ def header_of(path: Path) -> Sequence[str]:
 
 def _columns(path: Path) -> Columns:
     """Return the columns of one file. Raises ConfigError, DataDamaged, PluginUnavailable."""
-    if path.suffix == ".parquet":
+    if path.suffix.lower() == ".parquet":
         from graspsense.sources.manifest.parquet_format import read_parquet
 
         return dict(read_parquet(path)[0].numbers)

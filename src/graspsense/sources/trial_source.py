@@ -92,10 +92,19 @@ def load_trials(
     )
 
 
+NOT_READ: Final = (".npz", ".arff", ".parquet")
+"""Endings of the tables that `graspsense export` writes for other programs, and that are not read as trials."""
+
+
 def kind_of(source: str) -> Kind:
     """Return the kind of source that this text names. Raises ConfigError if it names none."""
     if source == SIMULATED or source.startswith(IDENTIFIED):
         return "simulated"
+    if source.lower().endswith(NOT_READ) and Path(source).is_file():
+        raise ConfigError(
+            f"{source} is not read as a table of trials: name the store as store:DIR, or a table of it as FILE.csv "
+            "(graspsense export DIR --to FILE.csv)"
+        )
     if source.lower().endswith((".csv", ".tsv", ".txt")) or Path(source).is_file():
         return "CSV"
     if ":" in source:
