@@ -165,7 +165,7 @@ def _own_settings(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> tup
 
 
 def _used(squeezes: Sequence[RecordedSqueeze], notes: list[str]) -> Sequence[RecordedSqueeze]:
-    """Return at most `MAX_SQUEEZES` squeezes, of as many objects as possible; a note says so where some are left out."""
+    """Return at most `MAX_SQUEEZES` squeezes, of as many objects as possible; a note says if some are left out."""
     if len(squeezes) <= MAX_SQUEEZES:
         return squeezes
     turn: dict[str, int] = {}
