@@ -15,6 +15,7 @@ from attrs import evolve, frozen
 
 from graspsense.plugin_api import RecordedSqueeze
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.identify.interval import student
 from graspsense_sim_gripper.identify.prepare import Squeeze, prepared
 
 HARDENS_BELOW: Final = 0.8
@@ -54,7 +55,7 @@ def with_fingertips_of_block(
     if len(ready) >= LEAST_SQUEEZES:
         alone = np.log([_fitted([one], hardens=fit.hardening_m is not None).stiffness_n_m for one in ready])
         scatter = float(np.std(alone, ddof=1)) / math.sqrt(len(alone))
-        half = _student(len(alone) - 1) * math.hypot(scatter, LAW_ERROR)
+        half = student(len(alone) - 1) * math.hypot(scatter, LAW_ERROR)
         found += f" (90 %: {k * math.exp(-half):.4g} to {k * math.exp(half):.4g})"
     found += (
         ", linear"
@@ -94,9 +95,3 @@ def _fitted(squeezes: Sequence[Squeeze], *, hardens: bool) -> _Fit:
     # k x^3 / (8 h^2) = k x / 2 * cubic (x / depth)^2
     hardening = depth / (2.0 * math.sqrt(cubic)) if cubic > 0.0 else None
     return _Fit(float(math.exp(done.x[0])), hardening, float(np.sqrt(np.mean(done.fun**2))))
-
-
-def _student(degrees: int) -> float:
-    from scipy.stats import t
-
-    return float(t.ppf(0.95, degrees))

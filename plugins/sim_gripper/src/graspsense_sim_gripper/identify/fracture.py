@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from graspsense.plugin_api import IdentifiedParameter, Undetermined
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel, Runs
+from graspsense_sim_gripper.identify.interval import student
 from graspsense_sim_gripper.identify.prepare import Squeeze
 
 Floats = NDArray[np.float64]
@@ -99,7 +100,7 @@ def fracture_of(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]
     if len(left) >= LEAST_BROKEN and fits["compression_m"][1] < fits["force_n"][1]:
         name = "compression_m"
     mean, spread = fits[name]
-    half = _student(len(left) - 1) * spread / math.sqrt(len(left)) if len(left) > 1 else math.nan
+    half = student(len(left) - 1) * spread / math.sqrt(len(left)) if len(left) > 1 else math.nan
     return FractureFit(
         name=name,
         value=math.exp(mean),
@@ -140,9 +141,3 @@ def _lognormal(breaks: Floats, survived: Floats) -> tuple[float, float]:
 
     found = minimize(negative, np.array([mean, math.log(first)]), method="Nelder-Mead")
     return float(found.x[0]), math.exp(float(found.x[1]))
-
-
-def _student(degrees: int) -> float:
-    from scipy.stats import t
-
-    return float(t.ppf(0.95, degrees))

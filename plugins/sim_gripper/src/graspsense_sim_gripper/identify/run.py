@@ -27,6 +27,7 @@ from graspsense_sim_gripper.identify.choose import choose
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.fracture import fracture_of
+from graspsense_sim_gripper.identify.interval import student
 from graspsense_sim_gripper.identify.laws import DataScale
 from graspsense_sim_gripper.identify.prepare import Squeeze, prepared, resolution
 from graspsense_sim_gripper.identify.refuse import shows_memory, undetermined
@@ -276,10 +277,8 @@ def _values(
 
 def _mean(name: str, unit: str, values: Any) -> IdentifiedParameter:
     """Return the mean of a quantity of each squeeze, with the interval of Student's t; a single one has none."""
-    from scipy.stats import t
-
     n, mean = len(values), float(np.mean(values))
-    half = float(t.ppf(0.95, n - 1) * np.std(values, ddof=1) / math.sqrt(n)) if n > 1 else math.nan
+    half = student(n - 1) * float(np.std(values, ddof=1)) / math.sqrt(n) if n > 1 else math.nan
     basis = f"between {n} squeezes" if n > 1 else "one squeeze: no interval"
     return IdentifiedParameter(
         name=name, unit=unit, value=mean, low=mean - half, high=mean + half, basis=basis

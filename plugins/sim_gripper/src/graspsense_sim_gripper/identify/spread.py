@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from graspsense_sim_gripper.identify.choose import fit_residuals
 from graspsense_sim_gripper.identify.fit import Fitted, fit
 from graspsense_sim_gripper.identify.forward import ForwardModel
+from graspsense_sim_gripper.identify.interval import normal, student
 from graspsense_sim_gripper.identify.laws import SNAP
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.identify.threads import in_threads
 
 Floats = NDArray[np.float64]
 
-LEVEL: Final = 0.90
 MAX_GROUPS: Final = 10
 LEAST_INSTANCES: Final = 3
 BOOTSTRAPS: Final = 24
@@ -74,7 +74,7 @@ def uncertainty(
         # The fit follows a part of the residuals' own errors, with as many directions as it has parameters.
         degrees = max(BLOCKS - len(at) - 1, 1)
         covariance = covariance * BLOCKS / degrees
-        centre, factor, basis = at, _student(degrees), "within one squeeze; not between squeezes"
+        centre, factor, basis = at, student(degrees), "within one squeeze; not between squeezes"
     else:
         kept = [[i for i in range(len(squeezes)) if i not in group] for group in groups]
         refits = in_threads(lambda one: _refit(model, fitted, squeezes, one), kept)
@@ -83,17 +83,17 @@ def uncertainty(
         deviations = table - table.mean(axis=0)
         covariance = (g - 1) / g * deviations.T @ deviations
         what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
-        centre, factor, basis = at, _student(g - 1), f"between {g} {what if g == len(groups) else 'groups'}"
+        centre, factor, basis = at, student(g - 1), f"between {g} {what if g == len(groups) else 'groups'}"
     # An error of the scale of the force is common to all squeezes, so that none of them shows it.
     scaled = np.array([1.0 if one.is_force else 0.0 for one in fitted.candidate.free])
     own = force_scale**2 * np.outer(scaled, scaled) + PATH_ERROR**2 * np.eye(len(at))
     own += np.diag(_corner_errors(fitted, squeezes) ** 2)
-    covariance = covariance + own * (_normal() / factor) ** 2
+    covariance = covariance + own * (normal() / factor) ** 2
     spread = np.sqrt(np.diag(covariance))
     low, high = np.exp(centre - factor * spread), np.exp(centre + factor * spread)
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    widening = factor / _normal()
+    widening = factor / normal()
     draws = np.exp(centre + widening * rng.standard_normal((DRAWS, len(at))) @ root.T)
     return Uncertainty(
         low=tuple(low.tolist()),
@@ -122,18 +122,6 @@ def _corner_errors(fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
         "drop_n": along_n / values["drop_n"],
     }
     return np.array([errors.get(one.name, 0.0) if one.slot == SNAP else 0.0 for one in fitted.candidate.free])
-
-
-def _normal() -> float:
-    from scipy.stats import norm
-
-    return float(norm.ppf(0.5 + 0.5 * LEVEL))
-
-
-def _student(degrees: int) -> float:
-    from scipy.stats import t
-
-    return float(t.ppf(0.5 + 0.5 * LEVEL, degrees))
 
 
 def _instances(squeezes: Sequence[Squeeze]) -> int:

@@ -274,7 +274,9 @@ class TrialGrasps:
         percent = 100 * self.work // MOST_WORK
         # Compiling takes seconds too, but no work.
         if percent > 0 and time.monotonic() - self._reported_s > PROGRESS_S:
-            _LOG.warning("selecting the model of the object: %d %% of the limit of trial grasps", percent)
+            _LOG.warning(
+                "selecting the model of the object: %d %% of the work after which it is given up", percent
+            )
             self._reported_s = time.monotonic()
 
     def _loop(
