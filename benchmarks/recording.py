@@ -2,10 +2,10 @@
 
     python benchmarks/recording.py [--json] [--rounds 10] [--seconds 4] [--short]
 
-Runs with and without a recorder alternate, in an order drawn anew each round. A control tick is, as in
-benchmarks/control.py, from the moment the gripper's read returns to the moment the command is applied. The sinks come
-after it, while the next frame is awaited; the whole tick, until read is called again, is given as well. The intervals
-are of the difference of the two p99 over resampled rounds.
+Runs with and without a recorder alternate, in an order drawn anew each round. A tick is from the moment the
+gripper's read returns to the moment it is called again: the law, the guard, the trace, and the sinks. The command is
+applied before the sinks, so the time until then is given as well. The intervals are of the difference of the two p99
+over resampled rounds.
 """
 
 from __future__ import annotations
