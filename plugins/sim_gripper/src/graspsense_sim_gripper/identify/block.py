@@ -22,7 +22,7 @@ HARDENS_BELOW: Final = 0.8
 """Fingertips count as nonlinear where this lowers the residual below this share of that of linear ones."""
 LAW_ERROR: Final = 0.01
 """Standard deviation of the logarithm of the stiffness that the law itself causes, which knows no rate: simulated
-fingertips come back within 0.7 %."""
+fingertips come back within 1.5 %."""
 LEAST_SQUEEZES: Final = 3
 """Fewer give no interval."""
 EXPONENT: Final = 2.0
