@@ -70,6 +70,18 @@ def test_a_file_gives_back_the_model(tmp_path, name):
     assert again.predict(CAN).label == "can:full"
 
 
+def test_a_pipeline_reads_a_model_once_and_again_when_its_file_has_changed(tmp_path):
+    path = tmp_path / "kept.json"
+    write_model(path, model("knn"))
+    settings = resolve("default", options=["classifier.type=knn", f"classifier.model={path}"])
+    first = model_for(settings, installed())
+    assert model_for(settings, installed()) is first
+
+    rewritten(path, target="object")
+
+    assert model_for(settings, installed()).target == "object"
+
+
 def test_the_file_says_what_it_was_trained_on(file):
     kept = json.loads(file.read_text())
 

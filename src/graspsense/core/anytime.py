@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from graspsense.core.model import Model
     from graspsense.core.roles import DeviceInfo, FeatureSet
     from graspsense.core.signals import Frame
-    from graspsense.core.trace import Trace, TraceRecorder
+    from graspsense.core.trace import TraceRecorder
 
 SWITCH_S: Final = 1e-4
 """Time after which the thread gives the interpreter back to the control loop that waits for it; usually 5 ms."""
@@ -92,6 +92,7 @@ class Anytime:
         self._running: Future[tuple[Features, Prediction]] | None = None
         self._running_after_s = 0.0
         self._switch_s = sys.getswitchinterval()
+        self._recorder: TraceRecorder | None = None
 
     def begin(self, recorder: TraceRecorder, info: DeviceInfo, tell: Tell) -> None:
         """Prepare before the gripper moves: on a device, what is imported or compiled at first use is used once."""
@@ -125,10 +126,11 @@ class Anytime:
         return self._running is not None and not self._running.done()
 
     def end(self) -> None:
-        """Wait for a prediction that is still running, which is dropped."""
+        """Wait for a prediction that is still running, which is dropped, and let the ticks go."""
         if self._pool is not None:
             self._pool.shutdown(wait=True, cancel_futures=True)
             sys.setswitchinterval(self._switch_s)
+        self._recorder = self._running = None
 
     def _set_due(self) -> None:
         assert self._contact_s is not None
@@ -152,20 +154,13 @@ class Anytime:
     def _prediction_of(self, after_s: float, model: Model) -> Callable[[], tuple[Features, Prediction]]:
         """Return the prediction of the ticks so far, to be computed in this thread or in another one."""
         recorder, contact_s = self._recorder, self._contact_s
-        n, m = len(recorder.frames), len(recorder.images)
+        assert recorder is not None
         assert contact_s is not None
+        n, m = len(recorder.frames), len(recorder.images)
 
         def compute() -> tuple[Features, Prediction]:
-            # The lists only grow, so that a slice of them is what it was at the checkpoint.
-            trace: Trace = trace_of(
-                recorder.frames[:n],
-                recorder.phases[:n],
-                recorder.commands[:n],
-                recorder.images[:m],
-                recorder.units,
-                recorder.signals[:n],
-            )
-            features = self._feature_set.extract(until_checkpoint(trace, contact_s, after_s))
+            trace = until_checkpoint(recorder.first_ticks(n, m), contact_s, after_s)
+            features = self._feature_set.extract(trace)
             return features, model.predict(features, self._settings, self._info)
 
         return compute

@@ -14,6 +14,7 @@ import platform
 import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -43,6 +44,8 @@ FORMAT: Final = "graspsense model"
 REGRESSION_FORMAT: Final = "graspsense regression model"
 """The `format` of a model that predicts a number (`graspsense.regression`)."""
 VERSION: Final = 1
+MODELS_KEPT: Final = 4
+"""How many models of pipelines stay in memory."""
 
 _EQUAL: Final = 1e-6
 
@@ -375,7 +378,16 @@ def load_model(name: str, plugins: Plugins, component: Component | None = None) 
     `component` is the classifier that the pipeline selects, if any. Raises ConfigError if the file is missing or
     another classifier made it, DataDamaged if its content is not a model.
     """
-    text = _text(name, plugins)
+    return _model_from(_text(name, plugins), name, plugins, component)
+
+
+@lru_cache(maxsize=MODELS_KEPT)
+def _kept_model(text: bytes, name: str, plugins: Plugins, component: Component) -> Model:
+    """Return the model in this text; one that a pipeline used before is not read again."""
+    return _model_from(text, name, plugins, component)
+
+
+def _model_from(text: bytes, name: str, plugins: Plugins, component: Component | None) -> Model:
     content = _content(name, text)
     made_by = content["classifier"]
     if component is None:
@@ -416,7 +428,8 @@ def load_model(name: str, plugins: Plugins, component: Component | None = None) 
 def model_for(settings: Settings, plugins: Plugins) -> Model | None:
     """Return the model of the classifier of a pipeline; None if the pipeline has no classifier.
 
-    Raises ConfigError if it does not name a model, and what `load_model` raises.
+    The same content gives the same model, which must not be changed. Raises ConfigError if the pipeline names no model,
+    and what `load_model` raises.
     """
     chosen = settings.classifier
     if chosen is None:
@@ -434,7 +447,7 @@ def model_for(settings: Settings, plugins: Plugins) -> Model | None:
             + _how_to_train(settings, name)
             + "\n  or do without: -o classifier.type=none"
         )
-    return load_model(name, plugins, chosen.component)
+    return _kept_model(_text(name, plugins), name, plugins, chosen.component)
 
 
 def _how_to_train(settings: Settings, out: str) -> str:

@@ -9,14 +9,14 @@ from typing import Any
 
 from attrs import frozen
 
-from graspsense.core.anytime import anytime_of
+from graspsense.core.anytime import Anytime, anytime_of
 from graspsense.core.config import Flag, Settings, resolve
 from graspsense.core.errors import named
 from graspsense.core.features import UNKNOWN, Features, Prediction, missing
 from graspsense.core.model import Model, model_for
 from graspsense.core.plugins import Plugins, installed
-from graspsense.core.roles import DeviceInfo, FeatureSet
-from graspsense.core.runner import Grasp, Sink, run_grasp
+from graspsense.core.roles import Controller, DeviceInfo, FeatureSet, SensorBackend
+from graspsense.core.runner import Grasp, Sink, no_collection, run_grasp
 from graspsense.core.signals import Outcome
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
 from graspsense.core.wiring import check
@@ -105,13 +105,7 @@ def grasp_with(
             on_event(event)
 
     plugins.run_starting(run)
-    try:
-        grasp = run_grasp(
-            backend, controller, settings.run, sinks=sinks, on_event=tell, on_open=on_open, watcher=anytime
-        )
-    finally:
-        if anytime is not None:
-            anytime.end()
+    grasp = _grasped(settings, backend, controller, anytime, sinks, tell, on_open)
     checkpoints = () if anytime is None else tuple(anytime.predictions)
     prediction: Prediction | None
     if grasp.outcome == Outcome.RECOGNISED:
@@ -136,6 +130,32 @@ def grasp_with(
     )
     plugins.run_finished(run, trial)
     return trial
+
+
+def _grasped(
+    settings: Settings,
+    backend: SensorBackend[Any],
+    controller: Controller[Any],
+    anytime: Anytime | None,
+    sinks: Iterable[Sink],
+    tell: Callable[[GraspEvent], None],
+    on_open: Callable[[DeviceInfo], None] | None,
+) -> Grasp:
+    # Until the ticks are let go, so that no collection looks at each of them.
+    with no_collection():
+        try:
+            return run_grasp(
+                backend,
+                controller,
+                settings.run,
+                sinks=sinks,
+                on_event=tell,
+                on_open=on_open,
+                watcher=anytime,
+            )
+        finally:
+            if anytime is not None:
+                anytime.end()
 
 
 def _recognised(

@@ -178,7 +178,7 @@ def run_grasp(
             grasp = _Grasp(backend, controller, run, info, sinks, on_event, interrupts)
             if watcher is not None:
                 grasp.watch_with(watcher)
-            with _no_collection():
+            with no_collection():
                 outcome, reason = grasp.drive()
         except BaseException:
             backend.close()
@@ -220,7 +220,7 @@ def _declared(backend: SensorBackend[Any]) -> tuple[Channel, ...]:
 
 
 @contextmanager
-def _no_collection() -> Iterator[None]:
+def no_collection() -> Iterator[None]:
     """Suspend garbage collection, which would pause a tick for milliseconds once there are thousands of frames."""
     collects = gc.isenabled()
     gc.disable()

@@ -143,6 +143,8 @@ class TraceRecorder:
     images: list[Pads] = field(factory=list, init=False)
     signals: list[Any] = field(factory=list, init=False)
     events: list[GraspEvent] = field(factory=list, init=False)
+    _blocks: tuple[Floats, ...] = field(default=(), init=False)
+    """The frames that were converted to numbers before, in whole blocks."""
     pads: Pads = field(default=NO_PADS, init=False)
     """The last image, which has as many cells also before the first one."""
 
@@ -167,11 +169,29 @@ class TraceRecorder:
 
     def trace(self) -> Trace:
         """Return the trace of the ticks collected so far."""
-        trace = trace_of(self.frames, self.phases, self.commands, self.images, self.units, self.signals)
+        trace = self.first_ticks(len(self.frames), len(self.images))
         if not self.images:
             none = np.empty((0, len(self.pads.left)))
             trace = evolve(trace, pad_left=none, pad_right=none.copy())
         return evolve(trace, events=tuple(self.events))
+
+    def first_ticks(self, n: int, m: int) -> Trace:
+        """Return the trace of the first `n` ticks with the first `m` images, without events.
+
+        A thread may call it while ticks are added: the lists only grow. Blocks of frames are converted once.
+        """
+        blocks = self._blocks
+        missing = self.frames[len(blocks) * BLOCK : n - n % BLOCK]
+        self._blocks = blocks = (*blocks, *_blocks_of(missing))
+        whole = blocks[: n // BLOCK]
+        return _trace_from(
+            [*whole, *_blocks_of(self.frames[len(whole) * BLOCK : n])],
+            self.phases[:n],
+            self.commands[:n],
+            self.images[:m],
+            self.units,
+            self.signals[:n],
+        )
 
 
 def trace_of(
@@ -186,12 +206,29 @@ def trace_of(
 
     `signals` are the values of `Reading.signals` in each tick, if the gripper has further channels.
     """
+    return _trace_from(_blocks_of(frames), phases, commands, images, units, signals)
+
+
+def _blocks_of(frames: Sequence[Frame]) -> list[Floats]:
+    """Return the numbers of the frames, a row each, in arrays of at most `BLOCK` rows."""
     width = len(_FRAME_COLUMNS)
-    table = np.empty((len(frames), width))
+    blocks = []
     for start in range(0, len(frames), BLOCK):
         block = frames[start : start + BLOCK]
         numbers = np.fromiter(chain.from_iterable(block), dtype=np.float64, count=len(block) * width)
-        table[start : start + BLOCK] = numbers.reshape(len(block), width)
+        blocks.append(numbers.reshape(len(block), width))
+    return blocks
+
+
+def _trace_from(
+    blocks: Sequence[Floats],
+    phases: Sequence[int],
+    commands: Sequence[float],
+    images: Sequence[Pads],
+    units: Mapping[str, str],
+    signals: Sequence[Any],
+) -> Trace:
+    table = np.concatenate(blocks) if blocks else np.empty((0, len(_FRAME_COLUMNS)))
     columns: dict[str, Any] = {
         name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(_FRAME_COLUMNS) if name != "dt_s"
     }

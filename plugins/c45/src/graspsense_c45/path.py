@@ -11,7 +11,7 @@ from graspsense_c45.branch_words import branch, with_unit
 from graspsense_c45.numbers_as_text import short
 from graspsense_c45.prediction import class_indices, distributions
 from graspsense_c45.schema import Attribute
-from graspsense_c45.tree import Tree
+from graspsense_c45.tree import Tree, largest_class
 
 
 @frozen
@@ -36,6 +36,7 @@ class Path:
     support: the training weight at the leaf, in rows. Where a tested value is missing, the prediction is a mean over
     all branches; the path follows the heaviest branch, and the step says so. numeric_tests: the tests of numeric
     attributes among the steps, as numbers. with_label: the training weight at the leaf that has the label.
+    distribution: the probability of each class.
     """
 
     steps: tuple[str, ...]
@@ -44,6 +45,7 @@ class Path:
     support: float
     numeric_tests: tuple[NumericTest, ...] = ()
     with_label: float = 0.0
+    distribution: tuple[float, ...] = ()
 
     def __str__(self) -> str:
         """Return the prediction and the steps in one line."""
@@ -58,7 +60,9 @@ def explain(tree: Tree, row: Sequence[float]) -> Path:
     """
     values = np.array([row], dtype=np.float64)
     shares = distributions(tree, values, "numpy")[0]
-    chosen = int(class_indices(tree, values, "numpy")[0])
+    # Without smoothing, the largest probability is that of the class: the row is routed once.
+    of_class = largest_class(shares[None]) if not tree.laplace else class_indices(tree, values, "numpy")
+    chosen = int(of_class[0])
     node, steps, tests = 0, [], []
     while not tree.is_leaf(node):
         tested = values[0, tree.splits.feature[node]]
@@ -85,6 +89,7 @@ def explain(tree: Tree, row: Sequence[float]) -> Path:
         float(tree.weighted_n_node_samples[node]),
         tuple(tests),
         float(tree.class_weights[node, chosen]),
+        tuple(shares.tolist()),
     )
 
 

@@ -131,12 +131,10 @@ class C45(Classifier[C45Config]):
     def explain(self, features: Features) -> Prediction:
         """Return the prediction with the path through the tree."""
         from graspsense_c45.path import explain
-        from graspsense_c45.prediction import distributions
 
         tree = self._fitted()
         row = [features[one.name] for one in tree.schema.attributes]
         path = explain(tree, row)
-        shares = distributions(tree, [row], "numpy")[0].tolist()
         missing = [
             missing_feature(one.name, one.unit, f": {features.reasons.get(one.name, 'no reason given')}")
             for one, value in zip(tree.schema.attributes, row, strict=True)
@@ -158,7 +156,7 @@ class C45(Classifier[C45Config]):
         one_leaf = not any(math.isnan(test.value) for test in tests)
         return Prediction(
             label=str(path.label),
-            probabilities=dict(zip(self.classes(), shares, strict=True)),
+            probabilities=dict(zip(self.classes(), path.distribution, strict=True)),
             because=(*missing, *path_reasons(tests), leaf),
             support=(path.with_label, path.support) if one_leaf and path.support > 0 else None,
         )
