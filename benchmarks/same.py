@@ -287,10 +287,10 @@ def text_of(result: Mapping[str, Any]) -> str:
         if len(group["different"]) > LISTED:
             lines.append(f"  {group['group']}: and {len(group['different']) - LISTED} more")
     if result["times"]:
-        lines += ["", f"{'processor time':<22} {'BASE s':>9} {'here s':>9} {'ratio':>6}  range"]
+        lines += ["", f"{'processor time':<32} {'BASE s':>9} {'here s':>9} {'ratio':>6}  range"]
     for row in result["times"]:
         lines.append(
-            f"{row['timed']:<22} {row['base_s']:>9.4f} {row['here_s']:>9.4f} {row['ratio']:>6.3f}"
+            f"{row['timed']:<32} {row['base_s']:>9.4f} {row['here_s']:>9.4f} {row['ratio']:>6.3f}"
             f"  {row['ratio_least']:.3f} to {row['ratio_most']:.3f}"
         )
     return "\n".join(lines)

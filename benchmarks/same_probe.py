@@ -249,6 +249,8 @@ class Timings:
         objects: list[str] = request["objects"]
         hybrid, seeds = create("controller", "hybrid"), range(len(objects))
         plain = load_pipeline("default")
+        # Versions that predict while a grasp goes on do more than earlier ones, but not without a classifier.
+        unrecognised = load_pipeline("default", options=["classifier.type='none'"])
         ideal = sim({"sensor": "ideal", "compile": "always"})
         pads = sim({"sensor": "pads", "compile": "always"})
         table = dict(c45_tables(Path(request["c45"])))["grasp_11c_1100"]
@@ -257,7 +259,10 @@ class Timings:
         spring_scene = sim(linear)
         spring = request["spring"]
         self.of: dict[str, Callable[[], object]] = {
-            "one grasp, plain": lambda: plain.grasp(object=objects[0], seed=0),
+            "catalogue, plain": lambda: [plain.grasp(object=name, seed=0) for name in objects],
+            "catalogue, plain, no classifier": lambda: [
+                unrecognised.grasp(object=name, seed=0) for name in objects
+            ],
             "batch, ideal sensors": lambda: ideal.run_many(hybrid, objects * 20, [*seeds] * 20, workers=1),
             "batch, pads": lambda: pads.run_many(hybrid, objects * 20, [*seeds] * 20, workers=1),
             "batch, linear scene": lambda: spring_scene.run_many(

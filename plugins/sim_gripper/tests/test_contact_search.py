@@ -14,6 +14,7 @@ from graspsense_sim_gripper.dynamics.state import ContactState
 from graspsense_sim_gripper.objects.library import find
 from graspsense_sim_gripper.reduction.levels import balance_rtol
 from graspsense_sim_gripper.terms.foam import Foam, foam
+from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
 from graspsense_sim_gripper.terms.term import NoState
 from graspsense_sim_gripper.terms.worn import Worn, WornState, worn
 
@@ -51,6 +52,25 @@ def test_the_first_touch_of_a_worn_shell_compresses_it_by_no_more_than_the_finge
     assert unbalanced == 0
     assert 0.0 < after.compression_m <= closure_m
     assert after.states[0].work_j <= 2200.0 * closure_m**2
+
+
+def test_an_object_that_relaxes_is_balanced_with_two_evaluations_of_its_law():
+    # The linearized balance alone takes three: it knows nothing of what relaxes during the step.
+    evaluations = 0
+
+    def counted(params, state, d0, d1, h, v1):
+        nonlocal evaluations
+        evaluations += 1
+        return maxwell(params, state, d0, d1, h, v1)
+
+    solve = bind_reachable(solve_contact, {"object_force": counted})
+    body = ObjectModel(0.06, 0.0, PadCompliance(1.5e4), Maxwell(3000.0, 0.2), balance_rtol=5e-9)
+    now = ContactState(0.0, 0.0, 0.0, MaxwellState(0.0))
+    for k in range(200):
+        closure_m = 5e-3 * math.sin(math.pi * (k + 1) / 400.0)
+        now, unbalanced = solve(body, now, closure_m, 0.0, 1e-3)
+        assert unbalanced == 0
+    assert evaluations <= 2.1 * 200
 
 
 def test_a_dented_object_is_thinner_by_its_dent(tmp_path):

@@ -42,10 +42,13 @@ def growth_per_tick(setup: GraspSetup, controller: GraspController, reduction: R
     drive, dt = setup.plant.drive, setup.dt_s
     mass = drive.inertia / setup.state.motion.jacobian_m_rev**2
     stiffest = mass * (reduction.contact.number / dt) ** 2
-    return max(
-        _spectral_radius(law, mass, drive.friction.damping_n_s_m, stiffness, drive.lag_s, dt)
-        for stiffness in (0.0, stiffest)
+    rates = np.array(
+        [
+            [[0.0, 1.0], [-stiffness / mass, -drive.friction.damping_n_s_m / mass]]
+            for stiffness in (0.0, stiffest)
+        ]
     )
+    return _spectral_radius(law, rates, 1.0 / mass, drive.lag_s, dt)
 
 
 def instability(setup: GraspSetup, controller: GraspController, reduction: Reduction) -> str:
@@ -91,22 +94,23 @@ def _numbers(memory: Any) -> Sequence[float]:
     return tuple(memory) if isinstance(memory, tuple) else (float(memory),)
 
 
-def _spectral_radius(
-    law: Array, mass_kg: float, damping_n_s_m: float, stiffness_n_m: float, lag_s: float, dt_s: float
-) -> float:
-    """Return the spectral radius of the map of closure, speed, effort and memory from tick to tick."""
-    rates = np.array([[0.0, 1.0], [-stiffness_n_m / mass_kg, -damping_n_s_m / mass_kg]])
-    by_effort = np.array([0.0, 1.0 / mass_kg])
+def _spectral_radius(law: Array, rates: Array, by_effort: float, lag_s: float, dt_s: float) -> float:
+    """Return the largest spectral radius of the maps of closure, speed, effort and memory from tick to tick.
+
+    `rates` are the matrices of closure and speed (1/s), shape (n, 2, 2); an effort of 1 N accelerates by `by_effort`.
+    """
+    driven = np.array([0.0, by_effort])
     if lag_s > 0.0:
-        rates = np.block([[rates, by_effort[:, None]], [np.zeros((1, 2)), np.full((1, 1), -1.0 / lag_s)]])
-        by_effort = np.array([0.0, 0.0, 1.0 / lag_s])
-    n, n_memory = len(rates), len(law) - 1
-    ahead, integral = exponentials(rates[None], dt_s)
+        lagging = np.zeros((len(rates), 3, 3))
+        lagging[:, :2, :2], lagging[:, :2, 2], lagging[:, 2, 2] = rates, driven, -1.0 / lag_s
+        rates, driven = lagging, np.array([0.0, 0.0, 1.0 / lag_s])
+    n, n_memory = len(driven), len(law) - 1
+    ahead, integral = exponentials(rates, dt_s)
     # The gap and its rate are the closure and the closing speed with the opposite sign.
     measured = np.zeros((len(law), n + n_memory))
     measured[:, :2], measured[:, n:] = -law[:, :2], law[:, 2:]
-    onward = np.zeros((n + n_memory, n + n_memory))
-    onward[:n, :n] = ahead[0, 0]
-    onward[:n] += np.outer(integral[0, 0] @ by_effort, measured[0])
-    onward[n:] = measured[1:]
+    onward = np.zeros((len(rates), n + n_memory, n + n_memory))
+    onward[:, :n, :n] = ahead[:, 0]
+    onward[:, :n] += (integral[:, 0] @ driven)[:, :, None] * measured[0]
+    onward[:, n:] = measured[1:]
     return float(np.max(np.abs(np.linalg.eigvals(onward))))

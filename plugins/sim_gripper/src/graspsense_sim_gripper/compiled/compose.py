@@ -22,7 +22,7 @@ from graspsense_sim_gripper.dynamics.contact import (
     no_event,
     solve_contact,
 )
-from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, Past, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
 from graspsense_sim_gripper.exact.propagate import bind_move
 from graspsense_sim_gripper.loop import FreeProgress, GraspParams, SimulationState, free_ticks, grasp
@@ -52,7 +52,7 @@ ContactSolver = Callable[[ObjectModel, ContactState, float, float, float], tuple
 INTERPRETED: Final[Constructors] = {
     kind: maker(kind)
     for kind in (
-        *(PlantState, Motion, Contact, ContactState, StepState, SensorState, Frame),
+        *(PlantState, Motion, Contact, ContactState, Past, StepState, SensorState, Frame),
         *(Start, Attempt, SpeedSearch, Stage, PadLoad, BalanceSearch),
     )
 }
@@ -216,7 +216,7 @@ def all_active(terms: Sequence[Any]) -> tuple[Switchable, ...]:
 def uncompressed(kinds: Sequence[str]) -> ContactState:
     """Return the state of an object of these terms that nothing has pressed yet."""
     states = (NO_STATE, *(find_term(kind)[1].at_rest for kind in kinds))
-    return ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0, 0.0, math.inf)
+    return ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0, Past(0.0, 0.0, math.inf))
 
 
 # ------------------------------------------------------------------------------------------ plant and loop

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 from graspsense_sim_gripper.dynamics.roots import MAX_ITERATIONS, bracketed_secant
-from graspsense_sim_gripper.dynamics.state import Contact, ContactState
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Past
 from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
 
 BALANCE_RTOL: Final = 1e-11
@@ -38,6 +38,8 @@ UNBALANCED_RTOL: Final = 1e-6
 MIN_SLOPE_N_M: Final = 1e-9
 MIN_SLOPE_SHARE: Final = 1e-3
 """The least slope of the balance with which a secant step is taken, absolute and relative to the pads' stiffness."""
+EQUAL_GUESSES: Final = 10.0
+"""Multiple of the tolerance of the balance by which two guesses of the compression may differ and count as equal."""
 CONTACT_TOL_M: Final = 1e-10
 """Tolerance with which a contact is located."""
 RECOVERED_M: Final = 1e-12
@@ -198,8 +200,8 @@ def restarted(contact: Contact) -> Contact:
 
 
 def _restarted(half: ContactState) -> ContactState:
-    d, force, slope, states, pad, branch, rate, _ = half
-    return ContactState(d, force, slope, states, pad, branch, rate, math.inf)
+    d, force, slope, states, pad, branch, past = half
+    return ContactState(d, force, slope, states, pad, branch, Past(past.rate_m_s, 0.0, math.inf))
 
 
 def solve_contact(
@@ -212,11 +214,13 @@ def solve_contact(
     """
     if model.pads.stiffness_n_m < math.inf:
         return _press_through_pads(model, now, closure_m, speed_m_s, h) if h > 0.0 else (now, 0)
-    d0, force0, slope, states0, pad0, branch0, rate0, _ = now
+    d0, force0, slope, states0, pad0, branch0, past = now
     force, states = object_force(model.terms, states0, d0, closure_m, h, speed_m_s)
     # A finger that is still behind where the object stood presses it only if the object has not recovered so far.
     if force >= 0.0 and (force <= 0.0 or force0 > 0.0 or closure_m >= d0):
-        return ContactState(closure_m, force, slope, states, pad0, branch0, rate0, math.inf), 0
+        return ContactState(
+            closure_m, force, slope, states, pad0, branch0, Past(past.rate_m_s, 0.0, math.inf)
+        ), 0
     return _release_from_rigid_pads(model, now, force, closure_m, speed_m_s, h) if h > 0.0 else (now, 0)
 
 
@@ -224,7 +228,7 @@ def _release_from_rigid_pads(
     model: ObjectModel, now: ContactState, force_n: float, closure_m: float, speed_m_s: float, h: float
 ) -> tuple[ContactState, int]:
     """Return the object that rigid pads at `closure_m` would pull with `force_n`: separated, or pressed after all."""
-    d0, force0, slope, states0, _, branch0, _, _ = now
+    d0, force0, slope, states0, _, branch0, _ = now
     load = PadLoad(0.0, 0.0, d0, h, -math.inf)
     total = _release_slope(slope, force_n, force0, d0, closure_m)
     search = BalanceSearch(d0 + (0.0 - force0) / total, d0, 0.0, slope, total, -math.inf, math.inf, 0)
@@ -234,10 +238,8 @@ def _release_from_rigid_pads(
         d1 = closure_m
         force, states = object_force(model.terms, states0, d0, d1, h, speed_m_s)
         if force >= 0.0:
-            pressed = ContactState(
-                d1, force, search.slope_n_m, states, now.pad_m, branch0, now.rate_m_s, math.inf
-            )
-            return pressed, 0
+            past = Past(now.past.rate_m_s, 0.0, math.inf)
+            return ContactState(d1, force, search.slope_n_m, states, now.pad_m, branch0, past), 0
         total = _release_slope(search.slope_n_m, force, force0, d0, closure_m)
         _, last, last_n, slope, _, lower, upper, n = search
         search = BalanceSearch(d0 - force0 / total, last, last_n, slope, total, lower, upper, n)
@@ -245,7 +247,8 @@ def _release_from_rigid_pads(
     d1 = search.compression_m
     # No force, but NaN where a law gave no finite one, so that it is noticed.
     none = force - force
-    free = ContactState(d1, none, search.slope_n_m, states, 0.0, branch0, (d1 - d0) / h, math.inf)
+    past = Past((d1 - d0) / h, 0.0, math.inf)
+    free = ContactState(d1, none, search.slope_n_m, states, 0.0, branch0, past)
     return free, _unbalanced(force, 0.0)
 
 
@@ -269,7 +272,7 @@ def _press_through_pads(
 ) -> tuple[ContactState, int]:
     """Return the object behind compliant pads: pressed or separated, whichever of the two is consistent."""
     pads = model.pads
-    d0, force0, slope, _, pad0, branch0, rate0, span = now
+    d0, force0, slope, _, pad0, branch0, (rate0, change0, span) = now
     pressed = force0 > 0.0
     over, base = h, d0
     if pressed:
@@ -288,9 +291,14 @@ def _press_through_pads(
         k, c, closed = (stiffness, push, closure_m) if pressed else (0.0, 0.0, -math.inf)
         excess, excess_slope = pad_excess(pads, closed - d0)
         total = max(k + slope + excess_slope, MIN_SLOPE_SHARE * k, MIN_SLOPE_N_M)
-        search = BalanceSearch(
-            d0 + (c - k * d0 + excess - force0) / total, d0, 0.0, slope, total, -math.inf, math.inf, 0
-        )
+        d1 = d0 + (c - k * d0 + excess - force0) / total
+        if pressed and span < math.inf:
+            # Usually closer than the linearized balance, which knows nothing of what relaxes meanwhile. Where the two
+            # are this close, nothing does, and the extrapolation has the rounding of three searches.
+            further = d0 + h * (rate0 + 0.5 * (h + span) * change0)
+            if total * abs(further - d1) > EQUAL_GUESSES * balance_tolerance(model, force0):
+                d1 = further
+        search = BalanceSearch(d1, d0, 0.0, slope, total, -math.inf, math.inf, 0)
         load = PadLoad(k, c, base, over, closed)
         search, force, states = _balance(model, now, load, search, h)
         d1, slope = search.compression_m, search.slope_n_m
@@ -304,14 +312,17 @@ def _press_through_pads(
     if not pressed:
         pad = creep.free_pad_m
         branch = branch0 * creep.decay + (creep.mean_n_m + creep.ramp_n_m) * (pad - pad0)
-        return ContactState(d1, force - force, slope, states, pad, branch, rate, math.inf), unbalanced
-    span = h if force0 > 0.0 else math.inf
+        past = Past(rate, 0.0, math.inf)
+        return ContactState(d1, force - force, slope, states, pad, branch, past), unbalanced
+    past = Past(rate, 0.0 if span == math.inf else 2.0 * (rate - rate0) / (h + span), h)
+    if force0 <= 0.0:
+        past = Past(rate, 0.0, math.inf)
     if not creeps:
-        return ContactState(d1, force, slope, states, pad0, branch0, rate, span), unbalanced
+        return ContactState(d1, force, slope, states, pad0, branch0, past), unbalanced
     pad = closure_m - d1
     branch = branch0 * creep.decay + creep.mean_n_m * (pad - pad0)
     branch += creep.ramp_n_m * h * (speed_m_s - (d1 - base) / over)
-    return ContactState(d1, force, slope, states, pad, branch, rate, span), unbalanced
+    return ContactState(d1, force, slope, states, pad, branch, past), unbalanced
 
 
 def balance_tolerance(model: ObjectModel, force_n: float) -> float:

@@ -20,6 +20,17 @@ class Motion(NamedTuple):
     """Derivative of the gap with respect to the motor's angle (m/rev)."""
 
 
+class Past(NamedTuple):
+    """The last step of a compression, from which the next one is extrapolated."""
+
+    rate_m_s: float = 0.0
+    """Mean rate of the compression over that step."""
+    change_m_s2: float = 0.0
+    """Change of the mean rate from the step before it to that step, divided by the time from middle to middle."""
+    span_s: float = math.inf
+    """Duration of that step; inf if it says nothing about the next one."""
+
+
 class ContactState(NamedTuple):
     """The object between the pads, or one half of an object that is held fast: compression, force and memory."""
 
@@ -33,10 +44,7 @@ class ContactState(NamedTuple):
     """Compression of the two pads in series. Updated only if the pads creep or have damping."""
     branch_n: float = 0.0
     """Force of the pads' Maxwell branch."""
-    rate_m_s: float = 0.0
-    """Mean rate of the compression over the last step."""
-    span_s: float = math.inf
-    """Duration of the last step; inf if that step gives no information about the rate."""
+    past: Past = Past()
 
 
 class Contact(NamedTuple):

@@ -26,7 +26,7 @@ from typing import Any, Final, NamedTuple
 from graspsense.plugin_api import bind
 from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.dynamics.contact import RECOVERED_M
-from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState, StepState
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, Past, PlantState, StepState
 from graspsense_sim_gripper.exact.expm import MAX_BISECTIONS
 from graspsense_sim_gripper.exact.modes import (
     CLOSING,
@@ -323,7 +323,13 @@ def _store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_
         compression = closure if touched == 1 else 0.0
     states, _ = unpack(model.terms, before.states, ws, X1 + TERM_STATES)
     left = ContactState(
-        compression, force, before.slope_n_m, states, pad_m, branch_n, before.rate_m_s, math.inf
+        compression,
+        force,
+        before.slope_n_m,
+        states,
+        pad_m,
+        branch_n,
+        Past(before.past.rate_m_s, 0.0, math.inf),
     )
     # An object that is held on the centre line has two halves in the same state.
     right = left if model.held == 1 else contact.right

@@ -71,10 +71,9 @@ def move(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> 
 
 def advance(params: PlantParams, state: PlantState, effort_n: float, dt: float) -> PlantState:
     """Return the plant after `dt` under a constant force."""
-    if state.motion.speed_rev_s == 0.0:
-        if rests(params.drive, state, effort_n):
-            return state
-    elif fits_a_step(params.steps, state.step, dt):
+    if state.motion.speed_rev_s == 0.0 and rests(params.drive, state, effort_n):
+        return state
+    if fits_a_step(params.steps, state.step, dt):
         coasts, after = coast(params, state, effort_n, dt)
         if coasts:
             return after

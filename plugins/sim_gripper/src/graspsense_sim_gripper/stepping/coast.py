@@ -24,7 +24,8 @@ SHAPE_SCALE_M: Final = 1e-3
 def coast(params: PlantParams, state: PlantState, effort_n: float, h: float) -> tuple[bool, PlantState]:
     """Return whether a tick of `h` is of this kind, and the plant after it."""
     coasts, motion, contact = glide(params, state.motion, state.contact, effort_n, h)
-    return coasts, glided(state, motion, contact, 1) if coasts else state
+    n_steps = 0 if state.motion.speed_rev_s == 0.0 else 1
+    return coasts, glided(state, motion, contact, n_steps) if coasts else state
 
 
 def can_glide(params: PlantParams, state: PlantState, dt: float) -> bool:
@@ -41,24 +42,40 @@ def glide(
     The forces on the pads do not change.
     """
     if motion.speed_rev_s == 0.0:
-        return contact.touched == 0 and is_held(params.drive, motion, contact, effort_n), motion, contact
-    left_n, right_n, offset, touched, left, right, pending, unbalanced = contact
-    reach = params.object.width_m + 2.0 * abs(offset)
+        return _rested(params, motion, contact, effort_n, h)
+    touched, pending = contact.touched, 0.0
+    reach = params.object.width_m + 2.0 * abs(contact.offset_m)
     if touched == 1:
         coasts, reach, pending = _free_until(params, contact, motion, h)
         if not coasts:
             return False, motion, contact
-    load = 0.5 * (left_n + right_n)
+    load = 0.5 * (contact.left_n + contact.right_n)
     coasts, motion1 = _coasted(params, motion, load, effort_n, h)
     if not coasts or motion1.gap_m <= reach:
         return False, motion, contact
     if touched == 1:
+        left_n, right_n, offset, _, left, right, _, unbalanced = contact
         if load > 0.0:
             # The finger pushes the object towards the middle.
             pushed = 0.5 * (motion1.gap_m - reach)
             offset = pushed if offset >= 0.0 else -pushed
         contact = Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
     return True, motion1, contact
+
+
+def _rested(
+    params: PlantParams, motion: Motion, contact: Contact, effort_n: float, h: float
+) -> tuple[bool, Motion, Contact]:
+    """Return what `glide` does for fingers that stand still."""
+    if not is_held(params.drive, motion, contact, effort_n):
+        return False, motion, contact
+    if contact.touched == 0:
+        return True, motion, contact
+    left_n, right_n, offset, touched, left, right, _, unbalanced = contact
+    if left_n + right_n > 0.0:
+        return False, motion, contact
+    recovers, _, pending = _free_until(params, contact, motion, h)
+    return recovers, motion, Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
 
 
 def glided(state: PlantState, motion: Motion, contact: Contact, n_steps: int) -> PlantState:
@@ -78,7 +95,7 @@ def _free_until(params: PlantParams, contact: Contact, motion: Motion, h: float)
         return pushed, model.width_m, pending
     reach = model.width_m + 2.0 * abs(contact.offset_m)
     pending += h
-    change = pending * max(abs(left.rate_m_s), abs(right.rate_m_s))
+    change = pending * max(abs(left.past.rate_m_s), abs(right.past.rate_m_s))
     shape = max(abs(left.compression_m), abs(right.compression_m), SHAPE_SCALE_M)
     recovers = not (
         motion.gap_m <= reach
