@@ -55,7 +55,24 @@ def test_the_threshold_is_reached_by_90_percent_of_the_trials_that_are_not_recog
 
     sets = sets_of(truth, wrong(20), ["a"] * 20, None)
 
-    assert sets.thresholds["a"].score == truth[1]  # ceil(21 * 0.9) = 19 of 20
+    assert truth[1] < sets.thresholds["a"].score < truth[2]  # reached by 18 of 20
+
+
+@pytest.mark.parametrize(("instances", "each"), [(9, 1), (15, 1), (16, 3)])
+def test_the_thresholds_of_few_instances_cover_what_is_asked_and_not_more(instances, each):
+    # Scores of any distribution that is the same for all instances: here those of one instance resemble each other.
+    rng = np.random.default_rng(instances)
+    named = [f"#{i}" for i in range(instances) for _ in range(each)]
+    covered = 0.0
+    draws = 1000
+    for _ in range(draws):
+        own = 0.8 * rng.normal(size=(instances + 1, 1)) if each > 1 else 0.0
+        scores = 1.0 / (1.0 + np.exp(-own - 0.6 * rng.normal(size=(instances + 1, each))))
+        truth = scores[:-1].ravel()
+        sets = sets_of(truth, wrong(len(truth)), ["a"] * len(truth), named)
+        covered += float((scores[-1] >= sets.thresholds["a"].score).mean())
+
+    assert covered / draws == pytest.approx(0.9, abs=0.03)  # three standard errors
 
 
 def test_a_label_that_is_recognised_more_often_than_asked_needs_no_other_member():
@@ -65,7 +82,9 @@ def test_a_label_that_is_recognised_more_often_than_asked_needs_no_other_member(
     seldom = sets_of(truth, [False] * 10 + [True] * 10, ["a"] * 20, None)
 
     assert often.of({"b": 0.6, "a": 0.4}, "b") == ("b",)
-    assert seldom.thresholds["a"].score == truth[1]  # with 9 of the 10 wrong ones, 19 of 20 are covered
+    assert (
+        truth[1] < seldom.thresholds["a"].score < truth[2]
+    )  # with 8 of the 10 wrong ones, 18 of 20 are covered
     assert seldom.of({"b": 0.8, "a": 0.2}, "b") == ("b", "a")
 
 
@@ -230,7 +249,7 @@ def test_equal_probabilities_are_told_apart_by_the_closeness_of_the_training_tri
 
 @pytest.fixture
 def csv_file(tmp_path):
-    trials = bottles(12, spread=1.5)
+    trials = bottles(12, spread=2.5)
     lines = ["label,bottle,force [N],noise"]
     for label, name, row in zip(trials.labels, trials.instances, trials.table.values.tolist(), strict=True):
         lines.append(",".join((label, name, *map(repr, row))))
