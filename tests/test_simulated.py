@@ -108,3 +108,17 @@ def test_many_trials_are_run_in_parts_of_equal_size_and_only_their_numbers_are_k
     assert in_parts.table.values.tobytes() == whole.table.values.tobytes()
     assert in_parts.before_contact.table.values.tobytes() == whole.before_contact.table.values.tobytes()
     assert (in_parts.labels, in_parts.table.names) == (whole.labels, whole.table.names)
+
+
+def test_a_note_says_in_how_many_grasps_of_which_objects_the_accuracy_is_not_verified(tmp_path):
+    rod = tmp_path / "rod.toml"
+    rod.write_text('width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 1e7\n')
+    settings = resolve("default", options=["gripper.pad_stiffness_n_m=inf", "gripper.sensor=ideal"])
+    groups = [Group(objects=("egg",), named={"rod:steel": str(rod)}, instances=2, trials=1)]
+
+    notes = simulated(settings, groups=groups).notes
+
+    assert [one for one in notes if "not verified" in one] == [
+        "2 of 4 grasps (rod:steel): accuracy not verified for trace, features (reasons: graspsense run --object NAME "
+        "--explain-model)"
+    ]

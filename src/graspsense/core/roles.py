@@ -198,7 +198,12 @@ class SensorBackend(ABC, Generic[ConfigT]):
         """Make the gripper safe and release the device, in a bounded time. May be called in any state, and twice."""
 
     def report(self) -> Mapping[str, float | int | str | bool]:
-        """Return counters, and values that the frames do not contain (a simulator knows the true force)."""
+        """Return counters, and values that the frames do not contain (a simulator knows the true force).
+
+        A simulator names under `not_verified` the quantities (a list) whose accuracy it does not guarantee in this
+        grasp, and under `unstable_loop` why the loop of controller and fingers is unstable. `run`, `train`, `evaluate`
+        and experiments print both.
+        """
         return {}
 
     def recorded_commands(self) -> Sequence[float] | None:

@@ -44,6 +44,9 @@ BATCH: Final = 500
 BATCH_WITHOUT_TRACES: Final = 20_000
 """Most grasps per call otherwise, whose results take 30 MB."""
 
+NAMED: Final = 3
+"""Most labels that a note names."""
+
 Progress = Callable[[int, int], None]
 OnTrace = Callable[[int, str, "Trace"], None]
 """Called with the number, the label and the trace of each trial."""
@@ -179,17 +182,20 @@ def simulated(
     if progress is not None:
         progress(0, len(plan.scenes))
     rows, before = FeatureRows(), FeatureRows()
+    doubts: dict[str, list[str]] = {}
     feature_set = with_checkpoints(settings.features.create(), checkpoints_s)
     extract = _Extraction(
         settings.features.component.qualified, feature_set, contact_force_of(settings.values)
     )
     wanted = on_trace is not None
     grasps = _grasps(settings, plan, progress, extract, traces=wanted)
-    for number, (features, features_before, trace) in enumerate(grasps):
+    for number, (features, features_before, trace, report) in enumerate(grasps):
         if on_trace is not None and trace is not None:
             on_trace(number, plan.labels[number], trace)
         rows.add(features)
         before.add(features_before)
+        for doubt in _doubts(report):
+            doubts.setdefault(doubt, []).append(plan.labels[number])
     table = rows.table()
     return Labelled(
         source="simulated grasps",
@@ -201,6 +207,7 @@ def simulated(
         notes=(
             "every figure here is simulated: it comes from a model of gripper and objects",
             *_states_note(plan.groups, plan.labels),
+            *(_doubt_note(doubt, of, len(plan.labels)) for doubt, of in doubts.items()),
         ),
         provenance={
             "simulated": True,
@@ -210,6 +217,22 @@ def simulated(
             "components": {t: one for t, one in settings.components.items() if t != "classifier"},
         },
     )
+
+
+def _doubts(report: Mapping[str, Any]) -> Iterator[str]:
+    """Yield why the figures of a simulated grasp may be inaccurate (see `SensorBackend.report`)."""
+    if report.get("unstable_loop"):
+        yield str(report["unstable_loop"])
+    elif report.get("not_verified"):
+        names = ", ".join(report["not_verified"])
+        yield f"accuracy not verified for {names} (reasons: graspsense run --object NAME --explain-model)"
+
+
+def _doubt_note(doubt: str, labels: Sequence[str], total: int) -> str:
+    """Return in how many grasps, and of which objects, the figures may be inaccurate."""
+    names = sorted(set(labels))
+    more = f" and {len(names) - NAMED} others" if len(names) > NAMED else ""
+    return f"{len(labels)} of {total} grasps ({', '.join(names[:NAMED])}{more}): {doubt}"
 
 
 def _states_note(groups: Sequence[Group], labels: Sequence[str]) -> tuple[str, ...]:
@@ -301,8 +324,8 @@ def _grasps(
     extract: _Extraction,
     *,
     traces: bool,
-) -> Iterator[tuple[Features, Features, Trace | None]]:
-    """Yield the features of each trial, those from before contact, and its trace if `traces` asks for it."""
+) -> Iterator[tuple[Features, Features, Trace | None, Mapping[str, Any]]]:
+    """Yield the features of each trial, those from before contact, its trace if `traces` asks for it, its report."""
     backend, controller = settings.gripper.create(), settings.controller.create()
     total = len(plan.scenes)
     if isinstance(backend, BatchBackend):
@@ -319,12 +342,12 @@ def _grasps(
                 traces=traces,
                 progress=None if progress is None else partial(_report_batch, progress, start, total),
             ):
-                yield *grasped.extracted, grasped.trace
+                yield *grasped.extracted, grasped.trace, grasped.report
         return
     for k, (scene, seed) in enumerate(zip(plan.scenes, plan.seeds, strict=True)):
         run = evolve(settings.run, seed=seed)
         grasp = run_grasp(backend.with_object(scene), controller, run, on_open=_refuse_real_device)
-        yield *extract(grasp.trace), grasp.trace
+        yield *extract(grasp.trace), grasp.trace, grasp.report
         if progress is not None:
             progress(k + 1, total)
 

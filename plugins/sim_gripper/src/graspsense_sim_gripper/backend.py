@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import repeat
-from typing import Any, Final, Unpack
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 from attrs import evolve
 
@@ -42,20 +42,22 @@ from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.fingertip import CELLS, FIRST_PAD_CELL, fingertips
 from graspsense_sim_gripper.loop import COLUMNS, FreeProgress, GraspParams
+from graspsense_sim_gripper.model_report import accuracy_report, model_report
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.palm import PalmBuffers, PalmSignals, channel, palm_signals
 from graspsense_sim_gripper.perturbed import perturbed
 from graspsense_sim_gripper.problem import IMAGES_PER_BLOCK, GraspController
-from graspsense_sim_gripper.reduction.model import QUANTITIES
 from graspsense_sim_gripper.reduction.propose import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sampled_loop import instability
 from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N, PadBuffers, apply_tare, sense
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick, raised_in_term
-from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
+
+if TYPE_CHECKING:
+    from graspsense_sim_gripper.batch.job import FinishedGrasp
 
 SIDES: Final = ("left", "right")
 
@@ -256,22 +258,18 @@ class SimBackend(BatchBackend[SimConfig]):
         term.
         """
         setup, reduction = self._setup, self._reduction
-        report = _model_report(self._state, setup.kinds)
+        report = model_report(self._state, setup.kinds)
         if reduction is not None:
-            valid = reduction.valid_for(self._state.peak_n)
             if isinstance(self._plant, ExactPlant):
                 reduction = reduction.with_exact_discretisation()
             report["selection"] = {
                 "fidelity": self.config.fidelity,
                 **reduction.as_values(),
                 "steps": self._state.step.n_steps,
-                "within": valid,
+                "within": reduction.valid_for(self._state.peak_n),
             }
             controller = self._controller or default_controller(self.config)
-            report["unstable_loop"] = instability(setup, controller, reduction)
-            problems = report["beyond"] or report["unstable_loop"]
-            doubtful = not valid or not report["resolved"] or problems != ""
-            report["not_verified"] = list(QUANTITIES if doubtful else reduction.not_verified)
+            report |= accuracy_report(report, reduction, instability(setup, controller, reduction))
         if self.config.explain:
             report["model"] = explain(setup, self._compressions)
         return report
@@ -328,25 +326,15 @@ class SimBackend(BatchBackend[SimConfig]):
                 reason=grasp.reason,
                 extracted=grasp.extracted,
                 trace=grasp.kept,
-                report=_model_report(grasp.state, kinds_in(scene)),
+                report=_report_of(grasp, scene),
             )
             for grasp, scene in zip(done, scenes, strict=True)
         ]
 
 
-def _model_report(state: PlantState, kinds: Sequence[str]) -> dict[str, Any]:
-    """Return what only the model knows at the end of a grasp."""
-    contact = state.contact
-    warnings = {
-        f"{kind}: {reason}": None
-        for half in (contact.left, contact.right)
-        for i, kind in enumerate(kinds, 1)
-        if (reason := find_term(kind)[1].beyond(half.states[i]))
-    }
-    return {
-        "simulated": True,
-        "true_peak_force_n": state.peak_n,
-        "resolved": state.step.unresolved + state.contact.unbalanced == 0,
-        "broken": any(getattr(term, "broken", 0) == 1 for term in contact.left.states),
-        "beyond": "; ".join(warnings),
-    }
+def _report_of(grasp: FinishedGrasp, scene: str) -> dict[str, Any]:
+    """Return the report of a grasp of a batch."""
+    report = model_report(grasp.state, kinds_in(scene))
+    if grasp.reduction is not None:
+        report |= accuracy_report(report, grasp.reduction, grasp.unstable_loop)
+    return report

@@ -59,6 +59,7 @@ from graspsense_sim_gripper.problem import (
 )
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.select import select
+from graspsense_sim_gripper.sampled_loop import instability
 from graspsense_sim_gripper.sensing import PadBuffers
 from graspsense_sim_gripper.term_failure import not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
@@ -89,6 +90,10 @@ class FinishedGrasp:
     """What `Job.extract` returned for the trace; None if there is no `Job.extract`."""
     kept: Trace | None
     """The trace; None if traces are not kept."""
+    reduction: Reduction | None = None
+    """The reduced model of the object; None without an object."""
+    unstable_loop: str = ""
+    """The text of `sampled_loop.instability` for the scene."""
 
     @property
     def trace(self) -> Trace:
@@ -145,6 +150,8 @@ class Scenes:
     """By `scene_key`."""
     _problems: dict[str, tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
     """By the name of the scene, with the number of the instance."""
+    _unstable: dict[tuple[str, bool], str] = field(factory=dict, init=False)
+    """Why the sampled loop is unstable, by `scene_key`."""
 
     def add(self, scene: str, *, compiled: bool = False) -> None:
         """Select the model of a scene. `compiled`: run the trial grasps compiled, not in the interpreter.
@@ -172,6 +179,16 @@ class Scenes:
                 problem = evolve(problem, number=split_number(scene)[1])
             known = self._problems[scene] = problem, reduction
         return instantiate(*known, seed)
+
+    def in_its_model(self, grasp: FinishedGrasp, scene: str, seed: int) -> FinishedGrasp:
+        """Return a grasp of a scene together with the reduced model that it was simulated in."""
+        key = scene_key(scene)
+        _, reduction = self._scenes[key]
+        if reduction is None:
+            return grasp
+        if key not in self._unstable:
+            self._unstable[key] = instability(self.setup(scene, seed), self.job.grasp_controller, reduction)
+        return evolve(grasp, reduction=reduction, unstable_loop=self._unstable[key])
 
 
 def scene_key(scene: str) -> tuple[str, bool]:

@@ -165,7 +165,9 @@ class _Batch:
                         ready[k] = future.result()
                         finished += len(ready[k])
                     while given in ready:
-                        yield from ready.pop(given)
+                        part = slice(slices[given], slices[given] + SLICE)
+                        done = zip(ready.pop(given), self.scenes[part], self.seeds[part], strict=True)
+                        yield from (self.models.in_its_model(*one) for one in done)
                         given += 1
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
