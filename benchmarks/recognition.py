@@ -74,16 +74,18 @@ class Kept(FeatureSet[Any]):
 
 
 def curve_of(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
-    """Return the times from the contact on, and gap, compression and the larger and the smaller force of the pads."""
+    """Return the times from the contact on, and gap, compression and the larger and the smaller force of the pads.
+
+    A trial without contact has zeros, as it has no features: what lies before the contact is a control of its own.
+    """
     samples = samples_of(trace, CONTACT_FORCE_N)
-    if isinstance(samples, str):
+    curve = samples if isinstance(samples, str) else contact_curve(samples, CONTACT_FORCE_N)
+    if isinstance(curve, str):
         return np.zeros(1), np.zeros((4, 1))
-    curve = contact_curve(samples, CONTACT_FORCE_N)
-    if isinstance(curve, str):  # never both pads: all of the trace
-        t, gap, pads = samples.t_s, samples.gap_m, samples.pads
-    else:
-        t, gap, pads = curve.t_s, curve.contact_gap_m - curve.compression_m, curve.pads
-    return t - t[0], np.array([gap, gap[0] - gap, pads.max(axis=0), pads.min(axis=0)])
+    gap = curve.contact_gap_m - curve.compression_m
+    return curve.t_s - curve.t_s[0], np.array(
+        [gap, gap[0] - gap, curve.pads.max(axis=0), curve.pads.min(axis=0)]
+    )
 
 
 def trials_of(source: str, kept: Kept, given: argparse.Namespace) -> Labelled:
