@@ -111,8 +111,10 @@ def identify(
 
 def _print(out: str, result: Identification) -> None:
     """Print the identified object, the candidates, and what is not determined."""
+    from graspsense.core.identification import repeatability
+
     rms = [fit.rms_n for fit in result.fits]
-    relative = [fit.rms_n / fit.peak_n for fit in result.fits]
+    relative = [fit.residual for fit in result.fits]
     echo_entry("object", result.label or "without a label")
     echo_entry("squeezes", f"{len(result.fits)}, in {result.seconds:.1f} s")
     worst, mean = max(relative), sum(relative) / len(relative)
@@ -120,6 +122,8 @@ def _print(out: str, result: Identification) -> None:
         "residual",
         f"{1e3 * sum(rms) / len(rms):.0f} mN rms, {100.0 * mean:.2f} % of the peak (largest {100.0 * worst:.2f} %)",
     )
+    if len(result.fits) > 1:
+        echo_entry("repeatable", f"squeezes differ by {_percent(repeatability(result.fits))} of the peak")
     echo()
     echo_table(
         ("PARAMETER", "VALUE", "UNIT", "90 % INTERVAL", "BASIS"),
@@ -158,6 +162,8 @@ def _percent(share: float) -> str:
 def _as_values(out: str, result: Identification) -> dict[str, Any]:
     from attrs import asdict
 
+    from graspsense.core.identification import repeatability
+
     def values(items: Sequence[Any]) -> list[dict[str, Any]]:
         return [asdict(one) for one in items]
 
@@ -169,6 +175,7 @@ def _as_values(out: str, result: Identification) -> dict[str, Any]:
         "candidates": values(result.candidates),
         "undetermined": values(result.undetermined),
         "fits": [{"name": one.name, "rms_n": one.rms_n, "peak_n": one.peak_n} for one in result.fits],
+        "repeatability": None if len(result.fits) < 2 else repeatability(result.fits),
         "checks": [{"statistic": one.statistic, "p": one.p} for one in result.checks],
         "notes": list(result.notes),
     }

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 from attrs import field, frozen
 
@@ -81,6 +82,37 @@ class SqueezeFit:
     fitted_n: NDArray[Any]
     rms_n: float
     peak_n: float
+
+    @property
+    def residual(self) -> float:
+        """The rms difference between fitted and measured force, relative to the peak."""
+        return self.rms_n / self.peak_n
+
+
+COMPARED: Final = 20
+"""Number of compressions at which squeezes are compared."""
+LEAST_COMPRESSION: Final = 0.1
+"""The smallest of them, relative to the largest compression that all squeezes reach."""
+
+
+def repeatability(fits: Sequence[SqueezeFit]) -> float:
+    """Return how much squeezes differ: the standard deviation of their loading force, relative to the mean peak.
+
+    The rms over compressions that all squeezes reach while they are loaded; NaN for a single squeeze. A fit cannot be
+    expected to be closer to a further squeeze than this.
+    """
+    import numpy as np
+
+    if len(fits) < 2:
+        return math.nan
+    deepest = min(float(np.max(one.compression_m)) for one in fits)
+    at = np.linspace(LEAST_COMPRESSION * deepest, deepest, COMPARED)
+    forces = []
+    for one in fits:
+        load = slice(0, int(np.argmax(one.compression_m)) + 1)
+        forces.append(np.interp(at, np.maximum.accumulate(one.compression_m[load]), one.measured_n[load]))
+    deviation = float(np.sqrt(np.mean(np.var(forces, axis=0, ddof=1))))
+    return deviation / float(np.mean([one.peak_n for one in fits]))
 
 
 @frozen(kw_only=True)

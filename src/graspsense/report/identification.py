@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from graspsense.core.identification import repeatability
 from graspsense.report.html import Page, Section, bullets, figure, panels, paragraph, table
 from graspsense.report.svg import INKS, QUIET, WIDTH, AxisScale, Picture, reaching
 
@@ -32,7 +33,7 @@ BINS: Final = 24
 
 def identification_page(result: Identification, scene: str) -> Page:
     """Return the page of an identification; `scene` is the name of the scene file."""
-    relative = [one.rms_n / one.peak_n for one in result.fits]
+    relative = [one.residual for one in result.fits]
     chosen = next(one.terms for one in result.candidates if one.chosen)
     what = result.label or "the object"
     return Page(
@@ -42,7 +43,7 @@ def identification_page(result: Identification, scene: str) -> Page:
         headline=f"{what}: {chosen}",
         answer=(
             f"{len(result.fits)} squeezes, fitted to {100.0 * float(np.mean(relative)):.2g} % of the peak force (rms). "
-            f"The scene is {scene}."
+            f"{_differ(result.fits)}The scene is {scene}."
         ),
         beside=bullets(result.notes),
         sections=(
@@ -54,6 +55,12 @@ def identification_page(result: Identification, scene: str) -> Page:
             Section(id="check", title="Simulated beside recorded squeezes", body=_checks(result.checks)),
         ),
     )
+
+
+def _differ(fits: Sequence[SqueezeFit]) -> str:
+    if len(fits) < 2:
+        return ""
+    return f"Among themselves, the squeezes differ by {100.0 * repeatability(fits):.2g} % of the peak. "
 
 
 def _parameters(parameters: Sequence[IdentifiedParameter]) -> str:
