@@ -9,6 +9,7 @@ import pytest
 from attrs import evolve
 
 from graspsense.plugin_api import ConfigError, RecordedSqueeze, Trace
+from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.contact import PadCompliance
 from graspsense_sim_gripper.identify.choose import choose
 from graspsense_sim_gripper.identify.fit import fit
@@ -17,7 +18,7 @@ from graspsense_sim_gripper.identify.fracture import fracture_of
 from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import prepared
 from graspsense_sim_gripper.identify.refuse import shows_memory
-from graspsense_sim_gripper.identify.run import _used
+from graspsense_sim_gripper.identify.run import _ready, _used
 from graspsense_sim_gripper.objects.spec import parse_scene
 
 PADS = PadCompliance(15000.0, 0.0, 0.0, 1.0)
@@ -123,6 +124,19 @@ def test_of_many_recordings_thirty_of_as_many_objects_as_possible_are_used():
 def test_a_recording_without_contact_is_refused():
     with pytest.raises(ConfigError, match="nothing was touched"):
         prepared(recorded(lambda closure: 0.0 * closure), 0.0)
+
+
+def test_recordings_without_contact_are_left_out_with_a_note_unless_all_are():
+    empty = evolve(recorded(lambda closure: 0.0 * closure), name="empty")
+    notes = []
+
+    kept, ready = _ready(SimConfig(), [recorded(), empty, recorded()], notes)
+
+    assert [one.name for one in kept] == ["one", "one"]
+    assert len(ready) == 2
+    assert notes == ["left out: empty: no force exceeds the noise: nothing was touched"]
+    with pytest.raises(ConfigError, match="nothing was touched"):
+        _ready(SimConfig(), [empty], [])
 
 
 def test_a_ramp_at_one_speed_shows_no_memory_and_a_hold_does():

@@ -126,6 +126,10 @@ def resolution(squeezes: int) -> Resolution:
     return Resolution(max(int(share * MAX_NODES), LEAST_NODES), max(int(share * MAX_SAMPLES), LEAST_SAMPLES))
 
 
+class NoSqueeze(ConfigError):
+    """A recording in which nothing, or too little, was squeezed."""
+
+
 def prepared(squeeze: RecordedSqueeze, delay_s: float, parts: Resolution = FULL) -> Squeeze:
     """Return the squeeze of a recording; `delay_s`: from the time of an image until it arrives.
 
@@ -139,9 +143,9 @@ def prepared(squeeze: RecordedSqueeze, delay_s: float, parts: Resolution = FULL)
     threshold = max(CONTACT_SHARE * peak, NOISE_FACTOR * noise)
     touching = np.flatnonzero(forces > threshold)
     if peak <= 0.0 or not len(touching):
-        raise ConfigError(f"{squeeze.name}: no force exceeds the noise: nothing was touched")
+        raise NoSqueeze(f"{squeeze.name}: no force exceeds the noise: nothing was touched")
     if len(touching) < MIN_SAMPLES:
-        raise ConfigError(
+        raise NoSqueeze(
             f"{squeeze.name}: {len(touching)} measurements of the force in contact, and at least {MIN_SAMPLES} are "
             "needed: squeeze more slowly, or measure at a higher rate"
         )

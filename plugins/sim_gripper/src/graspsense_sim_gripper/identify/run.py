@@ -29,7 +29,7 @@ from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.fracture import fracture_of
 from graspsense_sim_gripper.identify.interval import student
 from graspsense_sim_gripper.identify.laws import DataScale
-from graspsense_sim_gripper.identify.prepare import Squeeze, prepared, resolution
+from graspsense_sim_gripper.identify.prepare import NoSqueeze, Squeeze, prepared, resolution
 from graspsense_sim_gripper.identify.refuse import shows_memory, undetermined
 from graspsense_sim_gripper.identify.share import measured_share
 from graspsense_sim_gripper.identify.spread import Uncertainty, uncertainty
@@ -65,16 +65,15 @@ def identify(
 ) -> Identification:
     """Return the object of these squeezes; `config` is that of a gripper whose recordings say nothing of their own.
 
-    `block` are squeezes of a rigid block, from which the fingertips are identified before. Raises ConfigError if a
-    squeeze has no contact or too few measurements of the force.
+    `block` are squeezes of a rigid block, from which the fingertips are identified before. A recording without contact,
+    or with too few measurements of the force, is left out with a note. Raises ConfigError if all are.
     """
     begin = time.monotonic()
     config, notes = _settings(config, squeezes, block)
     drive, pads = drive_and_pads(config)
     model = ForwardModel(pads=pads)
     model.compile()
-    squeezes = _used(squeezes, notes)
-    ready = [prepared(one, config.pad_delay_s, resolution(len(squeezes))) for one in squeezes]
+    squeezes, ready = _ready(config, _used(squeezes, notes), notes)
     cells = _has_cells(config, squeezes)
     shares = _measured_shares(squeezes, ready, drive) if cells else [1.0] * len(ready)
     share = _share(shares) if cells else 1.0
@@ -117,6 +116,27 @@ def identify(
         notes=tuple(notes),
         seconds=time.monotonic() - begin,
     )
+
+
+def _ready(
+    config: SimConfig, squeezes: Sequence[RecordedSqueeze], notes: list[str]
+) -> tuple[list[RecordedSqueeze], list[Squeeze]]:
+    """Return the squeezes that can be fitted, as recorded and prepared; a note names each other one.
+
+    Raises NoSqueeze if there is none.
+    """
+    kept, ready, refusals = [], [], []
+    for one in squeezes:
+        try:
+            ready.append(prepared(one, config.pad_delay_s, resolution(len(squeezes))))
+        except NoSqueeze as refusal:
+            refusals.append(refusal)
+        else:
+            kept.append(one)
+    if not ready:
+        raise refusals[0]
+    notes += [f"left out: {refusal}" for refusal in refusals]
+    return kept, ready
 
 
 def _shares(config: SimConfig, block: Sequence[RecordedSqueeze]) -> list[float]:
