@@ -37,7 +37,7 @@ from graspsense.plugins.features.contact_curve import contact_curve, samples_of
 from graspsense.sources.trial_source import STORE, TrialSource, labelled_trials
 
 CLASSIFIERS = ("c45", "tree", "knn", "svm", "mlp", "forest", "boosted", "ebm")
-FEATURE_SETS = ("chitta", "curve", "catch22")
+FEATURE_SETS = ("chitta", "curve", "quantiles", "catch22")
 POINTS = 128
 """Number of times of a curve."""
 CONTACT_FORCE_N = 0.625
@@ -227,7 +227,10 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("sources", nargs="*", metavar="SOURCE")
     parser.add_argument("--classifiers", type=names, default=CLASSIFIERS)
     parser.add_argument(
-        "--feature-sets", type=names, default=None, help="[chitta, curve, and catch22 if installed]"
+        "--feature-sets",
+        type=names,
+        default=None,
+        help="[chitta, curve, quantiles, and catch22 if installed]",
     )
     parser.add_argument("--instances", type=int, default=20, help="simulated: instances of each object")
     parser.add_argument("--trials", type=int, default=3, help="simulated: grasps of each instance")

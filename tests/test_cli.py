@@ -128,7 +128,7 @@ def test_version_is_that_of_the_distribution():
             ["plugins", "show", "replai"],
             "graspsense: no plugin or component named 'replai'. "
             "Known: backprop, boosted, catch22, chitta, curve, ebm, force, forest, graspsense, hybrid, knn, mlp, "
-            "replay, svm, tree, velocity. Did you mean 'replay'?\n",
+            "quantiles, replay, svm, tree, velocity. Did you mean 'replay'?\n",
         ),
     ],
 )

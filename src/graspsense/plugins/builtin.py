@@ -46,6 +46,11 @@ def graspsense_feature_sets() -> Iterable[FeatureSetEntry]:
         summary="stiffness, work, relaxation, hysteresis and shape of the whole force curve",
     )
     yield FeatureSetEntry(
+        name="quantiles",
+        target="graspsense.plugins.features.quantiles:QuantileFeatures",
+        summary="quantiles of gap, forces and their rates over the contact and its halves",
+    )
+    yield FeatureSetEntry(
         name="catch22",
         target="graspsense.plugins.features.catch22:Catch22Features",
         summary="22 characteristics of the force over time (pycatch22)",

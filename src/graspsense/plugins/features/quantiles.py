@@ -1,0 +1,149 @@
+"""Quantiles of gap and forces, and of their rates, over the whole contact and over its halves.
+
+An interval method for time series: what a quantile says does not depend on when exactly something happens. The
+intervals and quantiles are fewer than in the source, so that each has a plain meaning. Source: A. Dempster, D. F.
+Schmidt and G. I. Webb, "QUANT: a minimalist interval method for time series classification", arXiv:2308.00928.
+
+The contact lasts from the first to the last time at which all pads feel the contact force. Gap and forces count as
+functions of time that are linear between samples, at 128 evenly spaced times.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from attrs import frozen
+
+from graspsense.plugin_api import CONTACT_FORCE_N, Channel, Feature, Features, FeatureSet, missing, setting
+from graspsense.plugins.features.contact_curve import contact_curve, samples_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from graspsense.plugin_api import Trace
+    from graspsense.plugins.features.contact_curve import CurveSamples
+
+    Floats = NDArray[np.float64]
+
+POINTS: Final = 128
+"""Number of times at which gap and forces are evaluated."""
+LEAST_SAMPLES: Final = 3
+CHANNELS: Final = (
+    ("gap", "m", "gap"),
+    ("high_force", "N", "force of the pad with the larger force"),
+    ("low_force", "N", "force of the pad with the smaller force"),
+)
+STRETCHES: Final = (
+    ("whole", slice(None), "the contact"),
+    ("first", slice(None, POINTS // 2), "the first half of the contact"),
+    ("second", slice(POINTS // 2, None), "the second half of the contact"),
+)
+QUANTILES: Final = (
+    ("min", "smallest"),
+    ("q25", "lower quartile of the"),
+    ("median", "median"),
+    ("q75", "upper quartile of the"),
+    ("max", "largest"),
+)
+_NEEDS: Final = "needs three samples in the contact"
+_CONTACT: Final = (
+    Feature("contact_gap", "m", "gap at the contact; needs a contact", width=True),
+    Feature("contact_time", "s", "time from the first to the last contact; needs a contact"),
+)
+_QUANTILES: Final = tuple(
+    Feature(
+        f"{channel}{suffix}_{stretch}_{quantile}",
+        f"{unit}{per}",
+        f"{words} {rate}{what} in {when}; {_NEEDS}",
+    )
+    for suffix, per, rate in (("", "", ""), ("_rate", "/s", "rate of the "))
+    for stretch, _, when in STRETCHES
+    for channel, unit, what in CHANNELS
+    for quantile, words in QUANTILES
+)
+
+
+@frozen(kw_only=True)
+class QuantilesConfig:
+    """The threshold of contact."""
+
+    contact_force_n: float = setting(
+        default=CONTACT_FORCE_N,
+        unit="N",
+        above=0.0,
+        plausible=(0.01, 20.0),
+        meaning="Force on each pad from which on it touches the object; that of the controller unless it is given "
+        "here.",
+        follows="controller.contact_force_n",
+    )
+
+
+class QuantileFeatures(FeatureSet[QuantilesConfig]):
+    """Extracts the quantiles; needs three samples in the contact."""
+
+    requires = (Channel("gap", "m"), Channel("force_left", "N"), Channel("force_right", "N"))
+    features = (*_CONTACT, *_QUANTILES)
+
+    def extract(self, trace: Trace) -> Features:
+        """Return the quantiles over the contact; all are missing without one."""
+        samples = samples_of(trace, self.config.contact_force_n)
+        contact = samples if isinstance(samples, str) else _contact(samples, self.config.contact_force_n)
+        values: list[float] = []
+        reasons: dict[str, str] = {}
+        if isinstance(samples, str) or isinstance(contact, str):
+            reasons = missing([feature.name for feature in self.features], str(contact))
+        else:
+            start_s, end_s = contact
+            values = [float(np.interp(start_s, samples.t_s, samples.gap_m)), end_s - start_s]
+            inside = (samples.t_s >= start_s) & (samples.t_s <= end_s)
+            if np.count_nonzero(inside) < LEAST_SAMPLES:
+                why = "fewer than three samples in the contact"
+                reasons = missing([feature.name for feature in _QUANTILES], why)
+            else:
+                values += _quantiles(samples, start_s, end_s).tolist()
+        absent = [math.nan] * (len(self.features) - len(values))
+        return Features(
+            names=tuple(feature.name for feature in self.features),
+            values=(*values, *absent),
+            units=_units(trace),
+            reasons=reasons,
+        )
+
+
+def _contact(samples: CurveSamples, contact_force_n: float) -> tuple[float, float] | str:
+    """Return the first and the last time at which all pads feel the contact force, or why there is none."""
+    curve = contact_curve(samples, contact_force_n)
+    if isinstance(curve, str):
+        return curve
+    last = int(np.flatnonzero(curve.lowest_n >= contact_force_n)[-1])
+    if last + 1 == len(curve.t_s):
+        return float(curve.t_s[0]), float(curve.t_s[last])
+    high, low = curve.lowest_n[last], curve.lowest_n[last + 1]
+    share = (high - contact_force_n) / (high - low)
+    return float(curve.t_s[0]), float(curve.t_s[last] + share * (curve.t_s[last + 1] - curve.t_s[last]))
+
+
+def _quantiles(samples: CurveSamples, start_s: float, end_s: float) -> Floats:
+    """Return the quantiles in the order of their features."""
+    at = np.linspace(start_s, end_s, POINTS)
+    pads = samples.pads
+    columns = (samples.gap_m, pads.max(axis=0), pads.min(axis=0))
+    values = np.array([np.interp(at, samples.t_s, column) for column in columns])
+    rates = np.diff(values, axis=1) / (at[1] - at[0])
+    shares = np.linspace(0.0, 1.0, len(QUANTILES))
+    parts = [
+        np.quantile(series[:, part], shares, axis=1).T.ravel()
+        for series in (values, rates)
+        for _, part, _ in STRETCHES
+    ]
+    result: Floats = np.concatenate(parts)
+    return result
+
+
+def _units(trace: Trace) -> tuple[str, ...]:
+    """Return the units of the features, given those of the trace: a recording can count time in frames."""
+    t, gap, force = trace.units["t"], trace.units["gap"], trace.units["force_left"]
+    of = {"m": gap, "N": force, "s": t, "m/s": f"{gap}/{t}", "N/s": f"{force}/{t}"}
+    return tuple(of[feature.unit] for feature in (*_CONTACT, *_QUANTILES))

@@ -1,0 +1,87 @@
+"""Quantiles of gap and forces over the contact: known curves, uneven samples, units, grasps without contact."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from attrs import evolve
+
+from graspsense.core.signals import Frame, Phase
+from graspsense.core.trace import SI_UNITS, trace_of
+from graspsense.plugin_api import create
+from graspsense.testing.samples import squeeze
+
+CONTACT_N = 0.625
+EVEN = np.arange(0.0, 0.9, 0.001)
+
+
+def extract(trace, **settings):
+    return create("feature-set", "graspsense/quantiles", **settings).extract(trace)
+
+
+def spring(t_s=EVEN, units=SI_UNITS):
+    """A spring is squeezed by 4 mm in 0.4 s and released in 0.4 s, at constant speed; the right pad feels 0.9 of it.
+
+    The fingers are open from 0.8 s on.
+    """
+    x = np.interp(t_s, [0.0, 0.4, 0.8], [0.0, 0.004, 0.0])
+    gap = 0.060 - x + np.maximum(t_s - 0.8, 0.0) * 0.01
+    frames = [
+        Frame(t, 0.001, g, 0.0, 0.0, 4000.0 * d, 3600.0 * d, math.nan, math.nan, 0)
+        for t, g, d in zip(t_s.tolist(), gap.tolist(), x.tolist(), strict=True)
+    ]
+    phase = np.where(t_s < 0.4, Phase.SQUEEZE, Phase.RELEASE)
+    return trace_of(frames, phase.tolist(), [0.0] * len(frames), [], units)
+
+
+def test_a_spring_that_is_squeezed_and_released_at_constant_speed():
+    f = extract(spring())
+    touch_m = CONTACT_N / 3600.0  # of the pad with the smaller force
+
+    assert not f.reasons
+    assert f["contact_gap"] == pytest.approx(0.060 - touch_m, abs=1e-6)
+    assert f["contact_time"] == pytest.approx(0.8 - 2.0 * touch_m / 0.01, abs=1e-3)
+    assert f["gap_whole_min"] == pytest.approx(0.056, abs=5e-5)
+    assert f["gap_whole_max"] == pytest.approx(0.060 - touch_m, abs=1e-6)
+    assert f["gap_whole_median"] == pytest.approx(0.058 - touch_m / 2.0, abs=5e-5)
+    assert f["high_force_second_max"] == pytest.approx(16.0, rel=0.02)
+    assert f["low_force_first_min"] == pytest.approx(CONTACT_N, abs=1e-3)
+    assert f["gap_rate_first_median"] == pytest.approx(-0.01, rel=1e-3)
+    assert f["gap_rate_second_median"] == pytest.approx(0.01, rel=1e-3)
+    assert f["low_force_rate_first_median"] == pytest.approx(36.0, rel=1e-3)
+
+
+def test_which_samples_a_recording_has_and_how_long_it_goes_on_does_not_count():
+    expected = extract(spring()).values
+    chosen = np.random.default_rng(1).uniform(size=len(EVEN)) < 0.5
+    chosen[[0, 400, 800]] = True
+    assert extract(spring(EVEN[chosen])).values == pytest.approx(expected, rel=0.02, abs=0.02)
+    later = np.concatenate((EVEN, [1.0, 5.0]))
+    assert extract(spring(later)).values == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+def test_swapping_the_fingers_changes_nothing():
+    trace = spring()
+    swapped = evolve(trace, force_left_n=trace.force_right_n, force_right_n=trace.force_left_n)
+    assert extract(swapped).values == extract(trace).values
+
+
+def test_a_grasp_without_contact_has_none_with_the_reason():
+    f = extract(squeeze(contacts=(-1.0, -1.0)))
+    assert set(f.reasons) == set(f.names)
+    assert "never felt 0.625 N" in f.reasons["gap_whole_median"]
+
+
+def test_too_few_samples_have_no_quantiles_and_say_so():
+    few = extract(spring().until(0.0185))
+    assert "fewer than three samples" in few.reasons["gap_whole_median"]
+    assert few["contact_gap"] == pytest.approx(0.060 - CONTACT_N / 3600.0, abs=1e-6)
+
+
+def test_the_units_are_those_of_the_recording():
+    f = extract(spring(units={**SI_UNITS, "t": "frames"}))
+    units = dict(zip(f.names, f.units, strict=True))
+    assert (units["contact_time"], units["gap_rate_whole_max"]) == ("frames", "m/frames")
+    assert units["low_force_whole_max"] == "N"
