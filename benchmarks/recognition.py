@@ -166,7 +166,7 @@ def peers(
             **{f"folds_{name}": of for name, of in protocols.items()},
         )
         script = Path(__file__).with_name("recognition_peers.py")
-        command = [given.aeon_python, str(script), str(data), str(answers), "--seed", str(given.seed)]
+        command = [given.aeon_python, str(script), str(data), str(answers), "--seed", str(given.peer_seed)]
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": ""}
         if subprocess.run(command, check=False, env=environment).returncode:
             raise SystemExit(f"{' '.join(command)} failed")
@@ -237,8 +237,12 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--folds", type=int, default=5)
     parser.add_argument("--seed", type=int, default=10)
     parser.add_argument("--aeon-python", metavar="PATH", help="the Python of an environment with aeon")
+    parser.add_argument(
+        "--peer-seed", type=int, help="of the random kernels of MultiRocket-Hydra [as --seed]"
+    )
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
+    given.peer_seed = given.seed if given.peer_seed is None else given.peer_seed
     if given.feature_sets is None:
         given.feature_sets = tuple(name for name in FEATURE_SETS if is_installed(name))
     if not given.sources:
