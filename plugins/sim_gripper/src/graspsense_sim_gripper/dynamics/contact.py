@@ -249,13 +249,17 @@ def _release_from_rigid_pads(
     none = force - force
     past = Past((d1 - d0) / h, 0.0, math.inf)
     free = ContactState(d1, none, search.slope_n_m, states, 0.0, branch0, past)
-    return free, _unbalanced(force, 0.0)
+    return free, _unbalanced(force, 0.0, 0.0)
 
 
-def _unbalanced(force_n: float, pads_n: float) -> int:
-    """Return 1 if the force of the object is not that of the pads, or not finite."""
+def _unbalanced(force_n: float, pads_n: float, push_n: float) -> int:
+    """Return 1 if the force of the object is not that of the pads, or not finite.
+
+    `push_n`: that of `PadLoad`, whose rounding the search does not see.
+    """
     miss_n = abs(force_n - pads_n)
-    return 0 if miss_n < math.inf and miss_n <= UNBALANCED_RTOL * max(abs(force_n), 1.0) else 1
+    most_n = UNBALANCED_RTOL * max(abs(force_n), 1.0) + LENGTH_RTOL * abs(push_n)
+    return 0 if miss_n < math.inf and miss_n <= most_n else 1
 
 
 def _release_slope(slope: float, force: float, force0: float, d0: float, closure_m: float) -> float:
@@ -308,7 +312,7 @@ def _press_through_pads(
         pressed, n_changes = not pressed, n_changes + 1
         over, base = h, d0
     excess, _ = pad_excess(pads, closed - d1)
-    rate, unbalanced = (d1 - d0) / h, _unbalanced(force, c - k * d1 + excess)
+    rate, unbalanced = (d1 - d0) / h, _unbalanced(force, c - k * d1 + excess, c)
     if not pressed:
         pad = creep.free_pad_m
         branch = branch0 * creep.decay + (creep.mean_n_m + creep.ramp_n_m) * (pad - pad0)
