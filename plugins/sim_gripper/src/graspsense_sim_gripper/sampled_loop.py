@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -42,13 +43,24 @@ def growth_per_tick(setup: GraspSetup, controller: GraspController, reduction: R
     drive, dt = setup.plant.drive, setup.dt_s
     mass = drive.inertia / setup.state.motion.jacobian_m_rev**2
     stiffest = mass * (reduction.contact.number / dt) ** 2
+    rows = tuple(map(tuple, law.tolist()))
+    return _growth(rows, mass, drive.friction.damping_n_s_m, stiffest, drive.lag_s, dt)
+
+
+@lru_cache(maxsize=1024)
+def _growth(
+    law: tuple[tuple[float, ...], ...],
+    mass_kg: float,
+    damping_n_s_m: float,
+    stiffest_n_m: float,
+    lag_s: float,
+    dt_s: float,
+) -> float:
+    """Return what `growth_per_tick` does, given the linearised law; the grasps of many batches have the same."""
     rates = np.array(
-        [
-            [[0.0, 1.0], [-stiffness / mass, -drive.friction.damping_n_s_m / mass]]
-            for stiffness in (0.0, stiffest)
-        ]
+        [[[0.0, 1.0], [-stiffness / mass_kg, -damping_n_s_m / mass_kg]] for stiffness in (0.0, stiffest_n_m)]
     )
-    return _spectral_radius(law, rates, 1.0 / mass, drive.lag_s, dt)
+    return _spectral_radius(np.array(law), rates, 1.0 / mass_kg, lag_s, dt_s)
 
 
 def instability(setup: GraspSetup, controller: GraspController, reduction: Reduction) -> str:
