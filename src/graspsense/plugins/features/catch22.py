@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import pycatch22
-from attrs import frozen
 
-from graspsense.plugin_api import CONTACT_FORCE_N, Channel, Feature, Features, FeatureSet, missing, setting
+from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, missing
 from graspsense.plugins.features.contact_curve import contact_curve, samples_of
+from graspsense.plugins.features.contact_threshold import ContactThreshold
 
 if TYPE_CHECKING:
     from graspsense.plugin_api import Trace
@@ -27,22 +27,7 @@ LEAST_SAMPLES: Final = 8
 """Number of samples from which on the course of the force is more than the interpolation between them."""
 
 
-@frozen(kw_only=True)
-class Catch22Config:
-    """The threshold of contact."""
-
-    contact_force_n: float = setting(
-        default=CONTACT_FORCE_N,
-        unit="N",
-        above=0.0,
-        plausible=(0.01, 20.0),
-        meaning="Force on each pad from which on it touches the object; that of the controller unless it is given "
-        "here.",
-        follows="controller.contact_force_n",
-    )
-
-
-class Catch22Features(FeatureSet[Catch22Config]):
+class Catch22Features(FeatureSet[ContactThreshold]):
     """Extracts the 22 characteristics; needs a contact, and eight samples from there to the release."""
 
     requires = (Channel("gap", "m"), Channel("force_left", "N"), Channel("force_right", "N"))

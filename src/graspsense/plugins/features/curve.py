@@ -19,7 +19,6 @@ import numpy as np
 from attrs import frozen
 
 from graspsense.plugin_api import (
-    CONTACT_FORCE_N,
     Channel,
     Feature,
     Features,
@@ -28,6 +27,7 @@ from graspsense.plugin_api import (
     setting,
 )
 from graspsense.plugins.features.contact_curve import ContactCurve, contact_curve, first_crossing, samples_of
+from graspsense.plugins.features.contact_threshold import ContactThreshold
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,17 +50,9 @@ LEAST_SAMPLES: Final = 3
 
 
 @frozen(kw_only=True)
-class CurveConfig:
+class CurveConfig(ContactThreshold):
     """The threshold of contact, and what is too short to measure."""
 
-    contact_force_n: float = setting(
-        default=CONTACT_FORCE_N,
-        unit="N",
-        above=0.0,
-        plausible=(0.01, 20.0),
-        meaning="Force on each pad from which on it touches; that of the controller unless it is given here.",
-        follows="controller.contact_force_n",
-    )
     window_s: float = setting(
         default=0.05,
         unit="s",

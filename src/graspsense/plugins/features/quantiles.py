@@ -14,10 +14,10 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from attrs import frozen
 
-from graspsense.plugin_api import CONTACT_FORCE_N, Channel, Feature, Features, FeatureSet, missing, setting
+from graspsense.plugin_api import Channel, Feature, Features, FeatureSet, missing
 from graspsense.plugins.features.contact_curve import contact_curve, samples_of
+from graspsense.plugins.features.contact_threshold import ContactThreshold
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,22 +65,7 @@ _QUANTILES: Final = tuple(
 )
 
 
-@frozen(kw_only=True)
-class QuantilesConfig:
-    """The threshold of contact."""
-
-    contact_force_n: float = setting(
-        default=CONTACT_FORCE_N,
-        unit="N",
-        above=0.0,
-        plausible=(0.01, 20.0),
-        meaning="Force on each pad from which on it touches the object; that of the controller unless it is given "
-        "here.",
-        follows="controller.contact_force_n",
-    )
-
-
-class QuantileFeatures(FeatureSet[QuantilesConfig]):
+class QuantileFeatures(FeatureSet[ContactThreshold]):
     """Extracts the quantiles; needs three samples in the contact."""
 
     requires = (Channel("gap", "m"), Channel("force_left", "N"), Channel("force_right", "N"))
