@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from graspsense.plugin_api import gap_and_rate, revolutions_at, straight_linkage
 from graspsense_sim_gripper.binding import bind_reachable
-from graspsense_sim_gripper.compiled.compose import plant_move, sum_of
+from graspsense_sim_gripper.compiled.compose import all_active, plant_move, sum_of, uncompressed
 from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
 from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, solve_contact
 from graspsense_sim_gripper.dynamics.drive import Drive, Friction, sliding_friction, stribeck_excess
@@ -29,8 +29,8 @@ from graspsense_sim_gripper.terms.gas import Gas
 from graspsense_sim_gripper.terms.liquid import Liquid, liquid
 from graspsense_sim_gripper.terms.loss import Loss, loss
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
-from graspsense_sim_gripper.terms.oscillator import OscillatorState
-from graspsense_sim_gripper.terms.registry import TERMS
+from graspsense_sim_gripper.terms.oscillator import OscillatorState, moved
+from graspsense_sim_gripper.terms.registry import TERMS, laws_of, moving_of
 from graspsense_sim_gripper.terms.rigid import Rigid, RigidState, rigid
 from graspsense_sim_gripper.terms.slosh import Slosh
 from graspsense_sim_gripper.terms.surface import Surface, surface
@@ -332,6 +332,28 @@ def test_nothing_pulls_when_the_fingers_open_faster_than_the_object_recovers():
         assert state.contact.right_n >= 0.0
     assert state.motion.gap_m > 0.05
     assert state.contact.left_n == 0.0
+
+
+def test_the_mass_of_a_surface_swings_on_when_the_shell_has_its_shape_again():
+    # A second contact would otherwise meet the mass where the first one left it.
+    kinds, swing = ("elastic", "surface"), Surface(2.0, 300.0, 2.0, 5e4)
+    model = thing(*all_active([Elastic(2000.0, 0.0), swing]), skins=2e5)
+    move = plant_move(laws_of(kinds), moving=moving_of(kinds))
+    params, squeezed = PlantParams(drive(), model, FINE), at(0.0501, uncompressed(kinds).states)
+    for _ in range(500):
+        squeezed = move(params, squeezed, 30.0, TICK)
+    freed = squeezed
+    while freed.contact.left.force_n > 0.0 or abs(freed.contact.left.compression_m) > 1e-12:
+        freed = move(params, freed, -60.0, TICK)
+    before = freed.contact.left.states[2]
+    assert before.y_m > 1e-4
+    for k in range(1, 300):
+        freed = move(params, freed, -60.0, TICK)
+        expected = moved(before, 0.5 * 2.0 / 2.0, 300.0 / 2.0, 0.0, 0.0, k * TICK)
+        if expected.y_m < 0.0:
+            break
+        assert freed.contact.left.states[2].y_m == pytest.approx(expected.y_m, rel=1e-6, abs=1e-9)
+    assert expected.y_m < 0.0  # a quarter of a swing was seen
 
 
 def test_the_finger_that_touches_first_pushes_with_the_tables_friction_until_both_touch():

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.build import build, instantiate
-from graspsense_sim_gripper.compiled.compose import hardens, pad_parts, phase_of_all, sum_of
+from graspsense_sim_gripper.compiled.compose import any_moves, hardens, pad_parts, phase_of_all, sum_of
 from graspsense_sim_gripper.compiled.jit import compile_part
 from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
@@ -36,7 +36,7 @@ from graspsense_sim_gripper.dynamics.contact import (
 from graspsense_sim_gripper.dynamics.roots import MAX_ITERATIONS, bracketed_secant
 from graspsense_sim_gripper.dynamics.state import Contact
 from graspsense_sim_gripper.stepping.control import MIN_STEP_S
-from graspsense_sim_gripper.terms.registry import laws_of, phases_of
+from graspsense_sim_gripper.terms.registry import laws_of, moving_of, phases_of
 
 STEP_S: Final = 1e-3
 """The longest step between two recorded times, if the settings give no `step_s`."""
@@ -233,7 +233,11 @@ def _until_event(model: ObjectModel, contact: Contact, gap_m: float, speed_m_s: 
 @lru_cache(maxsize=64)
 def _follower(kinds: tuple[str, ...], hardens: bool) -> Callable[..., Driven]:
     """Return `follow` for an object of these terms. `hardens`: whether the pads are nonlinear."""
-    parts = {"object_force": sum_of(laws_of(kinds)), "object_phase": phase_of_all(phases_of(kinds))}
+    parts = {
+        "object_force": sum_of(laws_of(kinds)),
+        "object_phase": phase_of_all(phases_of(kinds)),
+        "object_moves": any_moves(moving_of(kinds)),
+    }
     return bind_reachable(follow, {**parts, **pad_parts(hardens)})
 
 

@@ -36,9 +36,9 @@ from graspsense_sim_gripper.stepping.implicit import SpeedSearch
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start
 from graspsense_sim_gripper.stepping.tr_bdf2 import Stage
 from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
-from graspsense_sim_gripper.terms.registry import active_laws, find_term, laws_of, phases_of
+from graspsense_sim_gripper.terms.registry import active_laws, find_term, laws_of, moving_of, phases_of
 from graspsense_sim_gripper.terms.switchable import Switchable, switched_on_sum
-from graspsense_sim_gripper.terms.term import LAW_ERRORS, NO_STATE, Law, OnSum, Phase, SumLaw
+from graspsense_sim_gripper.terms.term import LAW_ERRORS, NO_STATE, Law, Moves, OnSum, Phase, SumLaw
 
 TermsStates = Any
 """A tuple with a state of its own type for each term."""
@@ -208,6 +208,26 @@ def phase_of_all(phases: Sequence[tuple[int, Phase]]) -> Phase:
     return combined
 
 
+def _no_move(states: TermsStates) -> bool:
+    return False
+
+
+moves: Moves = _no_move
+others_move: Moves = _no_move
+
+
+def _one_moves(states: TermsStates) -> bool:
+    return moves(states[PLACE]) or others_move(states)
+
+
+def any_moves(moving: Sequence[tuple[int, Moves]]) -> Moves:
+    """Return whether one of these terms moves, each given with its place among the states."""
+    combined: Moves = _no_move
+    for place, one in reversed(moving):
+        combined = bind(_one_moves, PLACE=place, moves=one, others_move=combined)
+    return combined
+
+
 def all_active(terms: Sequence[Any]) -> tuple[Switchable, ...]:
     """Return the parameters of these terms as the sum of `laws_of` takes them: all kept, and nothing lumped."""
     return (Switchable(0, LumpedSpringDamper(0.0, 0.0)), *(Switchable(1, params) for params in terms))
@@ -267,6 +287,7 @@ def contact_solver(kinds: tuple[str, ...], hardens: bool = False) -> ContactSolv
 def plant_move(
     laws: Sequence[Law | OnSum],
     phases: Sequence[tuple[int, Phase]] = (),
+    moving: Sequence[tuple[int, Moves]] = (),
     *,
     converges: bool = True,
     lags: bool = True,
@@ -274,13 +295,17 @@ def plant_move(
 ) -> Callable[[PlantParams, PlantState, float, float], PlantState]:
     """Return `move` for an object whose force is the sum of these laws, with the events of `phases_of`.
 
+    `moving`: the terms that move in a free object, as `moving_of` returns them.
+
     `converges`: whether the steps of a tick may be halved until the result no longer changes; `lags`: whether the force
     of the drive may lag behind the command; `hardens`: whether the pads are nonlinear.
     """
     over_a_tick: PlantMove = refine_until_converged if converges else advance
     if lags:
         over_a_tick = bind(move, advance=over_a_tick)
-    events = {"object_phase": phase_of_all(phases)} if phases else {"has_event": no_event}
+    events: dict[str, Any] = {"object_phase": phase_of_all(phases)} if phases else {"has_event": no_event}
+    if moving:
+        events["object_moves"] = any_moves(moving)
     parts = {"object_force": sum_of(laws), **events, **pad_parts(hardens)}
     return bind_reachable(over_a_tick, parts)
 
@@ -302,6 +327,7 @@ def _step_move(composition: Composition) -> PlantMove:
     return plant_move(
         laws_of(kinds),
         phases_of(kinds),
+        moving_of(kinds),
         converges=composition.converges,
         lags=composition.lags,
         hardens=composition.hardens,

@@ -170,6 +170,14 @@ object_phase: Callable[[Any], int] = _no_events
 """A number that changes at the events of the terms; the composition of a scene binds it where a term has events."""
 
 
+def _nothing_moves(states: Any) -> bool:
+    return False
+
+
+object_moves: Callable[[Any], bool] = _nothing_moves
+"""Whether a term moves in a free object (see `Term.moves`); the composition of a scene binds it where one can."""
+
+
 def has_event(before: Contact, after: Contact) -> bool:
     """Return whether a term of the object has an event between these contacts (see `Term.phase`)."""
     return object_phase(before.left.states) != object_phase(after.left.states) or object_phase(
@@ -183,14 +191,16 @@ def no_event(before: Contact, after: Contact) -> bool:
 
 
 def is_touched(contact: Contact, gap_m: float, reach_m: float) -> int:
-    """Return 1, or 0 for a released object that has recovered its shape: it is in the state before the first contact.
+    """Return 1, or 0 for a released object that has recovered its shape and in which nothing moves any more.
 
     `reach_m`: the gap at which the nearer finger touches the object.
     """
     left, right = contact.left, contact.right
     shape = abs(left.compression_m) + abs(left.pad_m) + abs(right.compression_m)
     separated = gap_m > reach_m and contact.left_n + contact.right_n == 0.0
-    return 0 if separated and shape <= RECOVERED_M else 1
+    if separated and shape <= RECOVERED_M:
+        return 1 if object_moves(left.states) or object_moves(right.states) else 0
+    return 1
 
 
 def restarted(contact: Contact) -> Contact:

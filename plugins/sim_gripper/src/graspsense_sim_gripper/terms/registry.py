@@ -24,7 +24,7 @@ from graspsense_sim_gripper.terms import (
 )
 from graspsense_sim_gripper.terms.lumped import lumped
 from graspsense_sim_gripper.terms.switchable import switched, switched_on_sum
-from graspsense_sim_gripper.terms.term import Law, OnSum, Phase, Term, one_phase
+from graspsense_sim_gripper.terms.term import Law, Moves, OnSum, Phase, Term, never_moves, one_phase
 
 TERMS: Final[dict[str, Term]] = {
     module.TERM.name: module.TERM
@@ -110,3 +110,12 @@ def phases_of(names: Sequence[str]) -> list[tuple[int, Phase]]:
     """Return the terms with events among those of `laws_of`: the place of each, and its `phase`. Raises UnknownName."""
     terms = [find_term(name)[1] for name in names]
     return [(i, term.phase) for i, term in enumerate(terms, 1) if term.phase is not one_phase]
+
+
+def moving_of(names: Sequence[str]) -> list[tuple[int, Moves]]:
+    """Return the terms that move in a free object, among those of `laws_of`: the place of each, and its `moves`.
+
+    Raises UnknownName.
+    """
+    terms = [find_term(name)[1] for name in names]
+    return [(i, term.moves) for i, term in enumerate(terms, 1) if term.moves is not never_moves]

@@ -12,6 +12,9 @@ from graspsense_sim_gripper.terms.term import Limit, LinearForm, OwnContact, Rat
 MAX_CHECKS: Final = 64
 BISECTIONS: Final = 45
 LEAST_SHARE: Final = 1e-3
+STILL_M: Final = 1e-12
+STILL_M_S: Final = 1e-9
+"""A mass that is nearer to its rest than the first and slower than the second is at rest."""
 
 
 class Surface(NamedTuple):
@@ -88,6 +91,11 @@ def _massless(
     return contact * max(d1 - y, 0.0), OscillatorState(y, 0.0)
 
 
+def moves(state: OscillatorState) -> bool:
+    """Return whether the mass, or without a mass its support, is not at rest."""
+    return abs(state.y_m) > STILL_M or abs(state.v_m_s) > STILL_M_S
+
+
 def rates(params: Surface, at: WorkingPoint) -> tuple[Rate, ...]:
     """Return the natural frequencies in contact and separated."""
     return (
@@ -131,6 +139,7 @@ TERM = Term(
     law=surface,
     at_rest=OscillatorState(0.0, 0.0),
     rates=rates,
+    moves=moves,
     limits=limits,
     linear=linear,
     positive=("mass_kg", "k_n_m", "contact_n_m"),

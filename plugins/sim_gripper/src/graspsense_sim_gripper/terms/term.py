@@ -13,6 +13,8 @@ TermState = Any
 """The state of a term: a named tuple of its own type."""
 Phase = Callable[[TermState], int]
 """`phase(state)`: which part of the law the state is in."""
+Moves = Callable[[TermState], bool]
+"""`moves(state)`: whether the state still changes in a free object that has its shape."""
 Law = Callable[[TermParams, TermState, float, float, float, float], tuple[float, TermState]]
 """`law(params, state, d0, d1, h, v1) -> (force, state)`: from d0 to d1 (m) in h (s), then at v1 (m/s)."""
 
@@ -135,6 +137,12 @@ def one_phase(state: TermState) -> int:
     return 0
 
 
+def never_moves(state: TermState) -> bool:
+    """Return False: in a free object that has its shape, the state no longer changes."""
+    del state
+    return False
+
+
 def not_dented(params: TermParams) -> float:
     """Return the dent (m) of a term that earlier use has not deformed."""
     del params
@@ -182,6 +190,9 @@ class Term:
 
     Where it changes, law or slope of the force change at once: an event, which the simulator locates within the tick.
     """
+    moves: Callable[[TermState], bool] = never_moves
+    """Returns whether the state still changes in a free object that has its shape, as a mass does that swings behind a
+    separated contact. Until it is still, the object counts as touched. Runs compiled, like the law."""
     dent: Callable[[TermParams], float] = not_dented
     """By how much (m) earlier use has made the object thinner. Compression is counted from the dented surface on."""
 
