@@ -5,13 +5,24 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from attrs import evolve
+from attrs import evolve, frozen
 from selection import error_of
 
 from graspsense.core.runner import run_grasp
-from graspsense.plugin_api import HOLD, ConfigError, Controller, Outcome, RunConfig, create
+from graspsense.plugin_api import (
+    HOLD,
+    Channel,
+    ConfigError,
+    Controller,
+    Feature,
+    FeatureSet,
+    Outcome,
+    RunConfig,
+    create,
+)
 from graspsense_sim_gripper.backend import SimBackend, default_controller
 from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.batch.job import Job, grasp_plain
 from graspsense_sim_gripper.build import instantiate, problem_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue, find
@@ -56,7 +67,49 @@ def test_a_verified_model_says_what_a_trial_grasp_found(accuracy, change, part):
     model = selected(config, find("naked:full_open"), hybrid())
     assert model.verification.error <= part * accuracy
     assert model.verification.grasps >= 2
-    assert model.as_values()["verified"].keys() == {"error", "quantity", "grasps"}
+    assert model.as_values()["verified"].keys() == {"error", "quantity", "grasps", "features"}
+
+
+@frozen
+class Zero:
+    force_n: float
+
+
+class ForceAbove(FeatureSet[Zero]):
+    """The steady force above a given one: the nearer this is, the more accurate the force has to be."""
+
+    requires = (Channel("force_left", "N"),)
+    features = (Feature("above", "", "Force at the end of the hold, less that of the setting."),)
+
+    def extract(self, trace):
+        return self.result(
+            {"above": float(trace.force_left_n[trace.phase == HOLD][-1] - self.config.force_n)}
+        )
+
+
+RINGING = thing(SHELL, ("surface", {"mass_kg": 0.02, "k_n_m": 3e3, "damping_n_s_m": 0.5, "contact_n_m": 2e4}))
+
+
+@pytest.mark.parametrize(
+    ("spec", "above_n", "flagged"),
+    [pytest.param(RINGING, 1.0, (), marks=pytest.mark.slow), (thing(SHELL), 1e-7, ("above",))],
+)
+def test_the_features_of_the_pipeline_are_verified_too(spec, above_n, flagged):
+    law = hybrid()
+    reference = evolve(CONFIG, fidelity="reference", accuracy=1e-4)
+    setup = instantiate(problem_of(reference, spec), selected(reference, spec, law), 0)
+    job = Job(config=reference, controller=law.controller, run=law.run, extract=None, traces=True)
+    trace = grasp_plain(job, setup).trace
+    steady_n = ForceAbove(Zero(0.0)).extract(trace)["above"]
+    theirs = evolve(law, features=ForceAbove(Zero(steady_n - above_n)))
+    coarse, fine = (selected(CONFIG, spec, controller) for controller in (law, theirs))
+    assert coarse.not_verified == ()
+    assert fine.not_verified == flagged
+    if not flagged:
+        # Per cent of one newton, not of the twenty that the fingers press with.
+        job = evolve(job, config=CONFIG)
+        done = grasp_plain(job, instantiate(problem_of(CONFIG, spec), fine, 0))
+        assert theirs.features.extract(done.trace)["above"] == pytest.approx(above_n, rel=CONFIG.accuracy)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from graspsense.core.entries import KINDS
-from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
+from graspsense.core.roles import Controller, DeviceInfo, FeatureSet, SensorBackend
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
 from graspsense.core.signals import EFFORT, FORCE, VELOCITY, Command, Pads, Phase, Reading
@@ -104,6 +104,10 @@ class _CommandRecorder(SensorBackend[None]):
     def expect(self, controller: Controller[Any], run: RunConfig) -> None:
         """Pass the controller and the settings on to the gripper."""
         self._gripper.expect(controller, run)
+
+    def expect_features(self, feature_set: FeatureSet[Any]) -> None:
+        """Pass the feature set on to the gripper."""
+        self._gripper.expect_features(feature_set)
 
     def open(self, seed: int) -> DeviceInfo:
         """Open the gripper and note its limits."""

@@ -104,6 +104,7 @@ def grasp_with(
         if on_event is not None:
             on_event(event)
 
+    backend.expect_features(feature_set)
     plugins.run_starting(run)
     grasp = _grasped(settings, backend, controller, anytime, sinks, tell, on_open)
     checkpoints = () if anytime is None else tuple(anytime.predictions)

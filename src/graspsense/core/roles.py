@@ -154,6 +154,13 @@ class SensorBackend(ABC, Generic[ConfigT]):
         """
         del controller, run
 
+    def expect_features(self, feature_set: FeatureSet[Any]) -> None:
+        """Announce, before `open` or a batch, the feature set that extracts from the next grasps.
+
+        A simulator verifies that these features are as accurate as it was asked to be; a real gripper ignores it.
+        """
+        del feature_set
+
     @abstractmethod
     def open(self, seed: int) -> DeviceInfo:
         """Open the gripper in a bounded time, without user interaction, and describe it.
@@ -200,9 +207,9 @@ class SensorBackend(ABC, Generic[ConfigT]):
     def report(self) -> Mapping[str, float | int | str | bool]:
         """Return counters, and values that the frames do not contain (a simulator knows the true force).
 
-        A simulator names under `not_verified` the quantities (a list) whose accuracy it does not guarantee in this
-        grasp, and under `unstable_loop` why the loop of controller and fingers is unstable. `run`, `train`, `evaluate`
-        and experiments print both.
+        A simulator names under `not_verified` the quantities and features (a list) whose accuracy it does not guarantee
+        in this grasp, and under `unstable_loop` why the loop of controller and fingers is unstable. `run`, `train`,
+        `evaluate` and experiments print both.
         """
         return {}
 

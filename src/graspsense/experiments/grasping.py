@@ -54,6 +54,7 @@ def grasp(params: Mapping[str, Any], seed: int) -> GraspResult:
             "experiments of kind grasp need a gripper that simulates batches, such as --gripper sim"
         )
     feature_set = settings.features.create()
+    backend.expect_features(feature_set)
 
     def extract(trace: Trace) -> tuple[dict[str, float], Mapping[str, float | None], GraspCurve | None]:
         curve = grasp_curve(trace, "", 0) if wanted else None

@@ -181,9 +181,11 @@ def _grasps(
     controller = settings.controller.create()
     scenes = [scene for plan in plans.plans for scene in plan.scenes]
     seeds = [seed for plan in plans.plans for seed in plan.seeds]
+    feature_set = settings.features.create()
+    backend.expect_features(feature_set)
     options: dict[str, Any] = {
         "run": settings.run,
-        "extract": settings.features.create().extract,
+        "extract": feature_set.extract,
         "workers": 1,
     }
     with warnings.catch_warnings():

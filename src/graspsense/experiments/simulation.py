@@ -114,7 +114,9 @@ def _measured(
     ideal = {"sensor": "ideal"} if "sensor" in fields_dict(type(settings.gripper.config)) else {}
     config = evolve(settings.gripper.config, **{**ideal, **variant.settings})
     backend = settings.gripper.component.create(config)
-    controller, extract = settings.controller.create(), _Extraction(settings.features.create())
+    controller, feature_set = settings.controller.create(), settings.features.create()
+    backend.expect_features(feature_set)
+    extract = _Extraction(feature_set)
 
     def run(which: slice) -> tuple[Sequence[Grasped], float]:
         began = time.process_time()

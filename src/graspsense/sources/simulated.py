@@ -329,6 +329,7 @@ def _grasps(
     backend, controller = settings.gripper.create(), settings.controller.create()
     total = len(plan.scenes)
     if isinstance(backend, BatchBackend):
+        backend.expect_features(extract.feature_set)
         # Parts of equal size, so that none is too small to be worth compiling for.
         size = ceil(total / ceil(total / (BATCH if traces else BATCH_WITHOUT_TRACES)))
         for start in range(0, total, size):
@@ -346,7 +347,9 @@ def _grasps(
         return
     for k, (scene, seed) in enumerate(zip(plan.scenes, plan.seeds, strict=True)):
         run = evolve(settings.run, seed=seed)
-        grasp = run_grasp(backend.with_object(scene), controller, run, on_open=_refuse_real_device)
+        gripper = backend.with_object(scene)
+        gripper.expect_features(extract.feature_set)
+        grasp = run_grasp(gripper, controller, run, on_open=_refuse_real_device)
         yield *extract(grasp.trace), grasp.trace, grasp.report
         if progress is not None:
             progress(k + 1, total)

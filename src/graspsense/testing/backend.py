@@ -11,6 +11,7 @@ from statistics import fmean, median
 from typing import Any, Final
 
 from graspsense.core.channels import further, no_signals, shape_of
+from graspsense.core.config import create
 from graspsense.core.entries import KINDS, Channel, FastChannel, TactileArray
 from graspsense.core.errors import DeviceLost, NoDevice, RecordingEnded, TareRefused, named
 from graspsense.core.guard import GuardState, guard
@@ -570,20 +571,24 @@ def same_seed_same_frames(subject: Subject) -> None:
 
 
 def expect_accepts_any_controller(subject: Subject) -> None:
-    """`expect` accepts any controller before `open`, raises nothing, and does not change `open`."""
+    """`expect` accepts any controller before `open`, and `expect_features` any set; both raise and open nothing."""
     controller, run = GentleController(kind_of(subject.entry.accepts)), RunConfig()
+    feature_set = create("feature-set", "chitta")
     backend = subject.create(**(subject.absent or {}))
     try:
         backend.expect(controller, run)
+        backend.expect_features(feature_set)
     except Exception as error:
         raise CheckFailed(
-            f"expect raised {named(error)}: store the arguments, open nothing, and raise in `open` instead"
+            f"expect or expect_features raised {named(error)}: store the arguments, open nothing, and raise in `open` "
+            "instead"
         ) from error
     finally:
         backend.close()
     backend = subject.create()
     try:
         backend.expect(controller, run)
+        backend.expect_features(feature_set)
         backend.open(0)
     finally:
         backend.close()

@@ -15,6 +15,7 @@ from graspsense.plugin_api import (
     Command,
     Controller,
     DeviceInfo,
+    FeatureSet,
     Frame,
     FreeRun,
     Grasped,
@@ -91,6 +92,7 @@ class SimBackend(BatchBackend[SimConfig]):
     def __init__(self, config: SimConfig) -> None:
         super().__init__(config)
         self._controller: GraspController | None = None
+        self._features: FeatureSet[Any] | None = None
         self._scaled: ScaledParameter | None = None
 
     @property
@@ -124,7 +126,13 @@ class SimBackend(BatchBackend[SimConfig]):
 
     def expect(self, controller: Controller[Any], run: RunConfig) -> None:
         """Set the controller for which the model of the object is selected."""
-        self._controller = GraspController(controller, run)
+        self._controller = GraspController(controller, run, self._features)
+
+    def expect_features(self, feature_set: FeatureSet[Any]) -> None:
+        """Set the feature set whose features are verified where the model of the object is selected."""
+        self._features = feature_set
+        if self._controller is not None:
+            self._controller = evolve(self._controller, features=feature_set)
 
     def open(self, seed: int) -> DeviceInfo:
         """Prepare the grasp that the config and the seed describe.
@@ -315,11 +323,10 @@ class SimBackend(BatchBackend[SimConfig]):
     ) -> list[Grasped]:
         """Grasp each object with its seed; compiled, on all cores, where numba is installed and it saves time."""
         # Imported here, since a single grasp needs neither threads nor compiling.
-        from graspsense_sim_gripper.batch.threads import grasps
+        from graspsense_sim_gripper.batch.threads import grasps, job_of
 
-        done = grasps(
-            self.config, controller, scenes, seeds, _COMPILED[self.config.compile], options, self._scaled
-        )
+        job = job_of(self.config, controller, options, features=self._features, scaled=self._scaled)
+        done = grasps(job, scenes, seeds, _COMPILED[self.config.compile], options)
         return [
             Grasped(
                 outcome=grasp.outcome,

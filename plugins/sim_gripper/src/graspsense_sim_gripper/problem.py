@@ -10,7 +10,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import Controller, DeviceInfo, RunConfig
+from graspsense.plugin_api import Controller, DeviceInfo, FeatureSet, RunConfig
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.objects.spec import ObjectSpec, TermParams
@@ -29,10 +29,12 @@ ControllerStep = Callable[..., Any]
 
 @frozen(eq=False)
 class GraspController:
-    """A controller with the settings of its runs."""
+    """A controller with the settings of its runs, and the feature set that is to follow."""
 
     controller: Controller[Any]
     run: RunConfig
+    features: FeatureSet[Any] | None = None
+    """The feature set that extracts from the grasps; its features are verified too. None: those of the paper only."""
 
     @property
     def step(self) -> ControllerStep:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from graspsense.plugin_api import (
     CompiledExtraction,
     Controller,
-    GraspEvent,
+    FeatureSet,
     Outcome,
-    Phase,
     RunConfig,
     SampleTrace,
     TickParams,
@@ -24,7 +23,6 @@ from graspsense.plugin_api import (
     Trace,
     compiled_extraction,
     ended_by_itself,
-    event_name,
     first_state,
     overdue,
     seconds_at_most,
@@ -39,7 +37,6 @@ from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.loop import (
     COLUMNS,
-    EVENT_SHIFT,
     NOT_STARTED,
     Buffers,
     GraspParams,
@@ -57,6 +54,7 @@ from graspsense_sim_gripper.problem import (
     PalmNoise,
     Problem,
 )
+from graspsense_sim_gripper.recorded_trace import recorded_trace
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sampled_loop import instability
@@ -114,6 +112,8 @@ class Job:
     """Called with each trace, for example to compute features; its result is `FinishedGrasp.extracted`."""
     traces: bool
     """Whether traces are kept."""
+    features: FeatureSet[Any] | None = None
+    """The feature set whose features are verified where a model is selected."""
     scaled: ScaledParameter | None = None
     """A parameter of the objects that is larger by a share."""
     extraction: CompiledExtraction | None = field(init=False)
@@ -137,8 +137,8 @@ class Job:
 
     @property
     def grasp_controller(self) -> GraspController:
-        """The controller with the settings of its runs."""
-        return GraspController(self.controller, self.run)
+        """The controller with the settings of its runs, and the feature set."""
+        return GraspController(self.controller, self.run, self.features)
 
 
 @define
@@ -146,6 +146,8 @@ class Scenes:
     """The scenes of a job, each with its reduced model. All seeds of a scene share the model."""
 
     job: Job
+    selected: Mapping[tuple[str, bool], Reduction | None] = field(factory=dict)
+    """Models that were selected elsewhere, by `scene_key`."""
     _scenes: dict[tuple[str, bool], tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
     """By `scene_key`."""
     _problems: dict[str, tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
@@ -158,11 +160,16 @@ class Scenes:
 
         Raises UnknownName and ConfigError as `build` and `select` do.
         """
-        job, reduction = self.job, None
+        job, key = self.job, scene_key(scene)
+        reduction = self.selected.get(key)
         problem = build(job.config, scene, job.scaled)
-        if problem.spec is not None:
-            reduction = select(problem, GraspController(job.controller, job.run), compiled=compiled)
-        self._scenes[scene_key(scene)] = problem, reduction
+        if problem.spec is not None and reduction is None:
+            reduction = select(problem, job.grasp_controller, compiled=compiled)
+        self._scenes[key] = problem, reduction
+
+    def models(self) -> dict[tuple[str, bool], Reduction | None]:
+        """Return the models of the scenes that were added, by `scene_key`."""
+        return {key: reduction for key, (_, reduction) in self._scenes.items()}
 
     def setup(self, scene: str, seed: int) -> GraspSetup:
         """Return the grasp of a scene with this seed. The model is selected if the scene was not added before.
@@ -289,12 +296,16 @@ def grasp_once(
     if setup.has_palm:
         signals["acceleration"] = sample_trace(table[0], np.asarray(buffers.palm.samples)[:, :n])
     if job.traces and 2 * n < len(columns[0]):
-        trace = _trace(job, table.copy(), numbers.copy(), images, times, signals)
+        trace = recorded_trace(
+            type(job.controller).events, table.copy(), numbers.copy(), images, times, signals
+        )
         return finished(job, outcome, reason, plant, trace)
     # A trace that fills most of the buffers, or that only features are extracted from, is a view of them.
     # While a column of it is referenced, those buffers are kept, and the next grasps have new ones.
     references = sys.getrefcount(columns), sys.getrefcount(phases)
-    done = finished(job, outcome, reason, plant, _trace(job, table, numbers, images, times, signals))
+    trace = recorded_trace(type(job.controller).events, table, numbers, images, times, signals)
+    done = finished(job, outcome, reason, plant, trace)
+    del trace
     if on_arrays and (sys.getrefcount(columns), sys.getrefcount(phases)) != references:
         storage.buffers = _first_images(buffers)._replace(
             columns=np.empty_like(columns), phases=np.empty_like(phases)
@@ -399,47 +410,4 @@ def _first_images(buffers: Buffers) -> Buffers:
     return buffers._replace(
         pads=pads._replace(noise=pads.noise[:IMAGES], images=pads.images[:IMAGES]),
         image_times=buffers.image_times[:IMAGES],
-    )
-
-
-def _trace(
-    job: Job,
-    table: NDArray[np.float64],
-    phases: NDArray[np.int64],
-    images: NDArray[np.float64],
-    times: NDArray[np.float64],
-    signals: Mapping[str, SampleTrace],
-) -> Trace:
-    events: tuple[GraspEvent, ...] = ()
-    if type(job.controller).events:
-        events = _take_events(type(job.controller).events, table[0], phases)
-    # The runner keeps the image that had arrived when the approach began, and those after it.
-    begin = 0
-    if len(phases) and len(times):
-        begin = max(int(np.searchsorted(times, table[0, 0], side="right")) - 1, 0)
-    images = images.reshape(-1, 2, CELLS)
-    return Trace(
-        **dict(zip(COLUMNS, table, strict=True)),
-        status=np.zeros(len(phases), np.int64),
-        phase=phases,
-        pad_t_s=np.array(times[begin:]),
-        pad_left=images[begin:, 0].copy(),
-        pad_right=images[begin:, 1].copy(),
-        signals=signals,
-        events=events,
-    )
-
-
-def _take_events(
-    names: Sequence[str], times: NDArray[np.float64], phases: NDArray[np.int64]
-) -> tuple[GraspEvent, ...]:
-    """Return the events that the loop wrote above the bits of the phases, and remove them there."""
-    ticks = np.flatnonzero(phases >> EVENT_SHIFT).tolist()
-    bits = (phases[ticks] >> EVENT_SHIFT).tolist()
-    phases[ticks] &= (1 << EVENT_SHIFT) - 1
-    return tuple(
-        GraspEvent(float(times[tick]), Phase(int(phases[tick])), event_name(names, i), "controller")
-        for tick, told in zip(ticks, bits, strict=True)
-        for i in range(told.bit_length())
-        if told >> i & 1
     )

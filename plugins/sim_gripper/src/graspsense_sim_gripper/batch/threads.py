@@ -19,7 +19,7 @@ from typing import Any, Final, Unpack
 
 from attrs import define, field
 
-from graspsense.plugin_api import BatchOptions, Controller, NotCompilable, RunConfig, entry_point
+from graspsense.plugin_api import BatchOptions, Controller, FeatureSet, NotCompilable, RunConfig, entry_point
 from graspsense_sim_gripper.batch.job import (
     FinishedGrasp,
     GraspLoop,
@@ -72,35 +72,43 @@ def run_many(
     Raises TypeError for an unknown option, ValueError if there are not as many seeds as scenes, UnknownName for an
     unknown object, and ConfigError if the object cannot be read or no model reaches the accuracy.
     """
-    return list(grasps(config, controller, scenes, seeds, compiled, {"traces": True, **options}))
+    options = {"traces": True, **options}
+    return list(grasps(job_of(config, controller, options), scenes, seeds, compiled, options))
 
 
-def grasps(
+def job_of(
     config: SimConfig,
     controller: Controller[Any],
-    scenes: Sequence[str],
-    seeds: Sequence[int],
-    compiled: bool | None,
     options: BatchOptions,
+    *,
+    features: FeatureSet[Any] | None = None,
     scaled: ScaledParameter | None = None,
-) -> Iterator[FinishedGrasp]:
-    """Yield the results of `run_many` one by one, in order. Raises as `run_many` does.
+) -> Job:
+    """Return the settings of a batch. Raises TypeError for an unknown option.
 
-    `scaled`: a parameter of the objects that is larger by a share.
+    `features`: the feature set whose features are verified. `scaled`: a parameter of the objects that is larger by a
+    share.
     """
     unknown = options.keys() - BatchOptions.__annotations__.keys()
     if unknown:
         raise TypeError(f"run_many has no {sorted(unknown)}; it has {sorted(BatchOptions.__annotations__)}")
-    if len(scenes) != len(seeds):
-        raise ValueError(f"{len(scenes)} scenes and {len(seeds)} seeds: give one seed a scene")
-    job = Job(
+    return Job(
         config=config,
         controller=controller,
         run=options.get("run") or RunConfig(),
         extract=options.get("extract"),
         traces=options.get("traces", False),
+        features=features,
         scaled=scaled,
     )
+
+
+def grasps(
+    job: Job, scenes: Sequence[str], seeds: Sequence[int], compiled: bool | None, options: BatchOptions
+) -> Iterator[FinishedGrasp]:
+    """Yield the results of `run_many` one by one, in order. Raises as `run_many` does."""
+    if len(scenes) != len(seeds):
+        raise ValueError(f"{len(scenes)} scenes and {len(seeds)} seeds: give one seed a scene")
     workers = options.get("workers") or os.cpu_count() or 1
     batch = _Batch(job, scenes, seeds, max(1, workers), compiled)
     try:

@@ -24,6 +24,7 @@ from attrs import asdict, evolve, fields
 from graspsense.plugin_api import Controller, GraspEvent, Outcome, Phase, RunConfig, Trace, create, recipe_of
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, finished, grasp_plain
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.reduction.cache import restored, stored
 
 _ARRAYS: Final = tuple(
     column.name for column in fields(Trace) if column.name not in ("units", "signals", "events")
@@ -59,6 +60,10 @@ class PlainProcess:
                     "config": asdict(job.config),
                     "controller": _named(job.controller),
                     "run": asdict(job.run),
+                    "models": [
+                        [*key, None if model is None else stored(model)]
+                        for key, model in scenes.models().items()
+                    ],
                     "traces": job.traces or job.extract is not None,
                 }
             )
@@ -139,7 +144,7 @@ def main() -> None:
             return
         traces = io.BytesIO()
         try:
-            scenes = scenes or Scenes(_job(greeting))
+            scenes = scenes or _scenes(greeting)
             setups = (scenes.setup(*grasp) for grasp in zip(wanted["scenes"], wanted["seeds"], strict=True))
             done = [grasp_plain(scenes.job, setup) for setup in setups]
             for grasp in done:
@@ -156,6 +161,14 @@ def main() -> None:
             line = _line({"refused": refused, "bytes": 0})
         answers.write(line + traces.getbuffer())
         answers.flush()
+
+
+def _scenes(greeting: dict[str, Json]) -> Scenes:
+    models = {
+        (scene, numbered): None if values is None else restored(values)
+        for scene, numbered, values in greeting["models"]
+    }
+    return Scenes(_job(greeting), models)
 
 
 def _job(greeting: dict[str, Json]) -> Job:

@@ -22,7 +22,7 @@ from typing import Any, Final, NamedTuple
 from attrs import asdict
 
 import graspsense.plugin_api as plugin_api
-from graspsense.plugin_api import NotCompilable, cache_folder, fingerprint
+from graspsense.plugin_api import FeatureSet, NotCompilable, cache_folder, fingerprint
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.problem import ControllerStep, GraspController, Problem
 from graspsense_sim_gripper.reduction.levels import Level
@@ -52,6 +52,8 @@ class Key(NamedTuple):
     step: ControllerStep
     controller: str
     """`GraspController.content`."""
+    features: str
+    """The feature set with its settings and its files; empty if there is none."""
 
 
 class ReductionCache:
@@ -66,7 +68,10 @@ class ReductionCache:
         if problem.spec is None:
             raise TypeError("where there is no object there is no model to reduce")
         spec = problem.spec
-        return Key(problem.model_config, spec.kinds, spec.content, controller.step, controller.content)
+        features = _features_content(controller.features)
+        return Key(
+            problem.model_config, spec.kinds, spec.content, controller.step, controller.content, features
+        )
 
     def get(self, key: Key) -> Reduction | None:
         """Return the model of this key, from memory or else from disk; None if there is none."""
@@ -117,7 +122,7 @@ def _file_name(key: Key) -> str | None:
         stamps = [_stamp(Path(str(sys.modules[function.__module__].__file__))) for function in functions]
     except (NotCompilable, KeyError, AttributeError, OSError):
         return None
-    for item in (key.spec, repr(key.config), key.controller, *marks, *stamps):
+    for item in (key.spec, repr(key.config), key.controller, key.features, *marks, *stamps):
         digest.update(item.encode())
         digest.update(b"\0")
     return f"{digest.hexdigest()[:32]}.json"
@@ -130,6 +135,24 @@ def _own_code() -> bytes:
     return "".join(_stamp(source) for folder in packages for source in sorted(folder.rglob("*.py"))).encode()
 
 
+def _features_content(feature_set: FeatureSet[Any] | None) -> str:
+    """Return text that identifies a feature set: its class, its settings, and the files in the folder of its code."""
+    if feature_set is None:
+        return ""
+    kind = type(feature_set)
+    return f"{kind.__module__}.{kind.__qualname__} {feature_set.config!r} {_folder_of(kind)}"
+
+
+@cache
+def _folder_of(kind: type) -> str:
+    source = getattr(sys.modules.get(kind.__module__), "__file__", None)
+    if source is None:
+        return ""
+    with suppress(OSError):
+        return "".join(_stamp(one) for one in sorted(Path(source).parent.glob("*.py")))
+    return ""
+
+
 def _stamp(source: Path) -> str:
     status = source.stat()
     return f"{source} {status.st_size} {status.st_mtime_ns}\n"
@@ -139,7 +162,7 @@ def _read(name: str) -> Reduction | None:
     folder = _folder()
     if folder is not None:
         with suppress(OSError, ValueError, TypeError, KeyError):
-            return _from_values(json.loads((folder / name).read_text(encoding="utf-8")))
+            return restored(json.loads((folder / name).read_text(encoding="utf-8")))
     return None
 
 
@@ -154,7 +177,7 @@ def _write(name: str, model: Reduction) -> None:
         # A rename is atomic: another process that reads or writes the same file never sees half of it.
         with tempfile.NamedTemporaryFile("w", dir=folder, suffix=".part", delete=False) as part:
             try:
-                json.dump(_as_values(model), part)
+                json.dump(stored(model), part)
                 part.close()
                 os.replace(part.name, folder / name)
             except BaseException:
@@ -175,7 +198,8 @@ def _delete_old_files(folder: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def _as_values(model: Reduction) -> dict[str, Json]:
+def stored(model: Reduction) -> dict[str, Json]:
+    """Return a model as values that JSON can represent."""
     values = asdict(model, recurse=True)
     tuples = {
         "point": model.point._asdict(),
@@ -185,7 +209,8 @@ def _as_values(model: Reduction) -> dict[str, Json]:
     return {**values, **tuples}
 
 
-def _from_values(values: dict[str, Json]) -> Reduction:
+def restored(values: dict[str, Json]) -> Reduction:
+    """Return the model of which `stored` has given these values. Raises KeyError or TypeError for others."""
     verification = values["verification"]
     return Reduction(
         **{
@@ -197,6 +222,10 @@ def _from_values(values: dict[str, Json]) -> Reduction:
             "scheme": TermDecision(**values["scheme"]),
             "contact": TermDecision(**values["contact"]),
             "level": Level(**values["level"]),
-            "verification": None if verification is None else Verification(**verification),
+            "verification": None if verification is None else _verification(verification),
         }
     )
+
+
+def _verification(values: dict[str, Json]) -> Verification:
+    return Verification(**{**values, "features": tuple(values["features"])})

@@ -22,16 +22,29 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import CONTACT_FORCE_N, REST_SPEED_M_S, REST_WINDOW_S
 
-SCALES: Final = {
-    "p_first": 1e-3,
-    "p_steady": 1e-3,
-    "f_steady": 1.0,
-    "delta_t": 0.05,
-    "dp_dt": 1e-3,
-    "df_dt": 1.0,
-    "peak": 1.0,
+UNIT_SCALES: Final = {
+    "m": 1e-3,
+    "s": 0.05,
+    "m/s": 1e-3,
+    "N": 1.0,
+    "N/s": 1.0,
+    "N/m": 1e3,
+    "J": 1e-3,
 }
-"""The error of a quantity is relative to its magnitude, or to this (m, m, N, s, m/s, N/s, N) if it is smaller."""
+"""The error of a quantity in this unit is relative to its magnitude, or to this if it is smaller."""
+SCALES: Final = {
+    name: UNIT_SCALES[unit]
+    for name, unit in (
+        ("p_first", "m"),
+        ("p_steady", "m"),
+        ("f_steady", "N"),
+        ("delta_t", "s"),
+        ("dp_dt", "m/s"),
+        ("df_dt", "N/s"),
+        ("peak", "N"),
+    )
+}
+"""The scale of each quantity that is compared."""
 TRACE_SCALE_N: Final = 1.0
 """The same for the root mean square of the force over time."""
 

@@ -45,6 +45,8 @@ class Verification:
     """The quantity with the largest error."""
     grasps: int
     """Number of trial grasps that were compared until a level was accepted."""
+    features: tuple[str, ...] = ()
+    """The features of the pipeline that no level gives to the accuracy."""
 
 
 @frozen(kw_only=True)
@@ -87,11 +89,14 @@ class Reduction:
 
     @property
     def not_verified(self) -> tuple[str, ...]:
-        """Those of `QUANTITIES` whose accuracy no trial grasp has verified; none for a reference.
+        """Those of `QUANTITIES`, or the features of the pipeline, whose accuracy no trial grasp has verified.
 
-        The peak force of a contact that bounces within a tick is right, unless a term was dropped as too fast.
+        There are none for a reference. The peak force of a contact that bounces within a tick is right, unless a term
+        was dropped as too fast.
         """
-        if self.verification is not None or self.steps.settle > 0.0:
+        if self.verification is not None:
+            return self.verification.features
+        if self.steps.settle > 0.0:
             return ()
         if math.isinf(self.contact.error) and all(math.isfinite(one.error) for one in self.decisions):
             return QUANTITIES[1:]

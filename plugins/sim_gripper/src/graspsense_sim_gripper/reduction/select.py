@@ -14,8 +14,10 @@ steps is tried. If the last level fails as well, no model of the scene has the a
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from contextlib import suppress
-from typing import Final
+from itertools import islice
+from typing import Final, NamedTuple
 
 from attrs import evolve
 
@@ -53,6 +55,10 @@ FINE: Final = 0.003
 may resolve a short contact that the other misses."""
 CULPRIT: Final = 0.2
 """A term is named as the cause of an error if less than this share of the error remains without the term."""
+
+MOST_FOR_FEATURES: Final = 2
+"""Further models that are tried where features of the pipeline are less accurate than those of the paper. A feature
+that shorter steps do not give is one that depends on ticks."""
 
 _SELECTED: Final = ReductionCache()
 
@@ -129,13 +135,26 @@ def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
     reference = propose(problem, grip, _reference_scale(config, FULL_SCALES[0]))
     if math.isinf(reference.contact.error):
         return propose(problem, grip)
-    return _first_accepted(problem, grip, trial)
+    return _best(problem, grip, trial)
 
 
-def _first_accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reduction:
-    """Return the model of the first level that trial grasps accept. Raises ConfigError if none does."""
+def _best(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reduction:
+    """Return the first accepted model in which the features of the pipeline are accurate too, or else the first.
+
+    Raises ConfigError if no model is accepted.
+    """
+    accepted = _accepted(problem, grip, trial)
+    first = next(accepted)
+    if not first.not_verified:
+        return first
+    further = islice(accepted, MOST_FOR_FEATURES)
+    return next((model for model in further if not model.not_verified), first)
+
+
+def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Reduction]:
+    """Yield the models that trial grasps accept, the fastest first. Raises ConfigError if there is none."""
     config = problem.model_config
-    least, quantity, grasps = math.inf, "", 1
+    least, quantity, grasps, n_accepted = math.inf, "", 1, 0
     near_threshold: Sensitivity | None = None
     tried: set[tuple[tuple[str, ...], Steps]] = set()
     for scale in scales_for(config.fidelity, config.spread, config.accuracy, _suits_explicit(problem, grip)):
@@ -150,29 +169,52 @@ def _first_accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reducti
         expected = trial.record(full)
         error, of = deviation(trial.record(reduction), expected)
         grasps += 1
-        if error <= _accepted(config) * config.accuracy:
-            verification = Verification(error=error, quantity=of, grasps=grasps)
-            if scale.plain == 1 and config.spread:
-                # Which thresholds are near differs between instances.
-                accepted = _accepted_for_instances(problem, reduction, full, trial, verification)
-                if accepted:
-                    return accepted
-                continue
-            sensitivity = trial.sensitivity(reduction, expected)
-            near = error + sensitivity.change > config.accuracy
-            if scale.plain == 1:
-                # Steps whose error is controlled may still tell on which side of a threshold the grasp is.
-                near = near or not sensitivity.covers
-            else:
-                near_threshold = sensitivity
-            grasps += 2
-            if not near:
-                return evolve(reduction, verification=evolve(verification, grasps=grasps))
-        elif error < least:
-            least, quantity = error, of
+        if error > _accepted_share(config) * config.accuracy:
+            if error < least:
+                least, quantity = error, of
+            continue
+        verification = Verification(
+            error=error, quantity=of, grasps=grasps, features=trial.features_beyond(reduction, full)
+        )
+        if scale.plain == 1 and config.spread:
+            # Which thresholds are near differs between instances.
+            accepted = _accepted_for_instances(problem, reduction, full, trial, verification)
+            if accepted:
+                n_accepted += 1
+                yield accepted
+            continue
+        sensitivity = trial.sensitivity(reduction, expected)
+        near = error + sensitivity.change > config.accuracy
+        if scale.plain == 1:
+            # Steps whose error is controlled may still tell on which side of a threshold the grasp is.
+            near = near or not sensitivity.covers
+        else:
+            near_threshold = sensitivity
+        grasps += 2
+        if not near:
+            n_accepted += 1
+            yield evolve(reduction, verification=evolve(verification, grasps=grasps))
+    if n_accepted == 0:
+        yield _with_finer_steps(problem, grip, trial, near_threshold, _Miss(least, quantity))
+
+
+class _Miss(NamedTuple):
+    """The least error of the models that were not accepted, and the quantity that has it."""
+
+    error: float
+    quantity: str
+
+
+def _with_finer_steps(
+    problem: Problem, grip: Grip, trial: TrialGrasps, near_threshold: Sensitivity | None, miss: _Miss
+) -> Reduction:
+    """Return a model for a tenth of the accuracy, where steps for the accuracy itself decide no threshold.
+
+    Raises ConfigError if there is none, or if the reason is no threshold.
+    """
+    config = problem.model_config
     if near_threshold is None:
-        term = _culprit(problem, grip, trial)
-        raise ConfigError(_refusal(problem, least, quantity, term))
+        raise ConfigError(_refusal(problem, *miss, _culprit(problem, grip, trial)))
     if config.accuracy >= COARSE:
         # With steps this coarse, the trial grasps cannot tell on which side of the threshold the grasp is.
         finer = evolve(problem, model_config=evolve(config, accuracy=0.1 * config.accuracy))
@@ -198,11 +240,12 @@ def _accepted_for_instances(
             # A single instance that fails, or takes too much work, is no reason to refuse the object.
             return None
         error, quantity = deviation(grasp, expected)
-        if error > _accepted(problem.model_config) * problem.model_config.accuracy:
+        if error > _accepted_share(problem.model_config) * problem.model_config.accuracy:
             return None
+        features = dict.fromkeys((*verification.features, *trial.features_beyond(reduction, full)))
         if error > verification.error:
             verification = evolve(verification, error=error, quantity=quantity)
-        verification = evolve(verification, grasps=verification.grasps + 1)
+        verification = evolve(verification, grasps=verification.grasps + 1, features=tuple(features))
         force_n = max(force_n, grasp.peak_n)
     return evolve(reduction, verification=verification, point=reduction.point._replace(force_n=force_n))
 
@@ -222,7 +265,7 @@ def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:
     return reference._replace(min_steps=factor * reference.min_steps)
 
 
-def _accepted(config: SimConfig) -> float:
+def _accepted_share(config: SimConfig) -> float:
     """Return the share of the accuracy by which trial grasps may differ."""
     return ACCEPTED_WITH_SPREAD if config.spread else ACCEPTED
 
@@ -263,7 +306,7 @@ def _refusal(problem: Problem, error: float, quantity: str, term: str) -> str:
     )
     return (
         f"{_inaccurate(problem)}: with every term and the smallest steps, {found} between two step lengths. The grasp "
-        f"depends on {cause}; {_advice(2.0 * error / _accepted(problem.model_config))}"
+        f"depends on {cause}; {_advice(2.0 * error / _accepted_share(problem.model_config))}"
     )
 
 

@@ -18,6 +18,7 @@ from attrs import define, evolve, field
 from graspsense.plugin_api import (
     CONTACT_FORCE_N,
     HOLD,
+    FeatureSet,
     NotCompilable,
     TickParams,
     first_state,
@@ -49,6 +50,7 @@ from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
 from graspsense_sim_gripper.reduction.candidates import reduced
 from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
 from graspsense_sim_gripper.reduction.model import Reduction
+from graspsense_sim_gripper.reduction.own_features import OwnFeatures, beyond, own_features
 from graspsense_sim_gripper.sensing import Bias, PadBuffers
 from graspsense_sim_gripper.stepping.scheme import VERLET, Steps
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick
@@ -129,9 +131,13 @@ class TrialGrasps:
     compiled: bool
     padding: tuple[str, ...] | None
     """The kinds of terms in compiled code, see `compiled.padding`; None: those of a batch."""
+    features: FeatureSet[Any] | None = None
+    """The feature set of the pipeline; None: only the features of the paper are compared."""
     only_near: bool = False
     """Whether they begin `NEAR_M` from the object, and the approach is simulated once for all steps."""
     _records: dict[Any, GraspRecord] = field(factory=dict, init=False)
+    _features: dict[Any, OwnFeatures | None] = field(factory=dict, init=False)
+    """The features of the pipeline in the grasps of `_records`."""
     _starts: dict[float, _Stage] = field(factory=dict, init=False)
     """The grasp shortly before the first contact, by the step tolerance of the approach."""
     work: int = field(default=0, init=False)
@@ -149,6 +155,18 @@ class TrialGrasps:
                 self.compiled = False
                 self._records[key] = self._grasp(reduction, force_n, travel)
         return self._records[key]
+
+    def features_beyond(self, reduction: Reduction, full: Reduction) -> tuple[str, ...]:
+        """Return the features of the pipeline that differ in this model from the full one by more than the accuracy.
+
+        Empty without a feature set, or if it fails on ideal sensors.
+        """
+        if self.features is None:
+            return ()
+        self.record(reduction)
+        self.record(full)
+        grasp, expected = (self._features[one.treatment, one.steps] for one in (reduction, full))
+        return beyond(grasp, expected, self.config.accuracy)
 
     def sensitivity(self, reduction: Reduction, expected: GraspRecord) -> Sensitivity:
         """Return the change of the grasp if the controller reads values that are as wrong as the model may be.
@@ -174,6 +192,11 @@ class TrialGrasps:
         setup = evolve(setup, sensor=setup.sensor._replace(bias=bias))
         until = start.progress.loop.ticks + self._max_ticks()
         end = self._runner(setup, start.from_open)(setup.plant.steps, start, until)
+        if self.features is not None and force_n == 0.0:
+            *columns, phases = np.concatenate(end.rows, axis=1)
+            self._features[reduction.treatment, reduction.steps] = own_features(
+                self.features, np.array(columns), phases
+            )
         return _record(end, bias, setup.dt_s)
 
     def of(self, setup: GraspSetup) -> TrialGrasps:
@@ -320,6 +343,7 @@ def trial_grasps(
         params_near=tick_params(near, law, run),
         compiled=compiled,
         padding=padding,
+        features=controller.features,
     )
 
 
