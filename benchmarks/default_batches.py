@@ -11,9 +11,6 @@ the trial grasps of an object without the cache on disk, once everything is comp
 from __future__ import annotations
 
 import argparse
-import math
-import os
-import tempfile
 import time
 from typing import Any, Final
 
@@ -30,7 +27,7 @@ from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.problem import GraspController, GraspSetup
 from graspsense_sim_gripper.reduction.error import deviation
-from graspsense_sim_gripper.reduction.select import select
+from graspsense_sim_gripper.reduction.select import select_anew
 
 OBJECTS: Final = (
     *("odwalla:full_open", "odwalla:full_closed", "naked:full_open", "naked:empty_open", "can:full_closed"),
@@ -69,7 +66,12 @@ def batch_of(
     """Return the grasps of a variant, with seeds 0, 1, ..."""
     config = evolve(SimConfig(), sensor="ideal" if ideal else "pads", **settings)
     job = Job(
-        config=config, controller=create("controller", "hybrid"), run=RunConfig(), extract=None, traces=ideal
+        config=config,
+        controller=create("controller", "hybrid"),
+        run=RunConfig(),
+        extract=None,
+        traces=ideal,
+        features=create("feature-set", "chitta"),
     )
     scenes = Scenes(job)
     for name in objects:
@@ -79,22 +81,13 @@ def batch_of(
 
 def selection_s(objects: tuple[str, ...], settings: dict[str, Any], *, compiled: bool) -> float:
     """Return the processor time of selecting the model of an object, with nothing cached."""
-    controller = GraspController(create("controller", "hybrid"), RunConfig())
-    # An accuracy that differs by rounding only is another key of the cache in memory.
-    accuracy = math.nextafter(settings.get("accuracy", 0.01), 1.0)
-    config = evolve(SimConfig(), **{**settings, "accuracy": accuracy})
-    spent, before = [], os.environ.get("XDG_CACHE_HOME")
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["XDG_CACHE_HOME"] = folder
-        for name in objects:
-            problem = build(config, name)
-            began = time.thread_time()
-            select(problem, controller, compiled=compiled)
-            spent.append(time.thread_time() - began)
-    if before is None:
-        del os.environ["XDG_CACHE_HOME"]
-    else:
-        os.environ["XDG_CACHE_HOME"] = before
+    controller = GraspController(create("controller", "hybrid"), RunConfig(), create("feature-set", "chitta"))
+    spent = []
+    for name in objects:
+        problem = build(evolve(SimConfig(), **settings), name)
+        began = time.thread_time()
+        select_anew(problem, controller, compiled=compiled)
+        spent.append(time.thread_time() - began)
     return float(np.median(spent))
 
 

@@ -88,17 +88,28 @@ def select(
     key = _SELECTED.key(problem, controller)
     reduction = _SELECTED.get(key)
     if reduction is None:
-        try:
-            reduction = _select_within_limit(
-                problem, trial_grasps(problem, controller, compiled=compiled, padding=padding)
-            )
-        except LAW_ERRORS as error:
-            reason = raised_in_term(error, problem.nominal.kinds if problem.nominal else ())
-            if not reason:
-                raise
-            raise ConfigError(f"{_scene_in_words(problem)}: {reason}") from error
+        reduction = select_anew(problem, controller, compiled=compiled, padding=padding)
         _SELECTED.put(key, reduction)
     return reduction
+
+
+def select_anew(
+    problem: Problem,
+    controller: GraspController,
+    *,
+    compiled: bool = False,
+    padding: tuple[str, ...] | None = None,
+) -> Reduction:
+    """Return the model as `select` does, without the cache. Raises as it does."""
+    try:
+        return _select_within_limit(
+            problem, trial_grasps(problem, controller, compiled=compiled, padding=padding)
+        )
+    except LAW_ERRORS as error:
+        reason = raised_in_term(error, problem.nominal.kinds if problem.nominal else ())
+        if not reason:
+            raise
+        raise ConfigError(f"{_scene_in_words(problem)}: {reason}") from error
 
 
 def _select_within_limit(problem: Problem, trial: TrialGrasps) -> Reduction:
