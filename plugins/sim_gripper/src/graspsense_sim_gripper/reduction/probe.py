@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Final
 
 from attrs import evolve, frozen
@@ -32,6 +32,13 @@ MIN_SPEED_M_S: Final = 1e-4
 """Slower contacts are probed at this speed."""
 MAX_DEPTH: Final = 0.9
 """No object is compressed by more than this share of its width."""
+MAX_WALKS: Final = 40
+DEPTH_RTOL: Final = 0.02
+FURTHER: Final = 1.01
+MOST_FURTHER: Final = 4.0
+"""The depth for a force is searched by walks, at most this many. Each goes a little further than where the last one
+reached the force, or by the missing share of the force, but by no more than the last factor, where it did not. The
+search ends when the depth changes by less than the tolerance."""
 MIN_FORCE_N: Final = 1.0
 """The change of a force is relative to the force, or to this value if the force is smaller."""
 
@@ -105,6 +112,7 @@ def forces_along(model: ObjectModel, kinds: Sequence[str], path: ProbePath) -> I
         before = t
 
 
+@lru_cache(maxsize=16)
 def stiffness(grip: Grip, dt_s: float) -> tuple[float, float]:
     """Return two stiffnesses (N/m): the largest over a tick of `dt_s` on the slow path, and that at the first touch.
 
@@ -128,6 +136,7 @@ def stiffness(grip: Grip, dt_s: float) -> tuple[float, float]:
     return largest, at_once / touch
 
 
+@lru_cache(maxsize=64)
 def damping(grip: Grip, model: ObjectModel, dt_s: float) -> float:
     """Return the damping (N s/m) of the pads and the object in this model, over a tick at the end of the fast path.
 
@@ -173,21 +182,41 @@ def _paths(
 
 
 def _depth(model: ObjectModel, kinds: Sequence[str], force_n: float, speed_m_s: float) -> float:
-    """Return the closure (m) at which the force exceeds `force_n`, by bisection to 2 %.
+    """Return the closure (m) at which the force exceeds `force_n`, to about 2 %.
 
     The fingers close at this speed; at speed 0, over the time of a squeeze.
     """
-    lower, upper = 0.0, MAX_DEPTH * max(model.width_m, 1e-4)
-    for _ in range(40):
-        middle = 0.5 * (lower + upper)
-        duration = middle / speed_m_s if speed_m_s > 0.0 else SQUEEZE_S
-        if any(force > force_n for force in forces_along(model, kinds, _path(middle, duration, 0.0))):
-            upper = middle
-        else:
-            lower = middle
-        if upper - lower < 0.02 * upper:
+    most = depth = MAX_DEPTH * max(model.width_m, 1e-4)
+    for _ in range(MAX_WALKS):
+        duration = depth / speed_m_s if speed_m_s > 0.0 else SQUEEZE_S
+        path = _path(depth, duration, 0.0)
+        reached, largest_n = _reached(path.closures, forces_along(model, kinds, path), force_n)
+        if reached is None:
+            if depth == most:
+                break
+            depth = min(depth * min(max(force_n / max(largest_n, MIN_FORCE_N), FURTHER), MOST_FURTHER), most)
+            continue
+        before, depth = depth, min(reached * FURTHER, depth)
+        if before - depth < DEPTH_RTOL * before:
             break
-    return upper
+    return depth
+
+
+def _reached(
+    closures: Sequence[float], forces: Iterator[float], force_n: float
+) -> tuple[float | None, float]:
+    """Return the closure (m) at which the force exceeds `force_n`, and the largest force (N) until then.
+
+    The closure is interpolated between the points; None if the force is never exceeded.
+    """
+    before_m = before_n = largest_n = 0.0
+    for closure, force in zip(closures, forces, strict=False):
+        if force > force_n:
+            share = (force_n - before_n) / (force - before_n)
+            return before_m + share * (closure - before_m) if share > 0.0 else closure, force
+        before_m, before_n = closure, force
+        largest_n = max(largest_n, force)
+    return None, largest_n
 
 
 def _path(depth_m: float, duration_s: float, hold_s: float) -> ProbePath:

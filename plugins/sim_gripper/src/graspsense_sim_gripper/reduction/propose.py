@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Final
 
 from graspsense.plugin_api import gap_and_rate, revolutions_at
@@ -292,6 +293,7 @@ def _term_decisions(grip: Grip, treatment: Sequence[str], errors: Sequence[float
     return decisions
 
 
+@lru_cache(maxsize=256)
 def _deciding(kind: str, params: TermParams, point: WorkingPoint) -> tuple[str, float]:
     """Return the number that characterises a term best, and its meaning.
 

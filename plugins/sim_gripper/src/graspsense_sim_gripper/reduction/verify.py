@@ -64,7 +64,7 @@ MIN_CLOSING_M_S: Final = 0.01
 """The remaining time of an approach is estimated with this closing speed, or with a higher present one."""
 MAX_HOLD_S: Final = 0.3
 """A longer hold is shortened to this in a trial grasp."""
-TICKS_AT_ONCE: Final = 200
+TICKS_AT_ONCE: Final = 500
 """Largest number of ticks of the approach between two checks of the distance."""
 CAPACITY: Final = 512
 """Largest number of ticks in a buffer; after each buffer the work is counted."""
