@@ -1,0 +1,212 @@
+"""Whether pads and spread give the distributions of the reference, on scenes of the map of regimes. Simulated.
+
+    python benchmarks/regimes_sensed.py [--scenes 500] [--instances 120] [--rows FILE] [--first N] [--short]
+
+Each scene of `benchmarks/regimes.py` with a stable loop is read by pads and encoder, with a spread of 10 % of
+stiffness, 0.5 mm of width and offset, and of Coulomb friction. Its instances are grasped in the model that is selected
+for 1 %, and in the reference, with the same seeds; the six features are those that `chitta` extracts from what the pads
+show.
+
+The distance of two distributions of a feature is the Wasserstein distance, relative to the magnitude of the mean of the
+reference, or to the scale of the unit if that is larger (`graspsense_sim_gripper.reduction.error.UNIT_SCALES`). It is
+within the accuracy if it is smaller, and shown to be if the upper end of its one-sided 95 % interval is (bootstrap over
+instances). A feature is compared where both grasps of an instance have it; the shares of instances that have it are
+compared as well.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import secrets
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from attrs import evolve
+from numpy.typing import NDArray
+from regimes import scene_of, share_words
+from selection import KINDS, Bench, Scene, controller_is_stable
+
+from graspsense.experiments.versions import where_measured
+from graspsense.plugin_api import ConfigError, Features, Outcome, RunConfig, create
+from graspsense_sim_gripper.batch.job import Job, grasp_once, grasp_plain
+from graspsense_sim_gripper.build import instantiate, problem_of
+from graspsense_sim_gripper.compiled.padding import padded
+from graspsense_sim_gripper.model_report import accuracy_report, model_report
+from graspsense_sim_gripper.problem import GraspController
+from graspsense_sim_gripper.reduction.error import UNIT_SCALES
+from graspsense_sim_gripper.reduction.select import select
+
+Row = dict[str, Any]
+ACCURACY: Final = 0.01
+REFERENCE: Final = 0.01
+"""With `fidelity = "reference"`: the steps are halved until nothing changes by more than 1e-9."""
+RESAMPLES: Final = 400
+WAYS: Final = {
+    "selected": {"accuracy": ACCURACY},
+    "fixed": {"fidelity": "full", "scheme": "explicit", "step_s": 1e-3},
+}
+
+
+def sensed(scene: Scene) -> Scene:
+    """Return the scene with pads and a spread of its instances."""
+    spec = evolve(scene.spec, stiffness_spread=0.1, width_spread_m=5e-4, offset_spread_m=5e-4)
+    config = evolve(scene.config, sensor="pads", spread=True, coulomb_spread_n=0.1 * scene.config.coulomb_n)
+    return evolve(scene, spec=spec, config=config)
+
+
+class Grasps:
+    """The instances of a scene, grasped in one model."""
+
+    def __init__(self, bench: Bench | None, scene: Scene, settings: Row) -> None:
+        features = create("feature-set", "chitta")
+        controller = create("controller", "hybrid", closing_speed_m_s=scene.speed_m_s)
+        config, run = evolve(scene.config, **settings), RunConfig(grasp_timeout_s=20.0)
+        self.bench, self.problem = bench, problem_of(config, scene.spec)
+        law = GraspController(controller, run, features)
+        self.reduction = select(self.problem, law, compiled=bench is not None, padding=KINDS)
+        self.job = Job(config=config, controller=controller, run=run, extract=features.extract, traces=False)
+
+    def of(self, instances: int) -> tuple[list[Features], list[int], list[str]]:
+        """Return the features, the outcome and the quantities in doubt of each instance."""
+        features, outcomes, doubts = [], [], []
+        for seed in range(instances):
+            setup = instantiate(self.problem, self.reduction, seed)
+            if self.bench is None:
+                done = grasp_plain(self.job, setup)
+            else:
+                full = padded(setup, KINDS)
+                loop = self.bench.loop_of(self.job.config, full, type(self.job.controller).step)
+                done = grasp_once(self.job, full, loop, self.bench.storage, on_arrays=True)
+            features.append(done.extracted)
+            outcomes.append(list(Outcome).index(done.outcome))
+            report = model_report(done.state, KINDS if self.bench else setup.kinds)
+            doubts += accuracy_report(report, self.reduction, "")["not_verified"]
+        return features, outcomes, doubts
+
+
+def distance(ours: NDArray[np.float64], theirs: NDArray[np.float64], unit: str) -> tuple[float, float]:
+    """Return the distance of two paired samples, and the upper end of its one-sided 95 % interval."""
+    scale = max(abs(float(np.mean(theirs))), UNIT_SCALES[unit])
+
+    def wasserstein(which: NDArray[np.int64]) -> NDArray[np.float64]:
+        pair = (np.sort(one[which], axis=-1) for one in (ours, theirs))
+        return np.asarray(np.mean(np.abs(np.subtract(*pair)), axis=-1) / scale)
+
+    drawn = np.random.default_rng(0).integers(len(ours), size=(RESAMPLES, len(ours)))
+    found = float(wasserstein(np.arange(len(ours))))
+    # The basic bootstrap interval: resampling adds to a distance what it is above the found one.
+    spread = np.quantile(wasserstein(drawn), 0.95) - found
+    return found, found + max(float(spread), 0.0)
+
+
+def compared(ours: Sequence[Features], theirs: Sequence[Features]) -> dict[str, Any]:
+    """Return for each feature the distance, its upper end, and the difference of the shares that have it."""
+    values, expected = (np.array([one.values for one in some]) for some in (ours, theirs))
+    result = {}
+    for k, (name, unit) in enumerate(zip(theirs[0].names, theirs[0].units, strict=True)):
+        has = [~np.isnan(one[:, k]) for one in (values, expected)]
+        both = has[0] & has[1]
+        found = (0.0, 0.0) if np.sum(both) < 5 else distance(values[both, k], expected[both, k], unit)
+        result[name] = [*found, abs(float(np.mean(has[0]) - np.mean(has[1])))]
+    return result
+
+
+def measured(bench: Bench | None, number: int, instances: int) -> Row:
+    """Return the distances of a scene."""
+    scene, _ = scene_of(number)
+    scene, row = sensed(scene), {"scene": number}
+    try:
+        reference = Grasps(bench, scene, {"accuracy": REFERENCE, "fidelity": "reference"})
+        if not controller_is_stable(
+            instantiate(reference.problem, reference.reduction, 0), reference.reduction
+        ):
+            return {**row, "unstable": True}
+        theirs, outcomes, _ = reference.of(instances)
+    except (ArithmeticError, ConfigError) as error:
+        return {**row, "failed": f"the reference: {error}"[:200]}
+    for way, settings in WAYS.items():
+        try:
+            ours, ended, doubts = Grasps(bench, scene, settings).of(instances)
+        except (ArithmeticError, ConfigError) as error:
+            row[way] = {"refused": f"{type(error).__name__}: {error}"[:200]}
+            continue
+        others = sum(a != b for a, b in zip(ended, outcomes, strict=True)) / instances
+        row[way] = {"features": compared(ours, theirs), "outcomes": others, "doubts": sorted(set(doubts))}
+    return row
+
+
+def page(rows: Sequence[Row], instances: int) -> list[str]:
+    """Return the figures in Markdown."""
+    done = [row for row in rows if "failed" not in row and not row.get("unstable")]
+    lines = [
+        f"{len(done)} scenes of {instances} instances each (numbers {rows[0]['scene']} to {rows[-1]['scene']}; "
+        f"{sum(bool(row.get('unstable')) for row in rows)} others have an unstable loop, "
+        f"{sum('failed' in row for row in rows)} no reference); {where_measured()}.",
+        "",
+        "| model | all features within 1 % | within 1 %, flagged or refused | shown within 1 % "
+        "| flagged | refused | largest distance without a flag |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for way, words in (("selected", "selected for 1 %"), ("fixed", "fixed steps of 1 ms, explicit")):
+        mine = [row[way] for row in done]
+        known = [one for one in mine if "refused" not in one]
+        worst = [(max(max(d, gone) for d, _, gone in one["features"].values()), one) for one in known]
+        upper = [max(max(u, gone) for _, u, gone in one["features"].values()) for one in known]
+        within = sum(d <= ACCURACY for d, _ in worst)
+        told = sum(d <= ACCURACY or bool(one["doubts"]) for d, one in worst) + len(mine) - len(known)
+        silent = max((d for d, one in worst if not one["doubts"]), default=math.nan)
+        lines.append(
+            f"| {words} | {share_words(within, len(mine))} | {share_words(told, len(mine))} "
+            f"| {share_words(sum(u <= ACCURACY for u in upper), len(mine))} "
+            f"| {sum(bool(one['doubts']) for one in known)} | {len(mine) - len(known)} | {silent:.2g} |"
+        )
+    lines += [
+        "",
+        "| feature | median distance | 95th percentile | scenes beyond 1 %, unflagged |",
+        "|---|---|---|---|",
+    ]
+    known = [row["selected"] for row in done if "refused" not in row["selected"]]
+    for name in known[0]["features"] if known else ():
+        found = [one["features"][name][0] for one in known]
+        beyond = sum(max(one["features"][name][::2]) > ACCURACY and not one["doubts"] for one in known)
+        lines.append(f"| `{name}` | {np.median(found):.1e} | {np.quantile(found, 0.95):.1e} | {beyond} |")
+    return lines
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--scenes", type=int, default=500)
+    parser.add_argument("--instances", type=int, default=120)
+    parser.add_argument("--first", type=int)
+    parser.add_argument("--rows", type=Path, help="JSON lines of the finished scenes, to go on with later")
+    parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
+    given = parser.parse_args()
+    first = given.first if given.first is not None else secrets.randbelow(2**31)
+    if given.short:
+        given.scenes, given.instances, first = 1, 5, 1
+    with tempfile.TemporaryDirectory() as folder:
+        file = given.rows or Path(folder) / "rows.jsonl"
+        rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+        first = rows[0]["scene"] if rows else first
+        known = {row["scene"] for row in rows}
+        bench = None if given.short else Bench()
+        for number in range(first, first + given.scenes):
+            if number in known:
+                continue
+            rows.append(measured(bench, number, given.instances))
+            with file.open("a") as out:
+                out.write(json.dumps(rows[-1]) + "\n")
+            print(f"\r{len(rows)} scenes", end="", file=sys.stderr, flush=True)
+    print("\n".join(page(rows, given.instances)))
+
+
+if __name__ == "__main__":
+    main()
