@@ -256,7 +256,8 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
         f"{len(unstable)} have an unstable sampled velocity loop, {len(rows) - len(done)} have no reference, "
         f"{sum(not row['reference_resolved'] for row in done)} have a reference with a tick that has not settled. "
         f"{where_measured()}.",
-        "A report of the simulator names an unstable loop (`unstable_loop`); the flags counted here leave it out.",
+        "A report of the simulator names the unstable loop of each of these scenes (`unstable_loop`), and lists peak, "
+        "trace and features as not verified; the flags counted here leave that out.",
         _confirmed(stable, "Stable loop, ideal sensors"),
         _confirmed(unstable, "Unstable loop"),
         "",
