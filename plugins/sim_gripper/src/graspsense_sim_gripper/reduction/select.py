@@ -202,11 +202,24 @@ def _accepted(problem: Problem, grip: Grip, trial: TrialGrasps) -> Iterator[Redu
         else:
             near_threshold = sensitivity
         grasps += 2
-        if not near:
+        if not near and _is_confirmed(problem, grip, trial, reduction, scale):
             n_accepted += 1
             yield evolve(reduction, verification=evolve(verification, grasps=grasps))
     if n_accepted == 0:
         yield _with_finer_steps(problem, grip, trial, near_threshold, _Miss(least, quantity))
+
+
+def _is_confirmed(
+    problem: Problem, grip: Grip, trial: TrialGrasps, reduction: Reduction, scale: LevelScale
+) -> bool:
+    """Return whether the model also agrees with the full model in still smaller steps.
+
+    A grasp that meets a threshold closely may be on one side of it in both grasps that were compared, and on the other
+    in the exact grasp.
+    """
+    finer = scale._replace(refinement=min(10.0 * scale.refinement, max(REFERENCE_SCALES)))
+    exact = trial.record(propose(problem, grip, _reference_scale(problem.model_config, finer)))
+    return deviation(trial.record(reduction), exact)[0] <= problem.model_config.accuracy
 
 
 class _Miss(NamedTuple):

@@ -75,7 +75,7 @@ PROGRESS_S: Final = 3.0
 """Trial grasps that take longer report how far they are, and again after as long."""
 SENSITIVITY: Final = 10.0
 MIN_FORCE_ERROR_N: Final = 0.01
-MAX_FORCE_ERROR_N: Final = 0.25
+MAX_FORCE_ERROR_N: Final = 1.0
 """The assumed error of the forces that the controller reads: SENSITIVITY times the difference of two models at the
 contact, limited to between MIN_FORCE_ERROR_N and MAX_FORCE_ERROR_N times the step tolerance of the level."""
 TRAVEL_ERROR: Final = 0.025
