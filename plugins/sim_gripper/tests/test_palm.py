@@ -44,7 +44,7 @@ def acceleration(trace):
 
 def plant(left_n, right_n):
     untouched = ContactState(0.0, 0.0, 0.0, ())
-    return PlantState(Motion(100.0, 0.0, 0.04, 4e-4), Contact(left_n, right_n, 0.0, 0, untouched, untouched))
+    return PlantState(Motion(100.0, 0.0, 0.04, 4e-4), Contact(left_n, right_n, 0.0, 0, untouched, ()))
 
 
 def felt(forces_n):

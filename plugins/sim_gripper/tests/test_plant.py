@@ -67,7 +67,7 @@ def at(gap, states=(), offset=0.0, speed_m_s=0.0, link=LINK):
     gap, rate = gap_and_rate(link, revolutions)
     fresh = ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0)
     motion = Motion(revolutions, speed_m_s / rate, gap, rate)
-    return PlantState(motion, Contact(0.0, 0.0, offset, 0, fresh, fresh))
+    return PlantState(motion, Contact(0.0, 0.0, offset, 0, fresh, ()))
 
 
 SPRING = (Elastic(2000.0, 0.0),)
@@ -98,7 +98,7 @@ def test_a_loaded_gripper_is_stuck_by_as_much_as_its_load_adds():
     # At 10 N on the pads breakaway is 8 + 0.5 * 10 = 13 N to either side of the balance.
     params = PlantParams(drive(), thing(*SPRING), FINE)
     pressed = ContactState(0.005, 10.0, 2000.0, (NoState(),))
-    loaded = at(0.045, (NoState(),))._replace(contact=Contact(10.0, 10.0, 0.0, 1, pressed, pressed))
+    loaded = at(0.045, (NoState(),))._replace(contact=Contact(10.0, 10.0, 0.0, 1, pressed, ()))
     for effort, moves in ((22.9, False), (23.1, True), (-2.9, False), (-3.1, True)):
         after = run(params, loaded, effort, 0.2)
         assert (after.motion.revolutions != loaded.motion.revolutions) == moves, effort

@@ -37,7 +37,7 @@ from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.build import CELL_OFFSET, EFFORT_LIMIT_N, build, device_info, instantiate
 from graspsense_sim_gripper.compiled.compose import INTERPRETED, composed_move, composition, free_motion
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.state import PlantState, is_finite
+from graspsense_sim_gripper.dynamics.state import PlantState, is_finite, right_of
 from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
@@ -198,14 +198,14 @@ class SimBackend(BatchBackend[SimConfig]):
         contact = self._state.contact
         if self._explains and contact.touched == 1:
             # Of an object that is fixed in place, the half that is pressed harder.
-            half = max(contact.left, contact.right, key=lambda half: half.force_n)
+            half = max(contact.left, right_of(contact.left, contact.right), key=lambda half: half.force_n)
             self._compressions.append((half.compression_m, half.force_n))
 
     def free_ticks(self, params: TickParams, state: TickState, frame: Frame, most: int) -> FreeRun | None:
         """Run ticks of free motion. Raises TermFailed."""
         effort = self._effort_n
         contact = self._state.contact
-        pressed = contact.left.force_n > 0.0 or contact.right.force_n > 0.0
+        pressed = contact.left.force_n > 0.0 or right_of(contact.left, contact.right).force_n > 0.0
         if self._free_ticks is None or self._explains or pressed or effort is None:
             return None
         self._move_on(effort)

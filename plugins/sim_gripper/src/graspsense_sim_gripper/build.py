@@ -223,7 +223,8 @@ def _plant(
             held=1 if instance.spec.held else 0,
         )
         at_rest, offset = uncompressed(instance.kinds), instance.offset_m
-    state = PlantState(gripper.motion, Contact(0.0, 0.0, offset, 0, at_rest, at_rest))
+    right = (at_rest,) if model.held == 1 else ()
+    state = PlantState(gripper.motion, Contact(0.0, 0.0, offset, 0, at_rest, right))
     return PlantParams(drive, model, gripper.steps), state
 
 

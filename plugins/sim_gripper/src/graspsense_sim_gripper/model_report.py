@@ -15,7 +15,7 @@ def model_report(state: PlantState, kinds: Sequence[str]) -> dict[str, Any]:
     contact = state.contact
     warnings = {
         f"{kind}: {reason}": None
-        for half in (contact.left, contact.right)
+        for half in (contact.left, *contact.right)
         for i, kind in enumerate(kinds, 1)
         if (reason := find_term(kind)[1].beyond(half.states[i]))
     }

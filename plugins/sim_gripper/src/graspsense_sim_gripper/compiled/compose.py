@@ -257,6 +257,8 @@ class Composition(NamedTuple):
     """Whether the gripper has an accelerometer."""
     hardens: bool = False
     """Whether the pads are nonlinear."""
+    held: bool = False
+    """Whether the object is held fast, so that its state has two halves."""
 
 
 def composition(
@@ -264,7 +266,8 @@ def composition(
 ) -> Composition:
     """Return the composition of a loop for this plant; `shape` is that of its exact discretisation, or None."""
     converges, lags = plant.steps.settle > 0.0, plant.drive.lag_s > 0.0
-    return Composition(kinds, shape, converges, lags, has_palm, hardens(plant.object))
+    held = plant.object.held == 1
+    return Composition(kinds, shape, converges, lags, has_palm, hardens(plant.object), held)
 
 
 def hardens(model: ObjectModel) -> bool:

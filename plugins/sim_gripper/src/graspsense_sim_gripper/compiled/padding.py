@@ -96,8 +96,7 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
         terms = tuple([own[i] if i >= 0 else filler.params for i, filler in layout.sources])
         plant = plant._replace(object=plant.object._replace(terms=terms))
         left = _padded_state(state.contact.left, layout)
-        both_same = state.contact.right is state.contact.left
-        right = left if both_same else _padded_state(state.contact.right, layout)
+        right = tuple([_padded_state(half, layout) for half in state.contact.right])
         state = state._replace(contact=state.contact._replace(left=left, right=right))
     # `evolve` would take a quarter of the time of this function.
     return GraspSetup(
@@ -121,7 +120,8 @@ def unpadded(state: PlantState, setup: GraspSetup) -> PlantState:
     if layout.kinds == setup.kinds:
         return state
     contact = state.contact
-    left, right = (_unpadded_state(half, layout) for half in (contact.left, contact.right))
+    left = _unpadded_state(contact.left, layout)
+    right = tuple([_unpadded_state(half, layout) for half in contact.right])
     return state._replace(contact=contact._replace(left=left, right=right))
 
 

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 from graspsense_sim_gripper.dynamics.roots import MAX_ITERATIONS, bracketed_secant
-from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Past
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Halves, Past, right_of
 from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
 
 BALANCE_RTOL: Final = 1e-11
@@ -181,8 +181,8 @@ object_moves: Callable[[Any], bool] = _nothing_moves
 def has_event(before: Contact, after: Contact) -> bool:
     """Return whether a term of the object has an event between these contacts (see `Term.phase`)."""
     return object_phase(before.left.states) != object_phase(after.left.states) or object_phase(
-        before.right.states
-    ) != object_phase(after.right.states)
+        right_of(before.left, before.right).states
+    ) != object_phase(right_of(after.left, after.right).states)
 
 
 def no_event(before: Contact, after: Contact) -> bool:
@@ -195,18 +195,32 @@ def is_touched(contact: Contact, gap_m: float, reach_m: float) -> int:
 
     `reach_m`: the gap at which the nearer finger touches the object.
     """
-    left, right = contact.left, contact.right
-    shape = abs(left.compression_m) + abs(left.pad_m) + abs(right.compression_m)
+    left = contact.left
+    shape = abs(left.compression_m) + abs(left.pad_m) + _deformation(contact.right)
     separated = gap_m > reach_m and contact.left_n + contact.right_n == 0.0
     if separated and shape <= RECOVERED_M:
         return 1 if object_moves(left.states) or object_moves(right.states) else 0
     return 1
 
 
+def _deformation(right: Halves) -> float:
+    if len(right) == 0:
+        return 0.0
+    half: ContactState = right[0]
+    return abs(half.compression_m)
+
+
 def restarted(contact: Contact) -> Contact:
     """Return the contact after an event of a term: the rate of compression before it says nothing any more."""
     left_n, right_n, offset, touched, left, right, pending, unbalanced = contact
-    return Contact(left_n, right_n, offset, touched, _restarted(left), _restarted(right), pending, unbalanced)
+    left, right = _restarted(left), _right_restarted(right)
+    return Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
+
+
+def _right_restarted(right: Halves) -> Halves:
+    if len(right) == 0:
+        return right
+    return (_restarted(right[0]),)
 
 
 def _restarted(half: ContactState) -> ContactState:
@@ -421,25 +435,34 @@ def pad_forces(
         offset = pushed if offset >= 0.0 else -pushed
     # Held fast, each finger presses its own half as if the other did the same. Free, both press the whole.
     shift = 2.0 * offset if model.held == 1 else 0.0
-    for side in range(1 + model.held):
-        half = left if side == 0 else right
-        half_closure = closure - shift if side == 0 else closure + shift
-        if still or half_closure >= 0.0 or half.compression_m != 0.0:
-            span = h
-            if (
-                0.0 <= half_closure <= CONTACT_TOL_M
-                and half.compression_m == 0.0
-                and half_closure < h * speed_m_s
-            ):
-                # The contact has only just begun: a damper of the pad has acted since then and no longer.
-                span = half_closure / speed_m_s
-            half, missed = solve_contact(model, half, half_closure, speed_m_s, span)
-            unbalanced += missed
-        if side == 0:
-            left = half
-        else:
-            right = half
+    left, missed = _pressed(model, left, closure - shift, speed_m_s, h, still)
+    unbalanced += missed
+    right, missed = _right_pressed(model, right, closure + shift, speed_m_s, h, still)
+    unbalanced += missed
     if model.held == 1:
-        return Contact(left.force_n, right.force_n, offset, touched, left, right, 0.0, unbalanced)
-    left1_n, right1_n = max(left.force_n, left1_n), max(left.force_n, right1_n)
+        left1_n, right1_n = left.force_n, right_of(left, right).force_n
+    else:
+        left1_n, right1_n = max(left.force_n, left1_n), max(left.force_n, right1_n)
     return Contact(left1_n, right1_n, offset, touched, left, right, 0.0, unbalanced)
+
+
+def _pressed(
+    model: ObjectModel, half: ContactState, closure_m: float, speed_m_s: float, h: float, still: bool
+) -> tuple[ContactState, int]:
+    """Return what `solve_contact` does where the fingers touch the object or it is deformed."""
+    if not (still or closure_m >= 0.0 or half.compression_m != 0.0):
+        return half, 0
+    span = h
+    if 0.0 <= closure_m <= CONTACT_TOL_M and half.compression_m == 0.0 and closure_m < h * speed_m_s:
+        # The contact has only just begun: a damper of the pad has acted since then and no longer.
+        span = closure_m / speed_m_s
+    return solve_contact(model, half, closure_m, speed_m_s, span)
+
+
+def _right_pressed(
+    model: ObjectModel, right: Halves, closure_m: float, speed_m_s: float, h: float, still: bool
+) -> tuple[Halves, int]:
+    if len(right) == 0:
+        return right, 0
+    half, missed = _pressed(model, right[0], closure_m, speed_m_s, h, still)
+    return (half,), missed

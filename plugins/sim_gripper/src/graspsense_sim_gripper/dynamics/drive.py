@@ -19,7 +19,7 @@ import math
 from typing import Final, NamedTuple
 
 from graspsense.plugin_api import ScrewLinkage
-from graspsense_sim_gripper.dynamics.state import Contact, Motion
+from graspsense_sim_gripper.dynamics.state import Contact, Motion, right_of
 
 STRIBECK_SPEEDS: Final = 4.5
 """Multiple of the Stribeck speed beyond which the excess is below 2e-9 of its maximum and counts as zero."""
@@ -106,7 +106,7 @@ def load_at_rest(contact: Contact, effort_n: float) -> float:
     exceeds it, and so moves no finger.
     """
     load = 0.5 * (contact.left_n + contact.right_n)
-    if contact.left.force_n == 0.0 and contact.right.force_n == 0.0:
+    if contact.left.force_n == 0.0 and right_of(contact.left, contact.right).force_n == 0.0:
         load = min(load, max(effort_n, 0.0))
     return load
 

@@ -47,6 +47,10 @@ class ContactState(NamedTuple):
     past: Past = Past()
 
 
+Halves = Any
+"""A tuple of one `ContactState`, or (). The type decides, so that compiled code moves no numbers that are not used."""
+
+
 class Contact(NamedTuple):
     """The forces on the two pads and the object between them."""
 
@@ -58,12 +62,18 @@ class Contact(NamedTuple):
     """1 from the first contact on, until the object is released and has recovered its shape."""
     left: ContactState
     """The whole object; where it is held fast, the half at the left finger, as if the other half did the same."""
-    right: ContactState
-    """The half at the right finger of an object that is held fast; otherwise unused."""
+    right: Halves
+    """The half at the right finger of an object that is held fast, as a tuple of it; otherwise ()."""
     pending_s: float = 0.0
     """Time since the release for which the recovery of the object's shape has not been computed yet."""
     unbalanced: int = 0
     """Searches for the balance of forces that have not converged so far."""
+
+
+def right_of(left: ContactState, right: Halves) -> ContactState:
+    """Return the half of the object at the right finger; `left`, the whole, of an object that is not held fast."""
+    half: ContactState = (left, *right)[-1]
+    return half
 
 
 class StepState(NamedTuple):
@@ -92,4 +102,6 @@ class PlantState(NamedTuple):
 def is_finite(state: PlantState) -> bool:
     """Return whether the forces on the object and the motion are finite numbers."""
     contact = state.contact
-    return math.isfinite(contact.left.force_n + contact.right.force_n + state.motion.speed_rev_s)
+    return math.isfinite(
+        contact.left.force_n + right_of(contact.left, contact.right).force_n + state.motion.speed_rev_s
+    )

@@ -26,7 +26,15 @@ from typing import Any, Final, NamedTuple
 from graspsense.plugin_api import bind
 from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.dynamics.contact import RECOVERED_M
-from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, Past, PlantState, StepState
+from graspsense_sim_gripper.dynamics.state import (
+    Contact,
+    ContactState,
+    Halves,
+    Motion,
+    Past,
+    PlantState,
+    StepState,
+)
 from graspsense_sim_gripper.exact.expm import MAX_BISECTIONS
 from graspsense_sim_gripper.exact.modes import (
     CLOSING,
@@ -301,6 +309,12 @@ def _store(
     return True, PlantState(motion, contact, step, effort_n, result.peak_n)
 
 
+def _both_same(right: Halves, left: ContactState) -> Halves:
+    if len(right) == 0:
+        return right
+    return (left,)
+
+
 def _store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_open_end: bool) -> Contact:
     """Return the contact with the state of the object and the forces on the pads in X1."""
     model, ws, before = params.plant.object, params.workspace, contact.left
@@ -332,7 +346,7 @@ def _store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_
         Past(before.past.rate_m_s, 0.0, math.inf),
     )
     # An object that is held on the centre line has two halves in the same state.
-    right = left if model.held == 1 else contact.right
+    right = _both_same(contact.right, left)
     return Contact(force, force, contact.offset_m, touched, left, right, 0.0, contact.unbalanced)
 
 

@@ -13,7 +13,7 @@ from typing import Final
 from graspsense.plugin_api import gap_and_rate
 from graspsense_sim_gripper.dynamics.contact import ObjectModel
 from graspsense_sim_gripper.dynamics.drive import ARREST_M_S, is_held, stribeck_excess
-from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState
+from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState, right_of
 from graspsense_sim_gripper.stepping.control import fits_a_step
 from graspsense_sim_gripper.stepping.scheme import SPEED_SCALE_M_S, PlantParams
 
@@ -30,7 +30,7 @@ def coast(params: PlantParams, state: PlantState, effort_n: float, h: float) -> 
 
 def can_glide(params: PlantParams, state: PlantState, dt: float) -> bool:
     """Return whether `glide` may advance this plant in ticks of `dt`, as long as it can."""
-    left, right = state.contact.left, state.contact.right
+    left, right = state.contact.left, right_of(state.contact.left, state.contact.right)
     return fits_a_step(params.steps, state.step, dt) and left.force_n == 0.0 and right.force_n == 0.0
 
 
@@ -87,7 +87,7 @@ def glided(state: PlantState, motion: Motion, contact: Contact, n_steps: int) ->
 def _free_until(params: PlantParams, contact: Contact, motion: Motion, h: float) -> tuple[bool, float, float]:
     """Return whether an object that was touched is not pressed, the gap down to which, and the time it is behind."""
     model: ObjectModel = params.object
-    left, right, pending = contact.left, contact.right, contact.pending_s
+    left, right, pending = contact.left, right_of(contact.left, contact.right), contact.pending_s
     if contact.left_n + contact.right_n > 0.0:
         pushed = not (
             left.force_n > 0.0 or left.compression_m != 0.0 or model.held == 1 or motion.speed_rev_s > 0.0

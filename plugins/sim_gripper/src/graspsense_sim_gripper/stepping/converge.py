@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from graspsense_sim_gripper.dynamics.state import PlantState, StepState
+from graspsense_sim_gripper.dynamics.state import PlantState, StepState, right_of
 from graspsense_sim_gripper.stepping.advance import rests, take_steps
 from graspsense_sim_gripper.stepping.coast import SHAPE_SCALE_M, coast
 from graspsense_sim_gripper.stepping.control import MAX_STEPS, fits_a_step
@@ -69,7 +69,10 @@ def _alike(before: PlantState, after: PlantState, share: float) -> bool:
     force1 = after.contact.left_n + after.contact.right_n
     # The shape of a released object affects no force until the object touches the fingers again.
     left0, left1 = before.contact.left.compression_m, after.contact.left.compression_m
-    right0, right1 = before.contact.right.compression_m, after.contact.right.compression_m
+    right0, right1 = (
+        right_of(before.contact.left, before.contact.right).compression_m,
+        right_of(after.contact.left, after.contact.right).compression_m,
+    )
     return (
         abs(speed1 - speed0) <= share * max(abs(speed1), SPEED_SCALE_M_S)
         and abs(force1 - force0) <= share * max(force1, FORCE_SCALE_N)

@@ -11,7 +11,7 @@ from typing import Final
 from graspsense.plugin_api import gap_and_rate
 from graspsense_sim_gripper.dynamics.contact import CONTACT_TOL_M
 from graspsense_sim_gripper.dynamics.drive import ARREST_M_S
-from graspsense_sim_gripper.dynamics.state import ContactState, Motion
+from graspsense_sim_gripper.dynamics.state import ContactState, Motion, right_of
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start, end_of_travel
 
 NEWTON_ITERATIONS: Final = 4
@@ -76,14 +76,16 @@ def parting(params: PlantParams, start: Start, attempt: Attempt) -> float:
         return 0.0
     before, after = start.contact, attempt.contact
     left = before.left.force_n > 0.0 and after.left.force_n == 0.0
-    right = before.right.force_n > 0.0 and after.right.force_n == 0.0
+    right = (
+        right_of(before.left, before.right).force_n > 0.0 and right_of(after.left, after.right).force_n == 0.0
+    )
     if not (left or right):
         return 0.0
     model = params.object
     shift = 2.0 * after.offset_m if model.held == 1 else 0.0
     beyond = _gap_beyond(after.left, gap1 - model.width_m + shift) if left else 0.0
     if right:
-        beyond = max(beyond, _gap_beyond(after.right, gap1 - model.width_m - shift))
+        beyond = max(beyond, _gap_beyond(right_of(after.left, after.right), gap1 - model.width_m - shift))
     if beyond <= CONTACT_TOL_M:
         return 0.0
     return min(max(1.0 - beyond / (gap1 - gap), MIN_FRACTION), MAX_FRACTION)

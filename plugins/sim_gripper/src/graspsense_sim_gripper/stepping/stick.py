@@ -6,7 +6,7 @@ from typing import Final
 
 from graspsense_sim_gripper.dynamics.contact import has_event, pad_forces, restarted
 from graspsense_sim_gripper.dynamics.drive import breakaway_friction, load_at_rest
-from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
+from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, right_of
 from graspsense_sim_gripper.stepping.control import MIN_STEP_S
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 
@@ -37,7 +37,7 @@ def stick(params: PlantParams, state: PlantState, effort_n: float, h: float) -> 
         t = max(t * (margin + SLIP_AIM_N) / (margin - margin1), min(t, MIN_STEP_S))
     if has_event(contact, after):
         t, after = _until_event(params, contact, gap, t)
-    if after.left.force_n == 0.0 and after.right.force_n == 0.0:
+    if after.left.force_n == 0.0 and right_of(after.left, after.right).force_n == 0.0:
         after = _against_table(after, 2.0 * max(effort_n, 0.0))
     peak = max(peak, after.left_n, after.right_n)
     return PlantState(Motion(revolutions, 0.0, gap, jacobian), after, step, given, peak), t

@@ -11,7 +11,7 @@ from typing import Final
 
 from graspsense_sim_gripper.dynamics.contact import balance_tolerance, pad_forces
 from graspsense_sim_gripper.dynamics.drive import acceleration, sliding_friction
-from graspsense_sim_gripper.dynamics.state import Contact, Motion
+from graspsense_sim_gripper.dynamics.state import Contact, Motion, right_of
 from graspsense_sim_gripper.stepping.events import drift
 from graspsense_sim_gripper.stepping.scheme import SPEED_SCALE_M_S, Attempt, PlantParams, Start
 
@@ -51,7 +51,7 @@ def _errors(
 ) -> tuple[float, float]:
     """Return the errors of speed (m/s) and force (N)."""
     (_, speed, _, jacobian), contact, _, rate, _, _ = start
-    left1, right1 = contact1.left, contact1.right
+    left1, right1 = contact1.left, right_of(contact1.left, contact1.right)
     load = 0.5 * (contact.left_n + contact.right_n)
     load1 = 0.5 * (contact1.left_n + contact1.right_n)
     change = rate1 - rate
