@@ -65,9 +65,9 @@ from graspsense_sim_gripper.terms.term import LAW_ERRORS
 TICKS: Final = 8200
 """Ticks that the buffers hold at first; a grasp that needs more continues with longer ones. It is not a power of two,
 because all columns would then share one set of the processor's cache and evict each other."""
-IMAGES: Final = 128
-"""Cell images that the buffers hold at first. A grasp that needs more draws more noise then: drawing is a tenth of the
-time of a grasp."""
+IMAGES: Final = 136
+"""Cell images that the buffers hold at first, which suffice for nine of ten grasps of the catalogue. A grasp that needs
+more draws more noise then: drawing is a tenth of the time of a grasp."""
 
 Extracted = Any
 """What `Job.extract` returns, such as features."""
@@ -332,8 +332,7 @@ def _run(
     if not ideal:
         noise.standard_normal(out=buffers.pads.noise)
     buffers.pads.images[-1] = math.nan
-    zeros = np.full((2, CELLS), CELL_OFFSET[0])
-    buffers = buffers._replace(pads=buffers.pads._replace(left_zero=zeros[0], right_zero=zeros[1]))
+    buffers.pads.left_zero[:] = buffers.pads.right_zero[:] = CELL_OFFSET[0]
     palm_noise = None
     if setup.has_palm:
         palm_noise, ticks = setup.palm_noise(), len(buffers.phases)
