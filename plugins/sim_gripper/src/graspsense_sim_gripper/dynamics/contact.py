@@ -199,7 +199,8 @@ def is_touched(contact: Contact, gap_m: float, reach_m: float) -> int:
     shape = abs(left.compression_m) + abs(left.pad_m) + _deformation(contact.right)
     separated = gap_m > reach_m and contact.left_n + contact.right_n == 0.0
     if separated and shape <= RECOVERED_M:
-        return 1 if object_moves(left.states) or object_moves(right.states) else 0
+        moves = object_moves(left.states) or object_moves(right_of(left, contact.right).states)
+        return 1 if moves else 0
     return 1
 
 
