@@ -32,7 +32,7 @@ from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction, Ter
 from graspsense_sim_gripper.reduction.probe import Grip, damping, stiffness
 from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, MEAN_FORCE, TR_BDF2, VERLET, Steps
 from graspsense_sim_gripper.terms.registry import find_term
-from graspsense_sim_gripper.terms.term import NO_STATE, OwnContact, WorkingPoint, no_rates
+from graspsense_sim_gripper.terms.term import NO_STATE, OwnContact, Term, WorkingPoint, no_rates
 
 FORCE_N: Final = 20.0
 SPEED_M_S: Final = 0.01
@@ -285,7 +285,7 @@ def _pads_decision(grip: Grip, name: str, error: float) -> TermDecision:
 def _term_decisions(grip: Grip, treatment: Sequence[str], errors: Sequence[float]) -> list[TermDecision]:
     decisions = []
     for i, kind in enumerate(grip.kinds):
-        what, number = _deciding(kind, grip.model.terms[i + 1].params, grip.point)
+        what, number = _deciding(find_term(kind)[1], grip.model.terms[i + 1].params, grip.point)
         decision = treatment[i] if treatment[i] in (KEPT, DROPPED) else f"limit: {treatment[i]}"
         decisions.append(
             TermDecision(term=kind, decision=decision, what=what, number=number, error=errors[i])
@@ -294,12 +294,11 @@ def _term_decisions(grip: Grip, treatment: Sequence[str], errors: Sequence[float
 
 
 @lru_cache(maxsize=256)
-def _deciding(kind: str, params: TermParams, point: WorkingPoint) -> tuple[str, float]:
+def _deciding(term: Term, params: TermParams, point: WorkingPoint) -> tuple[str, float]:
     """Return the number that characterises a term best, and its meaning.
 
     It is the fastest rate times the duration of the grasp, or, without rates, the force over the gripping force.
     """
-    term = find_term(kind)[1]
     rates = term.rates(params, point)
     if rates:
         fastest = max(rates, key=lambda rate: rate.per_s)
