@@ -1,6 +1,7 @@
 """Whether `graspsense identify` brings known scenes back, and at how many recordings a simulator stops paying.
 
     python benchmarks/identify.py [--repeats 4] [--only NAME...] [--sensors NAME...] [--recordings N...] [--rows FILE]
+    python benchmarks/identify.py --delays 0 0.01 0.025 [...] [--rows FILE] [--markdown docs/identify.md]
     python benchmarks/identify.py --rows FILE --markdown docs/identify.md
     python benchmarks/identify.py --transfer [--rows FILE] [--markdown docs/identify.md] [--png docs/identify.png]
 
@@ -11,6 +12,9 @@ between objects (10 %). The scene is then identified from these grasps. A row sa
 chosen, and how many of the 90 % intervals hold the true values where they were. An interval of a single squeeze is of
 this squeeze, whose object has the nominal stiffness. Rows are appended to the file of `--rows`, and `--markdown` writes
 its tables between the marks of a page.
+
+With `--delays`: the forces of the recordings are late by these times (s), of which the settings of the gripper do not
+know, and their table is that of the delays that come back.
 
 With `--transfer`: four containers of the catalogue are the real world. From 1, 3, 10 and 30 recordings of each,
 a classifier is trained on the recordings, and another on simulated squeezes of the scenes that they were identified as.
@@ -29,14 +33,15 @@ import time
 import tomllib
 from collections.abc import Mapping, Sequence
 from datetime import date
+from itertools import product
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from attrs import asdict, frozen
+from attrs import asdict, evolve, frozen
 
 from graspsense import load_pipeline
-from graspsense.core.identification import RecordedSqueeze
+from graspsense.core.identification import Identification, RecordedSqueeze
 from graspsense.evaluation.intervals import wilson
 from graspsense.plugin_api import RunConfig, create, table_of
 from graspsense_sim_gripper.config import SimConfig
@@ -122,6 +127,10 @@ class Row:
     found: tuple[tuple[str, float, float, float, float], ...]
     """Each parameter with its true value, its value, and the ends of its interval, where the true terms were chosen."""
     seconds: float
+    late_s: float = 0.0
+    """By how much the forces of the recordings were late."""
+    delay: tuple[float, float, float, bool] | None = None
+    """The identified delay, the ends of its interval, and whether it was used; None if none was determined."""
 
 
 def drawn(terms: Sequence[Mapping[str, Any]], repeat: int) -> list[dict[str, Any]]:
@@ -169,6 +178,22 @@ def squeezes_of(
     ]
 
 
+def delayed(squeeze: RecordedSqueeze, late_s: float) -> RecordedSqueeze:
+    """Return the recording of a sensor whose forces, and times of images, are late by a number of ticks."""
+    trace = squeeze.trace
+    ticks = round(late_s / float(np.median(np.diff(trace.t_s))))
+    last = len(trace.t_s) - ticks
+
+    def late(force: Any) -> Any:
+        return np.concatenate([np.full(ticks, force[0]), force[:last]])
+
+    left, right = late(trace.force_left_n), late(trace.force_right_n)
+    return evolve(
+        squeeze,
+        trace=evolve(trace, pad_t_s=trace.pad_t_s + late_s, force_left_n=left, force_right_n=right),
+    )
+
+
 def true_values(terms: Sequence[Mapping[str, Any]], identified: str) -> dict[str, float]:
     """Return the true values of the parameters, with a foam's force at the compression of the identified scene.
 
@@ -200,7 +225,7 @@ def named(terms: Sequence[Mapping[str, Any]]) -> str:
     return " + ".join(f"elastic ({form})" if kind == "elastic" else kind for kind in kinds)
 
 
-def measured(name: str, sensor: str, count: int, repeat: int) -> Row:
+def measured(name: str, sensor: str, count: int, repeat: int, late_s: float = 0.0) -> Row:
     """Return the row of a scene."""
     terms = drawn(SCENES[name], repeat)
     text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0)
@@ -208,7 +233,7 @@ def measured(name: str, sensor: str, count: int, repeat: int) -> Row:
     series = (list(SCENES).index(name) * 10 + list(SENSORS).index(sensor)) * 100 + count
     seeds = [100_000 * (series + 1) + 100 * repeat + i for i in range(count)]
     squeezes = squeezes_of(text, name, SENSORS[sensor], [str(one) for one in seeds], seeds)
-    result = identify(SimConfig(), squeezes, lambda *_: None)
+    result = identify(SimConfig(), [delayed(one, late_s) for one in squeezes], lambda *_: None)
     chosen = next(one for one in result.candidates if one.chosen)
     true = next((one for one in result.candidates if one.terms == named(terms)), None)
     right = true is chosen
@@ -225,7 +250,17 @@ def measured(name: str, sensor: str, count: int, repeat: int) -> Row:
         told_apart=right or true is None or not alike or chosen.parameters > true.parameters,
         found=tuple((one.name, truth[one.name], one.value, one.low, one.high) for one in found),
         seconds=result.seconds,
+        late_s=late_s,
+        delay=_delay(result),
     )
+
+
+def _delay(result: Identification) -> tuple[float, float, float, bool] | None:
+    """Return the delay, the ends of its interval, and whether it was used; None if it was refused."""
+    found = next((one for one in result.parameters if one.name == "delay_s"), None)
+    refused = any(one.what == "delay of the sensor" for one in result.undetermined)
+    used = tomllib.loads(result.scene)["identified"]["sensor"]["delay_s"] != 0.0
+    return None if found is None or (refused and not used) else (found.value, found.low, found.high, used)
 
 
 def in_words(row: Row) -> str:
@@ -289,6 +324,36 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
         group = [one for one in rows if one["scene"] == name]
         if group:
             lines.append(line((name,), group))
+    return "\n".join(lines)
+
+
+def delays_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of the delays: by sensor, number of recordings, and delay."""
+    columns = ("sensor", "squeezes", "forces late by", "scenes", "delay used", "not determined")
+    columns += ("90 % intervals of the delay that cover", "median error of the delay", "right terms")
+    columns += ("90 % intervals of the parameters that cover",)
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    for key in sorted(
+        {(list(SENSORS).index(one["sensor"]), one["recordings"], one["late_s"]) for one in rows}
+    ):
+        sensor, count, late_s = list(SENSORS)[key[0]], key[1], key[2]
+        group = [
+            one
+            for one in rows
+            if (one["sensor"], one["recordings"], one["late_s"]) == (sensor, count, late_s)
+        ]
+        found = [one["delay"] for one in group if one["delay"]]
+        errors = [1e3 * abs(value - late_s) for value, *_ in found]
+        covered = _covered([one["found"] for one in group])
+        cells = (
+            *(sensor, str(count), f"{1e3 * late_s:.0f} ms", str(len(group))),
+            *(str(sum(one[3] for one in found)), str(len(group) - len(found))),
+            _share(sum(low <= late_s <= high for _, low, high, _ in found), len(found)),
+            f"{float(np.median(errors)):.2g} ms" if errors else "–",
+            _share(sum(one["right_terms"] for one in group), len(group)),
+            _share(sum(covered), len(covered)),
+        )
+        lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
@@ -401,6 +466,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=list(SCENES), default=list(SCENES))
     parser.add_argument("--sensors", nargs="+", choices=list(SENSORS), default=list(SENSORS))
     parser.add_argument("--recordings", nargs="+", type=int, help="the numbers of recordings")
+    parser.add_argument("--delays", nargs="+", type=float, help="the times by which the forces are late (s)")
     parser.add_argument("--transfer", action="store_true")
     parser.add_argument("--rows", type=Path, help="append the rows to this file (JSON lines)")
     parser.add_argument(
@@ -429,21 +495,21 @@ def main() -> None:
         # A run that is stopped has all scenes in its rows.
         for repeat in range(asked.first, asked.first + asked.repeats):
             for count in asked.recordings or COUNTS:
-                for sensor in asked.sensors:
-                    for name in asked.only:
-                        row = measured(name, sensor, count, repeat)
-                        rows.append(asdict(row))
-                        if asked.rows:
-                            with asked.rows.open("a", encoding="utf-8") as out:
-                                out.write(f"{json.dumps(rows[-1])}\n")
-                        if not asked.json:
-                            print(in_words(row), flush=True)
+                for sensor, name, late_s in product(asked.sensors, asked.only, asked.delays or [0.0]):
+                    row = measured(name, sensor, count, repeat, late_s)
+                    rows.append(asdict(row))
+                    if asked.rows:
+                        with asked.rows.open("a", encoding="utf-8") as out:
+                            out.write(f"{json.dumps(rows[-1])}\n")
+                    if not asked.json:
+                        print(in_words(row), flush=True)
+
     made = {"date": str(date.today()), "python": platform.python_version(), "cores": os.cpu_count()}
     if asked.json:
         print(json.dumps({"rows": rows, "made": made}, indent=2))
     else:
         if not asked.transfer:
-            print(as_markdown(rows))
+            print((delays_markdown if asked.delays else as_markdown)(rows))
         print(f"{made}, {time.monotonic() - begin:.0f} s")
 
 
@@ -454,6 +520,8 @@ def _publish(asked: argparse.Namespace) -> None:
         draw_transfer(rows, asked.png)
     if asked.markdown and asked.transfer:
         write_between(asked.markdown, "transfer", transfer_markdown(rows))
+    elif asked.markdown and asked.delays:
+        write_between(asked.markdown, "delays", delays_markdown(rows))
     elif asked.markdown:
         write_between(asked.markdown, "known scenes", as_markdown(rows))
 

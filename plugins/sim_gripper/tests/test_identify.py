@@ -7,8 +7,9 @@ import tomllib
 import numpy as np
 import pytest
 from attrs import evolve
+from squeezes import DEPTH_M, WIDTH_M, recorded
 
-from graspsense.plugin_api import ConfigError, RecordedSqueeze, Trace
+from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.contact import PadCompliance
 from graspsense_sim_gripper.identify.choose import choose
@@ -18,41 +19,10 @@ from graspsense_sim_gripper.identify.fracture import fracture_of
 from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import prepared
 from graspsense_sim_gripper.identify.refuse import shows_memory
-from graspsense_sim_gripper.identify.run import _ready, _used
+from graspsense_sim_gripper.identify.run import _fit_to_use, _used
 from graspsense_sim_gripper.objects.spec import parse_scene
 
 PADS = PadCompliance(15000.0, 0.0, 0.0, 1.0)
-WIDTH_M = 0.05
-DEPTH_M = 0.008
-
-
-def recorded(force_of=None, *, hold_s=1.0, speed_m_s=0.02, period_s=0.0) -> RecordedSqueeze:
-    """Return a squeeze at constant speed with a hold, whose force is `force_of(closure)`."""
-    load_s = DEPTH_M / speed_m_s
-    t = np.arange(0.0, 0.3 + load_s + hold_s, 0.002)
-    gap = WIDTH_M + 0.3 * speed_m_s - speed_m_s * np.minimum(t, 0.3 + load_s)
-    force = (force_of or (lambda closure: 1000.0 * closure))(np.maximum(WIDTH_M - gap, 0.0))
-    images = np.arange(0.001, t[-1], period_s) if period_s else np.empty(0)
-    if period_s:
-        force = force[np.searchsorted(t, images)][np.maximum(np.searchsorted(images, t, side="right") - 1, 0)]
-    nothing = np.full(len(t), np.nan)
-    trace = Trace(
-        t_s=t,
-        gap_m=gap,
-        velocity_m_s=nothing,
-        effort_n=nothing,
-        force_left_n=force,
-        force_right_n=force,
-        edge_left_n=nothing,
-        edge_right_n=nothing,
-        status=np.zeros(len(t), np.int64),
-        phase=np.zeros(len(t), np.int64),
-        command=nothing,
-        pad_t_s=images,
-        pad_left=np.empty((len(images), 0)),
-        pad_right=np.empty((len(images), 0)),
-    )
-    return RecordedSqueeze(name="one", sha256="0" * 64, trace=trace)
 
 
 def scale_of(squeeze) -> DataScale:
@@ -130,13 +100,13 @@ def test_recordings_without_contact_are_left_out_with_a_note_unless_all_are():
     empty = evolve(recorded(lambda closure: 0.0 * closure), name="empty")
     notes = []
 
-    kept, ready = _ready(SimConfig(), [recorded(), empty, recorded()], notes)
+    kept, ready = _fit_to_use(SimConfig(), [recorded(), empty, recorded()], notes)
 
     assert [one.name for one in kept] == ["one", "one"]
     assert len(ready) == 2
     assert notes == ["left out: empty: no force exceeds the noise: nothing was touched"]
     with pytest.raises(ConfigError, match="nothing was touched"):
-        _ready(SimConfig(), [empty], [])
+        _fit_to_use(SimConfig(), [empty], [])
 
 
 def test_a_ramp_at_one_speed_shows_no_memory_and_a_hold_does():

@@ -274,3 +274,8 @@ class SimConfig:
     def has_forced_steps(self) -> bool:
         """Whether the settings prescribe the scheme or the length of the steps."""
         return self.scheme != "auto" or self.step_s is not None
+
+    @property
+    def force_delay_s(self) -> float:
+        """Time between the measurement of a force and its arrival: that of the pads, and none with the ideal sensor."""
+        return float(self.pad_delay_s) if self.sensor == "pads" else 0.0

@@ -44,7 +44,7 @@ def with_fingertips_of_block(
     `share` is the part of the force that the cells measure, for each squeeze. Raises ConfigError if a squeeze has no
     contact or too few measurements of the force.
     """
-    ready = [prepared(one, config.pad_delay_s) for one in block]
+    ready = [prepared(one, config.force_delay_s) for one in block]
     ready = [evolve(one, force_n=one.force_n / part) for one, part in zip(ready, share, strict=True)]
     linear = _fitted(ready, hardens=False)
     fit = _fitted(ready, hardens=True)

@@ -15,7 +15,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import CandidateScore
-from graspsense_sim_gripper.identify.fit import Fitted, Mask, fit, held_out_rms
+from graspsense_sim_gripper.identify.fit import LEAST_ERROR, Fitted, Mask, fit, held_out_rms
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import Squeeze
@@ -32,8 +32,6 @@ MANY: Final = 4
 """Candidates that are usually refined and judged, for the progress."""
 WORTH_TRYING: Final = 3.0
 """A candidate whose fit is worse than the best by this factor is not judged by held-out data."""
-LEAST_ERROR: Final = 1e-3
-"""Errors below this share of the peak are those of the path's nodes: they tell no candidates apart."""
 LEAST_GAIN: Final = 0.03
 """A term more has to reduce the error on held-out data by at least this share."""
 
@@ -43,6 +41,8 @@ class Choice:
     """The chosen fit, and the scores of all candidates."""
 
     fitted: Fitted
+    refined: tuple[Fitted, ...]
+    """The candidates whose direct fit was near the best, chosen or not."""
     scores: tuple[CandidateScore, ...]
 
 
@@ -96,8 +96,8 @@ def choose(
     worth = [one for one in fits if one.rms <= WORTH_TRYING * least and not _adds_nothing(one, fits)]
     judged = in_threads(lambda one: _judged(model, one, squeezes), worth, counter.done)
     best = _simplest(judged)
-    refined = {one.candidate.name for one in fits}
-    only_directly = [one for one in directly if one.candidate.name not in refined]
+    names = {one.candidate.name for one in fits}
+    only_directly = [one for one in directly if one.candidate.name not in names]
     only_directly += [one for k, one in enumerate(rough) if k not in kept]
     scores = [_score(one, best, judged, fits) for one in fits]
     dropped = [
@@ -110,7 +110,8 @@ def choose(
         )
         for one in only_directly
     ]
-    return Choice(fitted=best.fitted, scores=(*sorted(scores, key=_rank), *sorted(dropped, key=_rank)))
+    ranked = (*sorted(scores, key=_rank), *sorted(dropped, key=_rank))
+    return Choice(fitted=best.fitted, refined=tuple(fits), scores=ranked)
 
 
 def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
@@ -119,12 +120,11 @@ def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:
     A parameter more has to reduce the residual by more than it would reduce that of noise (Bayesian information
     criterion, Schwarz 1978), and by `LEAST_GAIN` where the terms of the simpler candidate are among those of this one.
     """
-    n = len(fitted.residuals)
     for one in fits:
         more = len(fitted.values) - len(one.values)
-        if more > 0 and n * math.log(_error(one) / _error(fitted)) < 0.5 * more * math.log(n):
+        if more > 0 and information(one) < information(fitted):
             return True
-        if _contains(fitted, one) and _error(fitted) > (1.0 - LEAST_GAIN) * _error(one):
+        if _contains(fitted, one) and least_error(fitted) > (1.0 - LEAST_GAIN) * least_error(one):
             return True
     return False
 
@@ -134,7 +134,13 @@ def _contains(fitted: Fitted, simpler: Fitted) -> bool:
     return fewer < free
 
 
-def _error(fitted: Fitted) -> float:
+def information(fitted: Fitted) -> float:
+    """Return half of the Bayesian information criterion, less a constant: smaller is better."""
+    n = len(fitted.residuals)
+    return n * math.log(least_error(fitted)) + 0.5 * fitted.parameters * math.log(n)
+
+
+def least_error(fitted: Fitted) -> float:
     """Return the rms residual, in which those below `LEAST_ERROR` hardly differ."""
     return math.hypot(fitted.rms, LEAST_ERROR)
 
@@ -190,6 +196,8 @@ def _judged(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) ->
 
 def fit_residuals(model: ForwardModel, fitted: Fitted, squeeze: Squeeze) -> NDArray[np.float64]:
     """Return the residuals of a fit to one squeeze at all of its samples, relative to the peak."""
+    if fitted.lag_s != 0.0:
+        squeeze = squeeze.delayed(fitted.lag_s)
     forces = model.forces(squeeze, fitted.candidate, fitted.values, fitted.widths_m[0], fitted.factors[0])
     return (forces - squeeze.force_n) / squeeze.peak_n
 

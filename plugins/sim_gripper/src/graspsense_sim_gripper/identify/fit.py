@@ -5,7 +5,8 @@ stiffness, since instances and placements differ: these are the spreads of a sce
 of their squeeze, so that every squeeze has the same weight.
 
 The Jacobian is computed by differences of the logarithms. A width or a factor acts on its own squeeze only, so one
-evaluation of all squeezes gives the derivatives with respect to all widths.
+evaluation of all squeezes gives the derivatives with respect to all widths. The time by which the force lags behind the
+gap is common to all squeezes, where it is fitted.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 from graspsense_sim_gripper.identify.forward import ForwardModel, Runs
 from graspsense_sim_gripper.identify.laws import CandidateLaw
-from graspsense_sim_gripper.identify.prepare import Squeeze
+from graspsense_sim_gripper.identify.prepare import MAX_LAG_S, Squeeze
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -36,6 +37,15 @@ WIDTH_RANGE: Final = 0.7
 """The width may differ from the first estimate by this share of the compression."""
 NO_FORCE: Final = 10.0
 """Relative residual where a law gives no finite force."""
+LAG_UNIT_S: Final = 0.01
+"""Unit of the lag of the force in the vector of a fit."""
+LAG_STEP: Final = 0.1
+"""Difference of the lag in the Jacobian, in these units, to both sides: where a measurement passes the contact, the
+derivative jumps."""
+LAG_STARTS: Final = (0.0, 0.5, -0.5)
+"""Lags to start from, in these units."""
+LEAST_ERROR: Final = 1e-3
+"""Errors below this share of the peak are those of the path's nodes: they tell no candidates apart."""
 MAX_EVALUATIONS: Final = 40
 TOLERANCE: Final = 1e-6
 STARTS: Final = 3
@@ -55,14 +65,20 @@ class Fitted:
     cost: float
     residuals: Floats
     """Relative to the peak of each squeeze."""
-    jacobian: Floats
-    """Of these, with respect to the logarithms of the values, the widths over the compression, and the factors'
-    logarithms."""
+    lag_s: float = 0.0
+    """By how much the force lags behind the gap, beyond the times of the squeezes; 0 where it was not fitted."""
+    lag_error_s: float = math.nan
+    """Its standard deviation, by the linearised fit."""
 
     @property
     def rms(self) -> float:
         """The rms residual over the peak."""
         return float(np.sqrt(np.mean(self.residuals**2)))
+
+    @property
+    def parameters(self) -> int:
+        """The number of its free parameters, the lag included."""
+        return len(self.values) + int(math.isfinite(self.lag_error_s))
 
     def at_bound(self, i: int) -> bool:
         """Whether a value is at an end of its range."""
@@ -74,9 +90,16 @@ class _Problem:
     """The residuals and their Jacobian as functions of one vector."""
 
     def __init__(
-        self, model: ForwardModel, candidate: CandidateLaw, squeezes: Sequence[Squeeze], masks: Sequence[Mask]
+        self,
+        model: ForwardModel,
+        candidate: CandidateLaw,
+        squeezes: Sequence[Squeeze],
+        masks: Sequence[Mask],
+        *,
+        has_lag: bool,
     ) -> None:
         self.model, self.candidate, self.squeezes = model, candidate, squeezes
+        self.has_lag = has_lag
         self.p, self.n = len(candidate.free), len(squeezes)
         self.has_factors = self.n > 1
         self.paths = model.paths(squeezes)
@@ -97,24 +120,34 @@ class _Problem:
         high = [math.log(one.high) for one in self.candidate.free]
         wide = [WIDTH_RANGE] * self.n
         factors = [FACTOR_RANGE] * (self.n if self.has_factors else 0)
+        lag = [MAX_LAG_S / LAG_UNIT_S] if self.has_lag else []
         return (
-            np.array([*low, *(-one for one in (*wide, *factors))]),
-            np.array([*high, *wide, *factors]),
+            np.array([*low, *(-one for one in (*wide, *factors, *lag))]),
+            np.array([*high, *wide, *factors, *lag]),
         )
 
     def split(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the values, widths and factors of a vector, or of each row of a table."""
         p, n = self.p, self.n
         widths = self.first_widths + x[..., p : p + n] * self.depths
-        factors = np.exp(x[..., p + n :]) if self.has_factors else np.ones_like(widths)
+        factors = np.exp(x[..., p + n : p + 2 * n]) if self.has_factors else np.ones_like(widths)
         return np.exp(x[..., :p]), widths, factors
+
+    def lags_s(self, x: Floats) -> Floats:
+        """Return the lag of a vector, or of each row of a table."""
+        lags: Floats = LAG_UNIT_S * x[..., -1] if self.has_lag else np.zeros(x.shape[:-1])
+        return lags
 
     def of_all(self, xs: Floats) -> Floats:
         """Return the residuals of each row of a table of vectors, without those that hold the factors."""
         values, widths, factors = self.split(xs)
         numbers = self.candidate.numbers(np.repeat(values, self.n, axis=0), factors.ravel())
-        path = np.tile(np.arange(self.n), len(xs))
-        forces = self.model.run(self.paths, Runs(path, widths.ravel(), numbers, self.candidate.active))
+        lags, which = np.unique(self.lags_s(xs), return_inverse=True)
+        paths = self.paths
+        if self.has_lag:
+            paths = self.model.paths([one.delayed(lag) for lag in lags.tolist() for one in self.squeezes])
+        path = (self.n * which.reshape(-1, 1) + np.arange(self.n)).ravel()
+        forces = self.model.run(paths, Runs(path, widths.ravel(), numbers, self.candidate.active))
         by_vector = forces.reshape(len(xs), self.n, -1)
         out: Floats = (by_vector[:, self.of_squeeze, self.at_node] - self.measured) / self.peaks
         np.nan_to_num(out, copy=False, nan=NO_FORCE, posinf=NO_FORCE, neginf=-NO_FORCE)
@@ -123,7 +156,8 @@ class _Problem:
     def residuals(self, x: Floats) -> Floats:
         if self._last is None or not np.array_equal(self._last[0], x):
             self._last = x.copy(), self.of_all(x[np.newaxis])[0]
-        held = FACTOR_WEIGHT * math.sqrt(self.size / self.n) * x[self.p + self.n :]
+        factors = x[self.p + self.n : self.p + 2 * self.n] if self.has_factors else x[:0]
+        held = FACTOR_WEIGHT * math.sqrt(self.size / self.n) * factors
         return np.concatenate([self._last[1], held])
 
     def jacobian(self, x: Floats) -> Floats:
@@ -131,8 +165,10 @@ class _Problem:
         blocks = [(self.p, WIDTH_STEP_SHARE)]
         if self.has_factors:
             blocks.append((self.p + self.n, STEP))
-        moved = np.tile(x, (self.p + len(blocks), 1))
+        moved = np.tile(x, (self.p + len(blocks) + 2 * self.has_lag, 1))
         moved[range(self.p), range(self.p)] += STEP
+        if self.has_lag:
+            moved[-2:, -1] += (-LAG_STEP, LAG_STEP)
         for row, (first, step) in enumerate(blocks, self.p):
             moved[row, first : first + self.n] += step
         there = self.of_all(moved)
@@ -143,6 +179,8 @@ class _Problem:
         if self.has_factors:
             own = np.arange(self.n)
             out[self.size + own, self.p + self.n + own] = FACTOR_WEIGHT * math.sqrt(self.size / self.n)
+        if self.has_lag:
+            out[: self.size, -1] = (there[-1] - there[-2]) / (2.0 * LAG_STEP)
         return out
 
 
@@ -157,14 +195,18 @@ def fit(
     squeezes: Sequence[Squeeze],
     masks: Sequence[Mask] | None = None,
     start: Fitted | None = None,
+    *,
+    has_lag: bool = False,
 ) -> Fitted:
     """Return the best fit of a candidate to these squeezes, from the best of its starts, or from another fit.
 
-    `masks`: the samples that count. `start`: a fit of the same candidate to the same squeezes.
+    `masks`: the samples that count. `start`: a fit of the same candidate to the same squeezes. `has_lag`: whether the
+    lag of the force is fitted, too.
     """
     from scipy.optimize import least_squares
 
-    problem = _Problem(model, candidate, squeezes, whole(squeezes) if masks is None else masks)
+    used = whole(squeezes) if masks is None else masks
+    problem = _Problem(model, candidate, squeezes, used, has_lag=has_lag)
     low, high = problem.bounds()
     best = None
     for x0 in _starts(problem, start):
@@ -190,8 +232,19 @@ def fit(
         factors=tuple(factors.tolist()),
         cost=float(best.cost),
         residuals=best.fun[: problem.size],
-        jacobian=np.asarray(best.jac)[: problem.size],
+        lag_s=float(problem.lags_s(best.x)),
+        lag_error_s=_lag_error_s(np.asarray(best.jac), best.fun[: problem.size]) if has_lag else math.nan,
     )
+
+
+def _lag_error_s(jacobian: Floats, residuals: Floats) -> float:
+    """Return the standard deviation of the lag: that of the residuals over what only a lag does to the forces."""
+    others, lag = jacobian[:, :-1], jacobian[:, -1]
+    scale = np.maximum(np.linalg.norm(others, axis=0), 1e-12)
+    mimicked, *_ = np.linalg.lstsq(others / scale, lag, rcond=1e-9)
+    alone = float(np.linalg.norm(lag - others / scale @ mimicked))
+    error = math.hypot(float(np.sqrt(np.mean(residuals**2))), LEAST_ERROR)
+    return LAG_UNIT_S * error / max(alone, 1e-12)
 
 
 def held_out_rms(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, width_m: float) -> float:
@@ -216,6 +269,7 @@ def _starts(problem: _Problem, start: Fitted | None) -> list[Floats]:
     """Return the vectors to start from: that of another fit, or the best of the candidate's own."""
     n = problem.n
     factors = np.zeros(n if problem.has_factors else 0)
+    lag = np.zeros(int(problem.has_lag))
     if start is not None:
         shares = [
             (width - one.width_m) / one.depth_m
@@ -223,8 +277,12 @@ def _starts(problem: _Problem, start: Fitted | None) -> list[Floats]:
         ]
         if problem.has_factors:
             factors = np.log(start.factors)
-        return [np.concatenate([np.log(start.values), shares, factors])]
-    vectors = [np.concatenate([np.log(one), np.zeros(n), factors]) for one in problem.candidate.starts()]
+        known = np.concatenate([np.log(start.values), shares, factors])
+        if not problem.has_lag:
+            return [known]
+        lags = LAG_STARTS if start.lag_s == 0.0 else (start.lag_s / LAG_UNIT_S,)
+        return [np.append(known, one) for one in lags]
+    vectors = [np.concatenate([np.log(one), np.zeros(n), factors, lag]) for one in problem.candidate.starts()]
     if len(vectors) <= STARTS:
         return vectors
     costs = np.sum(problem.of_all(np.array(vectors)) ** 2, axis=1)

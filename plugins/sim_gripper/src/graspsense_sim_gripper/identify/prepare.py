@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import ConfigError, RecordedSqueeze, Trace
@@ -49,6 +49,8 @@ RECOIL_SHARE: Final = 0.12
 intact object loses less than `BREAK_SHARE` of its force there."""
 MIN_SAMPLES: Final = 8
 """Fewer samples in contact determine nothing."""
+MAX_LAG_S: Final = 0.1
+"""The force lags behind the gap by at most this time more than the settings say, or precedes it by as much."""
 
 
 class Stretches(NamedTuple):
@@ -92,6 +94,13 @@ class Squeeze:
     """The share of the force that the pads measure."""
     broken_n: float | None = None
     """The force at the last node, right after the object broke, where the squeeze is cut; None if it did not break."""
+    course: tuple[Floats, Floats]
+    """Times and gaps of the recording from `MAX_LAG_S` before the first node on."""
+
+    def delayed(self, lag_s: float) -> Squeeze:
+        """Return the squeeze if its force lagged behind the gap by so much: at every node, the gap of that time."""
+        gap = np.interp(self.t_s - lag_s, *self.course)
+        return evolve(self, gap_m=gap, speed_m_s=-np.gradient(gap, self.t_s))
 
     @cached_property
     def measured_path(self) -> tuple[Floats, Floats]:
@@ -130,13 +139,18 @@ class NoSqueeze(ConfigError):
     """A recording in which nothing, or too little, was squeezed."""
 
 
-def prepared(squeeze: RecordedSqueeze, delay_s: float, parts: Resolution = FULL) -> Squeeze:
-    """Return the squeeze of a recording; `delay_s`: from the time of an image until it arrives.
+def prepared(
+    squeeze: RecordedSqueeze, delay_s: float, parts: Resolution = FULL, lag_s: float = 0.0
+) -> Squeeze:
+    """Return the squeeze of a recording.
+
+    `delay_s`: by how much a force without a time of its own lags behind the gap, by the settings of the sensor. The
+    times of images contain this delay. `lag_s`: by how much every force lags beyond that.
 
     Raises ConfigError if it has no gap, no force, no contact, or too few samples in contact.
     """
     trace = squeeze.trace
-    times, forces = _samples(squeeze.name, trace, delay_s)
+    times, forces = _samples(squeeze.name, trace, delay_s, lag_s)
     peak = float(np.max(forces))
     first = int(np.argmax(forces > CONTACT_SHARE * peak))
     noise = float(np.std(forces[: max(first - 2, 0)])) if first > 6 else 0.0
@@ -155,11 +169,12 @@ def prepared(squeeze: RecordedSqueeze, delay_s: float, parts: Resolution = FULL)
     window = (times >= begin) & (np.arange(len(times)) <= last)
     after = times[:0] if broken is None else times[broken : broken + 1]
     broken_n = None if broken is None else float(forces[broken])
-    course = _course(trace, np.append(times[window], after))
-    times, forces = _in_blocks(times[window], forces[window], course, parts.samples)
-    nodes, sample = _nodes(np.append(times, after), course, parts.nodes)
+    progress = _progress(trace, np.append(times[window], after))
+    times, forces = _in_blocks(times[window], forces[window], progress, parts.samples)
+    nodes, sample = _nodes(np.append(times, after), progress, parts.nodes)
     sample = sample[: len(times)]
-    gap = _smooth_gap(trace, nodes)
+    course = _smooth_course(trace, nodes)
+    gap = np.interp(nodes, *course)
     width = float(np.interp(times[max(int(np.argmax(forces > threshold)) - 1, 0)], nodes, gap))
     return Squeeze(
         name=squeeze.name,
@@ -172,13 +187,14 @@ def prepared(squeeze: RecordedSqueeze, delay_s: float, parts: Resolution = FULL)
         sample=sample,
         force_n=forces,
         broken_n=broken_n,
+        course=course,
         width_m=width,
         noise_n=noise,
         stretches=_stretches(nodes, gap, width, has_approach=first > 1),
     )
 
 
-def _samples(name: str, trace: Trace, delay_s: float) -> tuple[Floats, Floats]:
+def _samples(name: str, trace: Trace, delay_s: float, lag_s: float) -> tuple[Floats, Floats]:
     """Return the times at which the force was measured, and the mean force of the pads. Raises ConfigError."""
     sides = [side for side in (trace.force_left_n, trace.force_right_n) if np.isfinite(side).any()]
     if not sides or not np.isfinite(trace.gap_m).any():
@@ -188,21 +204,22 @@ def _samples(name: str, trace: Trace, delay_s: float) -> tuple[Floats, Floats]:
     changed = np.flatnonzero(np.any([np.diff(side, prepend=np.nan) != 0.0 for side in sides], axis=0))
     images = trace.pad_t_s
     if len(images) > MIN_SAMPLES and len(changed) <= 1.3 * len(images) + 2:
-        at = np.searchsorted(times, images + delay_s - 1e-9)
-        known = at < len(times)
-        times, force = images[known], force[at[known]]
+        # Whatever its delay, an image has arrived when the next one is taken. The last one may still be on its way.
+        images = images[images + delay_s <= times[-1] + 1e-9]
+        shown = np.append(np.searchsorted(times, images[1:] - 1e-9), len(times)) - 1
+        times, force, delay_s = images[shown >= 0], force[shown[shown >= 0]], 0.0
     elif len(changed) > MIN_SAMPLES and np.median(np.diff(changed)) > 1.5:
         # A force of a lower rate than the ticks, repeated between its samples. In a hold it may not change for long.
         times, force = times[changed], force[changed]
     finite = np.isfinite(force) & np.isfinite(times)
-    return times[finite], force[finite]
+    return times[finite] - delay_s - lag_s, force[finite]
 
 
-def _course(trace: Trace, times: Floats) -> tuple[Floats, Floats]:
+def _progress(trace: Trace, times: Floats) -> tuple[Floats, Floats]:
     """Return times of a squeeze, and a measure from 0 to 1 that rises by half with the time and by half with the way of
     the fingers: nodes at equal distances in it are dense where the force changes, and follow a long hold too."""
     t = np.linspace(times[0], times[-1], MAX_NODES)
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(_smooth_gap(trace, t))))])
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(np.interp(t, *_smooth_course(trace, t)))))])
     return t, 0.5 * (t - t[0]) / (t[-1] - t[0]) + 0.5 * way / max(float(way[-1]), 1e-12)
 
 
@@ -237,30 +254,30 @@ def _end(trace: Trace, times: Floats, forces: Floats, first: int, last: int) -> 
 
 
 def _in_blocks(
-    times: Floats, values: Floats, course: tuple[Floats, Floats], samples: int
+    times: Floats, values: Floats, progress: tuple[Floats, Floats], samples: int
 ) -> tuple[Floats, Floats]:
-    """Return at most this number of means of neighbouring samples, which are evenly spaced along the course."""
+    """Return at most this number of means of neighbouring samples, which are evenly spaced in the progress."""
     if len(times) <= samples:
         return times, values
-    block = np.minimum(np.interp(times, *course) * samples, samples - 1).astype(np.int64)
+    block = np.minimum(np.interp(times, *progress) * samples, samples - 1).astype(np.int64)
     edges = np.flatnonzero(np.diff(block, prepend=-1))
     counts = np.diff(edges, append=len(times))
     return np.add.reduceat(times, edges) / counts, np.add.reduceat(values, edges) / counts
 
 
-def _nodes(times: Floats, course: tuple[Floats, Floats], nodes: int) -> tuple[Floats, NDArray[np.int64]]:
+def _nodes(times: Floats, progress: tuple[Floats, Floats], nodes: int) -> tuple[Floats, NDArray[np.int64]]:
     """Return the nodes of a path, and which of them are the times of the samples.
 
     Between two samples they are evenly spaced, so that no step is much shorter than those beside it.
     """
-    pieces = np.ceil(np.diff(np.interp(times, *course)) * nodes).astype(np.int64)
+    pieces = np.ceil(np.diff(np.interp(times, *progress)) * nodes).astype(np.int64)
     pieces = np.maximum(pieces, 1)
     sample = np.concatenate([[0], np.cumsum(pieces)])
     return np.interp(np.arange(sample[-1] + 1), sample, times), sample
 
 
-def _smooth_gap(trace: Trace, nodes: Floats) -> Floats:
-    """Return the gap at the nodes, averaged over the ticks between them."""
+def _smooth_course(trace: Trace, nodes: Floats) -> tuple[Floats, Floats]:
+    """Return times and gaps around these nodes, averaged over the ticks between two nodes."""
     known = np.isfinite(trace.gap_m)
     times, gap = trace.t_s[known], trace.gap_m[known]
     per_node = (nodes[-1] - nodes[0]) / MAX_NODES / max(float(np.median(np.diff(times))), 1e-9)
@@ -268,7 +285,11 @@ def _smooth_gap(trace: Trace, nodes: Floats) -> Floats:
     if width > 1:
         padded = np.pad(gap, width // 2, mode="edge")
         gap = np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
-    return np.interp(nodes, times, gap)
+    part = slice(
+        max(int(np.searchsorted(times, nodes[0] - MAX_LAG_S)) - 1, 0),
+        int(np.searchsorted(times, nodes[-1] + MAX_LAG_S)) + 2,
+    )
+    return times[part], gap[part]
 
 
 def _stretches(t_s: Floats, gap: Floats, width: float, *, has_approach: bool) -> Stretches:

@@ -23,12 +23,13 @@ from graspsense_sim_gripper.dynamics.drive import Drive
 from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.identify.block import with_fingertips_of_block
 from graspsense_sim_gripper.identify.check import predictive_checks
-from graspsense_sim_gripper.identify.choose import choose
+from graspsense_sim_gripper.identify.choose import Choice, choose
+from graspsense_sim_gripper.identify.delay import delay_of, lag_beyond_settings
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.fracture import fracture_of
 from graspsense_sim_gripper.identify.interval import student
-from graspsense_sim_gripper.identify.laws import DataScale
+from graspsense_sim_gripper.identify.laws import DataScale, memories
 from graspsense_sim_gripper.identify.prepare import NoSqueeze, Squeeze, prepared, resolution
 from graspsense_sim_gripper.identify.refuse import shows_memory, undetermined
 from graspsense_sim_gripper.identify.share import measured_share
@@ -73,22 +74,22 @@ def identify(
     drive, pads = drive_and_pads(config)
     model = ForwardModel(pads=pads)
     model.compile()
-    squeezes, ready = _ready(config, _used(squeezes, notes), notes)
     cells = _has_cells(config, squeezes)
-    shares = _measured_shares(squeezes, ready, drive) if cells else [1.0] * len(ready)
-    share = _share(shares) if cells else 1.0
-    ready = [_with_share(one, share) for one in ready]
-    choice = choose(
-        model,
-        ready,
-        _scale(ready),
-        has_memory=shows_memory(ready),
-        progress=lambda done, total: progress("fitting candidates", done, total),
-    )
+    squeezes, ready, shares, share = _ready(config, _used(squeezes, notes), notes, cells=cells)
+    choice = _chosen(model, ready, progress)
+    lag = lag_beyond_settings(model, choice.refined, ready)
+    if lag.lag_s != 0.0:
+        squeezes, ready, shares, share = _ready(config, squeezes, [], cells=cells, lag_s=lag.lag_s)
+        choice = _chosen(model, ready, progress)
     progress("computing intervals", 0, 1)
-    found = uncertainty(model, choice.fitted, ready, _scale_error(config, drive, ready) if cells else 0.0)
-    open_ = undetermined(choice.fitted, found, ready, shares, cells)
+    damper = memories(_scale(ready))[0]
+    delay = delay_of(model, choice.fitted, damper, ready, config.force_delay_s, lag)
+    scale_error = _scale_error(config, drive, ready) if cells else 0.0
+    found = uncertainty(model, choice.fitted, ready, scale_error, lag.error_s)
+    open_ = [*delay.undetermined, *undetermined(choice.fitted, found, ready, shares, cells)]
     values, parameters = _values(choice.fitted, found, share, shares, cells)
+    if delay.found is not None:
+        parameters.append(delay.found)
     fracture = fracture_of(model, choice.fitted, ready)
     if fracture is not None:
         open_, parameters = [*open_, *fracture.undetermined], [*parameters, *fracture.parameters]
@@ -99,6 +100,7 @@ def identify(
         parameters=parameters,
         values=values,
         gripper=_fingertips(config),
+        delay=delay,
         squeezes=ready,
         candidates=choice.scores,
         undetermined=open_,
@@ -118,17 +120,47 @@ def identify(
     )
 
 
-def _ready(
-    config: SimConfig, squeezes: Sequence[RecordedSqueeze], notes: list[str]
-) -> tuple[list[RecordedSqueeze], list[Squeeze]]:
-    """Return the squeezes that can be fitted, as recorded and prepared; a note names each other one.
+def _chosen(model: ForwardModel, squeezes: Sequence[Squeeze], progress: Progress) -> Choice:
+    return choose(
+        model,
+        squeezes,
+        _scale(squeezes),
+        has_memory=shows_memory(squeezes),
+        progress=lambda done, total: progress("fitting candidates", done, total),
+    )
 
-    Raises NoSqueeze if there is none.
+
+def _ready(
+    config: SimConfig,
+    squeezes: Sequence[RecordedSqueeze],
+    notes: list[str],
+    *,
+    cells: bool,
+    lag_s: float = 0.0,
+) -> tuple[list[RecordedSqueeze], list[Squeeze], list[float], float]:
+    """Return the squeezes that can be fitted, as recorded and prepared, the share of the force that `cells` measure in
+    each, and the common share.
+
+    The forces of the prepared ones are whole. A note names each other squeeze. `lag_s`: by how much the force lags
+    beyond the delay of the settings. Raises NoSqueeze if there is none.
     """
+    kept, ready = _fit_to_use(config, squeezes, notes, lag_s)
+    if not cells:
+        return kept, ready, [1.0] * len(ready), 1.0
+    drive, _ = drive_and_pads(config)
+    shares = _measured_shares(kept, ready, drive)
+    share = _share(shares)
+    return kept, [_with_share(one, share) for one in ready], shares, share
+
+
+def _fit_to_use(
+    config: SimConfig, squeezes: Sequence[RecordedSqueeze], notes: list[str], lag_s: float = 0.0
+) -> tuple[list[RecordedSqueeze], list[Squeeze]]:
+    """Return the squeezes with contact and enough measurements, as recorded and prepared."""
     kept, ready, refusals = [], [], []
     for one in squeezes:
         try:
-            ready.append(prepared(one, config.pad_delay_s, resolution(len(squeezes))))
+            ready.append(prepared(one, config.force_delay_s, resolution(len(squeezes)), lag_s))
         except NoSqueeze as refusal:
             refusals.append(refusal)
         else:
@@ -144,7 +176,7 @@ def _shares(config: SimConfig, block: Sequence[RecordedSqueeze]) -> list[float]:
     if not _has_cells(config, block):
         return [1.0] * len(block)
     drive, _ = drive_and_pads(config)
-    ready = [prepared(one, config.pad_delay_s) for one in block]
+    ready = [prepared(one, config.force_delay_s) for one in block]
     return [_share(_measured_shares(block, ready, drive))] * len(block)
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import chain
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from attrs import evolve, frozen
@@ -62,32 +62,29 @@ def uncertainty(
     fitted: Fitted,
     squeezes: Sequence[Squeeze],
     force_scale: float = 0.0,
+    lag_error_s: float = 0.0,
     seed: int = 0,
 ) -> Uncertainty:
-    """Return the uncertainty of a fit. `force_scale`: standard deviation of the logarithm of the force's scale."""
+    """Return the uncertainty of a fit.
+
+    `force_scale`: standard deviation of the logarithm of the force's scale. `lag_error_s`: that of the lag of the force
+    (s), beyond what the squeezes show by their scatter; 0 if the lag was not identified.
+    """
     rng = np.random.default_rng(seed)
-    groups = _groups(squeezes)
     at = np.log(fitted.values)
-    if len(groups) < 2:
-        again = _bootstrapped(model, fitted, squeezes[0], rng)
-        covariance = np.cov(again, rowvar=False, ddof=1).reshape(len(at), len(at))
-        # The fit follows a part of the residuals' own errors, with as many directions as it has parameters.
-        degrees = max(BLOCKS - len(at) - 1, 1)
-        covariance = covariance * BLOCKS / degrees
-        centre, factor, basis = at, student(degrees), "within one squeeze; not between squeezes"
-    else:
-        kept = [[i for i in range(len(squeezes)) if i not in group] for group in groups]
-        refits = in_threads(lambda one: _refit(model, fitted, squeezes, one), kept)
-        table = np.log([one.values for one in refits])
-        g = len(groups)
-        deviations = table - table.mean(axis=0)
-        covariance = (g - 1) / g * deviations.T @ deviations
-        what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
-        centre, factor, basis = at, student(g - 1), f"between {g} {what if g == len(groups) else 'groups'}"
+    again = refits(model, fitted, squeezes, rng, has_lag=lag_error_s > 0.0)
+    table = np.log([one.values for one in again.fits])
+    deviations = table - table.mean(axis=0)
+    covariance = again.scale * deviations.T @ deviations
+    centre, factor, basis = at, again.factor, again.basis
     # An error of the scale of the force is common to all squeezes, so that none of them shows it.
     scaled = np.array([1.0 if one.is_force else 0.0 for one in fitted.candidate.free])
     own = force_scale**2 * np.outer(scaled, scaled) + PATH_ERROR**2 * np.eye(len(at))
     own += np.diag(_corner_errors(fitted, squeezes) ** 2)
+    if lag_error_s > 0.0:
+        later = fit(model, fitted.candidate, [one.delayed(lag_error_s) for one in squeezes], start=fitted)
+        shift = np.log(later.values) - at
+        own += np.outer(shift, shift)
     covariance = covariance + own * (normal() / factor) ** 2
     spread = np.sqrt(np.diag(covariance))
     low, high = np.exp(centre - factor * spread), np.exp(centre + factor * spread)
@@ -102,6 +99,41 @@ def uncertainty(
         draws=draws,
         **_spreads(fitted, squeezes),
     )
+
+
+class Refits(NamedTuple):
+    """Fits to parts of the data, or to data drawn again, and how their scatter gives an interval."""
+
+    fits: Sequence[Fitted]
+    scale: float
+    """The variance of the fit over the sum of their squared deviations."""
+    factor: float
+    """Half the width of the interval, in standard deviations."""
+    basis: str
+
+
+def refits(
+    model: ForwardModel,
+    fitted: Fitted,
+    squeezes: Sequence[Squeeze],
+    rng: np.random.Generator,
+    *,
+    has_lag: bool,
+) -> Refits:
+    """Return the fits without each group of squeezes in turn, or to a single squeeze with residuals drawn again."""
+    groups = _groups(squeezes)
+    if len(groups) < 2:
+        # The fit follows a part of the residuals' own errors, with as many directions as it has parameters.
+        degrees = max(BLOCKS - len(fitted.values) - int(has_lag) - 1, 1)
+        fits = _bootstrapped(model, fitted, squeezes[0], rng, has_lag=has_lag)
+        scale = BLOCKS / degrees / (BOOTSTRAPS - 1)
+        return Refits(fits, scale, student(degrees), "within one squeeze; not between squeezes")
+    kept = [[i for i in range(len(squeezes)) if i not in group] for group in groups]
+    fits = in_threads(lambda one: _refit(model, fitted, squeezes, one, has_lag=has_lag), kept)
+    g = len(groups)
+    what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
+    basis = f"between {g} {what if g == len(groups) else 'groups'}"
+    return Refits(fits, (g - 1) / g, student(g - 1), basis)
 
 
 def _corner_errors(fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
@@ -141,14 +173,16 @@ def _groups(squeezes: Sequence[Squeeze]) -> list[list[int]]:
     return groups
 
 
-def _refit(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], kept: Sequence[int]) -> Fitted:
+def _refit(
+    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], kept: Sequence[int], *, has_lag: bool
+) -> Fitted:
     """Return the fit without some squeezes, whose stiffness is that of the mean of the others."""
     start = evolve(
         fitted,
         widths_m=tuple(fitted.widths_m[i] for i in kept),
         factors=tuple(fitted.factors[i] for i in kept),
     )
-    return fit(model, fitted.candidate, [squeezes[i] for i in kept], start=start)
+    return fit(model, fitted.candidate, [squeezes[i] for i in kept], start=start, has_lag=has_lag)
 
 
 def _bootstrapped(
@@ -156,8 +190,10 @@ def _bootstrapped(
     fitted: Fitted,
     squeeze: Squeeze,
     rng: np.random.Generator,
-) -> Floats:
-    """Return the logarithms of the values of refits to the fitted force with blocks of residuals drawn again."""
+    *,
+    has_lag: bool,
+) -> list[Fitted]:
+    """Return refits to the fitted force with blocks of residuals drawn again."""
     residuals = fit_residuals(model, fitted, squeeze) * squeeze.peak_n
     clean = squeeze.force_n + residuals
     length = max(len(residuals) // BLOCKS, 1)
@@ -166,8 +202,9 @@ def _bootstrapped(
         starts = rng.integers(0, max(len(residuals) - length, 1), size=-(-len(residuals) // length))
         drawn = np.concatenate([residuals[s : s + length] for s in starts])[: len(residuals)]
         drawn_again.append(evolve(squeeze, force_n=clean - drawn * rng.choice((-1.0, 1.0))))
-    refits = in_threads(lambda one: fit(model, fitted.candidate, [one], start=fitted), drawn_again)
-    return np.log([one.values for one in refits])
+    return in_threads(
+        lambda one: fit(model, fitted.candidate, [one], start=fitted, has_lag=has_lag), drawn_again
+    )
 
 
 def _spreads(fitted: Fitted, squeezes: Sequence[Squeeze]) -> dict[str, float]:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from attrs import frozen
 
 from graspsense.plugin_api import CandidateScore, IdentifiedParameter, Undetermined
+from graspsense_sim_gripper.identify.delay import Delay
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.fracture import FractureFit
 from graspsense_sim_gripper.identify.laws import SLOTS
@@ -26,6 +27,7 @@ class SceneFacts:
     """The keys of the object."""
     gripper: Mapping[str, float]
     """The settings of the fingertips."""
+    delay: Delay
     squeezes: Sequence[Squeeze]
     candidates: Sequence[CandidateScore]
     undetermined: Sequence[Undetermined]
@@ -72,6 +74,9 @@ def _identified(facts: SceneFacts) -> list[str]:
         "",
         "[identified.gripper]",
         *(f"{key} = {_number(value)}" for key, value in facts.gripper.items()),
+        "",
+        "[identified.sensor]",
+        f"delay_s = {_number(facts.delay.used_s)}  # that of the settings: {_number(facts.delay.settings_s)}",
         "",
         "[identified.intervals]",
         *(

@@ -25,6 +25,7 @@ def _is_text(value: Any) -> bool:
 
 _TABLES: Final[Mapping[str, tuple[Callable[[Any], bool], str]]] = {
     "gripper": (_is_number, "a number"),
+    "sensor": (_is_number, "a number"),
     "intervals": (_is_interval, "two numbers"),
     "recordings": (_is_text, "the hash of a recording"),
     "candidates": (_is_number, "a number"),

@@ -1,0 +1,40 @@
+"""Recordings of squeezes whose forces are known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from graspsense.core.identification import RecordedSqueeze
+from graspsense.core.trace import Trace
+
+WIDTH_M = 0.05
+DEPTH_M = 0.008
+
+
+def recorded(force_of=None, *, hold_s=1.0, speed_m_s=0.02, period_s=0.0) -> RecordedSqueeze:
+    """Return a squeeze at constant speed with a hold, whose force is `force_of(closure)`."""
+    load_s = DEPTH_M / speed_m_s
+    t = np.arange(0.0, 0.3 + load_s + hold_s, 0.002)
+    gap = WIDTH_M + 0.3 * speed_m_s - speed_m_s * np.minimum(t, 0.3 + load_s)
+    force = (force_of or (lambda closure: 1000.0 * closure))(np.maximum(WIDTH_M - gap, 0.0))
+    images = np.arange(0.001, t[-1], period_s) if period_s else np.empty(0)
+    if period_s:
+        force = force[np.searchsorted(t, images)][np.maximum(np.searchsorted(images, t, side="right") - 1, 0)]
+    nothing = np.full(len(t), np.nan)
+    trace = Trace(
+        t_s=t,
+        gap_m=gap,
+        velocity_m_s=nothing,
+        effort_n=nothing,
+        force_left_n=force,
+        force_right_n=force,
+        edge_left_n=nothing,
+        edge_right_n=nothing,
+        status=np.zeros(len(t), np.int64),
+        phase=np.zeros(len(t), np.int64),
+        command=nothing,
+        pad_t_s=images,
+        pad_left=np.empty((len(images), 0)),
+        pad_right=np.empty((len(images), 0)),
+    )
+    return RecordedSqueeze(name="one", sha256="0" * 64, trace=trace)
