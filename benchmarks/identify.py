@@ -45,8 +45,10 @@ from graspsense.core.identification import Identification, RecordedSqueeze
 from graspsense.evaluation.intervals import wilson
 from graspsense.plugin_api import RunConfig, create, table_of
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.identify.gas import combinations
 from graspsense_sim_gripper.identify.laws import SLOTS
 from graspsense_sim_gripper.identify.run import identify
+from graspsense_sim_gripper.terms.gas import Gas
 
 WIDTH_M: Final = 0.05
 AT_M: Final = 0.01
@@ -90,6 +92,19 @@ SCENES: Final[Mapping[str, tuple[Mapping[str, Any], ...]]] = {
         {"type": "loss", "damping_n_s_m": 40.0},
     ),
 }
+AIR: Final = {"pressure_pa": 101325.0, "exponent": 1.0, "bulge_m3_pa": 0.0, "area_slope_m": 0.0}
+SCENES_WITH_GAS: Final[Mapping[str, tuple[Mapping[str, Any], ...]]] = {
+    "closed gas": (
+        {"type": "elastic", "k1_n_m": 500.0},
+        {"type": "gas", "area_m2": 2e-4, "volume_m3": 2.4e-6, **AIR},
+    ),
+    "vented gas": (
+        {"type": "elastic", "k1_n_m": 1300.0},
+        {"type": "gas", "area_m2": 1.2e-3, "volume_m3": 1e-4, "vent_m2": 7e-7, **AIR},
+    ),
+}
+ALL_SCENES: Final = {**SCENES, **SCENES_WITH_GAS}
+"""Of those with gas, the combinations of `graspsense_sim_gripper.identify.gas` come back, and not each number."""
 COUNTS: Final = (1, 3, 10)
 SENSORS: Final[Mapping[str, Mapping[str, Any]]] = {
     "ideal": {"sensor": "ideal"},
@@ -138,7 +153,7 @@ def drawn(terms: Sequence[Mapping[str, Any]], repeat: int) -> list[dict[str, Any
     rng = np.random.default_rng([repeat, len(terms)])
     return [
         {
-            key: value if key in ("type", "at_m") else value * math.exp(rng.uniform(-FACTOR, FACTOR))
+            key: value if key in ("type", "at_m", *AIR) else value * math.exp(rng.uniform(-FACTOR, FACTOR))
             for key, value in term.items()
         }
         for term in terms
@@ -208,6 +223,10 @@ def true_values(terms: Sequence[Mapping[str, Any]], identified: str) -> dict[str
     values = {}
     for term in terms:
         name = "maxwell 2" if term["type"] == "maxwell" and term is not branches[0] else term["type"]
+        if name == "gas":
+            numbers = {key: value for key, value in term.items() if key != "type"}
+            values |= {f"gas.{key}": value for key, value in combinations(Gas(**numbers)).items()}
+            continue
         for key, value in term.items():
             if key in ("type", "at_m"):
                 continue
@@ -222,15 +241,17 @@ def named(terms: Sequence[Mapping[str, Any]]) -> str:
     cubic = sum(one.get("k3_n_m3", 0.0) for one in terms)
     form = "softening" if cubic < 0.0 else "k1, k3" if cubic > 0.0 else "k1"
     kinds = sorted((one["type"] for one in terms), key=SLOTS.index)
-    return " + ".join(f"elastic ({form})" if kind == "elastic" else kind for kind in kinds)
+    vented = any(one.get("vent_m2") for one in terms)
+    words = {"elastic": f"elastic ({form})", "gas": "gas (vented)" if vented else "gas (closed)"}
+    return " + ".join(words.get(kind, kind) for kind in kinds)
 
 
 def measured(name: str, sensor: str, count: int, repeat: int, late_s: float = 0.0) -> Row:
     """Return the row of a scene."""
-    terms = drawn(SCENES[name], repeat)
+    terms = drawn(ALL_SCENES[name], repeat)
     text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0)
     # Other objects in every row: the number of an object fixes its stiffness, whatever its terms.
-    series = (list(SCENES).index(name) * 10 + list(SENSORS).index(sensor)) * 100 + count
+    series = (list(ALL_SCENES).index(name) * 10 + list(SENSORS).index(sensor)) * 100 + count
     seeds = [100_000 * (series + 1) + 100 * repeat + i for i in range(count)]
     squeezes = squeezes_of(text, name, SENSORS[sensor], [str(one) for one in seeds], seeds)
     result = identify(SimConfig(), [delayed(one, late_s) for one in squeezes], lambda *_: None)
@@ -320,7 +341,7 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
             if group:
                 lines.append(line((sensor, str(count)), group))
     lines += [line(("all", "all"), rows), "", *header(("scene",))]
-    for name in SCENES:
+    for name in ALL_SCENES:
         group = [one for one in rows if one["scene"] == name]
         if group:
             lines.append(line((name,), group))
@@ -463,7 +484,7 @@ def main() -> None:
     )
     parser.add_argument("--repeats", type=int, default=4)
     parser.add_argument("--first", type=int, default=0, help="number of the first repeat")
-    parser.add_argument("--only", nargs="+", choices=list(SCENES), default=list(SCENES))
+    parser.add_argument("--only", nargs="+", choices=list(ALL_SCENES), default=list(SCENES))
     parser.add_argument("--sensors", nargs="+", choices=list(SENSORS), default=list(SENSORS))
     parser.add_argument("--recordings", nargs="+", type=int, help="the numbers of recordings")
     parser.add_argument("--delays", nargs="+", type=float, help="the times by which the forces are late (s)")

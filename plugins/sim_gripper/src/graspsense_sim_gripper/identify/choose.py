@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from graspsense.plugin_api import CandidateScore
 from graspsense_sim_gripper.identify.fit import LEAST_ERROR, Fitted, Mask, fit, held_out_rms
 from graspsense_sim_gripper.identify.forward import ForwardModel
-from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
+from graspsense_sim_gripper.identify.laws import CandidateLaw, DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.identify.threads import in_threads
 
@@ -86,7 +86,7 @@ def choose(
     candidates = [
         joined.starting_at(_values(rough[k]))
         for k in kept
-        for joined in (statics[k], *(statics[k].joined(one) for one in with_memory))
+        for joined in (statics[k], *_joined(statics[k], with_memory))
     ]
     directly = in_threads(lambda one: fit(direct, one, squeezes), candidates, counter.done)
     least_directly = max(min(one.rms for one in directly), LEAST_ERROR)
@@ -112,6 +112,11 @@ def choose(
     ]
     ranked = (*sorted(scores, key=_rank), *sorted(dropped, key=_rank))
     return Choice(fitted=best.fitted, refined=tuple(fits), scores=ranked)
+
+
+def _joined(static: CandidateLaw, with_memory: Sequence[CandidateLaw]) -> list[CandidateLaw]:
+    """Return a law with each memory whose terms it does not have already."""
+    return [static.joined(one) for one in with_memory if static.can_join(one)]
 
 
 def _adds_nothing(fitted: Fitted, fits: Sequence[Fitted]) -> bool:

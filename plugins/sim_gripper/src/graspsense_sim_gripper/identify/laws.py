@@ -11,8 +11,10 @@ import numpy as np
 from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
+from graspsense_sim_gripper.identify.gas import AREA_M2, FIXED, LENGTH, RESISTANCE, STIFFNESS, parameters_of
 from graspsense_sim_gripper.terms.elastic import Elastic
 from graspsense_sim_gripper.terms.foam import Foam
+from graspsense_sim_gripper.terms.gas import Gas
 from graspsense_sim_gripper.terms.loss import Loss
 from graspsense_sim_gripper.terms.lumped import LumpedSpringDamper
 from graspsense_sim_gripper.terms.maxwell import Maxwell
@@ -23,9 +25,9 @@ from graspsense_sim_gripper.terms.switchable import Switchable
 
 Floats = NDArray[np.float64]
 
-SLOTS: Final = ("elastic", "rigid", "maxwell", "maxwell", "loss", "foam", "snap")
+SLOTS: Final = ("elastic", "rigid", "maxwell", "maxwell", "loss", "foam", "snap", "gas")
 """The terms of the compiled law, of which a candidate switches some on. All candidates share its code."""
-ELASTIC, RIGID, MAXWELL, SECOND, LOSS, FOAM, SNAP = range(len(SLOTS))
+ELASTIC, RIGID, MAXWELL, SECOND, LOSS, FOAM, SNAP, GAS = range(len(SLOTS))
 MAX_STARTS: Final = 40
 
 
@@ -45,7 +47,8 @@ class DataScale(NamedTuple):
 class FreeParameter:
     """A parameter that is fitted, by its logarithm: its slot, its name, its range, and values to start from.
 
-    These are positive; the parameter of the term is `sign` times the value.
+    These are positive; the parameter of the term is `sign` times the value. Those of a gas are combinations of the
+    parameters of its term (`identify.gas`).
     """
 
     slot: int
@@ -91,7 +94,14 @@ class CandidateLaw:
             cubic = [parameter.sign for parameter in self.free if parameter.name == "k3_n_m3"]
             form = "softening" if cubic == [-1.0] else "k1, k3" if cubic else "k1"
             words.append(f"elastic ({form})" if slot == ELASTIC else SLOTS[slot])
+            if slot == GAS:
+                vented = any(parameter.name == RESISTANCE for parameter in self.free)
+                words[-1] += " (vented)" if vented else " (closed)"
         return " + ".join(words)
+
+    def can_join(self, other: CandidateLaw) -> bool:
+        """Whether it has none of the terms of the other."""
+        return not set(self.slots) & set(other.slots)
 
     def joined(self, other: CandidateLaw) -> CandidateLaw:
         """Return the candidate with the terms of both."""
@@ -102,9 +112,18 @@ class CandidateLaw:
         of_slot: dict[int, dict[str, float]] = {slot: {} for slot in self.slots}
         for (slot, name), value in self.fixed.items():
             of_slot[slot][name] = value
+        combined = {}
         for parameter, value in zip(self.free, values, strict=True):
-            of_slot[parameter.slot][parameter.name] = parameter.sign * float(value)
+            if parameter.slot == GAS:
+                combined[parameter.name] = float(value)
+            else:
+                of_slot[parameter.slot][parameter.name] = parameter.sign * float(value)
+        if combined:
+            of_slot[GAS] |= {name: float(value) for name, value in self._of_gas(combined).items()}
         return of_slot
+
+    def _of_gas(self, combined: Mapping[str, Any]) -> dict[str, Any]:
+        return parameters_of(combined, self.fixed.get((GAS, "area_m2"), AREA_M2))
 
     @cached_property
     def active(self) -> NDArray[np.int64]:
@@ -113,8 +132,8 @@ class CandidateLaw:
 
     @cached_property
     def _numbers(self) -> tuple[Floats, list[int], list[float], list[int]]:
-        """The numbers of all terms, of which the free ones are 1, the columns and signs of the free ones, and the
-        columns of stiffnesses."""
+        """The numbers of all terms, of which the free ones are 1, the columns and signs of the free ones but those of a
+        gas, and the columns of stiffnesses."""
         numbers, stiff = np.ones(N_NUMBERS), []
         for slot in self.slots:
             term = find_term(SLOTS[slot])[1]
@@ -122,8 +141,8 @@ class CandidateLaw:
             for name, value in {**_defaults(term.params), **fixed}.items():
                 numbers[_column(slot, name)] = value
             stiff += [_column(slot, name) for name in term.stiffnesses]
-        columns = [_column(one.slot, one.name) for one in self.free]
-        return numbers, columns, [one.sign for one in self.free], stiff
+        own = [one for one in self.free if one.slot != GAS]
+        return numbers, [_column(one.slot, one.name) for one in own], [one.sign for one in own], stiff
 
     def numbers(self, values: Floats, factors: Floats) -> Floats:
         """Return the numbers of the terms, as `terms_of` reads them, with every stiffness times the factor of its row.
@@ -132,7 +151,12 @@ class CandidateLaw:
         """
         base, columns, signs, stiff = self._numbers
         numbers = np.tile(base, (len(values), 1))
-        numbers[:, columns] = values * np.array(signs)
+        own = [i for i, one in enumerate(self.free) if one.slot != GAS]
+        numbers[:, columns] = values[:, own] * np.array(signs)
+        if len(own) < len(self.free):
+            combined = {one.name: values[:, i] for i, one in enumerate(self.free) if one.slot == GAS}
+            for name, value in self._of_gas(combined).items():
+                numbers[:, _column(GAS, name)] = value
         numbers[:, stiff] *= factors[:, np.newaxis]
         return numbers
 
@@ -202,6 +226,19 @@ def terms_of(active: Any, numbers: Any, r: int) -> tuple[Switchable, ...]:
                 float(numbers[r, 21]),
             ),
         ),
+        Switchable(
+            int(active[7]),
+            Gas(
+                float(numbers[r, 22]),
+                float(numbers[r, 23]),
+                float(numbers[r, 24]),
+                float(numbers[r, 25]),
+                float(numbers[r, 26]),
+                float(numbers[r, 27]),
+                float(numbers[r, 28]),
+                float(numbers[r, 29]),
+            ),
+        ),
     )
 
 
@@ -251,7 +288,35 @@ def static_candidates(scale: DataScale) -> list[CandidateLaw]:
         CandidateLaw(free=(softer, softening)),
         CandidateLaw(free=foam, fixed={(FOAM, "at_m"): float(f"{depth:.2g}")}),
         CandidateLaw(free=snap),
+        CandidateLaw(free=(evolve(k1, starts=(0.5 * k, 0.1 * k)),)).joined(_closed_gas(scale)),
     ]
+
+
+def _gas_stiffness(scale: DataScale) -> FreeParameter:
+    k = scale.force_n / scale.depth_m
+    return FreeParameter(slot=GAS, name=STIFFNESS, low=1e-3 * k, high=100.0 * k, starts=(0.3 * k, k))
+
+
+def _closed_gas(scale: DataScale) -> CandidateLaw:
+    depth = scale.depth_m
+    length = FreeParameter(
+        slot=GAS, name=LENGTH, low=0.7 * depth, high=100.0 * depth, starts=(1.3 * depth, 3.0 * depth)
+    )
+    return CandidateLaw(free=(_gas_stiffness(scale), length), fixed=_fixed_gas())
+
+
+def _vented_gas(scale: DataScale) -> CandidateLaw:
+    speed = scale.depth_m / max(scale.load_s, 1e-3)
+    drag = scale.force_n / speed**2
+    resistance = FreeParameter(
+        slot=GAS, name=RESISTANCE, low=1e-4 * drag, high=1e4 * drag, starts=(0.1 * drag, 3.0 * drag)
+    )
+    fixed = {**_fixed_gas(), (GAS, "area_m2"): AREA_M2}
+    return CandidateLaw(free=(_gas_stiffness(scale), resistance), fixed=fixed)
+
+
+def _fixed_gas() -> dict[tuple[int, str], float]:
+    return {(GAS, name): value for name, value in FIXED.items()}
 
 
 def memories(scale: DataScale) -> list[CandidateLaw]:
@@ -282,4 +347,4 @@ def memories(scale: DataScale) -> list[CandidateLaw]:
     )
     fast = branch(MAXWELL, 0.2, (0.04 * scale.memory_s,))
     slow = branch(SECOND, 0.2, (0.4 * scale.memory_s,))
-    return [loss, one, fast.joined(slow), one.joined(loss)]
+    return [loss, one, fast.joined(slow), one.joined(loss), _vented_gas(scale)]

@@ -10,7 +10,7 @@ import numpy as np
 
 from graspsense.plugin_api import Undetermined
 from graspsense_sim_gripper.identify.fit import Fitted
-from graspsense_sim_gripper.identify.laws import SNAP
+from graspsense_sim_gripper.identify.laws import GAS, SNAP
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.identify.spread import LEAST_INSTANCES, Uncertainty
 
@@ -27,11 +27,6 @@ FALL_SHARE: Final = 0.25
 """A fall of the force by this share of the peak between two samples needs a term of its own."""
 
 _NOT_FITTED: Final = (
-    (
-        "gas",
-        "trapped gas feels as a stiffening shell with a memory: area, volume and bulge are not separated",
-        "squeeze once sealed and once open, measure the volume, and write the term by hand",
-    ),
     (
         "liquid",
         "a column that follows is a spring, and one that stands is a wall: its lengths are not separated",
@@ -55,7 +50,19 @@ _NOT_FITTED: Final = (
 )
 """The terms that are not fitted, why, and what would determine them."""
 
+_GAS_UNTOLD: Final = Undetermined(
+    what="gas",
+    reason="gas that is hardly compressed and does not escape is a spring, and part of the other terms here",
+    remedy="squeeze once sealed and once open, or until a fifth of the volume is displaced",
+)
+_GAS_COMBINED: Final = (
+    "the squeezes determine the stiffness n p A^2 / V of the gas and {other}; fixed are {fixed}: every other gas with "
+    "these combinations has the same force"
+)
 _REMEDIES: Final = {
+    "stiffness_n_m": "squeeze deeper",
+    "length_m": "squeeze deeper",
+    "resistance_n_s2_m2": "squeeze at two speeds that differ by a factor of two or more, and hold",
     "k3_n_m3": "squeeze deeper",
     "exponent": "squeeze deeper",
     "critical_m": "squeeze beyond the drop of the force",
@@ -98,8 +105,26 @@ def undetermined(
                 remedy="record from before the contact",
             )
         )
+    open_.append(_gas(fitted))
     open_ += [Undetermined(what=what, reason=reason, remedy=remedy) for what, reason, remedy in _NOT_FITTED]
     return open_
+
+
+def _gas(fitted: Fitted) -> Undetermined:
+    """Return what stays open of a gas: whether there is one, or its numbers one by one."""
+    law = fitted.candidate
+    if GAS not in law.slots:
+        return _GAS_UNTOLD
+    vented = (GAS, "area_m2") in law.fixed
+    other = "rho A^3 / (2 C_d^2 vent^2)" if vented else "the length V / A"
+    fixed = ", ".join(f"{name} = {value:g}" for (slot, name), value in law.fixed.items() if slot == GAS)
+    return Undetermined(
+        what="gas: area, volume, pressure and vent one by one"
+        if vented
+        else "gas: pressure, exponent and bulge",
+        reason=_GAS_COMBINED.format(other=other, fixed=fixed),
+        remedy="measure the area that moves, or the volume, and write the others by hand",
+    )
 
 
 def _falls(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:

@@ -49,6 +49,7 @@ UNITS: Final = {
     "m": "m",
     "s": "s",
     "n_s_m": "N s/m",
+    "n_s2_m2": "N s2/m2",
 }
 """The units by the ends of names."""
 OF_FINGERTIPS: Final = (

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from graspsense_sim_gripper.identify.choose import fit_residuals
 from graspsense_sim_gripper.identify.fit import Fitted, fit
 from graspsense_sim_gripper.identify.forward import ForwardModel
+from graspsense_sim_gripper.identify.gas import AREA_FACTOR
 from graspsense_sim_gripper.identify.interval import normal, student
-from graspsense_sim_gripper.identify.laws import SNAP
+from graspsense_sim_gripper.identify.laws import GAS, SNAP
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.identify.threads import in_threads
 
@@ -85,6 +86,7 @@ def uncertainty(
         later = fit(model, fitted.candidate, [one.delayed(lag_error_s) for one in squeezes], start=fitted)
         shift = np.log(later.values) - at
         own += np.outer(shift, shift)
+    own += _area_errors(model, fitted, squeezes)
     covariance = covariance + own * (normal() / factor) ** 2
     spread = np.sqrt(np.diag(covariance))
     low, high = np.exp(centre - factor * spread), np.exp(centre + factor * spread)
@@ -134,6 +136,16 @@ def refits(
     what = "objects" if _instances(squeezes) >= LEAST_INSTANCES else "squeezes"
     basis = f"between {g} {what if g == len(groups) else 'groups'}"
     return Refits(fits, (g - 1) / g, student(g - 1), basis)
+
+
+def _area_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
+    """Return the covariance of the logarithms that the conventional area of a vented gas causes."""
+    law, key = fitted.candidate, (GAS, "area_m2")
+    if key not in law.fixed:
+        return np.zeros((len(fitted.values), len(fitted.values)))
+    wider = evolve(law, fixed={**law.fixed, key: AREA_FACTOR * law.fixed[key]})
+    shift = np.log(fit(model, wider, squeezes, start=fitted).values) - np.log(fitted.values)
+    return np.outer(shift, shift)
 
 
 def _corner_errors(fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:

@@ -51,11 +51,17 @@ def scene_text(facts: SceneFacts) -> str:
         labels = {one.name: one.label for one in facts.fitted.candidate.free if one.slot == slot}
         for name, value in given.items():
             interval = intervals.get(labels.get(name, ""))
-            comment = "not fitted" if interval is None else _interval(interval)
+            comment = _not_fitted(facts, slot, name) if interval is None else _interval(interval)
             lines.append(f"{name} = {_number(value)}  # {comment}")
     if facts.fracture is not None:
         lines += _fracture(facts.fracture, intervals)
     return "\n".join([*lines, "", *_identified(facts)]) + "\n"
+
+
+def _not_fitted(facts: SceneFacts, slot: int, name: str) -> str:
+    if (slot, name) in facts.fitted.candidate.fixed:
+        return "not fitted: a conventional value"
+    return "follows from the fitted combinations, gas. in [identified.intervals]"
 
 
 def _fracture(fit: FractureFit, intervals: Mapping[str, IdentifiedParameter]) -> list[str]:
