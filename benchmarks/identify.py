@@ -544,7 +544,8 @@ def _publish(asked: argparse.Namespace) -> None:
     elif asked.markdown and asked.delays:
         write_between(asked.markdown, "delays", delays_markdown(rows))
     elif asked.markdown:
-        write_between(asked.markdown, "known scenes", as_markdown(rows))
+        of_gas = all(row["scene"] in SCENES_WITH_GAS for row in rows)
+        write_between(asked.markdown, "gas" if of_gas else "known scenes", as_markdown(rows))
 
 
 if __name__ == "__main__":

@@ -29,26 +29,26 @@ FALL_SHARE: Final = 0.25
 _NOT_FITTED: Final = (
     (
         "liquid",
-        "a column that follows is a spring, and one that stands is a wall: its lengths are not separated",
+        "only two combinations of its five numbers change the force, and these by a ringing that pads are too slow for",
         "measure area, neck and level, and write the term by hand",
     ),
     (
         "slosh",
-        "an oscillation after the contact is small beside the force, and slower sensors do not show it",
+        "beside the force of a squeeze, the oscillation of the contents is smaller than the error of a sensor",
         "measure the mass of the contents, and the frequency on a free container, and write the term by hand",
     ),
     (
         "surface",
-        "a slow squeeze shows its springs in series only, not its mass",
+        "beside a spring, a branch and a damper, no number of it changes the force of a squeeze",
         "tap the surface, measure its frequency and decay, and write the term by hand",
     ),
     (
         "worn",
-        "wear is a trend over the squeezes of one object, and recordings have no number of uses",
+        "one squeeze wears little, which looks like a change of stiffness; recordings have no number of uses",
         "record one object many times in a row, and identify the first and the last ten apart",
     ),
 )
-"""The terms that are not fitted, why, and what would determine them."""
+"""The terms that are not fitted, why (`benchmarks/determined.py`), and what would determine them."""
 
 _GAS_UNTOLD: Final = Undetermined(
     what="gas",
