@@ -153,7 +153,9 @@ def drawn(terms: Sequence[Mapping[str, Any]], repeat: int) -> list[dict[str, Any
     rng = np.random.default_rng([repeat, len(terms)])
     return [
         {
-            key: value if key in ("type", "at_m", *AIR) else value * math.exp(rng.uniform(-FACTOR, FACTOR))
+            key: value
+            if key in ("type", "at_m") or (term["type"] == "gas" and key in AIR)
+            else value * math.exp(rng.uniform(-FACTOR, FACTOR))
             for key, value in term.items()
         }
         for term in terms
