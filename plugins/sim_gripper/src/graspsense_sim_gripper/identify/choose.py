@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from graspsense.plugin_api import CandidateScore
 from graspsense_sim_gripper.identify.fit import LEAST_ERROR, Fitted, Mask, fit, held_out_rms
 from graspsense_sim_gripper.identify.forward import ForwardModel
-from graspsense_sim_gripper.identify.laws import CandidateLaw, DataScale, memories, static_candidates
+from graspsense_sim_gripper.identify.laws import GAS, CandidateLaw, DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.identify.threads import in_threads
 
@@ -80,9 +80,7 @@ def choose(
             min(pair, key=lambda one: one.cost)
             for pair in zip(tried[: len(statics)], tried[len(statics) :], strict=True)
         ]
-    order = np.argsort([one.cost for one in rough], kind="stable")[:STATIC_KEPT].tolist()
-    # The simplest law stays among the candidates, so that the table shows what it costs to leave the others out.
-    kept = sorted({0, *(int(k) for k in order)})
+    kept = _kept(rough)
     candidates = [
         joined.starting_at(_values(rough[k]))
         for k in kept
@@ -112,6 +110,15 @@ def choose(
     ]
     ranked = (*sorted(scores, key=_rank), *sorted(dropped, key=_rank))
     return Choice(fitted=best.fitted, refined=tuple(fits), scores=ranked)
+
+
+def _kept(rough: Sequence[Fitted]) -> list[int]:
+    """Return which laws are tried with every memory: those that fit best."""
+    order = np.argsort([one.cost for one in rough], kind="stable").tolist()
+    # A gas takes no other law's place: it resembles a spring that stiffens.
+    first = [k for k in order if GAS not in rough[k].candidate.slots][:STATIC_KEPT]
+    # The simplest law stays among the candidates, so that the table shows what it costs to leave the others out.
+    return sorted({0, *first, *order[:STATIC_KEPT]})
 
 
 def _joined(static: CandidateLaw, with_memory: Sequence[CandidateLaw]) -> list[CandidateLaw]:
