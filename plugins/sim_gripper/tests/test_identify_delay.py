@@ -40,10 +40,19 @@ def late_recordings(gripper, late_s, seeds=(1, 2, 3)):
     ]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("late_s", [0.0, 0.01, 0.025])
+GRIPPERS = ({"sensor": "ideal"}, {"sensor": "pads"}, {"sensor": "pads", "pad_delay_s": 0.01})
+LATE_S = (0.0, 0.01, 0.025)
+IN_CI = ((0, 0.025), (1, 0.0), (1, 0.025), (2, 0.01))
+"""The place of a gripper, and a delay."""
+
+
 @pytest.mark.parametrize(
-    "gripper", [{"sensor": "ideal"}, {"sensor": "pads"}, {"sensor": "pads", "pad_delay_s": 0.01}]
+    ("gripper", "late_s"),
+    [
+        pytest.param(gripper, late_s, marks=pytest.mark.slow if (i, late_s) in IN_CI else pytest.mark.long)
+        for i, gripper in enumerate(GRIPPERS)
+        for late_s in LATE_S
+    ],
 )
 def test_a_known_delay_comes_back_and_does_not_bias_relaxation(gripper, late_s):
     settings_s = gripper.get("pad_delay_s", 0.0)
