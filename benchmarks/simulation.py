@@ -26,9 +26,9 @@ from pathlib import Path
 from typing import Any
 
 from graspsense import __version__
-from graspsense.plugin_api import create
+from graspsense.plugin_api import BatchOptions, create
 from graspsense_sim_gripper.batch import run_many
-from graspsense_sim_gripper.batch.threads import grasps
+from graspsense_sim_gripper.batch.threads import grasps, job_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue
 
@@ -101,8 +101,10 @@ def many(n: int) -> dict[str, Any]:
         def run(count: int, config: SimConfig = config) -> tuple[float, float]:
             scenes = [names[k % len(names)] for k in range(count)]
             began, spent = time.perf_counter(), time.process_time()
+            options: BatchOptions = {"extract": features.extract}
+            job = job_of(config, law, options, features=features)
             # As the commands do, which keep no results but their own numbers.
-            for _ in grasps(config, law, scenes, range(count), True, {"extract": features.extract}):
+            for _ in grasps(job, scenes, range(count), True, options):
                 pass
             return time.perf_counter() - began, time.process_time() - spent
 
