@@ -252,12 +252,12 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
         "1e-3 to 30, head space 1e-7 to 2e-3 m³, vent 0 to 1e-4 m², relaxation time 1e-6 to 1e4 s,",
         "approach 1 to 100 mm/s, tick 0.2 to 5 ms, slosh 0.5 to 2000 Hz, with pads or ideal sensors.",
         "",
-        f"{len(rows)} scenes (numbers {rows[0]['scene']} to {rows[-1]['scene']}); the full count is 1500. "
+        f"{len(rows)} scenes (numbers {_numbers(rows)}); the full count is 1500. "
         f"{len(unstable)} have an unstable sampled velocity loop, {len(rows) - len(done)} have no reference, "
         f"{sum(not row['reference_resolved'] for row in done)} have a reference with a tick that has not settled. "
         f"{where_measured()}.",
-        "A report of the simulator names the unstable loop of each of these scenes (`unstable_loop`), and lists peak, "
-        "trace and features as not verified; the flags counted here leave that out.",
+        "Where the loop is unstable, a report of the simulator says so (`unstable_loop`), and lists peak, trace and "
+        "features as not verified; the flags counted here leave that out.",
         _confirmed(stable, "Stable loop, ideal sensors"),
         _confirmed(unstable, "Unstable loop"),
         "",
@@ -276,6 +276,14 @@ def page(rows: Sequence[Row], picture: str | None) -> str:
     lines += ["", "## Where fixed steps of 1 ms fail", "", *_fixed(stable)]
     lines += ["", "## Largest errors without a flag", "", *_misses(stable)]
     return "\n".join(lines) + "\n"
+
+
+def _numbers(rows: Sequence[Row]) -> str:
+    """Return the numbers of the scenes in words, one range for each run of the program."""
+    numbers = sorted(row["scene"] for row in rows)
+    first = [a for k, a in enumerate(numbers) if k == 0 or numbers[k - 1] < a - 1]
+    last = [a for k, a in enumerate(numbers) if k == len(numbers) - 1 or numbers[k + 1] > a + 1]
+    return ", ".join(f"{a} to {b}" for a, b in zip(first, last, strict=True))
 
 
 def _confirmed(rows: Sequence[Row], what: str) -> str:
