@@ -8,6 +8,7 @@ import pytest
 from attrs import evolve, frozen
 from selection import error_of
 
+from graspsense.core.checkpoints import with_checkpoints
 from graspsense.core.runner import run_grasp
 from graspsense.plugin_api import (
     HOLD,
@@ -110,6 +111,35 @@ def test_the_features_of_the_pipeline_are_verified_too(spec, above_n, flagged):
         job = evolve(job, config=CONFIG)
         done = grasp_plain(job, instantiate(problem_of(CONFIG, spec), fine, 0))
         assert theirs.features.extract(done.trace)["above"] == pytest.approx(above_n, rel=CONFIG.accuracy)
+
+
+class Shaken(ForceAbove):
+    """The same of a set that cannot do without the accelerometer of the palm."""
+
+    requires = (Channel("force_left", "N"), Channel("acceleration", "m/s2"))
+
+
+class Silent(ForceAbove):
+    """A set that fails on every trace."""
+
+    def extract(self, trace):
+        raise ZeroDivisionError
+
+
+@pytest.mark.parametrize("kind", [Shaken, Silent])
+def test_features_that_no_trial_grasp_has_are_not_verified(kind):
+    law = evolve(hybrid(), features=kind(Zero(0.0)))
+    model = selected(CONFIG, thing(SHELL), law)
+    assert model.not_verified == ("features",)
+    # No finer model is tried, since none would have them.
+    assert model.steps == selected(CONFIG, thing(SHELL), hybrid()).steps
+
+
+def test_features_at_checkpoints_are_verified_as_those_of_the_whole_grasp():
+    features = with_checkpoints(create("feature-set", "chitta"), (0.2, 0.4))
+    model = selected(CONFIG, thing(SHELL), evolve(hybrid(), features=features))
+    assert model.verification is not None
+    assert model.not_verified == ()
 
 
 @pytest.mark.slow

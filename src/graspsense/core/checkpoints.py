@@ -90,6 +90,8 @@ class CheckpointFeatures(FeatureSet[Any]):
     def __init__(self, feature_set: FeatureSet[Any], checkpoints_s: Sequence[float]) -> None:
         super().__init__(feature_set.config)
         self._feature_set, self._checkpoints_s = feature_set, tuple(checkpoints_s)
+        # The channels of the set within it; a set whose entry declares them has none of its own.
+        self.requires = getattr(feature_set, "requires", ())  # type: ignore[misc]
 
     def extract(self, trace: Trace) -> Features:
         """Return the features of the whole grasp, and those at each checkpoint with what they cost."""

@@ -46,7 +46,7 @@ class Verification:
     grasps: int
     """Number of trial grasps that were compared until a level was accepted."""
     features: tuple[str, ...] = ()
-    """The features of the pipeline that no level gives to the accuracy."""
+    """The features of the pipeline that no level gives to the accuracy; `("features",)` if trial grasps have none."""
 
 
 @frozen(kw_only=True)

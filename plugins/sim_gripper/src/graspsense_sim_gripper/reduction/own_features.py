@@ -3,6 +3,8 @@
 A feature set reads values at ticks. Two grasps that differ by a part of a tick may therefore differ in a feature by
 what it changes within a tick, however accurate both are. That much is found by extracting from the same grasp sampled
 half a tick later, and does not count.
+
+Trial grasps have neither cell images nor further signals. A feature set that needs them is not verified.
 """
 
 from __future__ import annotations
@@ -13,13 +15,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import Features, FeatureSet
+from graspsense.plugin_api import CHANNELS, Features, FeatureSet
 from graspsense_sim_gripper.loop import COLUMNS, EVENT_SHIFT
 from graspsense_sim_gripper.recorded_trace import recorded_trace
 from graspsense_sim_gripper.reduction.error import UNIT_SCALES
 
 HELD: Final = tuple(COLUMNS.index(name) for name in ("effort_n", "command"))
 """The columns that are constant within a tick."""
+READ: Final = CHANNELS.keys() - {"pads"}
+"""The channels of a trial grasp."""
+NOT_READ: Final = ("features",)
+"""What is not verified where the features cannot be extracted from a trial grasp."""
 ROUNDING: Final = 1e-9
 """Difference of a feature, in its unit, below which it is rounding."""
 
@@ -35,10 +41,14 @@ class OwnFeatures(NamedTuple):
 def own_features(
     feature_set: FeatureSet[Any], table: NDArray[np.float64], phases: NDArray[np.float64]
 ) -> OwnFeatures | None:
-    """Return the features of a grasp that ideal sensors read; None if the set fails without cell images.
+    """Return the features of a grasp that ideal sensors read; None if the set needs further channels, or fails.
 
     `table`, shape (columns, n), and `phases`, shape (n,), are those of `loop.Buffers`.
     """
+    # The entry of a set may declare the channels instead of its class.
+    required = {channel.name for channel in getattr(feature_set, "requires", ())}
+    if not required <= READ:
+        return None
     numbers = phases.astype(np.int64) & ((1 << EVENT_SHIFT) - 1)
     later = np.array(table)
     later[:, :-1] = 0.5 * (table[:, :-1] + table[:, 1:])
@@ -61,10 +71,11 @@ def _extracted(
 def beyond(grasp: OwnFeatures | None, expected: OwnFeatures | None, accuracy: float) -> tuple[str, ...]:
     """Return the names of the features of a grasp that differ from the expected ones by more than `accuracy`.
 
-    The difference is relative to the magnitude, or to the scale of the unit (`error.UNIT_SCALES`) if that is larger.
+    `NOT_READ` if one of the grasps has no features. A feature without a value in both grasps does not differ. The
+    difference is relative to the magnitude, or to the scale of the unit (`error.UNIT_SCALES`) if that is larger.
     """
     if grasp is None or expected is None:
-        return ()
+        return NOT_READ
     names, values = expected.features.names, expected.features.values
     found, later = (dict(zip(one.names, one.values, strict=True)) for one in (grasp.features, expected.later))
     return tuple(

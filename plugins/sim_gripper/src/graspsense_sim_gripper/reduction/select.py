@@ -31,6 +31,7 @@ from graspsense_sim_gripper.reduction.candidates import reduced
 from graspsense_sim_gripper.reduction.error import deviation
 from graspsense_sim_gripper.reduction.levels import FULL_SCALES, REFERENCE_SCALES, LevelScale, scales_for
 from graspsense_sim_gripper.reduction.model import DROPPED, Reduction, TermDecision, Verification
+from graspsense_sim_gripper.reduction.own_features import NOT_READ
 from graspsense_sim_gripper.reduction.probe import Grip
 from graspsense_sim_gripper.reduction.propose import fixed, grip_of, propose
 from graspsense_sim_gripper.reduction.verify import (
@@ -156,7 +157,7 @@ def _best(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reduction:
     """
     accepted = _accepted(problem, grip, trial)
     first = next(accepted)
-    if not first.not_verified:
+    if first.not_verified in ((), NOT_READ):
         return first
     further = islice(accepted, MOST_FOR_FEATURES)
     return next((model for model in further if not model.not_verified), first)

@@ -159,7 +159,7 @@ class TrialGrasps:
     def features_beyond(self, reduction: Reduction, full: Reduction) -> tuple[str, ...]:
         """Return the features of the pipeline that differ in this model from the full one by more than the accuracy.
 
-        Empty without a feature set, or if it fails on ideal sensors.
+        Empty without a feature set, `own_features.NOT_READ` for one that ideal sensors do not suffice for.
         """
         if self.features is None:
             return ()
