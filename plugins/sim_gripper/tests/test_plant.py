@@ -29,7 +29,7 @@ from graspsense_sim_gripper.terms.gas import Gas
 from graspsense_sim_gripper.terms.liquid import Liquid, liquid
 from graspsense_sim_gripper.terms.loss import Loss, loss
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
-from graspsense_sim_gripper.terms.oscillator import OscillatorState, moved
+from graspsense_sim_gripper.terms.oscillator import Forcing, OscillatorState, moved
 from graspsense_sim_gripper.terms.registry import TERMS, laws_of, moving_of
 from graspsense_sim_gripper.terms.rigid import Rigid, RigidState, rigid
 from graspsense_sim_gripper.terms.slosh import Slosh
@@ -349,7 +349,7 @@ def test_the_mass_of_a_surface_swings_on_when_the_shell_has_its_shape_again():
     assert before.y_m > 1e-4
     for k in range(1, 300):
         freed = move(params, freed, -60.0, TICK)
-        expected = moved(before, 0.5 * 2.0 / 2.0, 300.0 / 2.0, 0.0, 0.0, k * TICK)
+        expected = moved(before, 0.5 * 2.0 / 2.0, 300.0 / 2.0, Forcing(0.0, 0.0, 0.0), k * TICK)
         if expected.y_m < 0.0:
             break
         assert freed.contact.left.states[2].y_m == pytest.approx(expected.y_m, rel=1e-6, abs=1e-9)

@@ -14,7 +14,7 @@ from graspsense_sim_gripper.terms.gas import Gas, GasState, gas
 from graspsense_sim_gripper.terms.liquid import GRAVITY_M_S2, Liquid, liquid
 from graspsense_sim_gripper.terms.loss import Loss, loss
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
-from graspsense_sim_gripper.terms.oscillator import OscillatorState, moved
+from graspsense_sim_gripper.terms.oscillator import Forcing, OscillatorState, moved
 from graspsense_sim_gripper.terms.registry import TERMS
 from graspsense_sim_gripper.terms.rigid import Rigid, RigidState, rigid
 from graspsense_sim_gripper.terms.slosh import Slosh, slosh
@@ -306,10 +306,13 @@ def test_liquid_with_a_stiff_wall_resists_as_its_mass_times_the_acceleration():
 )
 def test_an_oscillators_motion_is_exact_whatever_the_step(w, ratio, steps):
     square, a = w * w, ratio * w
-    whole = moved(OscillatorState(1e-3, 0.2), a, square, 3.0, 40.0, 0.01)
+    bend = -0.5 * square
+    whole = moved(OscillatorState(1e-3, 0.2), a, square, Forcing(3.0, 40.0, bend), 0.01)
     pieces = OscillatorState(1e-3, 0.2)
     for k in range(steps):
-        pieces = moved(pieces, a, square, 3.0 + 40.0 * 0.01 * k / steps, 40.0, 0.01 / steps)
+        t = 0.01 * k / steps
+        forcing = Forcing(3.0 + 40.0 * t + bend * t * t, 40.0 + 2.0 * bend * t, bend)
+        pieces = moved(pieces, a, square, forcing, 0.01 / steps)
     scale = 1e-3 + 3.4 / square + 0.01 * 0.2
     assert pieces.y_m == pytest.approx(whole.y_m, abs=1e-8 * scale)
 
@@ -327,6 +330,25 @@ def test_slosh_is_exact_for_a_rate_that_changes_linearly_whatever_its_damping(ra
     if ratio >= 1e3:
         # The damper carries the mass along: it has the deceleration of the wall, 1 m/s2.
         assert forces[0] == pytest.approx(-0.5, rel=1e-3)
+
+
+@pytest.mark.parametrize("stiffness", [1e-6, 300.0, 1e9])
+@pytest.mark.parametrize(
+    ("law", "params"),
+    [
+        (liquid, lambda k: Liquid(1.2e-3, 5e-4, 0.08, 1.2e-3**2 / k, viscosity_pa_s=0.1)),
+        (surface, lambda k: Surface(0.2, k, 2.0, 2e4)),
+    ],
+)
+def test_a_mass_on_springs_is_exact_for_a_rate_that_changes_linearly(law, params, stiffness):
+    forces = []
+    for n in (1, 40):
+        state, h = OscillatorState(0.0, 0.0), 2e-3 / n
+        for k in range(n):
+            d0, d1 = (0.02 * t - 4.0 * t * t for t in (k * h, (k + 1) * h))
+            force, state = law(params(stiffness), state, d0, d1, h, 0.02 - 8.0 * (k + 1) * h)
+        forces.append(force)
+    assert forces[0] == pytest.approx(forces[1], rel=1e-7)
 
 
 def test_worn_is_of_second_order_in_its_step():

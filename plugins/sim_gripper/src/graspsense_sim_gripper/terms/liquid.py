@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.terms.oscillator import OscillatorState, moved
+from graspsense_sim_gripper.terms.oscillator import Forcing, OscillatorState, moved
 from graspsense_sim_gripper.terms.term import Limit, LinearForm, Rate, Term, WorkingPoint
 
 GRAVITY_M_S2: Final = 9.80665
@@ -48,12 +48,13 @@ def _seen(params: Liquid) -> _AtCompression:
 def liquid(
     params: Liquid, state: OscillatorState, d0: float, d1: float, h: float, v1: float
 ) -> tuple[float, OscillatorState]:
-    """Return the force of the pressure on the wall; exact if the compression changes at a constant rate."""
+    """Return the force of the pressure on the wall; exact if the rate of compression changes linearly."""
     mass, k, damping, wall = _seen(params)
     if h > 0.0:
         pull = wall / mass
-        rising = pull * (d1 - d0) / h
-        state = moved(state, 0.5 * damping / mass, (k + wall) / mass, pull * d0, rising, h)
+        mean = (d1 - d0) / h
+        forcing = Forcing(pull * d0, pull * (2.0 * mean - v1), pull * (v1 - mean) / h)
+        state = moved(state, 0.5 * damping / mass, (k + wall) / mass, forcing, h)
     return wall * (d1 - state.y_m), state
 
 

@@ -1,4 +1,4 @@
-"""The exact motion of a damped oscillator under a force that changes linearly, used by three terms."""
+"""The exact motion of a damped oscillator under a force that is quadratic in time, used by three terms."""
 
 from __future__ import annotations
 
@@ -13,16 +13,24 @@ class OscillatorState(NamedTuple):
     v_m_s: float
 
 
-def moved(
-    now: OscillatorState, damping: float, square: float, u0: float, u1: float, h: float
-) -> OscillatorState:
-    """Return the motion after `h` seconds of y'' + 2 a y' + w2 y = u0 + u1 t.
+class Forcing(NamedTuple):
+    """The force on the oscillator per mass (m/s²), u0 + u1 t + u2 t²."""
+
+    u0: float
+    u1: float
+    u2: float
+
+
+def moved(now: OscillatorState, damping: float, square: float, forcing: Forcing, h: float) -> OscillatorState:
+    """Return the motion after `h` seconds of y'' + 2 a y' + w2 y = u0 + u1 t + u2 t².
 
     `damping` is a (1/s, not negative) and `square` w2 (1/s2, positive). Exact for any `h`, underdamped or overdamped.
     """
     a, w2 = damping, square
-    slope = u1 / w2
-    offset = (u0 - 2.0 * a * slope) / w2
+    # The motion without its own oscillation: offset + slope t + bend t².
+    bend = forcing.u2 / w2
+    slope = (forcing.u1 - 4.0 * a * bend) / w2
+    offset = (forcing.u0 - 2.0 * a * slope - 2.0 * bend) / w2
     y, v = now.y_m - offset, now.v_m_s - slope
     rest = w2 - a * a
     if rest > 1e-12 * w2:
@@ -40,6 +48,6 @@ def moved(
         even = math.exp(-a * h)
         odd = even * h
     return OscillatorState(
-        offset + slope * h + y * even + (v + a * y) * odd,
-        slope + v * even - (a * v + w2 * y) * odd,
+        offset + h * (slope + bend * h) + y * even + (v + a * y) * odd,
+        slope + 2.0 * bend * h + v * even - (a * v + w2 * y) * odd,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from graspsense_sim_gripper.terms.oscillator import OscillatorState, moved
+from graspsense_sim_gripper.terms.oscillator import Forcing, OscillatorState, moved
 from graspsense_sim_gripper.terms.term import LinearForm, Rate, Term, WorkingPoint
 
 
@@ -30,7 +30,7 @@ def slosh(
     if h > 0.0:
         mean = (d1 - d0) / h
         start = OscillatorState(d0 - state.y_m, 2.0 * mean - v1 - state.v_m_s)
-        between = moved(start, a, square, 2.0 * (v1 - mean) / h, 0.0, h)
+        between = moved(start, a, square, Forcing(2.0 * (v1 - mean) / h, 0.0, 0.0), h)
         state = OscillatorState(d1 - between.y_m, v1 - between.v_m_s)
     return params.mass_kg * (square * (d1 - state.y_m) + 2.0 * a * (v1 - state.v_m_s)), state
 

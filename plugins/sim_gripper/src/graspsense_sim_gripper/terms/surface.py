@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from graspsense_sim_gripper.terms.oscillator import OscillatorState, moved
+from graspsense_sim_gripper.terms.oscillator import Forcing, OscillatorState, moved
 from graspsense_sim_gripper.terms.phi import phi1, phi_ramp
 from graspsense_sim_gripper.terms.term import Limit, LinearForm, OwnContact, Rate, Term, WorkingPoint
 
@@ -40,7 +40,8 @@ def surface(
     a = 0.5 * damping / mass
     if h <= 0.0:
         return contact * max(d1 - state.y_m, 0.0), state
-    speed = (d1 - d0) / h
+    mean = (d1 - d0) / h
+    speed, bend = 2.0 * mean - v1, (v1 - mean) / h
     checks = math.ceil(math.sqrt((k + contact) / mass) * h / 0.5)
     step = h / min(max(checks, 1), MAX_CHECKS)
     t = 0.0
@@ -49,21 +50,23 @@ def surface(
         ahead = min(step, h - t)
         square = (k + contact) / mass if touching else k / mass
         pull = contact / mass if touching else 0.0
-        d = d0 + speed * t
-        after = moved(state, a, square, pull * d, pull * speed, ahead)
-        if (d + speed * ahead - after.y_m > 0.0) != touching:
+        # The compression is d + rate u + bend u² at the time u from here.
+        d, rate = d0 + t * (speed + bend * t), speed + 2.0 * bend * t
+        forcing = Forcing(pull * d, pull * rate, pull * bend)
+        after = moved(state, a, square, forcing, ahead)
+        if (d + ahead * (rate + bend * ahead) - after.y_m > 0.0) != touching:
             # Bisect for the time of the contact or separation.
             least, most = 0.0, ahead
             for _ in range(BISECTIONS):
                 ahead = 0.5 * (least + most)
-                after = moved(state, a, square, pull * d, pull * speed, ahead)
-                if (d + speed * ahead - after.y_m > 0.0) == touching:
+                after = moved(state, a, square, forcing, ahead)
+                if (d + ahead * (rate + bend * ahead) - after.y_m > 0.0) == touching:
                     least = ahead
                 else:
                     most = ahead
             # Without it, a grazing contact would be found repeatedly at the same time.
             ahead = max(most, LEAST_SHARE * step)
-            after = moved(state, a, square, pull * d, pull * speed, ahead)
+            after = moved(state, a, square, forcing, ahead)
             touching = not touching
         state = after
         t += ahead
