@@ -104,10 +104,14 @@ def test_uneven_samples_of_the_same_curve_give_the_same_features(seed, n, expone
     even = FEATURES.extract(grasp(EVEN, exponent=exponent))
     other = FEATURES.extract(grasp(np.unique(np.concatenate(([0.0], uneven, [EVEN[-1]]))), exponent=exponent))
     assert defined(other) == defined(even) == set(NAMES)
+    # 400 samples are up to 40 ms apart: the begin and the end of the hold lie anywhere between two of them.
+    factor = 2.0 if n == 400 else 1.0
     for name in NAMES:
         scale = {"curvature": 1.0, "residual_compression": 0.004, "creep": 0.004, "hysteresis": 1.0}
-        rel = 0.15 if name == "relaxation_time" else 0.06
-        assert other[name] == pytest.approx(even[name], rel=rel, abs=0.02 * scale.get(name, 0.0)), name
+        rel = factor * (0.15 if name == "relaxation_time" else 0.06)
+        assert other[name] == pytest.approx(even[name], rel=rel, abs=0.02 * factor * scale.get(name, 0.0)), (
+            name
+        )
 
 
 def test_repeated_forces_between_cell_images_do_not_shift_the_curve():
