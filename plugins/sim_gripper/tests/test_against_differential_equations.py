@@ -840,8 +840,13 @@ def test_the_reference_is_the_solution_of_the_equations_for_every_term(name, pla
 
 
 @pytest.mark.parametrize(
-    "accuracy", [0.01, *(pytest.param(other, marks=pytest.mark.long) for other in (0.1, 1e-3))]
+    ("accuracy", "most"),
+    [
+        (1e-3, 1e-3),
+        # The error of worn shells and of masses behind a contact is not that of the steps alone.
+        *(pytest.param(one, max(one, 2e-4), marks=pytest.mark.long) for one in (0.1, 0.01, 1e-4)),
+    ],
 )
 @pytest.mark.parametrize(("name", "place", "gripper"), marked(2, 1))
-def test_steps_for_an_accuracy_have_it(name, place, gripper, accuracy):
-    assert max(errors(name, place, gripper, fidelity="full", accuracy=accuracy)) <= accuracy
+def test_steps_for_an_accuracy_have_it(name, place, gripper, accuracy, most):
+    assert max(errors(name, place, gripper, fidelity="full", accuracy=accuracy)) <= most
