@@ -1,11 +1,12 @@
 """Whether pads and spread give the distributions of the reference, on scenes of the map of regimes. Simulated.
 
-    python benchmarks/regimes_sensed.py [--scenes 500] [--instances 40] [--most 640] [--rows FILE] [--first N] [--short]
+    python benchmarks/regimes_sensed.py [--scenes 500] [--instances 640] [--rows FILE] [--first N] [--short]
 
 Each scene of `benchmarks/regimes.py` with a stable loop is read by pads and encoder, with a spread of 10 % of
 stiffness, 0.5 mm of width and offset, and of Coulomb friction. Its instances are grasped in the model that is selected
-for 1 %, and in the reference, with the same seeds; the six features are those that `chitta` extracts from what the pads
-show.
+for 1 %, and with every term in steps for 0.01 %, with the same seeds; the six features are those that `chitta` extracts
+from what the pads show. Where the steps for 0.01 % are not verified or refused, the reference takes their place. It
+takes some hundred times as long, so it is not used everywhere.
 
 The distance of two distributions of a feature is the Wasserstein distance, relative to the root mean square of the
 feature in the reference, or to the scale of the unit if that is larger (`reduction.error.UNIT_SCALES` of the
@@ -13,10 +14,6 @@ simulator). It is within the accuracy if it is smaller, and shown to be if the u
 is (bootstrap over instances). Where it is larger, a permutation test (the model and the reference swapped at random in
 each instance) says whether the distributions differ at all, or the distance is that of so many instances. A feature is
 compared where both grasps of an instance have it; the shares of instances that have it are compared as well.
-
-A distance of few instances is too large rather than too small, since an image that is read earlier in one grasp and
-later in another averages out only over many. A scene with a distance above the accuracy is therefore repeated with four
-times as many instances, up to `--most`.
 """
 
 from __future__ import annotations
@@ -27,8 +24,8 @@ import math
 import secrets
 import sys
 import tempfile
-from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -51,8 +48,8 @@ from graspsense_sim_gripper.reduction.select import select
 
 Row = dict[str, Any]
 ACCURACY: Final = 0.01
-REFERENCE: Final = 0.01
-"""With `fidelity = "reference"`: the steps are halved until nothing changes by more than 1e-9."""
+FINEST: Final = ({"accuracy": 1e-4, "fidelity": "full"}, {"accuracy": ACCURACY, "fidelity": "reference"})
+"""The settings of what the models are compared with, the first that is verified."""
 RESAMPLES: Final = 400
 LEAST_PAIRS: Final = 5
 DIFFERS: Final = 0.05
@@ -157,38 +154,42 @@ def compared(ours: Sequence[Features], theirs: Sequence[Features]) -> dict[str, 
     return result
 
 
-def measured(bench: Bench | None, number: int, instances: int, most: int) -> Row:
-    """Return the distances of a scene, from so many instances, or from more where a distance is too large."""
+def finest(bench: Bench | None, scene: Scene) -> Grasps:
+    """Return the grasps that a model is compared with. Raises ConfigError if the reference is refused."""
+    fast, reference = FINEST
+    with suppress(ConfigError):
+        grasps = Grasps(bench, scene, fast)
+        if not grasps.reduction.not_verified:
+            return grasps
+    return Grasps(bench, scene, reference)
+
+
+def measured(bench: Bench | None, number: int, instances: int) -> Row:
+    """Return the distances of a scene, from so many instances."""
     scene, _ = scene_of(number)
     scene, row = sensed(scene), {"scene": number}
     try:
-        reference = Grasps(bench, scene, {"accuracy": REFERENCE, "fidelity": "reference"})
-        if not controller_is_stable(
-            instantiate(reference.problem, reference.reduction, 0), reference.reduction
-        ):
+        best = finest(bench, scene)
+        row["by"] = best.job.config.fidelity
+        if not controller_is_stable(instantiate(best.problem, best.reduction, 0), best.reduction):
             return {**row, "unstable": True}
-        reference.extend(instances)
+        best.extend(instances)
     except (ArithmeticError, ConfigError) as error:
         return {**row, "failed": f"the reference: {error}"[:200]}
     for way, settings in WAYS.items():
         try:
-            grasps = Grasps(bench, scene, settings)
-            row[way] = against(reference, grasps, instances)
-            while way == "selected" and largest(row[way]) > ACCURACY and len(grasps.features) < most:
-                row[way] = against(reference, grasps, min(4 * len(grasps.features), most))
+            row[way] = against(best, Grasps(bench, scene, settings), instances)
         except (ArithmeticError, ConfigError) as error:
             row[way] = {"refused": f"{type(error).__name__}: {error}"[:200]}
     return row
 
 
-def against(reference: Grasps, grasps: Grasps, instances: int) -> Row:
-    """Return the distances of so many instances of a model from those of the reference."""
-    reference.extend(instances)
+def against(best: Grasps, grasps: Grasps, instances: int) -> Row:
+    """Return the distances of so many instances of a model from those of the best one."""
     grasps.extend(instances)
-    pairs = zip(grasps.outcomes, reference.outcomes[:instances], strict=True)
+    pairs = zip(grasps.outcomes, best.outcomes, strict=True)
     return {
-        "instances": instances,
-        "features": compared(grasps.features, reference.features[:instances]),
+        "features": compared(grasps.features, best.features),
         "outcomes": sum(one != other for one, other in pairs) / instances,
         "doubts": sorted(grasps.doubts),
     }
@@ -208,13 +209,12 @@ def differs(found: Row) -> bool:
     return any(one.largest > ACCURACY and one.p < DIFFERS / len(some) for one in some)
 
 
-def page(rows: Sequence[Row]) -> list[str]:
+def page(rows: Sequence[Row], instances: int) -> list[str]:
     """Return the figures in Markdown."""
     done = [row for row in rows if "failed" not in row and not row.get("unstable")]
-    counts = Counter(row["selected"]["instances"] for row in done if "instances" in row["selected"])
-    sizes = ", ".join(f"{scenes} of {instances}" for instances, scenes in sorted(counts.items()))
     lines = [
-        f"{len(done)} scenes (numbers {rows[0]['scene']} to {rows[-1]['scene']}), with so many instances: {sizes} ("
+        f"{len(done)} scenes of {instances} instances each (numbers {rows[0]['scene']} to {rows[-1]['scene']}; "
+        f"{sum(row['by'] == 'reference' for row in done)} compared with the reference; "
         f"{sum(bool(row.get('unstable')) for row in rows)} others have an unstable loop, "
         f"{sum('failed' in row for row in rows)} no reference); {where_measured()}.",
         "",
@@ -258,15 +258,14 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--scenes", type=int, default=500)
-    parser.add_argument("--instances", type=int, default=40)
-    parser.add_argument("--most", type=int, default=640)
+    parser.add_argument("--instances", type=int, default=640)
     parser.add_argument("--first", type=int)
     parser.add_argument("--rows", type=Path, help="JSON lines of the finished scenes, to go on with later")
     parser.add_argument("--short", action="store_true", help="least work, only to show that it runs")
     given = parser.parse_args()
     first = given.first if given.first is not None else secrets.randbelow(2**31)
     if given.short:
-        given.scenes, given.instances, given.most, first = 1, 5, 5, 1
+        given.scenes, given.instances, first = 1, 5, 1
     with tempfile.TemporaryDirectory() as folder:
         file = given.rows or Path(folder) / "rows.jsonl"
         rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
@@ -276,11 +275,11 @@ def main() -> None:
         for number in range(first, first + given.scenes):
             if number in known:
                 continue
-            rows.append(measured(bench, number, given.instances, given.most))
+            rows.append(measured(bench, number, given.instances))
             with file.open("a") as out:
                 out.write(json.dumps(rows[-1]) + "\n")
             print(f"\r{len(rows)} scenes", end="", file=sys.stderr, flush=True)
-    print("\n".join(page(rows)))
+    print("\n".join(page(rows, given.instances)))
 
 
 if __name__ == "__main__":
