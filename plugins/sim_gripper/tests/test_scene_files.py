@@ -293,9 +293,20 @@ def test_the_explanation_adds_up_to_the_force_that_was_felt():
     assert sum(row["share"] for row in rows.values()) == pytest.approx(1.0)
     assert rows["maxwell"]["rates"] == [{"what": "relaxes", "per_s": 2.5}]
     # A spring gives back what was put in; a branch that relaxes does not.
-    assert abs(rows["elastic"]["lost_j"]) < 1e-3 * rows["elastic"]["work_j"]
+    # It separates within a tick, and what it returns in this tick is not counted.
+    assert abs(rows["elastic"]["lost_j"]) < 2e-3 * rows["elastic"]["work_j"]
     assert rows["maxwell"]["lost_j"] > 0.2 * rows["maxwell"]["work_j"] > 0.0
     assert rows["elastic"]["expected_n"] == pytest.approx(rows["elastic"]["peak_n"], rel=1e-3)
+
+
+def test_the_explanation_leaves_out_what_happens_in_a_released_object():
+    # Released, it springs back against its damper faster than a tick.
+    grasp = run_grasp(SimBackend(SimConfig(object="odwalla:full_open", explain=True)), HYBRID, RunConfig())
+    model = grasp.report["model"]
+    assert "loss" in {row["term"] for row in model["terms"]}
+    for row in model["terms"]:
+        assert abs(row["peak_n"]) < model["peak_n"]
+        assert abs(row["lost_j"]) < 2.0 * model["peak_n"] * model["compression_m"]
 
 
 @pytest.mark.slow

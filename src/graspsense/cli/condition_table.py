@@ -9,7 +9,7 @@ from graspsense.cli.terminal import Style, echo, echo_entry, echo_table
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from graspsense.experiments.condition import Conditions
+    from graspsense.experiments.condition import Conditions, FeatureCondition
 
 HEADER = ("FEATURE", "MEDIAN MOVEMENT", "99 % OF GRASPS", "ABOVE 1 %", "MOST BY")
 
@@ -22,7 +22,7 @@ def condition_rows(conditions: Conditions) -> list[tuple[str, ...]]:
             _share(one.median),
             _share(one.finest),
             f"{100 * one.beyond:.0f} % of grasps",
-            one.parameter,
+            _most_by(one),
         )
         for one in conditions.features
     ]
@@ -38,7 +38,7 @@ def print_conditions(conditions: Conditions, accuracy: float | None = None) -> N
         + (f" (sensor {conditions.sensor})" if conditions.sensor else ""),
     )
     if conditions.grasps == 1:
-        rows = [(one.feature, _share(one.finest), one.parameter) for one in conditions.features]
+        rows = [(one.feature, _share(one.finest), _most_by(one)) for one in conditions.features]
         echo_table(("FEATURE", "MOVEMENT", "MOST BY"), rows)
     else:
         echo_table(HEADER, condition_rows(conditions))
@@ -73,6 +73,11 @@ def conditions_markdown(measured: Sequence[Conditions]) -> str:
             "",
         ]
     return "\n".join([*lines, f"Measured with: {where_measured()}.", ""])
+
+
+def _most_by(one: FeatureCondition) -> str:
+    """Return the parameter that moves a feature most; "none" if nothing moves it."""
+    return one.parameter if one.finest > 0.0 else "none"
 
 
 def _share(movement: float) -> str:

@@ -62,7 +62,7 @@ def print_selection(selection: Mapping[str, Any]) -> None:
         f"{selection['expected_force_n']:.3g} N and {selection['expected_speed_m_s'] * 1e3:.3g} mm/s",
     )
     rows = [
-        (row["term"], row["decision"], f"{row['error']:.2g}", f"{row['number']:.3g} ({row['what']})")
+        (row["term"], row["decision"], f"{row['error']:.2g}", f"{row['what']} = {row['number']:.3g}")
         for row in selection["decisions"]
     ]
     echo_table(("TERM", "DECISION", "ERROR", "REASON"), rows)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from graspsense_sim_gripper.dynamics.contact import pad_compression
 from graspsense_sim_gripper.objects.spec import TermParams
@@ -16,12 +16,13 @@ def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> d
     """Return the contribution of each term as plain values, also of terms that the reduced model dropped.
 
     `compressions` holds the compression (m) and the force (N) of the object at each tick from the first contact on.
-    For each term, `terms` gives
+    Ticks in which the fingers do not press the object are left out: what its terms do to each other while it recovers
+    is faster than a tick. For each term, `terms` gives
 
     - `peak_n`: its largest force (N),
     - `at_peak_n` and `share`: its force (N) when the force of the object is largest, and its share of the sum of terms,
     - `work_j`: the work done on it until then (J),
-    - `lost_j`: the work that it has not returned at the end (J),
+    - `lost_j`: the work that it has not returned when the object separates (J),
     - `expected_n`: the largest force (N) that `Term.importance` predicts for such a grasp,
     - `rates`: its rates (1/s).
     """
@@ -36,8 +37,9 @@ def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> d
         speed_m_s=deepest / (max(path.index(deepest), 1) * setup.dt_s),
         seconds=len(forces_n) * setup.dt_s,
     )
+    along = _Path(path, [force_n > 0.0 for force_n in forces_n], peak, setup.dt_s)
     rows = [
-        _contribution(kind, params, path, peak, setup.dt_s, point)
+        _contribution(kind, params, along, point)
         for kind, params in zip(setup.kinds, setup.terms, strict=True)
     ]
     total = sum(row["at_peak_n"] for row in rows)
@@ -54,24 +56,34 @@ def explain(setup: GraspSetup, compressions: Sequence[tuple[float, float]]) -> d
     }
 
 
-def _contribution(
-    kind: str, params: TermParams, path: Sequence[float], peak: int, dt_s: float, point: WorkingPoint
-) -> dict[str, Any]:
-    """Return the contribution of a term.
+class _Path(NamedTuple):
+    """The compression of the object in the ticks of a grasp."""
 
-    `path` holds the compression (m) before the first tick and after each tick; `peak` is the tick of the largest force.
-    """
-    term = find_term(kind)[1]
+    compression_m: Sequence[float]
+    """Before the first tick and after each tick."""
+    pressed: Sequence[bool]
+    """Whether the fingers press the object at the end of each tick."""
+    peak: int
+    """The tick of the largest force."""
+    dt_s: float
+
+
+def _contribution(kind: str, params: TermParams, along: _Path, point: WorkingPoint) -> dict[str, Any]:
+    """Return the contribution of a term."""
+    term, (path, pressed, peak, dt_s) = find_term(kind)[1], along
     state, force, work, work_to_peak = term.at_rest, 0.0, 0.0, 0.0
     forces: list[float] = []
     for i in range(len(path) - 1):
         before = force
-        # The mean rate over this tick and the next.
-        after = path[i + 2] if i + 2 < len(path) else path[i + 1]
-        speed = 0.5 * (after - path[i]) / dt_s
+        # The mean rate over this tick and the next, if the object is still pressed in it.
+        ticks = 2 if i + 2 < len(path) and pressed[i + 1] else 1
+        speed = (path[i + ticks] - path[i]) / (ticks * dt_s)
         force, state = term.law(params, state, path[i], path[i + 1], dt_s, speed)
+        if not pressed[i]:
+            force = 0.0
+        else:
+            work += 0.5 * (before + force) * (path[i + 1] - path[i])
         forces.append(force)
-        work += 0.5 * (before + force) * (path[i + 1] - path[i])
         if i == peak:
             work_to_peak = work
     return {

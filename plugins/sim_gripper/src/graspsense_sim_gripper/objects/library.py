@@ -146,7 +146,10 @@ def find(name: str) -> ObjectSpec:
     if name in shipped:
         return parse_scene(shipped[name], name, f"scene {name}")
     kinds = sorted({n.partition(":")[0] for n in known} | shipped.keys())
-    raise UnknownName(f"no object named {kind!r}. Known: {', '.join(kinds)}.{suggestion(kind, kinds)}")
+    raise UnknownName(
+        f"no object named {kind!r}. Known: {', '.join(kinds)}, and none.{suggestion(kind, kinds)} A scene of your own "
+        "is a file: write its name with .toml"
+    )
 
 
 def kinds_in(scene: str) -> tuple[str, ...]:

@@ -302,5 +302,5 @@ def _deciding(term: Term, params: TermParams, point: WorkingPoint) -> tuple[str,
     rates = term.rates(params, point)
     if rates:
         fastest = max(rates, key=lambda rate: rate.per_s)
-        return f"{fastest.what}, times seconds of grasp", fastest.per_s * point.seconds
+        return f"rate ({fastest.what}) times duration of the grasp", fastest.per_s * point.seconds
     return "force over gripping force", term.importance(params, point) / point.force_n

@@ -298,7 +298,7 @@ class TrialGrasps:
         # Compiling takes seconds too, but no work.
         if percent > 0 and time.monotonic() - self._reported_s > PROGRESS_S:
             _LOG.warning(
-                "selecting the model of the object: %d %% of the work after which it is given up", percent
+                "selecting the model of the object: %d %% of the allowed ticks and steps used", percent
             )
             self._reported_s = time.monotonic()
 
