@@ -17,7 +17,7 @@ from graspsense_sim_gripper.identify.fit import fit
 from graspsense_sim_gripper.identify.forward import RIGID_PADS, ForwardModel
 from graspsense_sim_gripper.identify.fracture import fracture_of
 from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
-from graspsense_sim_gripper.identify.prepare import prepared
+from graspsense_sim_gripper.identify.prepare import _smooth_course, prepared
 from graspsense_sim_gripper.identify.refuse import shows_memory
 from graspsense_sim_gripper.identify.run import _fit_to_use, _used
 from graspsense_sim_gripper.objects.spec import parse_scene
@@ -48,6 +48,25 @@ def test_a_force_of_the_pads_is_taken_at_the_time_of_its_image():
     closure = np.maximum(WIDTH_M - squeeze.gap_m[squeeze.sample][loading], 0.0)
     # Taken at the ticks that repeat it, it would lag by 20 ms on average, which is 0.4 N here.
     assert np.abs(squeeze.force_n[loading] - 1000.0 * closure).max() < 0.1
+
+
+def test_a_force_that_is_a_mean_is_compared_with_the_mean_of_the_law():
+    t_s, sample = np.linspace(0.0, 1.0, 41), np.arange(0, 41, 4)
+    squeeze = evolve(
+        prepared(recorded(), 0.0), t_s=t_s, sample=sample, averaged_s2=np.full(len(sample), 0.01**2)
+    )
+    # The mean of 3 t^2 over times of variance v is 3 t^2 + 3 v.
+    mean = squeeze.at_samples(3.0 * t_s**2)
+    assert mean[1:-1] == pytest.approx(3.0 * t_s[sample[1:-1]] ** 2 + 3.0 * 0.01**2)
+
+
+def test_the_mean_over_ticks_does_not_flatten_a_course_of_the_gap():
+    squeeze = recorded()
+    t_s = squeeze.trace.t_s
+    curved = evolve(squeeze, trace=evolve(squeeze.trace, gap_m=WIDTH_M - 0.02 * t_s**2))
+    times, gap = _smooth_course(curved.trace, np.linspace(0.0, float(t_s[-1]), 41))
+    inner = slice(50, -50)
+    assert gap[inner] == pytest.approx(WIDTH_M - 0.02 * times[inner] ** 2, abs=1e-12)
 
 
 def test_no_step_of_a_path_is_much_shorter_than_those_beside_it():

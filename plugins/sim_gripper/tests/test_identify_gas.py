@@ -12,12 +12,15 @@ from squeezes import WIDTH_M, recorded
 from graspsense.core.identification import RecordedSqueeze
 from graspsense.plugin_api import RunConfig, create
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.contact import PadCompliance
 from graspsense_sim_gripper.identify.choose import choose
+from graspsense_sim_gripper.identify.fit import fit
 from graspsense_sim_gripper.identify.forward import RIGID_PADS, ForwardModel
 from graspsense_sim_gripper.identify.gas import AREA_M2, combinations, parameters_of
 from graspsense_sim_gripper.identify.laws import DataScale, static_candidates
 from graspsense_sim_gripper.identify.prepare import prepared
 from graspsense_sim_gripper.identify.run import identify
+from graspsense_sim_gripper.identify.spread import _scale_errors, uncertainty
 from graspsense_sim_gripper.terms.gas import Gas
 
 AIR = {"area_slope_m": 0.0, "pressure_pa": 101325.0, "exponent": 1.0, "bulge_m3_pa": 0.0}
@@ -49,6 +52,42 @@ def test_a_gas_that_is_hardly_compressed_is_not_told_from_a_spring():
         done = choose(model, [noisy], scale, has_memory=False, progress=lambda done, total: None)
         assert done.fitted.candidate.name == chosen
     assert done.fitted.values == pytest.approx((300.0, 600.0, 1.5 * depth), rel=0.05)
+
+
+def behind_pads(length, noise_n):
+    """Return a squeeze of a shell with a closed gas behind fingertips that harden, and what made it."""
+    squeeze = prepared(recorded(period_s=1.0 / 60.0), 0.0)
+    depth = squeeze.depth_m
+    model = ForwardModel(pads=PadCompliance(15000.0, 0.0, 0.0, 1.0, 0.002, 2.0))
+    law = static_candidates(DataScale(squeeze.peak_n, depth, 0.4, 1.4, 0.01))[-1]
+    true = (300.0, 600.0, length * depth)
+    clean = model.forces(squeeze, law, true, WIDTH_M, 1.0)
+    noise_n = noise_n * np.random.default_rng(0).standard_normal(len(clean))
+    return evolve(squeeze, force_n=clean + noise_n), model, law, true
+
+
+def test_intervals_of_a_gas_are_wide_where_the_shell_and_the_gas_do_nearly_the_same():
+    squeeze, model, law, true = behind_pads(3.0, 0.03)
+    found = uncertainty(model, fit(model, law, [squeeze]), [squeeze])
+    assert all(low < one < high for low, one, high in zip(found.low, true, found.high, strict=True))
+    # The stiffness of the shell is not determined beside that of the gas.
+    assert found.high[0] > 4.0 * found.low[0]
+
+
+def test_a_shell_that_the_fit_leaves_out_has_an_interval_in_proportion_to_the_force():
+    squeeze, model, law, true = behind_pads(2.0, 0.02)
+    softest = 1e-3
+    none = evolve(fit(model, law, [squeeze]), values=(softest, 900.0, true[2]))
+    assert uncertainty(model, none, [squeeze]).high[0] > 100.0
+
+
+def test_an_error_of_the_scale_of_the_force_changes_lengths_behind_compliant_fingertips():
+    squeeze, model, law, _ = behind_pads(1.3, 0.0)
+    errors = np.sqrt(np.diag(_scale_errors(model, fit(model, law, [squeeze]), [squeeze], 0.05)))
+    assert errors[2] > 2e-3
+    rigid = ForwardModel(pads=RIGID_PADS)
+    errors = np.sqrt(np.diag(_scale_errors(rigid, fit(rigid, law, [squeeze]), [squeeze], 0.05)))
+    assert errors == pytest.approx((0.05, 0.05, 0.0), abs=1e-4)
 
 
 @pytest.mark.slow

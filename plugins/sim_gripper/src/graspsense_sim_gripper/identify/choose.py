@@ -32,6 +32,8 @@ MANY: Final = 4
 """Candidates that are usually refined and judged, for the progress."""
 WORTH_TRYING: Final = 3.0
 """A candidate whose fit is worse than the best by this factor is not judged by held-out data."""
+MANY_EVALUATIONS: Final = 400
+"""Of the chosen fit, so that it converges in a flat valley, too."""
 LEAST_GAIN: Final = 0.03
 """A term more has to reduce the error on held-out data by at least this share."""
 
@@ -94,6 +96,9 @@ def choose(
     worth = [one for one in fits if one.rms <= WORTH_TRYING * least and not _adds_nothing(one, fits)]
     judged = in_threads(lambda one: _judged(model, one, squeezes), worth, counter.done)
     best = _simplest(judged)
+    converged = fit(
+        model, best.fitted.candidate, squeezes, start=best.fitted, max_evaluations=MANY_EVALUATIONS
+    )
     names = {one.candidate.name for one in fits}
     only_directly = [one for one in directly if one.candidate.name not in names]
     only_directly += [one for k, one in enumerate(rough) if k not in kept]
@@ -109,7 +114,7 @@ def choose(
         for one in only_directly
     ]
     ranked = (*sorted(scores, key=_rank), *sorted(dropped, key=_rank))
-    return Choice(fitted=best.fitted, refined=tuple(fits), scores=ranked)
+    return Choice(fitted=converged, refined=tuple(fits), scores=ranked)
 
 
 def _kept(rough: Sequence[Fitted]) -> list[int]:

@@ -47,7 +47,10 @@ LAG_STARTS: Final = (0.0, 0.5, -0.5)
 LEAST_ERROR: Final = 1e-3
 """Errors below this share of the peak are those of the path's nodes: they tell no candidates apart."""
 MAX_EVALUATIONS: Final = 40
+"""Of one start. Where two parameters nearly do the same, the minimum is a flat valley, and a fit ends on its way."""
 TOLERANCE: Final = 1e-6
+SMALLEST_SINGULAR: Final = 1e-9
+"""Of the Jacobian with columns of length 1: below this, a change of the parameters changes no force."""
 STARTS: Final = 3
 """The best starts, which are optimised."""
 
@@ -109,7 +112,7 @@ class _Problem:
         self.size = sum(sizes)
         self.of_squeeze = np.repeat(np.arange(self.n), sizes)
         kept = list(zip(squeezes, masks, strict=True))
-        self.at_node = np.concatenate([one.sample[mask] for one, mask in kept])
+        self.masks = masks
         self.measured = np.concatenate([one.force_n[mask] for one, mask in kept])
         self.peaks = np.repeat([one.peak_n for one in squeezes], sizes)
         self._last: tuple[Floats, Floats] | None = None
@@ -133,6 +136,15 @@ class _Problem:
         factors = np.exp(x[..., p + n : p + 2 * n]) if self.has_factors else np.ones_like(widths)
         return np.exp(x[..., :p]), widths, factors
 
+    def vector(self, fitted: Fitted) -> Floats:
+        """Return the vector of a fit to these squeezes, without its lag."""
+        shares = [
+            (width - one.width_m) / one.depth_m
+            for width, one in zip(fitted.widths_m, self.squeezes, strict=True)
+        ]
+        factors = np.log(fitted.factors) if self.has_factors else np.zeros(0)
+        return np.concatenate([np.log(fitted.values), shares, factors])
+
     def lags_s(self, x: Floats) -> Floats:
         """Return the lag of a vector, or of each row of a table."""
         lags: Floats = LAG_UNIT_S * x[..., -1] if self.has_lag else np.zeros(x.shape[:-1])
@@ -149,7 +161,11 @@ class _Problem:
         path = (self.n * which.reshape(-1, 1) + np.arange(self.n)).ravel()
         forces = self.model.run(paths, Runs(path, widths.ravel(), numbers, self.candidate.active))
         by_vector = forces.reshape(len(xs), self.n, -1)
-        out: Floats = (by_vector[:, self.of_squeeze, self.at_node] - self.measured) / self.peaks
+        samples = [
+            one.at_samples(by_vector[:, i, : len(one.t_s)])[:, self.masks[i]]
+            for i, one in enumerate(self.squeezes)
+        ]
+        out: Floats = (np.concatenate(samples, axis=1) - self.measured) / self.peaks
         np.nan_to_num(out, copy=False, nan=NO_FORCE, posinf=NO_FORCE, neginf=-NO_FORCE)
         return out
 
@@ -197,6 +213,7 @@ def fit(
     start: Fitted | None = None,
     *,
     has_lag: bool = False,
+    max_evaluations: int = MAX_EVALUATIONS,
 ) -> Fitted:
     """Return the best fit of a candidate to these squeezes, from the best of its starts, or from another fit.
 
@@ -217,7 +234,7 @@ def fit(
             problem.jacobian,
             bounds=(low, high),
             x_scale="jac",
-            max_nfev=MAX_EVALUATIONS,
+            max_nfev=max_evaluations,
             ftol=TOLERANCE,
             xtol=TOLERANCE,
         )
@@ -235,6 +252,28 @@ def fit(
         lag_s=float(problem.lags_s(best.x)),
         lag_error_s=_lag_error_s(np.asarray(best.jac), best.fun[: problem.size]) if has_lag else math.nan,
     )
+
+
+def linear_covariance(
+    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], least_error: float
+) -> Floats:
+    """Return the covariance of the logarithms of the values that the residuals leave, by the linearised fit.
+
+    It is that of the values with a common stiffness which is the mean of the squeezes. `least_error`: by how much the
+    forces of the model are wrong at least, over the peak. A direction that changes no force has a large variance.
+    """
+    problem = _Problem(model, fitted.candidate, squeezes, whole(squeezes), has_lag=False)
+    jacobian = problem.jacobian(problem.vector(fitted))[: problem.size]
+    p, n = problem.p, problem.n
+    if problem.has_factors:
+        # Changes of the factors whose sum is zero.
+        jacobian = np.hstack([jacobian[:, : p + n], jacobian[:, p + n :] @ (np.eye(n) - 1.0 / n)[:, 1:]])
+    scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-12)
+    _, singular, rows = np.linalg.svd(jacobian / scale, full_matrices=False)
+    error = math.hypot(fitted.rms, least_error)
+    root = (rows.T / np.maximum(singular, SMALLEST_SINGULAR) * error) / scale[:, np.newaxis]
+    covariance: Floats = (root @ root.T)[:p, :p]
+    return covariance
 
 
 def _lag_error_s(jacobian: Floats, residuals: Floats) -> float:
@@ -271,13 +310,7 @@ def _starts(problem: _Problem, start: Fitted | None) -> list[Floats]:
     factors = np.zeros(n if problem.has_factors else 0)
     lag = np.zeros(int(problem.has_lag))
     if start is not None:
-        shares = [
-            (width - one.width_m) / one.depth_m
-            for width, one in zip(start.widths_m, problem.squeezes, strict=True)
-        ]
-        if problem.has_factors:
-            factors = np.log(start.factors)
-        known = np.concatenate([np.log(start.values), shares, factors])
+        known = problem.vector(start)
         if not problem.has_lag:
             return [known]
         lags = LAG_STARTS if start.lag_s == 0.0 else (start.lag_s / LAG_UNIT_S,)

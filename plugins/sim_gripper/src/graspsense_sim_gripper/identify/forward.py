@@ -207,5 +207,4 @@ class ForwardModel:
         """Return the force (N) at the samples of a squeeze; NaN where a law has none."""
         numbers = candidate.numbers(np.array([values]), np.array([factor]))
         runs = Runs(np.zeros(1, np.int64), np.array([width_m]), numbers, candidate.active)
-        forces: Floats = self.run(self.paths([squeeze]), runs)[0][squeeze.sample]
-        return forces
+        return squeeze.at_samples(self.run(self.paths([squeeze]), runs)[0])

@@ -85,6 +85,8 @@ class Squeeze:
     """Nodes at which the force was measured."""
     force_n: Floats
     """The force at these nodes: the mean of both pads, over `share`."""
+    averaged_s2: Floats
+    """Variance of the times of the measurements of which each of these forces is the mean; 0 for a single one."""
     width_m: float
     """The gap at contact, as a first estimate."""
     noise_n: float
@@ -101,6 +103,28 @@ class Squeeze:
         """Return the squeeze if its force lagged behind the gap by so much: at every node, the gap of that time."""
         gap = np.interp(self.t_s - lag_s, *self.course)
         return evolve(self, gap_m=gap, speed_m_s=-np.gradient(gap, self.t_s))
+
+    @cached_property
+    def averaging(self) -> tuple[Floats, Floats]:
+        """Weights of the node before and of the node after each sample in the mean over the times of the sample.
+
+        The mean of a force f over times of variance v is f + v f'' / 2, and f'' follows from the three nodes.
+        """
+        inner = (self.sample > 0) & (self.sample < len(self.t_s) - 1)
+        at = np.clip(self.sample, 1, len(self.t_s) - 2)
+        before_s, after_s = self.t_s[at] - self.t_s[at - 1], self.t_s[at + 1] - self.t_s[at]
+        share = np.where(inner, self.averaged_s2 / (before_s + after_s), 0.0)
+        return share / before_s, share / after_s
+
+    def at_samples(self, forces: Floats) -> Floats:
+        """Return the mean force over the times of each sample, from forces at the nodes, in the last axis."""
+        last = len(self.t_s) - 1
+        here = forces[..., self.sample]
+        before = forces[..., np.maximum(self.sample - 1, 0)]
+        after = forces[..., np.minimum(self.sample + 1, last)]
+        weight_before, weight_after = self.averaging
+        mean: Floats = here + weight_before * (before - here) + weight_after * (after - here)
+        return mean
 
     @cached_property
     def measured_path(self) -> tuple[Floats, Floats]:
@@ -170,7 +194,7 @@ def prepared(
     after = times[:0] if broken is None else times[broken : broken + 1]
     broken_n = None if broken is None else float(forces[broken])
     progress = _progress(trace, np.append(times[window], after))
-    times, forces = _in_blocks(times[window], forces[window], progress, parts.samples)
+    times, forces, averaged_s2 = _in_blocks(times[window], forces[window], progress, parts.samples)
     nodes, sample = _nodes(np.append(times, after), progress, parts.nodes)
     sample = sample[: len(times)]
     course = _smooth_course(trace, nodes)
@@ -186,6 +210,7 @@ def prepared(
         step_s=np.diff(nodes, prepend=nodes[0] - BEFORE_S),
         sample=sample,
         force_n=forces,
+        averaged_s2=averaged_s2,
         broken_n=broken_n,
         course=course,
         width_m=width,
@@ -255,14 +280,17 @@ def _end(trace: Trace, times: Floats, forces: Floats, first: int, last: int) -> 
 
 def _in_blocks(
     times: Floats, values: Floats, progress: tuple[Floats, Floats], samples: int
-) -> tuple[Floats, Floats]:
-    """Return at most this number of means of neighbouring samples, which are evenly spaced in the progress."""
+) -> tuple[Floats, Floats, Floats]:
+    """Return times and values of at most this number of means of neighbouring samples, which are evenly spaced in the
+    progress, and the variance of the times of each."""
     if len(times) <= samples:
-        return times, values
+        return times, values, np.zeros(len(times))
     block = np.minimum(np.interp(times, *progress) * samples, samples - 1).astype(np.int64)
     edges = np.flatnonzero(np.diff(block, prepend=-1))
     counts = np.diff(edges, append=len(times))
-    return np.add.reduceat(times, edges) / counts, np.add.reduceat(values, edges) / counts
+    mean_s = np.add.reduceat(times, edges) / counts
+    variance_s2 = np.add.reduceat((times - np.repeat(mean_s, counts)) ** 2, edges) / counts
+    return mean_s, np.add.reduceat(values, edges) / counts, variance_s2
 
 
 def _nodes(times: Floats, progress: tuple[Floats, Floats], nodes: int) -> tuple[Floats, NDArray[np.int64]]:
@@ -283,13 +311,19 @@ def _smooth_course(trace: Trace, nodes: Floats) -> tuple[Floats, Floats]:
     per_node = (nodes[-1] - nodes[0]) / MAX_NODES / max(float(np.median(np.diff(times))), 1e-9)
     width = 2 * int(per_node // 2) + 1
     if width > 1:
-        padded = np.pad(gap, width // 2, mode="edge")
-        gap = np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
+        # A mean flattens a curved course. What it takes away, a second mean takes away once more: it is added again.
+        once = _moving_mean(gap, width)
+        gap = 2.0 * once - _moving_mean(once, width)
     part = slice(
         max(int(np.searchsorted(times, nodes[0] - MAX_LAG_S)) - 1, 0),
         int(np.searchsorted(times, nodes[-1] + MAX_LAG_S)) + 2,
     )
     return times[part], gap[part]
+
+
+def _moving_mean(values: Floats, width: int) -> Floats:
+    padded = np.pad(values, width // 2, mode="edge")
+    return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
 
 
 def _stretches(t_s: Floats, gap: Floats, width: float, *, has_approach: bool) -> Stretches:

@@ -2,8 +2,9 @@
 
 With three or more squeezes the interval is that of the delete-a-group jackknife (Shao and Tu, The Jackknife and
 Bootstrap, 1995, section 2.3) with Student's t, on the logarithms. A group is an object if there are three of them,
-otherwise a squeeze. The scatter between groups is many times the standard deviation that one fit gives itself. One
-squeeze shows no such scatter: blocks of its residuals are drawn again.
+otherwise a squeeze. The scatter between groups is usually many times the standard deviation that one fit gives itself.
+One squeeze shows no such scatter: blocks of its residuals are drawn again. No interval is smaller than that of the
+linearised fit.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense_sim_gripper.identify.choose import fit_residuals
-from graspsense_sim_gripper.identify.fit import Fitted, fit
+from graspsense_sim_gripper.identify.fit import Fitted, fit, linear_covariance
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.gas import AREA_FACTOR
 from graspsense_sim_gripper.identify.interval import normal, student
@@ -34,11 +35,16 @@ BOOTSTRAPS: Final = 24
 BLOCKS: Final = 12
 """Blocks of neighbouring residuals of a squeeze, which are drawn again together."""
 DRAWS: Final = 200
+LARGEST: Final = math.log(30.0)
+"""A logarithm changes by at most this in proportion to the force. A larger change is one of a value near zero."""
 MOVING_SHARE: Final = 0.3
 """Where the gap changes by at least this share of its largest change between measurements, the fingers move."""
 PATH_ERROR: Final = 1e-3
 """Standard deviation of the logarithm of a value that the finite number of nodes of a path causes: the median error
 with ideal sensors (`benchmarks/identify.py`)."""
+PATH_FORCE_ERROR: Final = 1e-4
+"""The same of the force, over the peak. With ideal sensors, the forces of the true values differ by 0.1 to 3.5 of this.
+"""
 
 
 @frozen(kw_only=True, eq=False)
@@ -76,11 +82,10 @@ def uncertainty(
     again = refits(model, fitted, squeezes, rng, has_lag=lag_error_s > 0.0)
     table = np.log([one.values for one in again.fits])
     deviations = table - table.mean(axis=0)
-    covariance = again.scale * deviations.T @ deviations
-    centre, factor, basis = at, again.factor, again.basis
-    # An error of the scale of the force is common to all squeezes, so that none of them shows it.
-    scaled = np.array([1.0 if one.is_force else 0.0 for one in fitted.candidate.free])
-    own = force_scale**2 * np.outer(scaled, scaled) + PATH_ERROR**2 * np.eye(len(at))
+    factor, basis = again.factor, again.basis
+    linear = linear_covariance(model, fitted, squeezes, PATH_FORCE_ERROR)
+    covariance = _at_least(again.scale * deviations.T @ deviations, linear * (normal() / factor) ** 2)
+    own = _scale_errors(model, fitted, squeezes, force_scale) + PATH_ERROR**2 * np.eye(len(at))
     own += np.diag(_corner_errors(fitted, squeezes) ** 2)
     if lag_error_s > 0.0:
         later = fit(model, fitted.candidate, [one.delayed(lag_error_s) for one in squeezes], start=fitted)
@@ -89,11 +94,12 @@ def uncertainty(
     own += _area_errors(model, fitted, squeezes)
     covariance = covariance + own * (normal() / factor) ** 2
     spread = np.sqrt(np.diag(covariance))
-    low, high = np.exp(centre - factor * spread), np.exp(centre + factor * spread)
+    best = np.array(fitted.values)
+    low, high = best * _changed(-factor * spread), best * _changed(factor * spread)
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     widening = factor / normal()
-    draws = np.exp(centre + widening * rng.standard_normal((DRAWS, len(at))) @ root.T)
+    draws = best * _changed(widening * rng.standard_normal((DRAWS, len(at))) @ root.T)
     return Uncertainty(
         low=tuple(low.tolist()),
         high=tuple(high.tolist()),
@@ -101,6 +107,47 @@ def uncertainty(
         draws=draws,
         **_spreads(fitted, squeezes),
     )
+
+
+def _changed(logs: Floats) -> Floats:
+    """Return the factors by which values change for changes of their logarithms by the linearised fit.
+
+    A value near zero hardly changes the force: its linearised change is far more than its own size, and no exponential.
+    """
+    factors: Floats = np.maximum(np.exp(np.clip(logs, -LARGEST, LARGEST)), 1.0 + logs)
+    return factors
+
+
+def _at_least(covariance: Floats, other: Floats) -> Floats:
+    """Return the covariance with each variance not smaller than in the other.
+
+    In a flat valley of the squares, a refit stays where it begins and does not scatter, and a few squeezes may agree by
+    chance.
+    """
+    both = covariance + other
+    own = np.sqrt(np.maximum(np.diag(covariance), np.diag(other)))
+    ratio = own / np.sqrt(np.diag(both))
+    return both * np.outer(ratio, ratio)
+
+
+def _scale_errors(
+    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], force_scale: float
+) -> Floats:
+    """Return the covariance of the logarithms that an error of the scale of the force causes.
+
+    It is common to all squeezes, so that none of them shows it. Through compliant fingertips, it changes lengths, too.
+    """
+    if force_scale == 0.0:
+        return np.zeros((len(fitted.values), len(fitted.values)))
+    more = math.exp(force_scale)
+    stronger = [evolve(one, force_n=more * one.force_n) for one in squeezes]
+    scaled = [
+        value * more if one.is_force else value
+        for one, value in zip(fitted.candidate.free, fitted.values, strict=True)
+    ]
+    found = fit(model, fitted.candidate, stronger, start=evolve(fitted, values=tuple(scaled)))
+    shift = np.log(found.values) - np.log(fitted.values)
+    return np.outer(shift, shift)
 
 
 class Refits(NamedTuple):
