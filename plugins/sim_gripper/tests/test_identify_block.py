@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 
 import pytest
+from identify import delayed
 
 from graspsense.core.identification import RecordedSqueeze
 from graspsense.plugin_api import ConfigError, RunConfig, create
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.identify.block import with_fingertips_of_block
-from graspsense_sim_gripper.identify.run import identify
+from graspsense_sim_gripper.identify.block import lag_of_block, with_fingertips_of_block
+from graspsense_sim_gripper.identify.run import _settings, _shares, identify
 
 
 def squeezes(scene, gripper, seeds):
@@ -38,6 +39,24 @@ def test_the_fingertips_of_known_squeezes_come_back(hardening):
     else:
         assert config.pad_hardening_m == pytest.approx(hardening, rel=0.05)
         assert "twice the linear force at 1 mm" in said
+
+
+@pytest.mark.parametrize("gripper", [{"sensor": "ideal"}, {"sensor": "pads"}])
+def test_a_delay_of_which_the_settings_do_not_know_does_not_bias_the_fingertips(gripper):
+    config, soft = SimConfig(**gripper), {**gripper, "pad_stiffness_n_m": 6000.0}
+    block = squeezes("block", soft, [1, 2, 3])
+    late = [delayed(one, 0.01) for one in block]
+    assert lag_of_block(config, block) == 0.0
+    lag_s = lag_of_block(config, late)
+    assert lag_s == pytest.approx(0.01, abs=5e-4)
+    in_time, _ = _settings(config, late, block)
+    found, (said,) = _settings(config, late, late)
+    assert found.pad_stiffness_n_m == pytest.approx(in_time.pad_stiffness_n_m, rel=2e-3)
+    assert "which these squeezes show" in said
+    # With the delay of the settings, they seem 4 % stiffer with the ideal sensor, and 6 % with pads.
+    wrong, said = with_fingertips_of_block(config, late, _shares(config, late, 0.0))
+    assert wrong.pad_stiffness_n_m > 1.035 * in_time.pad_stiffness_n_m
+    assert "the delay of the settings" in said
 
 
 def test_a_squeeze_of_nothing_is_refused():

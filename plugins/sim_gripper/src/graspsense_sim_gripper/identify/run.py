@@ -21,7 +21,7 @@ from graspsense_sim_gripper.build import drive_and_pads
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.drive import Drive
 from graspsense_sim_gripper.fingertip import CELLS
-from graspsense_sim_gripper.identify.block import with_fingertips_of_block
+from graspsense_sim_gripper.identify.block import lag_of_block, with_fingertips_of_block
 from graspsense_sim_gripper.identify.check import predictive_checks
 from graspsense_sim_gripper.identify.choose import Choice, choose
 from graspsense_sim_gripper.identify.delay import delay_of, lag_beyond_settings
@@ -30,7 +30,7 @@ from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.fracture import fracture_of
 from graspsense_sim_gripper.identify.interval import student
 from graspsense_sim_gripper.identify.laws import DataScale, memories
-from graspsense_sim_gripper.identify.prepare import NoSqueeze, Squeeze, prepared, resolution
+from graspsense_sim_gripper.identify.prepare import FULL, NoSqueeze, Squeeze, prepared, resolution
 from graspsense_sim_gripper.identify.refuse import shows_memory, undetermined
 from graspsense_sim_gripper.identify.share import measured_share
 from graspsense_sim_gripper.identify.spread import Uncertainty, uncertainty
@@ -172,12 +172,12 @@ def _fit_to_use(
     return kept, ready
 
 
-def _shares(config: SimConfig, block: Sequence[RecordedSqueeze]) -> list[float]:
+def _shares(config: SimConfig, block: Sequence[RecordedSqueeze], lag_s: float) -> list[float]:
     """Return the share of the force that the cells measure in squeezes of a block: one for all of them."""
     if not _has_cells(config, block):
         return [1.0] * len(block)
     drive, _ = drive_and_pads(config)
-    ready = [prepared(one, config.force_delay_s) for one in block]
+    ready = [prepared(one, config.force_delay_s, FULL, lag_s) for one in block]
     return [_share(_measured_shares(block, ready, drive))] * len(block)
 
 
@@ -195,7 +195,8 @@ def _settings(
     config, notes = _own_settings(config, squeezes)
     if not block:
         return config, notes
-    config, said = with_fingertips_of_block(config, block, _shares(config, block))
+    lag_s = lag_of_block(config, block)
+    config, said = with_fingertips_of_block(config, block, _shares(config, block, lag_s), lag_s)
     return config, [said]
 
 
