@@ -2,6 +2,7 @@
 
     python benchmarks/identify.py [--repeats 4] [--only NAME...] [--sensors NAME...] [--recordings N...] [--rows FILE]
     python benchmarks/identify.py --delays 0 0.01 0.025 [...] [--rows FILE] [--markdown docs/identify.md]
+    python benchmarks/identify.py --spreads 0 0.3 [...] [--rows FILE] [--markdown docs/identify.md]
     python benchmarks/identify.py --rows FILE --markdown docs/identify.md
     python benchmarks/identify.py --transfer [--rows FILE] [--markdown docs/identify.md] [--png docs/identify.png]
 
@@ -15,6 +16,9 @@ its tables between the marks of a page.
 
 With `--delays`: the forces of the recordings are late by these times (s), of which the settings of the gripper do not
 know, and their table is that of the delays that come back.
+
+With `--spreads`: one parameter of each scene of `OWN_SPREADS` differs between objects by these standard deviations of
+its logarithm, and their table is that of the spreads that are claimed.
 
 With `--transfer`: four containers of the catalogue are the real world. From 1, 3, 10 and 30 recordings of each,
 a classifier is trained on the recordings, and another on simulated squeezes of the scenes that they were identified as.
@@ -31,7 +35,7 @@ import platform
 import tempfile
 import time
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date
 from itertools import product
 from pathlib import Path
@@ -115,6 +119,8 @@ SENSORS: Final[Mapping[str, Mapping[str, Any]]] = {
 FACTOR: Final = 0.3
 """The logarithm of the largest factor on the values of a scene."""
 STIFFNESS_SPREAD: Final = 0.1
+OWN_SPREADS: Final = {"creeping": "maxwell.tau_s", "stiffening": "elastic.k3_n_m3", "foam": "foam.exponent"}
+"""The parameter with a spread of its own in the rows of `--spreads`."""
 HOLD_S: Final = 1.5
 TOLD_APART: Final = 1.03
 """Terms whose fits differ by less than this factor are not told apart by the data."""
@@ -146,6 +152,10 @@ class Row:
     """By how much the forces of the recordings were late."""
     delay: tuple[float, float, float, bool] | None = None
     """The identified delay, the ends of its interval, and whether it was used; None if none was determined."""
+    own_spread: float = 0.0
+    """The spread of the parameter of `OWN_SPREADS`."""
+    spreads: tuple[tuple[str, float, float, float], ...] = ()
+    """The parameters for which a spread of their own was claimed, with it and the ends of its interval."""
 
 
 def drawn(terms: Sequence[Mapping[str, Any]], repeat: int) -> list[dict[str, Any]]:
@@ -162,12 +172,17 @@ def drawn(terms: Sequence[Mapping[str, Any]], repeat: int) -> list[dict[str, Any
     ]
 
 
-def scene_text(terms: Sequence[Mapping[str, Any]], spread: float) -> str:
-    """Return the text of a scene with these terms."""
+def scene_text(
+    terms: Sequence[Mapping[str, Any]], spread: float, own: str = "", own_spread: float = 0.0
+) -> str:
+    """Return the text of a scene with these terms. `own`: the parameter with a spread of its own."""
     lines = [f"width_m = {WIDTH_M}", f"stiffness_spread = {spread}", "share = 0.6", "share_spread = 0.01"]
     for term in terms:
         lines.append("[[terms]]")
         lines += [f"{key} = {json.dumps(value)}" for key, value in term.items()]
+        kind, _, name = own.partition(".")
+        if own_spread > 0.0 and kind == term["type"]:
+            lines.append(f"spread = {{ {name} = {own_spread} }}")
     return "\n".join(lines) + "\n"
 
 
@@ -248,10 +263,12 @@ def named(terms: Sequence[Mapping[str, Any]]) -> str:
     return " + ".join(words.get(kind, kind) for kind in kinds)
 
 
-def measured(name: str, sensor: str, count: int, repeat: int, late_s: float = 0.0) -> Row:
+def measured(
+    name: str, sensor: str, count: int, repeat: int, late_s: float = 0.0, own_spread: float = 0.0
+) -> Row:
     """Return the row of a scene."""
     terms = drawn(ALL_SCENES[name], repeat)
-    text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0)
+    text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0, OWN_SPREADS.get(name, ""), own_spread)
     # Other objects in every row: the number of an object fixes its stiffness, whatever its terms.
     series = (list(ALL_SCENES).index(name) * 10 + list(SENSORS).index(sensor)) * 100 + count
     seeds = [100_000 * (series + 1) + 100 * repeat + i for i in range(count)]
@@ -275,6 +292,12 @@ def measured(name: str, sensor: str, count: int, repeat: int, late_s: float = 0.
         seconds=result.seconds,
         late_s=late_s,
         delay=_delay(result),
+        own_spread=own_spread,
+        spreads=tuple(
+            (one.name.removesuffix(".spread"), one.value, one.low, one.high)
+            for one in result.parameters
+            if one.name.endswith(".spread")
+        ),
     )
 
 
@@ -375,6 +398,43 @@ def delays_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
             f"{float(np.median(errors)):.2g} ms" if errors else "–",
             _share(sum(one["right_terms"] for one in group), len(group)),
             _share(sum(covered), len(covered)),
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def spreads_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of the spreads: by sensor, number of objects, parameter and spread."""
+    columns = (
+        "sensor",
+        "objects",
+        "parameter",
+        "its spread",
+        "scenes",
+        "claimed",
+        "claimed of another parameter",
+    )
+    columns += ("90 % intervals that cover", "median of what was claimed")
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    keys = {
+        (list(SENSORS).index(one["sensor"]), one["recordings"], one["scene"], one["own_spread"])
+        for one in rows
+    }
+    for place, count, scene, spread in sorted(keys):
+        sensor, parameter = list(SENSORS)[place], OWN_SPREADS[scene]
+        group = [
+            one
+            for one in rows
+            if (one["sensor"], one["recordings"], one["scene"], one["own_spread"])
+            == (sensor, count, scene, spread)
+        ]
+        found = [claim for one in group for claim in one["spreads"] if claim[0] == parameter]
+        others = sum(any(claim[0] != parameter for claim in one["spreads"]) for one in group)
+        cells = (
+            *(sensor, str(count), f"`{parameter}`", f"{spread:g}", str(len(group))),
+            *(_share(len(found), len(group)), str(others)),
+            _share(sum(low <= spread <= high for *_, low, high in found), len(found)) if spread else "–",
+            f"{float(np.median([value for _, value, *_ in found])):.2g}" if found else "–",
         )
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
@@ -490,6 +550,9 @@ def main() -> None:
     parser.add_argument("--sensors", nargs="+", choices=list(SENSORS), default=list(SENSORS))
     parser.add_argument("--recordings", nargs="+", type=int, help="the numbers of recordings")
     parser.add_argument("--delays", nargs="+", type=float, help="the times by which the forces are late (s)")
+    parser.add_argument(
+        "--spreads", nargs="+", type=float, help="the spreads of the parameters of OWN_SPREADS"
+    )
     parser.add_argument("--transfer", action="store_true")
     parser.add_argument("--rows", type=Path, help="append the rows to this file (JSON lines)")
     parser.add_argument(
@@ -518,8 +581,10 @@ def main() -> None:
         # A run that is stopped has all scenes in its rows.
         for repeat in range(asked.first, asked.first + asked.repeats):
             for count in asked.recordings or COUNTS:
-                for sensor, name, late_s in product(asked.sensors, asked.only, asked.delays or [0.0]):
-                    row = measured(name, sensor, count, repeat, late_s)
+                for sensor, name, late_s, own in product(
+                    asked.sensors, asked.only, asked.delays or [0.0], asked.spreads or [0.0]
+                ):
+                    row = measured(name, sensor, count, repeat, late_s, own)
                     rows.append(asdict(row))
                     if asked.rows:
                         with asked.rows.open("a", encoding="utf-8") as out:
@@ -532,8 +597,15 @@ def main() -> None:
         print(json.dumps({"rows": rows, "made": made}, indent=2))
     else:
         if not asked.transfer:
-            print((delays_markdown if asked.delays else as_markdown)(rows))
+            print(_tables(asked)(rows))
         print(f"{made}, {time.monotonic() - begin:.0f} s")
+
+
+def _tables(asked: argparse.Namespace) -> Callable[[Sequence[Mapping[str, Any]]], str]:
+    """Return what writes the tables of the asked rows."""
+    if asked.spreads:
+        return spreads_markdown
+    return delays_markdown if asked.delays else as_markdown
 
 
 def _publish(asked: argparse.Namespace) -> None:
@@ -543,6 +615,8 @@ def _publish(asked: argparse.Namespace) -> None:
         draw_transfer(rows, asked.png)
     if asked.markdown and asked.transfer:
         write_between(asked.markdown, "transfer", transfer_markdown(rows))
+    elif asked.markdown and asked.spreads:
+        write_between(asked.markdown, "spreads", spreads_markdown(rows))
     elif asked.markdown and asked.delays:
         write_between(asked.markdown, "delays", delays_markdown(rows))
     elif asked.markdown:

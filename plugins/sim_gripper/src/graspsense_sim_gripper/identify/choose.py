@@ -117,6 +117,19 @@ def choose(
     return Choice(fitted=converged, refined=tuple(fits), scores=ranked)
 
 
+def chosen_instead(choice: Choice, fitted: Fitted, verdict: str) -> Choice:
+    """Return the choice of another of the refined candidates."""
+    scores = [
+        evolve(one, chosen=True, verdict=f"chosen: {verdict}")
+        if one.terms == fitted.candidate.name
+        else evolve(one, chosen=False, verdict="only common values need its terms")
+        if one.chosen
+        else one
+        for one in choice.scores
+    ]
+    return Choice(fitted=fitted, refined=choice.refined, scores=tuple(sorted(scores, key=_rank)))
+
+
 def _kept(rough: Sequence[Fitted]) -> list[int]:
     """Return which laws are tried with every memory: those that fit best."""
     order = np.argsort([one.cost for one in rough], kind="stable").tolist()

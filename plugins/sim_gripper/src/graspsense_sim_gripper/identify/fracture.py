@@ -21,6 +21,7 @@ from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel, Runs
 from graspsense_sim_gripper.identify.interval import student
 from graspsense_sim_gripper.identify.prepare import Squeeze
+from graspsense_sim_gripper.identify.random_effects import FALSE_CLAIMS, Scatter, between
 
 Floats = NDArray[np.float64]
 
@@ -39,8 +40,9 @@ class FractureFit:
     value: float
     low: float
     high: float
-    spread: float
-    """Standard deviation of the logarithm between objects; NaN if fewer than three broke."""
+    spread: Scatter | None
+    """Standard deviation of the logarithm between objects; None if fewer than three broke, or if they differ by no more
+    than the measurements leave open."""
     left: float
     broken: int
     whole: int
@@ -50,7 +52,7 @@ class FractureFit:
         """The identified parameters."""
         unit = "N" if self.name == "force_n" else "m"
         basis = f"{self.broken} of {self.broken + self.whole} squeezes broke the object"
-        return [
+        found = [
             IdentifiedParameter(
                 name=f"fracture.{self.name}",
                 unit=unit,
@@ -63,6 +65,18 @@ class FractureFit:
                 name="fracture.left", unit="", value=self.left, low=math.nan, high=math.nan, basis="median"
             ),
         ]
+        if self.spread is not None:
+            found.append(
+                IdentifiedParameter(
+                    name=f"fracture.{self.name}.spread",
+                    unit="",
+                    value=self.spread.value,
+                    low=self.spread.low,
+                    high=self.spread.high,
+                    basis=basis,
+                )
+            )
+        return found
 
     @property
     def undetermined(self) -> list[Undetermined]:
@@ -78,10 +92,16 @@ class FractureFit:
         ]
 
 
-def fracture_of(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> FractureFit | None:
-    """Return the fracture of these squeezes; None if none of them broke the object."""
+def fracture_of(
+    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], force_scatter: float = 0.0
+) -> FractureFit | None:
+    """Return the fracture of these squeezes; None if none of them broke the object.
+
+    `force_scatter`: standard deviation of the logarithm of the force's scale between squeezes.
+    """
     breaks: dict[str, list[float]] = {"force_n": [], "compression_m": []}
     survived: dict[str, list[float]] = {"force_n": [], "compression_m": []}
+    errors: dict[str, list[float]] = {"force_n": [], "compression_m": []}
     left = []
     for i, squeeze in enumerate(squeezes):
         forces, compressions = _whole(model, fitted, squeeze, i)
@@ -90,8 +110,10 @@ def fracture_of(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]
             survived["compression_m"].append(float(np.max(compressions)))
             continue
         last = squeeze.sample[-1]
-        breaks["force_n"].append(0.5 * float(forces[last] + forces[-1]))
-        breaks["compression_m"].append(0.5 * float(compressions[last] + compressions[-1]))
+        for name, course in (("force_n", forces), ("compression_m", compressions)):
+            breaks[name].append(0.5 * float(course[last] + course[-1]))
+            # Anywhere between the two measurements.
+            errors[name].append(abs(math.log(float(course[-1]) / float(course[last]))) / math.sqrt(12.0))
         left.append(squeeze.broken_n / max(float(forces[-1]), 1e-9))
     if not left:
         return None
@@ -100,17 +122,30 @@ def fracture_of(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]
     if len(left) >= LEAST_BROKEN and fits["compression_m"][1] < fits["force_n"][1]:
         name = "compression_m"
     mean, spread = fits[name]
+    variances = np.array(errors[name]) ** 2 + (force_scatter**2 if name == "force_n" else 0.0)
     half = student(len(left) - 1) * spread / math.sqrt(len(left)) if len(left) > 1 else math.nan
     return FractureFit(
         name=name,
         value=math.exp(mean),
         low=math.exp(mean - half),
         high=math.exp(mean + half),
-        spread=spread if len(left) >= LEAST_BROKEN else math.nan,
+        spread=_spread(np.log(breaks[name]), variances, spread) if len(left) >= LEAST_BROKEN else None,
         left=min(max(float(np.median(left)), 0.0), MOST_LEFT),
         broken=len(left),
         whole=len(squeezes) - len(left),
     )
+
+
+def _spread(logs: Floats, variances: Floats, likeliest: float) -> Scatter | None:
+    """Return the spread between objects; None if the errors of the breaks make their scatter.
+
+    `likeliest`: with the objects that did not break. Its interval is as wide as that of the broken ones alone.
+    """
+    scatter = between(logs, variances + SMALLEST_SPREAD**2, FALSE_CLAIMS)
+    if scatter is None:
+        return None
+    ratio = likeliest / scatter.value
+    return Scatter(likeliest, ratio * scatter.low, ratio * scatter.high)
 
 
 def _whole(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> tuple[Floats, Floats]:

@@ -23,14 +23,21 @@ from graspsense_sim_gripper.dynamics.drive import Drive
 from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.identify.block import lag_of_block, with_fingertips_of_block
 from graspsense_sim_gripper.identify.check import predictive_checks
-from graspsense_sim_gripper.identify.choose import Choice, choose
-from graspsense_sim_gripper.identify.delay import delay_of, lag_beyond_settings
+from graspsense_sim_gripper.identify.choose import choose
+from graspsense_sim_gripper.identify.delay import delay_of
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel
-from graspsense_sim_gripper.identify.fracture import fracture_of
+from graspsense_sim_gripper.identify.fracture import FractureFit, fracture_of
 from graspsense_sim_gripper.identify.interval import student
 from graspsense_sim_gripper.identify.laws import DataScale, memories
 from graspsense_sim_gripper.identify.prepare import FULL, NoSqueeze, Squeeze, prepared, resolution
+from graspsense_sim_gripper.identify.random_effects import (
+    Individual,
+    OwnSpread,
+    as_parameters,
+    own_spreads,
+    simplest_alone,
+)
 from graspsense_sim_gripper.identify.refuse import shows_memory, undetermined
 from graspsense_sim_gripper.identify.share import measured_share
 from graspsense_sim_gripper.identify.spread import Uncertainty, uncertainty
@@ -77,21 +84,20 @@ def identify(
     model.compile()
     cells = _has_cells(config, squeezes)
     squeezes, ready, shares, share = _ready(config, _used(squeezes, notes), notes, cells=cells)
-    choice = _chosen(model, ready, progress)
-    lag = lag_beyond_settings(model, choice.refined, ready)
+    individual = _chosen(model, ready, progress)
+    lag = individual.lag(model, ready)
     if lag.lag_s != 0.0:
         squeezes, ready, shares, share = _ready(config, squeezes, [], cells=cells, lag_s=lag.lag_s)
-        choice = _chosen(model, ready, progress)
+        individual = _chosen(model, ready, progress)
+    choice = individual.choice
     progress("computing intervals", 0, 1)
-    damper = memories(_scale(ready))[0]
-    delay = delay_of(model, choice.fitted, damper, ready, config.force_delay_s, lag)
+    delay = delay_of(model, choice.fitted, memories(_scale(ready))[0], ready, config.force_delay_s, lag)
     scale_error = _scale_error(config, drive, ready) if cells else 0.0
-    found = uncertainty(model, choice.fitted, ready, scale_error, lag.error_s)
+    found = uncertainty(model, choice.fitted, ready, scale_error, lag.error_s, individual.of_each)
     open_ = [*delay.undetermined, *undetermined(choice.fitted, found, ready, shares, cells)]
     values, parameters = _values(choice.fitted, found, share, shares, cells)
-    if delay.found is not None:
-        parameters.append(delay.found)
-    fracture = fracture_of(model, choice.fitted, ready)
+    own, fracture = _between_objects(model, individual, ready, shares)
+    parameters += [*([delay.found] if delay.found else []), *as_parameters(choice.fitted, own)]
     if fracture is not None:
         open_, parameters = [*open_, *fracture.undetermined], [*parameters, *fracture.parameters]
     label = next((one.label for one in squeezes if one.label), "")
@@ -105,6 +111,7 @@ def identify(
         squeezes=ready,
         candidates=choice.scores,
         undetermined=open_,
+        spreads={one.place: one.scatter.value for one in own},
         fracture=fracture,
     )
     return Identification(
@@ -121,14 +128,15 @@ def identify(
     )
 
 
-def _chosen(model: ForwardModel, squeezes: Sequence[Squeeze], progress: Progress) -> Choice:
-    return choose(
+def _chosen(model: ForwardModel, squeezes: Sequence[Squeeze], progress: Progress) -> Individual:
+    choice = choose(
         model,
         squeezes,
         _scale(squeezes),
         has_memory=shows_memory(squeezes),
         progress=lambda done, total: progress("fitting candidates", done, total),
     )
+    return simplest_alone(model, choice, squeezes)
 
 
 def _ready(
@@ -249,6 +257,21 @@ def _has_cells(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> bool:
 def _share(shares: Sequence[float]) -> float:
     known = [one for one in shares if math.isfinite(one)]
     return min(float(np.median(known)), 1.0) if known else 1.0
+
+
+def _between_objects(
+    model: ForwardModel, individual: Individual, squeezes: Sequence[Squeeze], shares: Sequence[float]
+) -> tuple[list[OwnSpread], FractureFit | None]:
+    """Return the parameters that differ between the objects, and how the objects broke."""
+    fitted, force_scatter = individual.choice.fitted, _force_scatter(shares)
+    own = own_spreads(model, fitted, individual.fits, squeezes, force_scatter)
+    return own, fracture_of(model, fitted, squeezes, force_scatter)
+
+
+def _force_scatter(shares: Sequence[float]) -> float:
+    """Return the standard deviation of the logarithm of the share between squeezes."""
+    known = [one for one in shares if math.isfinite(one)]
+    return float(np.std(np.log(known), ddof=1)) if len(known) > 1 else 0.0
 
 
 def _fingertips(config: SimConfig) -> dict[str, float]:

@@ -70,14 +70,15 @@ def uncertainty(
     squeezes: Sequence[Squeeze],
     force_scale: float = 0.0,
     lag_error_s: float = 0.0,
-    seed: int = 0,
+    of_each: Fitted | None = None,
 ) -> Uncertainty:
     """Return the uncertainty of a fit.
 
     `force_scale`: standard deviation of the logarithm of the force's scale. `lag_error_s`: that of the lag of the force
-    (s), beyond what the squeezes show by their scatter; 0 if the lag was not identified.
+    (s), beyond what the squeezes show by their scatter; 0 if the lag was not identified. `of_each`: a fit with other
+    widths and factors, of which the spreads are.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     at = np.log(fitted.values)
     again = refits(model, fitted, squeezes, rng, has_lag=lag_error_s > 0.0)
     table = np.log([one.values for one in again.fits])
@@ -86,7 +87,7 @@ def uncertainty(
     linear = linear_covariance(model, fitted, squeezes, PATH_FORCE_ERROR)
     covariance = _at_least(again.scale * deviations.T @ deviations, linear * (normal() / factor) ** 2)
     own = _scale_errors(model, fitted, squeezes, force_scale) + PATH_ERROR**2 * np.eye(len(at))
-    own += np.diag(_corner_errors(fitted, squeezes) ** 2)
+    own += np.diag(corner_errors(fitted, squeezes) ** 2)
     if lag_error_s > 0.0:
         later = fit(model, fitted.candidate, [one.delayed(lag_error_s) for one in squeezes], start=fitted)
         shift = np.log(later.values) - at
@@ -105,7 +106,7 @@ def uncertainty(
         high=tuple(high.tolist()),
         basis=basis,
         draws=draws,
-        **_spreads(fitted, squeezes),
+        **_spreads(fitted if of_each is None else of_each, squeezes),
     )
 
 
@@ -195,7 +196,7 @@ def _area_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze
     return np.outer(shift, shift)
 
 
-def _corner_errors(fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
+def corner_errors(fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
     """Return the relative errors of the parameters of a snap-through from the distance between two measurements.
 
     A corner of the law lies anywhere between two measurements, and a bootstrap leaves it where it is.

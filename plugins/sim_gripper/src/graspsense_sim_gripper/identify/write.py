@@ -31,6 +31,8 @@ class SceneFacts:
     squeezes: Sequence[Squeeze]
     candidates: Sequence[CandidateScore]
     undetermined: Sequence[Undetermined]
+    spreads: Mapping[int, float]
+    """Spreads of parameters of their own, by the place of the parameter among the free ones."""
     fracture: FractureFit | None = None
 
 
@@ -53,9 +55,21 @@ def scene_text(facts: SceneFacts) -> str:
             interval = intervals.get(labels.get(name, ""))
             comment = _not_fitted(facts, slot, name) if interval is None else _interval(interval)
             lines.append(f"{name} = {_number(value)}  # {comment}")
+        lines += _spread(facts, slot, intervals)
     if facts.fracture is not None:
         lines += _fracture(facts.fracture, intervals)
     return "\n".join([*lines, "", *_identified(facts)]) + "\n"
+
+
+def _spread(facts: SceneFacts, slot: int, intervals: Mapping[str, IdentifiedParameter]) -> list[str]:
+    """Return the line with the spreads of a term's parameters, if there are any."""
+    free = facts.fitted.candidate.free
+    own = {free[place]: value for place, value in facts.spreads.items() if free[place].slot == slot}
+    if not own:
+        return []
+    values = ", ".join(f"{one.name} = {_number(value)}" for one, value in own.items())
+    known = ", ".join(_interval(intervals[f"{one.label}.spread"]) for one in own)
+    return [f"spread = {{ {values} }}  # {known}"]
 
 
 def _not_fitted(facts: SceneFacts, slot: int, name: str) -> str:
@@ -68,7 +82,10 @@ def _fracture(fit: FractureFit, intervals: Mapping[str, IdentifiedParameter]) ->
     interval = _interval(intervals[f"fracture.{fit.name}"])
     lines = ["", "[[terms]]", 'type = "fracture"', f"{fit.name} = {_number(fit.value)}  # {interval}"]
     lines.append(f"left = {_number(fit.left)}")
-    return lines if math.isnan(fit.spread) else [*lines, f"spread = {{ {fit.name} = {_number(fit.spread)} }}"]
+    if fit.spread is None:
+        return lines
+    known = _interval(intervals[f"fracture.{fit.name}.spread"])
+    return [*lines, f"spread = {{ {fit.name} = {_number(fit.spread.value)} }}  # {known}"]
 
 
 def _identified(facts: SceneFacts) -> list[str]:
