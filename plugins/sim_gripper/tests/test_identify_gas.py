@@ -19,6 +19,7 @@ from graspsense_sim_gripper.identify.forward import RIGID_PADS, ForwardModel
 from graspsense_sim_gripper.identify.gas import AREA_M2, combinations, parameters_of
 from graspsense_sim_gripper.identify.laws import DataScale, static_candidates
 from graspsense_sim_gripper.identify.prepare import prepared
+from graspsense_sim_gripper.identify.refuse import undetermined
 from graspsense_sim_gripper.identify.run import identify
 from graspsense_sim_gripper.identify.spread import _scale_errors, uncertainty
 from graspsense_sim_gripper.terms.gas import Gas
@@ -72,6 +73,12 @@ def test_intervals_of_a_gas_are_wide_where_the_shell_and_the_gas_do_nearly_the_s
     assert all(low < one < high for low, one, high in zip(found.low, true, found.high, strict=True))
     # The stiffness of the shell is not determined beside that of the gas.
     assert found.high[0] > 4.0 * found.low[0]
+    (shell,) = [
+        one
+        for one in undetermined(fit(model, law, [squeeze]), found, [squeeze], [1.0], cells=False)
+        if one.what == "elastic.k1_n_m"
+    ]
+    assert "open" in shell.remedy
 
 
 def test_a_shell_that_the_fit_leaves_out_has_an_interval_in_proportion_to_the_force():

@@ -10,7 +10,7 @@ import numpy as np
 
 from graspsense.plugin_api import Undetermined
 from graspsense_sim_gripper.identify.fit import Fitted
-from graspsense_sim_gripper.identify.laws import GAS, SNAP
+from graspsense_sim_gripper.identify.laws import ELASTIC, GAS, SNAP
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.identify.spread import LEAST_INSTANCES, Uncertainty
 
@@ -59,7 +59,9 @@ _GAS_COMBINED: Final = (
     "the squeezes determine the stiffness n p A^2 / V of the gas and {other}; fixed are {fixed}: every other gas with "
     "these combinations has the same force"
 )
+_SHELL_OR_GAS: Final = "squeeze deeper, or squeeze the object open, too, which shows its shell alone"
 _REMEDIES: Final = {
+    "k1_n_m": "squeeze deeper",
     "stiffness_n_m": "squeeze deeper",
     "length_m": "squeeze deeper",
     "resistance_n_s2_m2": "squeeze at two speeds that differ by a factor of two or more, and hold",
@@ -180,6 +182,8 @@ def _parameters(fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze])
             )
             needed = max(HOLD_TIMES * tau, 2.0 * hold_s)
             remedy = f"hold for {needed:.2g} s (the longest hold is {hold_s:.2g} s)"
+        elif parameter.slot == ELASTIC and GAS in fitted.candidate.slots:
+            remedy = _SHELL_OR_GAS
         else:
             remedy = _REMEDIES.get(parameter.name, "record more squeezes")
             if "deeper" in remedy:
