@@ -72,3 +72,19 @@ def test_the_command_refuses_what_is_not_a_scene_before_it_reads(tmp_path):
     done = CliRunner().invoke(cli, ["identify", "none.mcap", "--out", str(tmp_path / "cup.json")])
     assert done.exit_code == 2
     assert "cup.json: the name of the file must end in .toml" in done.output
+
+
+def test_a_single_scene_is_refused_before_anything_is_simulated(tmp_path):
+    path = tmp_path / "cup.toml"
+    path.write_text(CUP)
+    done = CliRunner().invoke(cli, ["train", f"identified:{path}", "--out", str(tmp_path / "model.json")])
+    assert done.exit_code != 0
+    assert isinstance(done.exception, SystemExit | ConfigError)
+    assert "a classifier needs two" in f"{done.output}{done.exception}"
+
+
+def test_a_scene_in_the_place_of_a_recording_is_named_as_such(tmp_path):
+    path = tmp_path / "cup.toml"
+    path.write_text(CUP)
+    with pytest.raises(ConfigError, match="is a scene, not a recording"):
+        recorded_squeezes([str(path)])

@@ -116,6 +116,26 @@ def test_a_recording_without_contact_is_refused():
         prepared(recorded(lambda closure: 0.0 * closure), 0.0)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_noise_of_pads_that_touch_nothing_is_no_squeeze(seed):
+    noisy = recorded(lambda closure: 0.01 * np.random.default_rng(seed).standard_normal(len(closure)))
+    with pytest.raises(ConfigError, match="nothing was touched"):
+        prepared(noisy, 0.0)
+
+
+@pytest.mark.parametrize(("share", "noted"), [(0.95, False), (0.5, True)])
+def test_pads_that_feel_different_forces_are_noted(share, noted):
+    squeeze = recorded()
+    left = squeeze.trace.force_left_n
+    apart = evolve(squeeze, trace=evolve(squeeze.trace, force_left_n=left, force_right_n=share * left))
+    notes = []
+
+    _fit_to_use(SimConfig(), [squeeze, apart], notes)
+
+    assert [one for one in notes if "the two pads differ" in one] == notes
+    assert bool(notes) == noted
+
+
 def test_recordings_without_contact_are_left_out_with_a_note_unless_all_are():
     empty = evolve(recorded(lambda closure: 0.0 * closure), name="empty")
     notes = []

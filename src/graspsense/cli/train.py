@@ -82,6 +82,7 @@ def train(
         train_value(source, classifier, out, keep, as_json, given)
         return
     learner = learner_of(source, classifier, given)
+    _refuse_single_scene(source)
     with ProgressLine() as progress:
         labelled = trials_of(source, progress, given, times)
     labelled = _with_target(labelled, target)
@@ -155,6 +156,19 @@ def _say_trained(out: str, model: Model) -> None:
         echo_entry(f"{after_s:g} s", f"after the contact: {part.provenance['trials']} grasps{sets}")
     # In one line, so that it can be copied.
     click.echo(f"how good    {command_line(('out', 'keep', 'overwrite', 'as_json'), 'evaluate')}")
+
+
+def _refuse_single_scene(source: str) -> None:
+    """Raise ConfigError for a single identified scene, before squeezes of it are simulated."""
+    from graspsense.core.errors import ConfigError
+    from graspsense.sources.identified import IDENTIFIED, identified_scenes
+
+    scenes = identified_scenes(source) if source.startswith(IDENTIFIED) else ()
+    if len(scenes) == 1:
+        raise ConfigError(
+            f"{source} has the single label {scenes[0].label!r}, and a classifier needs two: name scenes of other "
+            f"objects too, as in {IDENTIFIED}cup.toml,mug.toml"
+        )
 
 
 def _with_target(labelled: Labelled, target: str) -> Labelled:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import tomllib
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -31,8 +33,9 @@ def recorded_squeezes(sources: Sequence[str], name: str | None = None) -> tuple[
         known = sorted({*labels, *map(class_of, labels)})
         squeezes = [one for one in squeezes if one.label and name in (one.label, class_of(one.label))]
         if not squeezes:
+            there_are = ", ".join(known) or "none has a label; leave out --class"
             raise ConfigError(
-                f"no recording has the label or the class {name!r}. Known: {', '.join(known) or 'none has a label'}."
+                f"no recording has the label or the class {name!r}. Known: {there_are}."
                 + suggestion(name, known)
             )
         labels = sorted({one.label for one in squeezes})
@@ -56,7 +59,20 @@ def _of_source(source: str) -> Iterator[RecordedSqueeze]:
         grasp = read_recorded(path)
         yield _of_grasp(grasp, path.name, hashlib.sha256(path.read_bytes()).hexdigest())
     else:
+        _refuse_scene(source)
         yield from _of_import(source)
+
+
+def _refuse_scene(source: str) -> None:
+    """Raise ConfigError for a scene in the place of a recording."""
+    path = Path(source).expanduser()
+    if path.suffix != ".toml":
+        return
+    with suppress(OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        if tomllib.loads(path.read_text(encoding="utf-8")).keys() & {"width_m", "terms"}:
+            raise ConfigError(
+                f"{source} is a scene, not a recording: name the recordings, as in {STORE}DIR, and the scene with --out"
+            )
 
 
 def _of_store(folder: str) -> Iterator[RecordedSqueeze]:

@@ -109,7 +109,9 @@ def choose(
             parameters=len(one.values),
             error=math.nan,
             fit_error=one.rms,
-            verdict=f"its direct fit is {one.rms / least_directly:.1f} times worse",
+            verdict=f"its direct residual is {one.rms / least_directly:.1f} times the least"
+            if one.rms > WORTH_REFINING * least_directly
+            else f"not among the {STATIC_KEPT} laws that fit best directly",
         )
         for one in only_directly
     ]
@@ -267,7 +269,7 @@ def _score(
     elif own is None and _adds_nothing(fitted, fits):
         verdict = "fits no better than with fewer terms"
     elif own is None:
-        verdict = f"its fit is {fitted.rms / best.fitted.rms:.1f} times worse"
+        verdict = f"its residual is {fitted.rms / best.fitted.rms:.1f} times that of the chosen terms"
     elif len(fitted.values) > len(best.fitted.values):
         verdict = f"more parameters, error {100.0 * (error / least - 1.0):+.0f} %"
     else:

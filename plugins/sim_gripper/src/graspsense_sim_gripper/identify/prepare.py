@@ -30,6 +30,8 @@ CONTACT_SHARE: Final = 0.03
 """The share of the peak force above which the object counts as touched."""
 NOISE_FACTOR: Final = 5.0
 """Multiple of the noise above which the object counts as touched."""
+SCATTER: Final = 1.4826 / math.sqrt(2.0)
+"""Standard deviation of white noise over the median difference of two neighbouring samples."""
 BEFORE_S: Final = 0.05
 """The path begins at least this long before the force exceeds the threshold."""
 BEFORE_SHARE: Final = 0.8
@@ -92,6 +94,8 @@ class Squeeze:
     noise_n: float
     """Standard deviation of the force before the contact."""
     stretches: Stretches
+    pad_difference: float
+    """The largest difference of the forces on both pads, over the largest mean force; 0 with a single pad."""
     share: float = 1.0
     """The share of the force that the pads measure."""
     broken_n: float | None = None
@@ -176,11 +180,12 @@ def prepared(
     trace = squeeze.trace
     times, forces = _samples(squeeze.name, trace, delay_s, lag_s)
     peak = float(np.max(forces))
+    scatter = SCATTER * float(np.median(np.abs(np.diff(forces)))) if len(forces) > MIN_SAMPLES else 0.0
     first = int(np.argmax(forces > CONTACT_SHARE * peak))
     noise = float(np.std(forces[: max(first - 2, 0)])) if first > 6 else 0.0
     threshold = max(CONTACT_SHARE * peak, NOISE_FACTOR * noise)
     touching = np.flatnonzero(forces > threshold)
-    if peak <= 0.0 or not len(touching):
+    if peak <= NOISE_FACTOR * scatter or not len(touching):
         raise NoSqueeze(f"{squeeze.name}: no force exceeds the noise: nothing was touched")
     if len(touching) < MIN_SAMPLES:
         raise NoSqueeze(
@@ -215,6 +220,7 @@ def prepared(
         course=course,
         width_m=width,
         noise_n=noise,
+        pad_difference=_pad_difference(trace, begin, float(times[-1])) / peak,
         stretches=_stretches(nodes, gap, width, has_approach=first > 1),
     )
 
@@ -238,6 +244,13 @@ def _samples(name: str, trace: Trace, delay_s: float, lag_s: float) -> tuple[Flo
         times, force = times[changed], force[changed]
     finite = np.isfinite(force) & np.isfinite(times)
     return times[finite] - delay_s - lag_s, force[finite]
+
+
+def _pad_difference(trace: Trace, begin_s: float, end_s: float) -> float:
+    """Return the largest difference (N) of the forces on both pads between two times; 0 if one pad has none."""
+    within = (trace.t_s >= begin_s) & (trace.t_s <= end_s)
+    apart = np.abs(trace.force_left_n - trace.force_right_n)[within]
+    return float(np.max(apart[np.isfinite(apart)], initial=0.0))
 
 
 def _progress(trace: Trace, times: Floats) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ import numpy as np
 from graspsense.plugin_api import Undetermined
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.laws import ELASTIC, GAS, SNAP
-from graspsense_sim_gripper.identify.prepare import Squeeze
+from graspsense_sim_gripper.identify.prepare import BREAK_SHARE, Squeeze
 from graspsense_sim_gripper.identify.spread import LEAST_INSTANCES, Uncertainty
 
 LEAST_HOLD_S: Final = 0.2
@@ -145,8 +145,9 @@ def _falls(fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Undetermined]:
     return [
         Undetermined(
             what="a fall of the force",
-            reason=f"the force of {len(forces)} squeezes falls at {min(forces):.3g} to {max(forces):.3g} N while the "
-            "fingers close, by less than half: neither a break nor a snap describes it",
+            reason=f"the force falls by more than {FALL_SHARE:.0%} of the peak in {len(forces)} of {len(squeezes)} "
+            f"squeezes (at {min(forces):.3g} to {max(forces):.3g} N) while the fingers close. It is neither a break (a "
+            f"fall by {BREAK_SHARE:.0%} at once) nor described by a snap",
             remedy='cut the recordings there (cut = "rupture" in a manifest), or squeeze more slowly, so that the '
             "fall has several measurements",
         )

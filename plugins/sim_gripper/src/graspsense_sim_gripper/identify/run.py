@@ -45,6 +45,8 @@ from graspsense_sim_gripper.identify.write import SceneFacts, scene_text
 
 Progress = Callable[[str, int, int], None]
 
+PADS_DIFFER: Final = 0.2
+"""Share of the largest force by which the forces on both pads may differ without a note."""
 MAX_SQUEEZES: Final = 30
 """More recordings hardly narrow the intervals, and a fit of all takes minutes."""
 
@@ -177,6 +179,13 @@ def _fit_to_use(
     if not ready:
         raise refusals[0]
     notes += [f"left out: {refusal}" for refusal in refusals]
+    apart = max(one.pad_difference for one in ready)
+    if apart > PADS_DIFFER:
+        notes.append(
+            f"the forces on the two pads differ by up to {apart:.0%} of the largest force. If the object is fixed off "
+            "the centre, one finger touches it before the other, and the chosen terms are wrong: centre it, or let it "
+            "stand free"
+        )
     return kept, ready
 
 
