@@ -30,6 +30,7 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.build import CELL_OFFSET, build, device_info, instantiate
 from graspsense_sim_gripper.compiled.compose import grasp_loop, guarded_loop
+from graspsense_sim_gripper.compiled.noise import DrawNoise, draw_by_numpy
 from graspsense_sim_gripper.compiled.padding import composition_of, padded, unpadded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
@@ -224,6 +225,8 @@ def _new_buffers() -> Buffers:
 class Storage:
     """The buffers of a thread. Its grasps use them one after the other."""
 
+    draw_noise: DrawNoise = draw_by_numpy
+    """Draws the noise of the first images of a grasp."""
     buffers: Buffers = field(factory=_new_buffers)
 
 
@@ -330,7 +333,7 @@ def _run(
     noise, ideal = setup.noise(), setup.sensor.ideal == 1
     buffers = storage.buffers
     if not ideal:
-        noise.standard_normal(out=buffers.pads.noise)
+        storage.draw_noise(noise, buffers.pads.noise)
     buffers.pads.images[-1] = math.nan
     buffers.pads.left_zero[:] = buffers.pads.right_zero[:] = CELL_OFFSET[0]
     palm_noise = None

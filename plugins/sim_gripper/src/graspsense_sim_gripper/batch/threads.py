@@ -35,6 +35,7 @@ from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.compiled.compose import Composition
 from graspsense_sim_gripper.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
+from graspsense_sim_gripper.compiled.noise import DrawNoise, compiled_noise, draw_by_numpy
 from graspsense_sim_gripper.compiled.padding import compiled_kinds, composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import kinds_in
@@ -129,6 +130,8 @@ class _Batch:
     """Remarks on how the grasps ran, as keys, so that each is given once."""
     measure: Measure | None = field(default=None, init=False)
     """The compiled form of `Job.extraction`."""
+    draw_noise: DrawNoise = field(default=draw_by_numpy, init=False)
+    """Draws the noise of the cell images of compiled grasps."""
     models: Scenes = field(init=False)
     counts: Counter[Composition] = field(factory=Counter, init=False)
     """Number of grasps of each composition."""
@@ -199,12 +202,20 @@ class _Batch:
             self.counts[composition_of(self.job.config, self.models.setup(examples[key], 0))] += n
         for composition, n in self.counts.items():
             self.is_compiled[composition] = self._worth(n)
-        if self.job.extraction is not None and any(self.is_compiled.values()):
+        if any(self.is_compiled.values()):
+            self._compile_around_the_loop()
+
+    def _compile_around_the_loop(self) -> None:
+        """Compile what each compiled grasp does before and after its loop."""
+        if find_spec("numba") is None:
+            return
+        if self.job.config.sensor != "ideal":
+            self.draw_noise = compiled_noise()
+        if self.job.extraction is not None:
             try:
                 self.measure = compiled_measure(self.job.extraction)
             except NotCompilable as error:
-                if find_spec("numba") is not None:
-                    self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
+                self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
 
     def _worth(self, n: int) -> bool:
         return n >= WORTH_COMPILING if self.compiled is None else self.compiled
@@ -214,8 +225,10 @@ class _Batch:
         scenes, seeds = self.scenes[begin : begin + SLICE], self.seeds[begin : begin + SLICE]
         done: dict[int, FinishedGrasp] = {}
         plain: list[int] = []
-        for i, (scene, seed) in enumerate(zip(scenes, seeds, strict=True)):
-            grasp = self._compiled(self.models.setup(scene, seed))
+        # All at first: between the loops of two grasps, the processor's caches hold little of the code for this.
+        setups = [self.models.setup(*grasp) for grasp in zip(scenes, seeds, strict=True)]
+        for i, setup in enumerate(setups):
+            grasp = self._compiled(setup)
             if grasp is None:
                 plain.append(i)
             else:
@@ -272,5 +285,5 @@ class _Batch:
 
     def _storage(self) -> Storage:
         if not hasattr(self.local, "storage"):
-            self.local.storage = Storage()
+            self.local.storage = Storage(self.draw_noise)
         return self.local.storage  # type: ignore[no-any-return]
