@@ -52,7 +52,7 @@ from graspsense_sim_gripper.problem import IMAGES_PER_BLOCK, GraspController
 from graspsense_sim_gripper.reduction.propose import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sampled_loop import instability
-from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N, PadBuffers, apply_tare, sense
+from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N, PadBuffers, apply_tare, sense, with_listed_cells
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
@@ -143,7 +143,8 @@ class SimBackend(BatchBackend[SimConfig]):
         self._reduction = None
         if problem.spec is not None:
             self._reduction = select(problem, self._controller or default_controller(self.config))
-        self._setup = setup = instantiate(problem, self._reduction, seed)
+        setup = instantiate(problem, self._reduction, seed)
+        self._setup = setup = evolve(setup, sensor=with_listed_cells(setup.sensor))
         exact = discretise(self.config, setup)
         self._plant: PlantParams | ExactPlant = setup.plant if exact is None else exact[0]
         shape = None if exact is None else exact[1]

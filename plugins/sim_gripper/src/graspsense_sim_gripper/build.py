@@ -6,7 +6,6 @@ This takes three steps: `build` gives the problem, `reduction.select` its reduce
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache, partial
 from typing import Any, Final, NamedTuple
@@ -52,10 +51,10 @@ TARE_IMAGES: Final = 6
 """Number of cell images in a tare."""
 CELL_OFFSET: Final = (3300.0, 250.0)
 """Mean and standard deviation of the counts of an unloaded cell; 2900 to 3800 counts are reported."""
-UNLOADED: Final = (CELL_OFFSET[0],) * CELLS
-"""The counts of the unloaded cells of an ideal sensor."""
-EVEN_WEIGHTS: Final = (1.0 / 15.0,) * 15
+EVEN_WEIGHTS: Final = (1.0 / PAD_CELLS,) * PAD_CELLS
 """The share of each cell of the gripping face in the force, if there is no object."""
+IDEAL_CELLS: Final = PadCells(np.array(EVEN_WEIGHTS), np.full(CELLS, CELL_OFFSET[0]))
+"""The cells of an ideal sensor; they are never read."""
 EXAMPLES: Final = 4
 """Number of instances whose trial grasps verify a model whose steps have no estimate of their error."""
 _SENSOR_SETTINGS: Final = ("noise_counts", "pad_period_s", "pad_cells", "pad_delay_s")
@@ -291,21 +290,21 @@ def _sensor(config: SimConfig, instance: Instance | None, rng: np.random.Generat
     """Return the sensors of a grasp. The offsets of the cells and the time of the first image are drawn here."""
     period = float(config.pad_period_s)
     if config.sensor == "ideal":
-        cells = PadCells(EVEN_WEIGHTS, UNLOADED)
-        return SensorParams(1, _linkage(config), ImageClock(0.0, period, 0.0), 1.0, 0.0, cells, cells)
+        clock = ImageClock(0.0, period, 0.0)
+        return SensorParams(1, _linkage(config), clock, 1.0, 0.0, IDEAL_CELLS, IDEAL_CELLS)
     mean, spread = CELL_OFFSET
-    offsets: Sequence[Sequence[float]] = (mean + spread * rng.standard_normal((2, CELLS))).tolist()
+    offsets = mean + spread * rng.standard_normal((2, CELLS))
     weights = cell_weights(instance.spec.patch, instance.patch_row) if instance else EVEN_WEIGHTS
     if config.pad_cells < PAD_CELLS:
         present = central_cells(config.pad_cells)
         weights = tuple([weight if cell in present else 0.0 for cell, weight in enumerate(weights)])
-    left, right = (PadCells(weights, tuple(offset)) for offset in offsets)
+    shares = np.array(weights)
     return SensorParams(
         ideal=0,
         link=_linkage(config),
         clock=ImageClock(float(rng.random()) * period, period, float(config.pad_delay_s)),
         share=float(instance.share) if instance else 1.0,
         noise_counts=float(config.noise_counts),
-        left=left,
-        right=right,
+        left=PadCells(shares, offsets[0]),
+        right=PadCells(shares, offsets[1]),
     )

@@ -31,7 +31,7 @@ from graspsense.plugin_api import (
 from graspsense_sim_gripper.build import CELL_OFFSET, build, device_info, instantiate
 from graspsense_sim_gripper.compiled.compose import grasp_loop, guarded_loop
 from graspsense_sim_gripper.compiled.noise import DrawNoise, draw_by_numpy
-from graspsense_sim_gripper.compiled.padding import composition_of, padded, unpadded
+from graspsense_sim_gripper.compiled.padding import PaddedLayout, composition_of, layout_of, padded, unpadded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.exact.discretise import discretise
@@ -59,7 +59,7 @@ from graspsense_sim_gripper.recorded_trace import recorded_trace
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sampled_loop import instability
-from graspsense_sim_gripper.sensing import PadBuffers
+from graspsense_sim_gripper.sensing import PadBuffers, with_listed_cells
 from graspsense_sim_gripper.term_failure import not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
@@ -83,8 +83,8 @@ class FinishedGrasp:
 
     outcome: Outcome
     reason: str
-    state: PlantState
-    """The plant at the end of the grasp, with the true peak force."""
+    _end: PlantState
+    """The plant at the end of the grasp, as its loop returned it."""
     extracted: Extracted
     """What `Job.extract` returned for the trace; None if there is no `Job.extract`."""
     kept: Trace | None
@@ -93,6 +93,27 @@ class FinishedGrasp:
     """The reduced model of the object; None without an object."""
     unstable_loop: str = ""
     """The text of `sampled_loop.instability` for the scene."""
+    _layout: PaddedLayout | None = None
+    """The layout of the terms in `_end`; None: they are those of the object."""
+
+    @property
+    def state(self) -> PlantState:
+        """The plant at the end of the grasp, with the true peak force."""
+        return self._end if self._layout is None else unpadded(self._end, self._layout)
+
+    def in_model(self, reduction: Reduction, unstable_loop: str) -> FinishedGrasp:
+        """Return the same result with the reduced model, and the text of `sampled_loop.instability` for it."""
+        # `evolve` would take three times as long.
+        return FinishedGrasp(
+            outcome=self.outcome,
+            reason=self.reason,
+            end=self._end,
+            layout=self._layout,
+            extracted=self.extracted,
+            kept=self.kept,
+            reduction=reduction,
+            unstable_loop=unstable_loop,
+        )
 
     @property
     def trace(self) -> Trace:
@@ -196,7 +217,7 @@ class Scenes:
             return grasp
         if key not in self._unstable:
             self._unstable[key] = instability(self.setup(scene, seed), self.job.grasp_controller, reduction)
-        return evolve(grasp, reduction=reduction, unstable_loop=self._unstable[key])
+        return grasp.in_model(reduction, self._unstable[key])
 
 
 def scene_key(scene: str) -> tuple[str, bool]:
@@ -238,7 +259,8 @@ def grasp_compiled(
     `measure`: the compiled form of `Job.extraction`; None: `Job.extract` is called with a trace.
     """
     try:
-        return grasp_once(job, padded(setup), loop, storage, on_arrays=True, own=setup, measure=measure)
+        whole, layout = padded(setup), layout_of(setup)
+        return grasp_once(job, whole, loop, storage, on_arrays=True, layout=layout, measure=measure)
     except LAW_ERRORS:
         # Compiled code does not say which term raised it.
         return grasp_plain(job, setup)
@@ -262,16 +284,14 @@ def grasp_once(
     storage: Storage,
     *,
     on_arrays: bool,
-    own: GraspSetup | None = None,
+    layout: PaddedLayout | None = None,
     measure: Measure | None = None,
 ) -> FinishedGrasp:
     """Grasp what `setup` describes with the loop, on arrays where it is compiled, on lists where it is not.
 
-    `own`: the same grasp before it was padded; the plant is returned with its terms. `measure`: as for
-    `grasp_compiled`.
+    `layout`: that in which the grasp is padded; None: it is not. `measure`: as for `grasp_compiled`.
     """
     end, buffers = _run(job, setup, loop, storage, on_arrays)
-    plant = end.plant if own is None else unpadded(end.plant, own)
     if on_arrays:
         storage.buffers = _first_images(buffers)
     outcome, reason = ended_by_itself(end.controller)
@@ -281,7 +301,7 @@ def grasp_once(
     elif not has_ended(end.controller):
         outcome, reason = Outcome.ABORTED, overdue(job.run)
     if not job.traces and job.extract is None:
-        return finished(job, outcome, reason, plant, None)
+        return finished(job, outcome, reason, end.plant, layout)
     n, k = end.loop.recorded, end.sensor.images
     columns, phases = buffers.columns, buffers.phases
     if measure is not None and job.extraction is not None:
@@ -292,7 +312,9 @@ def grasp_once(
             pass
         else:
             extracted = job.extraction.result(measured)
-            return FinishedGrasp(outcome=outcome, reason=reason, state=plant, extracted=extracted, kept=None)
+            return FinishedGrasp(
+                outcome=outcome, reason=reason, end=end.plant, layout=layout, extracted=extracted, kept=None
+            )
     table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
     images, times = np.asarray(buffers.pads.images[:k]), np.asarray(buffers.image_times[:k])
     signals: dict[str, SampleTrace] = {}
@@ -302,12 +324,12 @@ def grasp_once(
         trace = recorded_trace(
             type(job.controller).events, table.copy(), numbers.copy(), images, times, signals
         )
-        return finished(job, outcome, reason, plant, trace)
+        return finished(job, outcome, reason, end.plant, layout, trace)
     # A trace that fills most of the buffers, or that only features are extracted from, is a view of them.
     # While a column of it is referenced, those buffers are kept, and the next grasps have new ones.
     references = sys.getrefcount(columns), sys.getrefcount(phases)
     trace = recorded_trace(type(job.controller).events, table, numbers, images, times, signals)
-    done = finished(job, outcome, reason, plant, trace)
+    done = finished(job, outcome, reason, end.plant, layout, trace)
     del trace
     if on_arrays and (sys.getrefcount(columns), sys.getrefcount(phases)) != references:
         storage.buffers = _first_images(buffers)._replace(
@@ -317,12 +339,21 @@ def grasp_once(
 
 
 def finished(
-    job: Job, outcome: Outcome, reason: str, state: PlantState, trace: Trace | None
+    job: Job,
+    outcome: Outcome,
+    reason: str,
+    end: PlantState,
+    layout: PaddedLayout | None = None,
+    trace: Trace | None = None,
 ) -> FinishedGrasp:
-    """Return the result of a grasp. `trace` may be None if neither traces nor `extract` are asked for."""
+    """Return the result of a grasp that ended in this state of the plant, whose terms are in this layout.
+
+    `trace` may be None if neither traces nor `extract` are asked for.
+    """
     extracted = None if job.extract is None or trace is None else job.extract(trace)
+    kept = trace if job.traces else None
     return FinishedGrasp(
-        outcome=outcome, reason=reason, state=state, extracted=extracted, kept=trace if job.traces else None
+        outcome=outcome, reason=reason, end=end, layout=layout, extracted=extracted, kept=kept
     )
 
 
@@ -347,7 +378,7 @@ def _run(
     most_ticks = math.ceil(seconds_at_most(job.run) / setup.dt_s)
     params = GraspParams(
         plant=setup.plant if exact is None else exact[0],
-        sensor=setup.sensor,
+        sensor=setup.sensor if on_arrays else with_listed_cells(setup.sensor),
         controller=job.params,
         dt_s=setup.dt_s,
         max_ticks=most_ticks,

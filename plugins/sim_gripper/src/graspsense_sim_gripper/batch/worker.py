@@ -110,7 +110,7 @@ class PlainProcess:
             trace = _read_trace(traces) if job.traces or job.extract is not None else None
             if trace is not None:
                 trace = evolve(trace, events=tuple(_event(*event) for event in told))
-            results.append(finished(job, Outcome(outcome), reason, _like(initial, values), trace))
+            results.append(finished(job, Outcome(outcome), reason, _like(initial, values), trace=trace))
         return results
 
 

@@ -11,15 +11,12 @@ from __future__ import annotations
 from functools import cache, lru_cache
 from typing import Final, NamedTuple
 
-import numpy as np
-
 from graspsense_sim_gripper.compiled.compose import Composition, composition
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import ContactState, PlantState
 from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.objects.library import catalogue
 from graspsense_sim_gripper.problem import GraspSetup
-from graspsense_sim_gripper.sensing import PadCells
 from graspsense_sim_gripper.terms.registry import find_term, in_order
 from graspsense_sim_gripper.terms.switchable import Switchable
 from graspsense_sim_gripper.terms.term import TermState
@@ -83,28 +80,24 @@ def composition_of(config: SimConfig, setup: GraspSetup, *, pad: bool = True) ->
 
 
 def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetup:
-    """Return the same grasp for a compiled loop: in the layout of `layout_of`, with the data of the cells in arrays."""
-    # Compiled code passes a tuple number by number, and indexes it by a chain of comparisons.
-    sensor = setup.sensor
-    cells = (IDEAL_CELLS, IDEAL_CELLS)
-    if sensor.ideal == 0:
-        cells = _as_arrays(sensor.left), _as_arrays(sensor.right)
-    sensor = sensor._replace(left=cells[0], right=cells[1])
-    layout, plant, state = layout_of(setup, kinds), setup.plant, setup.state
-    if setup.kinds != layout.kinds:
-        own = plant.object.terms
-        terms = tuple([own[i] if i >= 0 else filler.params for i, filler in layout.sources])
-        plant = plant._replace(object=plant.object._replace(terms=terms))
-        left = _padded_state(state.contact.left, layout)
-        right = tuple([_padded_state(half, layout) for half in state.contact.right])
-        state = state._replace(contact=state.contact._replace(left=left, right=right))
+    """Return the same grasp for a compiled loop, in the layout of `layout_of`."""
+    layout = layout_of(setup, kinds)
+    if setup.kinds == layout.kinds:
+        return setup
+    plant, state = setup.plant, setup.state
+    own = plant.object.terms
+    terms = tuple([own[i] if i >= 0 else filler.params for i, filler in layout.sources])
+    plant = plant._replace(object=plant.object._replace(terms=terms))
+    left = _padded_state(state.contact.left, layout)
+    right = tuple([_padded_state(half, layout) for half in state.contact.right])
+    state = state._replace(contact=state.contact._replace(left=left, right=right))
     # `evolve` would take a quarter of the time of this function.
     return GraspSetup(
         kinds=layout.kinds,
         terms=setup.terms,
         plant=plant,
         state=state,
-        sensor=sensor,
+        sensor=setup.sensor,
         sensor_state=setup.sensor_state,
         dt_s=setup.dt_s,
         rng=setup.rng,
@@ -114,11 +107,8 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
     )
 
 
-def unpadded(state: PlantState, setup: GraspSetup) -> PlantState:
-    """Return the state of the plant after a compiled grasp, with the states of the own terms of `setup` only."""
-    layout = layout_of(setup)
-    if layout.kinds == setup.kinds:
-        return state
+def unpadded(state: PlantState, layout: PaddedLayout) -> PlantState:
+    """Return the state of the plant after a grasp in this layout, with the states of the object's own terms only."""
     contact = state.contact
     left = _unpadded_state(contact.left, layout)
     right = tuple([_unpadded_state(half, layout) for half in contact.right])
@@ -159,11 +149,3 @@ def _filler(kind: str) -> Filler:
     _, term = find_term(kind)
     # Compiled code distinguishes types: the parameters must be floats, whatever their value.
     return Filler(Switchable(0, term.params(*(1.0 for _ in term.params._fields))), term.at_rest)
-
-
-def _as_arrays(cells: PadCells) -> PadCells:
-    return PadCells(np.array(cells.weights, float), np.array(cells.offset, float))
-
-
-IDEAL_CELLS: Final = _as_arrays(PadCells((1.0 / 15.0,) * 15, (0.0,) * 22))
-"""The cells of an ideal sensor; they are never read."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from functools import cache, lru_cache
 from typing import Final
 
 import numpy as np
 from attrs import frozen
 
-from graspsense_sim_gripper.objects.spec import NominalTerm, ObjectSpec, TermParams
+from graspsense_sim_gripper.objects.spec import ObjectSpec, TermParams
 
 GRAVITY_M_S2: Final = 9.80665
 PAD_CELLS: Final = 15
@@ -54,8 +54,8 @@ def sample(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None
     # The stiffness is lognormal, and never negative. All other values are clipped at two standard deviations.
     stiffness_factor = math.exp(spec.stiffness_spread * draws[0])
     clipped = [min(max(draw, -2.0), 2.0) for draw in draws[:5]]
-    own = iter(draws[5:])
-    terms = tuple([_sampled_term(term, stiffness_factor, own) for term in spec.nominal_terms])
+    params = _sampled_params(spec, stiffness_factor, draws[5:])
+    terms = tuple([tuple.__new__(kind, params[begin:end]) for kind, begin, end in spec.params_of_terms])
     dents = [dent(terms[i]) for i, dent in spec.dents]
     return Instance(
         spec=spec,
@@ -76,19 +76,17 @@ def _draws_of_number(name: str, number: int, count: int) -> tuple[float, ...]:
     return tuple(rng.standard_normal(count).tolist())
 
 
-def _sampled_term(term: NominalTerm, stiffness_factor: float, draws: Iterator[float]) -> TermParams:
-    """Return the parameters of a term of an instance; each with a spread of its own takes one of the `draws`."""
-    params, is_stiffness, spread = term
-    values = [
-        value * stiffness_factor if stiff else value
-        for value, stiff in zip(params, is_stiffness, strict=True)
-    ]
-    if any(spread):
+def _sampled_params(spec: ObjectSpec, stiffness_factor: float, draws: Sequence[float]) -> list[float]:
+    """Return the parameters of all terms of an instance; each with a spread of its own takes one of the `draws`."""
+    nominal = spec.nominal_params
+    values = [value * stiffness_factor if stiff else value for value, stiff, _ in nominal]
+    if draws:
+        own = iter(draws)
         values = [
-            value * math.exp(own * next(draws)) if own > 0.0 else value
-            for value, own in zip(values, spread, strict=True)
+            value * math.exp(param.spread * next(own)) if param.spread > 0.0 else value
+            for value, param in zip(values, nominal, strict=True)
         ]
-    return tuple.__new__(type(params), values)
+    return values
 
 
 def cell_weights(patch: str, row: float) -> tuple[float, ...]:

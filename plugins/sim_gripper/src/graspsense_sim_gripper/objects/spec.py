@@ -55,13 +55,13 @@ class ParsedTerm(NamedTuple):
     spread: TermSpread
 
 
-class NominalTerm(NamedTuple):
-    """The nominal parameters of a term, and how they vary between instances."""
+class NominalParam(NamedTuple):
+    """The nominal value of a parameter of a term, and how it varies between instances."""
 
-    params: TermParams
-    is_stiffness: tuple[bool, ...]
-    """Whether the parameter varies with the stiffness of the object."""
-    spread: tuple[float, ...]
+    value: float
+    is_stiffness: bool
+    """Whether it varies with the stiffness of the object."""
+    spread: float
     """The standard deviation of the logarithm of its own variation; 0: it has none."""
 
 
@@ -104,23 +104,31 @@ class ObjectSpec:
         return tuple(kind for kind, _ in self.terms)
 
     @cached_property
-    def nominal_terms(self) -> tuple[NominalTerm, ...]:
-        """The nominal parameters of each term."""
+    def nominal_params(self) -> tuple[NominalParam, ...]:
+        """The nominal parameters of all terms, one term after the other."""
         nominal = []
         spreads = self.spreads or ({},) * len(self.terms)
         for (kind, values), spread in zip(self.terms, spreads, strict=True):
             term = find_term(kind)[1]
-            # A default may be written as an integer, and compiled code distinguishes the types.
-            params = term.params._make(float(value) for value in term.params(**values))
-            stiff = tuple(name in term.stiffnesses for name in params._fields)
-            own = tuple(spread.get(name, 0.0) for name in params._fields)
-            nominal.append(NominalTerm(params, stiff, own))
+            for name, value in term.params(**values)._asdict().items():
+                # A default may be written as an integer, and compiled code distinguishes the types.
+                nominal.append(NominalParam(float(value), name in term.stiffnesses, spread.get(name, 0.0)))
         return tuple(nominal)
+
+    @cached_property
+    def params_of_terms(self) -> tuple[tuple[type[TermParams], int, int], ...]:
+        """For each term the type of its parameters, and where they begin and end in `nominal_params`."""
+        places, begin = [], 0
+        for kind in self.kinds:
+            params = find_term(kind)[1].params
+            places.append((params, begin, begin + len(params._fields)))
+            begin = places[-1][2]
+        return tuple(places)
 
     @cached_property
     def n_own_spreads(self) -> int:
         """The number of parameters with a spread of their own."""
-        return sum(value > 0.0 for term in self.nominal_terms for value in term.spread)
+        return sum(param.spread > 0.0 for param in self.nominal_params)
 
     @cached_property
     def dents(self) -> tuple[tuple[int, Callable[[TermParams], float]], ...]:
