@@ -27,7 +27,7 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
 from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance
 from graspsense_sim_gripper.dynamics.drive import Drive, Friction
-from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState
 from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.objects.instance import PAD_CELLS, Instance, cell_weights, central_cells, sample
 from graspsense_sim_gripper.objects.library import find, split_number
@@ -39,7 +39,7 @@ from graspsense_sim_gripper.reduction.candidates import reduce_plant
 from graspsense_sim_gripper.reduction.levels import step_tolerance
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.propose import grip_of, propose
-from graspsense_sim_gripper.sensing import ImageClock, PadCells, SensorParams, initial_sensor
+from graspsense_sim_gripper.sensing import ImageClock, PadCells, SensorParams, SensorState, initial_sensor
 from graspsense_sim_gripper.stepping.scheme import PlantParams, Steps
 
 EFFORT_LIMIT_N: Final = 100.0
@@ -172,7 +172,7 @@ def _setup(
         plant=plant,
         state=state,
         sensor=sensor,
-        sensor_state=initial_sensor(sensor, state),
+        sensor_state=_gripper(config).sensor_state,
         dt_s=1.0 / config.rate_hz,
         rng=rng,
         noise_state=rng.bit_generator.state,
@@ -213,7 +213,7 @@ def _plant(
     if instance is None:
         # A negative width: the fingers close without touching anything.
         model = ObjectModel(-1.0, 0.0, gripper.pads, all_active(()))
-        at_rest, offset = uncompressed(()), 0.0
+        at_rest, offset = _uncompressed(()), 0.0
     else:
         model = ObjectModel(
             width_m=instance.width_m,
@@ -222,10 +222,15 @@ def _plant(
             pads=gripper.pads,
             held=1 if instance.spec.held else 0,
         )
-        at_rest, offset = uncompressed(instance.kinds), instance.offset_m
+        at_rest, offset = _uncompressed(instance.kinds), instance.offset_m
     right = (at_rest,) if model.held == 1 else ()
     state = PlantState(gripper.motion, Contact(0.0, 0.0, offset, 0, at_rest, right))
     return PlantParams(drive, model, gripper.steps), state
+
+
+@lru_cache(maxsize=256)
+def _uncompressed(kinds: tuple[str, ...]) -> ContactState:
+    return uncompressed(kinds)
 
 
 class _Gripper(NamedTuple):
@@ -237,6 +242,8 @@ class _Gripper(NamedTuple):
     """The steps of a model that is not reduced."""
     motion: Motion
     """At rest with open fingers."""
+    sensor_state: SensorState
+    """What the sensors show then."""
 
 
 @lru_cache(maxsize=64)
@@ -266,7 +273,7 @@ def _gripper(config: SimConfig) -> _Gripper:
         exponent=float(config.pad_exponent),
     )
     motion = Motion(drive.open_rev, 0.0, *gap_and_rate(link, drive.open_rev))
-    return _Gripper(drive, pads, Steps(step_tolerance(config.accuracy)), motion)
+    return _Gripper(drive, pads, Steps(step_tolerance(config.accuracy)), motion, initial_sensor(link, motion))
 
 
 def drive_and_pads(config: SimConfig) -> tuple[Drive, PadCompliance]:

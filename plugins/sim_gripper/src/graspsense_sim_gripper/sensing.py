@@ -146,10 +146,10 @@ def with_listed_cells(params: SensorParams) -> SensorParams:
     return params._replace(left=left, right=right)
 
 
-def initial_sensor(params: SensorParams, plant: PlantState) -> SensorState:
+def initial_sensor(link: ScrewLinkage, motion: Motion) -> SensorState:
     """Return the sensor's state before the first tick; the velocity filter starts at rest."""
-    ticks = float(math.floor(plant.motion.revolutions * ENCODER_TICKS))
-    gap, _ = gap_and_rate(params.link, ticks / ENCODER_TICKS)
+    ticks = float(math.floor(motion.revolutions * ENCODER_TICKS))
+    gap, _ = gap_and_rate(link, ticks / ENCODER_TICKS)
     return SensorState(ticks, gap, 0.0, 0, 0.0, PadForces(0.0, 0.0, 0.0, 0.0), Pending(0, 0.0, 0.0))
 
 
