@@ -1,0 +1,130 @@
+"""Where the time of a grasp in a batch goes: the compiled loop, and what is done in Python around it.
+
+    python benchmarks/grasp_parts.py [--repeats 40] [--json] [--short]
+
+Grasps of the catalogue in turn with spread and features, hybrid controller, one thread, with pads and with ideal
+sensors. Microseconds of processor for a grasp, each the mean over 220 grasps of the least of the repeats: the whole
+grasp in slices as a batch runs it, the loop within it with the conversion of its arguments, and other parts by
+themselves. Simulated.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import time
+from collections.abc import Callable
+from datetime import date
+from typing import Any, Final
+
+from graspsense.plugin_api import create, entry_point
+from graspsense_sim_gripper.batch.job import Scenes, Storage, grasp_compiled
+from graspsense_sim_gripper.batch.threads import SLICE, job_of
+from graspsense_sim_gripper.compiled.extraction import compiled_measure
+from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
+from graspsense_sim_gripper.compiled.noise import compiled_noise, draw_by_numpy
+from graspsense_sim_gripper.compiled.padding import composition_of, padded
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.library import catalogue
+from graspsense_sim_gripper.problem import GraspSetup
+
+GRASPS: Final = 220
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--repeats", type=int, default=40)
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--short", action="store_true", help="one repeat")
+    given = parser.parse_args()
+    repeats = 1 if given.short else given.repeats
+    rows = {
+        sensor: parts(SimConfig(sensor=sensor), repeats)  # type: ignore[arg-type]
+        for sensor in ("pads", "ideal")
+    }
+    made = {"date": date.today().isoformat(), "load": round(os.getloadavg()[0], 1), "repeats": repeats}
+    if given.json:
+        print(json.dumps({"made": made, "us_a_grasp": rows}, indent=2))
+        return
+    print(", ".join(f"{key} {value}" for key, value in made.items()))
+    for sensor, row in rows.items():
+        for name, us in row.items():
+            print(f"{sensor:<7}{name:<44}{us:7.1f} us")
+
+
+def parts(config: SimConfig, repeats: int) -> dict[str, float]:
+    """Return the microseconds of a grasp and of its parts."""
+    law, features = create("controller", "hybrid"), create("feature-set", "chitta")
+    job = job_of(config, law, {"extract": features.extract}, features=features)
+    names, scenes = sorted(catalogue()), Scenes(job)
+    for name in names:
+        scenes.add(name, compiled=True)
+    setups = [scenes.setup(names[k % len(names)], k) for k in range(GRASPS)]
+    composition, storage = composition_of(config, setups[0]), Storage(compiled_noise())
+    compiled, measure = compiled_loop(composition, type(law).step), compiled_measure(job.extraction)
+    with compiling(composition):
+        grasp_compiled(job, setups[0], compiled, storage, measure)
+    loop, in_loop = entry_point(compiled), [0.0]
+
+    def timed_loop(*arguments: Any) -> Any:
+        began = time.thread_time()
+        end = loop(*arguments)
+        in_loop[0] += time.thread_time() - began
+        return end
+
+    def sampled(begin: int) -> list[GraspSetup]:
+        return [scenes.setup(names[k % len(names)], k) for k in range(begin, min(begin + SLICE, GRASPS))]
+
+    def whole(begin: int, loop: Any = loop) -> None:
+        for setup in sampled(begin):
+            composition_of(config, setup)
+            grasp_compiled(job, setup, loop, storage, measure)
+
+    def of_each(part: Callable[[Any], Any]) -> Callable[[int], None]:
+        def of_slice(begin: int) -> None:
+            for setup in setups[begin : begin + SLICE]:
+                part(setup)
+
+        return of_slice
+
+    def noise(draw: Any) -> Callable[[int], None]:
+        return of_each(lambda setup: draw(setup.noise(), storage.buffers.pads.noise))
+
+    def loop_only(begin: int) -> float:
+        in_loop[0] = 0.0
+        whole(begin, timed_loop)
+        return in_loop[0]
+
+    ways: dict[str, Callable[[int], Any]] = {
+        "whole grasp": whole,
+        "loop, within it": loop_only,
+        "sampling, by itself": sampled,
+        "filling the layout, by itself": of_each(padded),
+    }
+    if config.sensor == "pads":
+        ways["noise of the first images, by itself"] = noise(compiled_noise())
+        ways["the same by numpy's own loop"] = noise(draw_by_numpy)
+    return {name: 1e6 * least / GRASPS for name, least in leasts(ways, repeats).items()}
+
+
+def leasts(ways: dict[str, Callable[[int], Any]], repeats: int) -> dict[str, float]:
+    """Return the seconds of all grasps in each way: of each slice the least, measured in turn.
+
+    A way that returns a number has measured itself.
+    """
+    least: dict[tuple[str, int], float] = {}
+    for _ in range(repeats):
+        for begin in range(0, GRASPS, SLICE):
+            for name, way in ways.items():
+                began = time.thread_time()
+                told = way(begin)
+                spent = told if isinstance(told, float) else time.thread_time() - began
+                least[name, begin] = min(spent, least.get((name, begin), spent))
+    return {name: sum(least[name, begin] for begin in range(0, GRASPS, SLICE)) for name in ways}
+
+
+if __name__ == "__main__":
+    main()
