@@ -84,8 +84,7 @@ def train(
     learner = learner_of(source, classifier, given)
     _refuse_single_scene(source)
     with ProgressLine() as progress:
-        labelled = trials_of(source, progress, given, times)
-    labelled = _with_target(labelled, target)
+        labelled = _with_target(trials_of(source, progress, given, times), target)
     parts = split_checkpoints(labelled, times) if times else ()
     if parts:
         labelled = parts[-1].labelled

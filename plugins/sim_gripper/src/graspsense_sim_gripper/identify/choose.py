@@ -109,14 +109,19 @@ def choose(
             parameters=len(one.values),
             error=math.nan,
             fit_error=one.rms,
-            verdict=f"its direct residual is {one.rms / least_directly:.1f} times the least"
-            if one.rms > WORTH_REFINING * least_directly
-            else f"not among the {STATIC_KEPT} laws that fit best directly",
+            verdict=_dropped(one.rms / least_directly),
         )
         for one in only_directly
     ]
     ranked = (*sorted(scores, key=_rank), *sorted(dropped, key=_rank))
     return Choice(fitted=converged, refined=tuple(fits), scores=ranked)
+
+
+def _dropped(times: float) -> str:
+    """Return why a candidate with so many times the least direct residual was not refined."""
+    if times > WORTH_REFINING:
+        return f"its direct residual is {times:.1f} times the least"
+    return f"not among the {STATIC_KEPT} laws that fit best directly"
 
 
 def chosen_instead(choice: Choice, fitted: Fitted, verdict: str) -> Choice:
