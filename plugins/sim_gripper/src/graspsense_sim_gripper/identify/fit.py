@@ -270,7 +270,9 @@ def linear_covariance(
         jacobian = np.hstack([jacobian[:, : p + n], jacobian[:, p + n :] @ (np.eye(n) - 1.0 / n)[:, 1:]])
     scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-12)
     _, singular, rows = np.linalg.svd(jacobian / scale, full_matrices=False)
-    error = math.hypot(fitted.rms, least_error)
+    # The fit follows a part of the residuals' own errors, with as many directions as it has parameters.
+    degrees = max(problem.size - jacobian.shape[1], 1)
+    error = math.hypot(fitted.rms * math.sqrt(problem.size / degrees), least_error)
     root = (rows.T / np.maximum(singular, SMALLEST_SINGULAR) * error) / scale[:, np.newaxis]
     covariance: Floats = (root @ root.T)[:p, :p]
     return covariance
