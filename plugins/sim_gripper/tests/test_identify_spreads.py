@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+import tomllib
 
 import numpy as np
 import pytest
 from attrs import evolve
 from squeezes import WIDTH_M, recorded
 
+from graspsense.core.identification import RecordedSqueeze
+from graspsense.plugin_api import RunConfig, create
+from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.contact import PadCompliance
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import prepared
 from graspsense_sim_gripper.identify.random_effects import alone, between, own_spreads
+from graspsense_sim_gripper.identify.run import identify
 
 MODEL = ForwardModel(pads=PadCompliance(15000.0, 0.0, 0.0, 1.0))
 OBJECTS = 6
@@ -100,3 +105,28 @@ def test_objects_without_names_have_no_spreads_of_their_own():
     nameless = [evolve(one, instance="") for one in squeezes]
     assert alone(MODEL, fitted, nameless) == []
     assert own_spreads(MODEL, fitted, [], nameless, 0.0) == []
+
+
+@pytest.mark.slow
+def test_the_scene_of_objects_that_relax_at_different_rates_has_the_spread_and_is_taken_by_the_simulator():
+    scene = (
+        'width_m = 0.05\n[[terms]]\ntype = "elastic"\nk1_n_m = 1200.0\n'
+        '[[terms]]\ntype = "maxwell"\nk_n_m = 500.0\ntau_s = 0.2\nspread = { tau_s = 0.4 }\n'
+    )
+    gripper = {"sensor": "ideal"}
+    backend, controller = create("sensor-backend", "sim", **gripper), create("controller", "hybrid")
+    objects = [f"{scene}#{k}" for k in range(4)]
+    done = backend.run_many(controller, objects, [1, 2, 3, 4], run=RunConfig(hold_s=1.0), traces=True)
+    recordings = [
+        RecordedSqueeze(
+            name=str(k), sha256="0" * 64, trace=one.trace, gripper=gripper, label="cup", instance=f"cup#{k}"
+        )
+        for k, one in enumerate(done)
+    ]
+    found = identify(SimConfig(), recordings, lambda *_: None)
+    (spread,) = [one for one in found.parameters if one.name.endswith(".spread")]
+    assert spread.name == "maxwell.tau_s.spread"
+    assert spread.low < 0.4 < spread.high
+    (maxwell,) = [one for one in tomllib.loads(found.scene)["terms"] if one["type"] == "maxwell"]
+    assert maxwell["spread"] == {"tau_s": pytest.approx(spread.value, rel=1e-4)}
+    backend.run_many(controller, [found.scene], [1], run=RunConfig(hold_s=0.2))
