@@ -107,7 +107,11 @@ def _answer(reports: dict[str, Report]) -> str:
         return "There is no answer yet: no task has a result."
     if len(reports) == 1:
         return next(iter(reports.values())).text
-    return f"{len(reports)} trade-offs were measured. Each has its recommendation below, or says that there is none."
+    return (
+        f"{len(reports)} trade-offs were measured. Each has its recommendation below, or says that there is none. "
+        "Rates of different trade-offs cannot be compared: they differ in what is recognised (the object, its state, "
+        "or both), in the trials and bottles, in the folds and in the seeds."
+    )
 
 
 def _headline(advice: Sequence[Advice]) -> str:
