@@ -34,8 +34,6 @@ from graspsense_sim_gripper.identify.laws import GAS, SLOTS
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.identify.spread import (
     LEAST_INSTANCES,
-    PATH_ERROR,
-    PATH_FORCE_ERROR,
     corner_errors,
 )
 from graspsense_sim_gripper.identify.threads import in_threads
@@ -46,6 +44,10 @@ Floats = NDArray[np.float64]
 
 FALSE_CLAIMS: Final = 0.05
 """In how many identifications a spread may be claimed that is not there, of whichever parameter."""
+LEAST_ERROR_ALONE: Final = 1e-3
+LEAST_FORCE_ERROR_ALONE: Final = 1e-4
+"""Errors of a fit to one squeeze, as standard deviations of the logarithm of a value and of the force over the peak.
+They are larger than those of `spread`, so that no spread of a thousandth is claimed."""
 LARGEST_ERROR: Final = 0.5
 """Standard deviation of a logarithm from which on a fit to one squeeze does not count."""
 LARGEST_VARIANCE: Final = 100.0
@@ -226,8 +228,8 @@ def _alone(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> Fit
 
 def _covariance(model: ForwardModel, fitted: Fitted, squeeze: Squeeze) -> Floats:
     """Return the covariance of the logarithms of the values that one squeeze has by itself."""
-    errors = PATH_ERROR**2 + corner_errors(fitted, [squeeze]) ** 2
-    return linear_covariance(model, fitted, [squeeze], PATH_FORCE_ERROR) + np.diag(errors)
+    errors = LEAST_ERROR_ALONE**2 + corner_errors(fitted, [squeeze]) ** 2
+    return linear_covariance(model, fitted, [squeeze], LEAST_FORCE_ERROR_ALONE) + np.diag(errors)
 
 
 def _of_objects(logs: Floats, variances: Floats, names: Sequence[str], level: float) -> Scatter | None:
