@@ -16,9 +16,10 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.contact import PadCompliance
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel
+from graspsense_sim_gripper.identify.individual import alone
 from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import prepared
-from graspsense_sim_gripper.identify.random_effects import alone, between, own_spreads
+from graspsense_sim_gripper.identify.random_effects import between, own_spreads
 from graspsense_sim_gripper.identify.run import identify
 
 MODEL = ForwardModel(pads=PadCompliance(15000.0, 0.0, 0.0, 1.0))

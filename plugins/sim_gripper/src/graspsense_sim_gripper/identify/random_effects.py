@@ -6,10 +6,6 @@ where Cochran's Q is improbable without one. Its estimate is that of Paule and M
 1982): Q is its expectation. The interval holds the variances at which Q is not improbable (Viechtbauer, Statistics in
 Medicine 26, 2007).
 
-Common values that do not hold for all objects fit badly, and a law with more terms, or a lag, may mimic that. So a
-simpler law with values of each squeeze is taken instead of the chosen one where it has more evidence, and the lag is
-then that of a single squeeze.
-
 All stiffnesses of an object vary together by the `stiffness_spread` of a scene. A stiffness has a spread of its own
 where its ratio to the one that differs least varies.
 """
@@ -21,24 +17,20 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-from attrs import evolve
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import IdentifiedParameter
-from graspsense_sim_gripper.identify.choose import Choice, chosen_instead
-from graspsense_sim_gripper.identify.delay import EVIDENCE, Lag, lag_beyond_settings
-from graspsense_sim_gripper.identify.fit import LEAST_ERROR, Fitted, fit, linear_covariance
+from graspsense_sim_gripper.identify.fit import Fitted, linear_covariance
 from graspsense_sim_gripper.identify.forward import ForwardModel
+from graspsense_sim_gripper.identify.individual import reference_stiffness, stiffnesses
 from graspsense_sim_gripper.identify.interval import LEVEL
-from graspsense_sim_gripper.identify.laws import GAS, SLOTS
+from graspsense_sim_gripper.identify.laws import GAS
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.identify.spread import (
     LEAST_INSTANCES,
     corner_errors,
 )
-from graspsense_sim_gripper.identify.threads import in_threads
 from graspsense_sim_gripper.objects.spec import MOST_SPREAD
-from graspsense_sim_gripper.terms.registry import find_term
 
 Floats = NDArray[np.float64]
 
@@ -84,77 +76,6 @@ def between(values: Floats, variances: Floats, level: float) -> Scatter | None:
     return Scatter(_at(values, variances, float(degrees)), *ends)
 
 
-def alone(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> list[Fitted]:
-    """Return the fits of a candidate to each squeeze by itself; none with fewer than three objects with names."""
-    names = {one.instance for one in squeezes}
-    if "" in names or len(names) < LEAST_INSTANCES:
-        return []
-    return in_threads(lambda i: _alone(model, fitted, squeezes[i], i), range(len(squeezes)))
-
-
-class Individual(NamedTuple):
-    """A choice, and the fits of its candidate to each squeeze by itself."""
-
-    choice: Choice
-    fits: list[Fitted]
-    """None with fewer than three objects with names."""
-    varies: bool
-    """Whether common values fit worse than noise would make them."""
-
-    def lag(self, model: ForwardModel, squeezes: Sequence[Squeeze]) -> Lag:
-        """Return the lag of the force beyond the settings."""
-        if not self.varies:
-            return lag_beyond_settings(model, self.choice.refined, squeezes)
-        first = in_threads(lambda one: _alone(model, one, squeezes[0], 0), self.choice.refined)
-        return lag_beyond_settings(model, first, squeezes[:1])
-
-    @property
-    def of_each(self) -> Fitted:
-        """The chosen fit with the width of each squeeze, and its factor on the stiffness: where the values vary, those
-        that it has by itself."""
-        fitted = self.choice.fitted
-        if not self.varies:
-            return fitted
-        values = np.log([one.values for one in self.fits])
-        reference = _reference(fitted, values)
-        logs = np.log(fitted.factors) if reference is None else values[:, reference]
-        return evolve(
-            fitted,
-            widths_m=tuple(one.widths_m[0] for one in self.fits),
-            factors=tuple(np.exp(logs - logs.mean()).tolist()),
-        )
-
-
-def simplest_alone(model: ForwardModel, choice: Choice, squeezes: Sequence[Squeeze]) -> Individual:
-    """Return the choice, or that of a simpler candidate whose values differ between objects."""
-    own = alone(model, choice.fitted, squeezes)
-    if not own or _evidence(own) > _common_evidence(choice.fitted) - EVIDENCE:
-        return Individual(choice, own, varies=False)
-    simpler = [one for one in choice.refined if one.parameters < choice.fitted.parameters]
-    for one in sorted(simpler, key=lambda one: (one.parameters, one.cost)):
-        fits = alone(model, one, squeezes)
-        if _evidence(fits) < min(_evidence(own), _common_evidence(choice.fitted)) - EVIDENCE:
-            chosen = chosen_instead(choice, one, "simpler, with values of each object")
-            return Individual(chosen, fits, varies=True)
-    return Individual(choice, own, varies=True)
-
-
-def _evidence(fits: Sequence[Fitted]) -> float:
-    """Return half of the Bayesian information criterion of fits to each squeeze, less a constant."""
-    residuals = np.concatenate([one.residuals for one in fits])
-    free = sum(len(one.values) for one in fits)
-    return _information(float(np.sqrt(np.mean(residuals**2))), free, len(residuals))
-
-
-def _common_evidence(fitted: Fitted) -> float:
-    """Return that of a fit with common values, and a factor of each squeeze on the stiffness."""
-    return _information(fitted.rms, len(fitted.values) + len(fitted.factors) - 1, len(fitted.residuals))
-
-
-def _information(rms: float, free: int, n: int) -> float:
-    return n * math.log(math.hypot(rms, LEAST_ERROR)) + 0.5 * free * math.log(n)
-
-
 def own_spreads(
     model: ForwardModel,
     fitted: Fitted,
@@ -172,7 +93,7 @@ def own_spreads(
     names = [one.instance for one in squeezes]
     values = np.log([one.values for one in fits])
     covariances = np.array([_covariance(model, *each) for each in zip(fits, squeezes, strict=True)])
-    stiff, reference = _stiffnesses(fitted), _reference(fitted, values)
+    stiff, reference = stiffnesses(fitted), reference_stiffness(fitted, values)
     tested = [i for i, one in enumerate(fitted.candidate.free) if i != reference and one.slot != GAS]
     found = []
     for i in tested:
@@ -188,15 +109,6 @@ def own_spreads(
     return found
 
 
-def _stiffnesses(fitted: Fitted) -> list[int]:
-    return [i for i, one in enumerate(fitted.candidate.free) if _is_stiffness(one.slot, one.name)]
-
-
-def _reference(fitted: Fitted, values: Floats) -> int | None:
-    """Return the stiffness that differs least between the squeezes: the others vary with it, and beyond it."""
-    return min(_stiffnesses(fitted), key=lambda i: float(np.var(values[:, i])), default=None)
-
-
 def as_parameters(fitted: Fitted, spreads: Sequence[OwnSpread]) -> list[IdentifiedParameter]:
     """Return the spreads as identified parameters."""
     return [
@@ -210,20 +122,6 @@ def as_parameters(fitted: Fitted, spreads: Sequence[OwnSpread]) -> list[Identifi
         )
         for place, scatter in spreads
     ]
-
-
-def _is_stiffness(slot: int, name: str) -> bool:
-    return name in find_term(SLOTS[slot])[1].stiffnesses
-
-
-def _alone(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> Fitted:
-    factor = fitted.factors[i]
-    own = tuple(
-        value * factor if _is_stiffness(one.slot, one.name) else value
-        for one, value in zip(fitted.candidate.free, fitted.values, strict=True)
-    )
-    start = evolve(fitted, values=own, widths_m=(fitted.widths_m[i],), factors=(1.0,))
-    return fit(model, fitted.candidate, [squeeze], start=start)
 
 
 def _covariance(model: ForwardModel, fitted: Fitted, squeeze: Squeeze) -> Floats:

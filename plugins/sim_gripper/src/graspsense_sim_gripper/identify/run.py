@@ -28,16 +28,11 @@ from graspsense_sim_gripper.identify.delay import delay_of
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.fracture import FractureFit, fracture_of
+from graspsense_sim_gripper.identify.individual import Individual, simplest_alone
 from graspsense_sim_gripper.identify.interval import student
 from graspsense_sim_gripper.identify.laws import DataScale, memories
 from graspsense_sim_gripper.identify.prepare import FULL, NoSqueeze, Squeeze, prepared, resolution
-from graspsense_sim_gripper.identify.random_effects import (
-    Individual,
-    OwnSpread,
-    as_parameters,
-    own_spreads,
-    simplest_alone,
-)
+from graspsense_sim_gripper.identify.random_effects import OwnSpread, as_parameters, own_spreads
 from graspsense_sim_gripper.identify.refuse import shows_memory, undetermined
 from graspsense_sim_gripper.identify.share import measured_share
 from graspsense_sim_gripper.identify.spread import Uncertainty, uncertainty
