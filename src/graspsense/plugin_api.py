@@ -167,6 +167,7 @@ _TABLE: Final[Table] = {
             *("Schedule", "TickParams", "TickState", "events_of", "first_state", "tick"),
             *(
                 "CALLED",
+                "CLOSES",
                 "FreeRun",
                 "FreeState",
                 "FreeTicks",

@@ -195,6 +195,7 @@ from graspsense.core.tick import events_of as events_of
 from graspsense.core.tick import first_state as first_state
 from graspsense.core.tick import tick as tick
 from graspsense.core.tick import CALLED as CALLED
+from graspsense.core.tick import CLOSES as CLOSES
 from graspsense.core.tick import FreeRun as FreeRun
 from graspsense.core.tick import FreeState as FreeState
 from graspsense.core.tick import FreeTicks as FreeTicks

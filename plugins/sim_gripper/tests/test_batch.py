@@ -142,7 +142,7 @@ def test_plain_grasps_in_processes_are_those_of_this_one_to_the_bit():
 def test_a_batch_takes_the_run_settings_as_the_runner_does():
     # Held ten times as long as by default, which a batch once did not notice.
     run = RunConfig(seed=4, hold_s=2.5)
-    config = SimConfig(object="toy")
+    config = SimConfig(object="toy", fidelity="fixed", scheme="explicit")
     alone = run_grasp(SimBackend(config), HYBRID, run).trace
     among = run_many(config, HYBRID, ["toy"], [4], run=run)[0].trace
     assert bits(alone) == bits(among)

@@ -1,4 +1,4 @@
-"""One law, three ways to run it: the runner, the plain loop and the compiled loop agree to the bit."""
+"""One law, three ways to run it: the runner, the plain loop and the compiled loop."""
 
 import numpy as np
 import pytest
@@ -19,6 +19,8 @@ from graspsense_sim_gripper.terms.term import NoState
 numba = pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
 
 HYBRID = create("controller", "hybrid")
+TICK_BY_TICK = {"fidelity": "fixed", "scheme": "explicit"}
+"""The settings with which no step lasts several ticks."""
 
 
 def columns(trace):
@@ -43,7 +45,7 @@ def assert_same(one, other):
     ],
 )
 def test_runner_plain_loop_and_compiled_loop_give_one_trace(scene, sensor):
-    config = SimConfig(object=scene, sensor=sensor)
+    config = SimConfig(object=scene, sensor=sensor, **TICK_BY_TICK)
     run = run_grasp(SimBackend(config), HYBRID, RunConfig(seed=5))
     plain = run_many(config, HYBRID, [scene], [5], compiled=False)[0]
     fast = run_many(config, HYBRID, [scene], [5], compiled=True)[0]
@@ -52,15 +54,40 @@ def test_runner_plain_loop_and_compiled_loop_give_one_trace(scene, sensor):
     assert_same(run.trace, fast.trace)
 
 
+@pytest.mark.parametrize("sensor", ["pads", "ideal"])
+def test_with_steps_over_several_ticks_the_plain_loop_and_the_compiled_loop_give_one_trace(sensor):
+    config = SimConfig(sensor=sensor)
+    plain = run_many(config, HYBRID, ["can:empty_open"], [5], compiled=False)[0]
+    fast = run_many(config, HYBRID, ["can:empty_open"], [5], compiled=True)[0]
+    assert plain.reduction.steps.macro_tolerance > 0.0
+    assert plain.outcome == fast.outcome
+    assert_same(plain.trace, fast.trace)
+
+
+@pytest.mark.parametrize("controller", ["velocity", "force", "hybrid"])
+def test_steps_over_several_ticks_give_the_features_of_single_ticks(controller):
+    # Asked for is 1 %; the times of ticks are whole milliseconds.
+    law, features = create("controller", controller), create("feature-set", "chitta")
+    config = SimConfig(object="odwalla:full_closed", sensor="ideal")
+    run = run_grasp(SimBackend(config), law, RunConfig(seed=5))
+    many = run_many(config, law, [config.object], [5])[0]
+    assert many.reduction.steps.macro_tolerance > 0.0
+    assert run.outcome == many.outcome
+    assert many.state.step.n_steps < 0.4 * len(run.trace.t_s)
+    alone, among = (features.extract(trace).as_dict() for trace in (run.trace, many.trace))
+    assert among == pytest.approx(alone, rel=0.01, abs=1e-3, nan_ok=True)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", ["velocity", "force", "hybrid"])
 def test_every_object_and_law_gives_one_trace_plain_and_compiled(controller):
     from graspsense_sim_gripper.objects.library import catalogue
 
     law, names = create("controller", controller), sorted(catalogue())
-    fast = run_many(SimConfig(), law, names, range(len(names)), compiled=True)
+    config = SimConfig(**TICK_BY_TICK)
+    fast = run_many(config, law, names, range(len(names)), compiled=True)
     for seed, name in enumerate(names):
-        run = run_grasp(SimBackend(evolve(SimConfig(), object=name)), law, RunConfig(seed=seed))
+        run = run_grasp(SimBackend(evolve(config, object=name)), law, RunConfig(seed=seed))
         assert (run.outcome, name) == (fast[seed].outcome, name)
         assert_same(run.trace, fast[seed].trace)
 
@@ -76,7 +103,7 @@ def test_the_backend_gives_the_same_whatever_stands_beside_a_grasp():
 def test_a_grasp_longer_than_the_room_made_for_it_is_whole():
     # 3 mm/s: 30 s of approach, more than the loop first makes room for.
     slow = create("controller", "hybrid", closing_speed_m_s=0.003)
-    config = SimConfig(object="block")
+    config = SimConfig(object="block", **TICK_BY_TICK)
     run = run_grasp(SimBackend(config), slow, RunConfig(seed=2))
     assert run.outcome.name == "STEADY"
     assert_same(run.trace, run_many(config, slow, ["block"], [2], compiled=True)[0].trace)
@@ -104,11 +131,11 @@ def test_a_law_that_cannot_be_compiled_runs_plain_and_the_warning_says_why():
     class Odd(type(HYBRID)):
         step = staticmethod(plain_only)
 
-    law = Odd(HYBRID.config)
+    law, config = Odd(HYBRID.config), SimConfig(**TICK_BY_TICK)
     seeds = range(2)
     with pytest.warns(UserWarning, match=r"plain Python.*test_loop.py:\d+"):
-        done = run_many(SimConfig(), law, ["toy"] * 2, seeds, compiled=True)
-    expected = run_many(SimConfig(), HYBRID, ["toy"] * 2, seeds, compiled=False)
+        done = run_many(config, law, ["toy"] * 2, seeds, compiled=True)
+    expected = run_many(config, HYBRID, ["toy"] * 2, seeds, compiled=False)
     for one, other in zip(done, expected, strict=True):
         assert_same(other.trace, one.trace)
 

@@ -42,7 +42,7 @@ from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
 from graspsense_sim_gripper.fingertip import CELLS, FIRST_PAD_CELL, fingertips
-from graspsense_sim_gripper.loop import COLUMNS, FreeProgress, GraspParams
+from graspsense_sim_gripper.loop import COLUMNS, GraspParams, LoopProgress
 from graspsense_sim_gripper.model_report import accuracy_report, model_report
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
@@ -52,7 +52,14 @@ from graspsense_sim_gripper.problem import IMAGES_PER_BLOCK, GraspController
 from graspsense_sim_gripper.reduction.propose import FORCE_N, SPEED_M_S
 from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sampled_loop import instability
-from graspsense_sim_gripper.sensing import PAD_COUNTS_PER_N, PadBuffers, apply_tare, sense, with_listed_cells
+from graspsense_sim_gripper.sensing import (
+    PAD_COUNTS_PER_N,
+    Measured,
+    PadBuffers,
+    apply_tare,
+    sense,
+    with_listed_cells,
+)
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
@@ -183,8 +190,10 @@ class SimBackend(BatchBackend[SimConfig]):
         buffers = self._buffers
         if self._sensor.images >= len(buffers.images):
             self._draw_noise()
+        contact = self._state.contact
+        measured = Measured(self._state.motion, contact.left_n, contact.right_n)
         frame, self._sensor = _sense(
-            setup.sensor, self._sensor, self._state, self._ticks * dt, dt, effort, buffers
+            setup.sensor, self._sensor, measured, self._ticks * dt, dt, effort, buffers
         )
         count = self._sensor.images
         if count != self._pads.counter:
@@ -214,7 +223,7 @@ class SimBackend(BatchBackend[SimConfig]):
         setup, table, first = self._setup, self._table, self._ticks
         most = min(most, MOST_FREE_TICKS)
         constants = GraspParams(self._plant, setup.sensor, params, setup.dt_s, first + most)
-        at = FreeProgress(first, 0, effort, self._state, self._sensor, state)
+        at = LoopProgress(first, 0, effort, self._state, self._sensor, state)
         at = self._free_ticks(constants, at, frame, table, self._phases)
         if at.ticks == first:
             return FreeRun(0, [], [], state)

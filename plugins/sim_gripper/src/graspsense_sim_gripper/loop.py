@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import (
-    CALLED,
+    APPROACH,
     HOLD,
     SQUEEZE,
     TARING,
@@ -20,22 +20,17 @@ from graspsense.plugin_api import (
     Reading,
     TickParams,
     TickState,
-    after_free,
-    free_from,
-    free_tick,
 )
-from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, is_finite
+from graspsense_sim_gripper.dynamics.state import PlantState, is_finite
 from graspsense_sim_gripper.sensing import (
+    Measured,
     PadBuffers,
     SensorParams,
     SensorState,
     apply_tare,
-    moved_sensor,
-    next_image_s,
     sense,
-    sense_motion,
 )
-from graspsense_sim_gripper.stepping.coast import glided
+from graspsense_sim_gripper.stepping.scheme import Steps
 
 COLUMNS: Final = (
     "t_s",
@@ -66,6 +61,25 @@ class GraspParams(NamedTuple):
     max_ticks: int
     palm: Any = ()
     """`PalmParams`; () without an accelerometer."""
+    macro_steps: int = 0
+    """1: steps of the plant may last several ticks (`macro_ticks`), and the ticks of a steady approach are run at once
+    (`steady`)."""
+
+
+class MacroControl(NamedTuple):
+    """The control of steps over several ticks."""
+
+    length: int
+    """Number of ticks of the next one."""
+    from_tick: int
+    """Number of ticks from which on it is tried."""
+    wait: int
+    """Ticks to wait after one that was not accepted; doubles each time."""
+
+
+def uses_macro_steps(exact: Any, steps: Steps) -> int:
+    """Return `GraspParams.macro_steps` for a plant with these steps; `exact`: its exact discretisation, or None."""
+    return 1 if exact is None and steps.macro_tolerance > 0.0 else 0
 
 
 class LoopState(NamedTuple):
@@ -83,15 +97,16 @@ class LoopState(NamedTuple):
     """The commanded effort of the last tick."""
     failed: int
     """1: a force or the motion was not finite after the last tick (see `before_failure`)."""
+    macro: MacroControl
 
 
-class FreeProgress(NamedTuple):
-    """The part of the state that changes in free motion: between two ticks, after the plant has moved."""
+class LoopProgress(NamedTuple):
+    """The part of the state that changes where several ticks are run at once."""
 
     ticks: int
     recorded: int
     effort_n: float
-    """The commanded effort of the last tick."""
+    """The effort that was commanded last."""
     plant: PlantState
     sensor: SensorState
     controller: TickState
@@ -125,16 +140,21 @@ class Buffers(NamedTuple):
 
 EVENT_SHIFT: Final = 8
 """Number of bits of a phase in `Buffers.phases`."""
-NOT_STARTED: Final = LoopState(0, 0, -1, 0, 0.0, 0)
+NOT_STARTED: Final = LoopState(0, 0, -1, 0, 0.0, 0, MacroControl(2, 0, 1))
+ROWS_AT_ONCE: Final = 128
+"""The most rows that are recorded at once. The loop stops this many rows before the end of a buffer, so that none is
+cut by it."""
 NOT_NEGATIVE: Final = 0x3FFFFFFF
 """After `&` with this mask the compiler knows that an index is not negative, and omits the check at each access."""
 
 
-def _move_unbound(plant: PlantModel, state: PlantState, effort_n: float, dt_s: float) -> PlantState:
+def move_unbound(plant: PlantModel, state: PlantState, effort_n: float, dt_s: float) -> PlantState:
+    """Raise TypeError: the composition binds the motion of the plant."""
     raise TypeError("the loop has no plant: compose.grasp_loop binds one")
 
 
-def _control_unbound(params: TickParams, state: TickState, reading: Reading) -> tuple[Command, TickState]:
+def control_unbound(params: TickParams, state: TickState, reading: Reading) -> tuple[Command, TickState]:
+    """Raise TypeError: the composition binds the controller."""
     raise TypeError("the loop has no controller: compose.grasp_loop binds one")
 
 
@@ -144,20 +164,16 @@ def _no_signals(
     return (), state
 
 
+def _no_macro_steps(
+    params: GraspParams, at: LoopProgress, now: MacroControl, pads: Pads, columns: Table, phases: Any
+) -> tuple[LoopProgress, MacroControl]:
+    return at, now
+
+
 def _every_tick(
-    params: GraspParams, at: FreeProgress, frame: Frame, columns: Table, phases: Any
-) -> FreeProgress:
+    params: GraspParams, at: LoopProgress, frame: Frame, columns: Table, phases: Any
+) -> LoopProgress:
     return at
-
-
-def _cannot_glide(plant: PlantModel, state: PlantState, dt_s: float) -> bool:
-    return False
-
-
-def _never_glides(
-    plant: PlantModel, motion: Motion, contact: Contact, effort_n: float, h: float
-) -> tuple[bool, Motion, Contact]:
-    return False, motion, contact
 
 
 def _keep_nothing(signals: Any, buffers: Any, row: int) -> None:
@@ -168,15 +184,12 @@ further_signals: Callable[..., tuple[Any, Any]] = _no_signals
 """What gives `Reading.signals`: `palm.palm_signals` of a gripper with an accelerometer."""
 keep_signals: Callable[[Any, Any, int], None] = _keep_nothing
 """What records them: `palm.keep_samples` of a gripper with an accelerometer."""
-move: Callable[[PlantModel, PlantState, float, float], PlantState] = _move_unbound
-control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = _control_unbound
-leap: Callable[[GraspParams, FreeProgress, Frame, Table, Any], FreeProgress] = _every_tick
-"""`free_ticks` where several ticks are run at once. In compiled code that gained nothing measurable and took a quarter
-longer to compile."""
-glide: Callable[[PlantModel, Motion, Contact, float, float], tuple[bool, Motion, Contact]] = _never_glides
-"""`stepping.coast.glide`, where it does what `move` does in a tick of free motion."""
-can_glide: Callable[[PlantModel, PlantState, float], bool] = _cannot_glide
-"""`stepping.coast.can_glide`, likewise."""
+move: Callable[[PlantModel, PlantState, float, float], PlantState] = move_unbound
+control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = control_unbound
+run_macro_step: Callable[..., tuple[LoopProgress, MacroControl]] = _no_macro_steps
+"""`macro_ticks.run_macro_step` where a step may last several ticks."""
+run_steady_ticks: Callable[[GraspParams, LoopProgress, Frame, Table, Any], LoopProgress] = _every_tick
+"""`steady.steady_ticks`, in the interpreter `free_ticks.steady_or_free_ticks`, where several ticks are run at once."""
 
 
 def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
@@ -188,18 +201,20 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
     """
     dt_s, pad_buffers, columns = params.dt_s, buffers.pads, buffers.columns
     images = pad_buffers.images
-    ticks, recorded, phase, tare_from, effort, failed = progress.loop
+    ticks, recorded, phase, tare_from, effort, failed, macro = progress.loop
     plant, sensor, state, palm = progress.plant, progress.sensor, progress.controller, progress.palm
-    capacity = len(columns[0])
+    capacity = len(columns[0]) - ROWS_AT_ONCE
     count = sensor.images
     pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
     while ticks < params.max_ticks and recorded < capacity and sensor.images < len(images):
-        frame, sensor = sense(params.sensor, sensor, plant, ticks * dt_s, dt_s, effort, pad_buffers)
+        measured = Measured(plant.motion, plant.contact.left_n, plant.contact.right_n)
+        t_s, last_effort = ticks * dt_s, effort
+        frame, sensor = sense(params.sensor, sensor, measured, t_s, dt_s, effort, pad_buffers)
         if sensor.images != count:
             count = sensor.images
             buffers.image_times[count - 1] = sensor.image_t_s
             pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
-        signals, palm = further_signals(params.palm, palm, plant, ticks * dt_s, dt_s, ticks, buffers.palm)
+        signals, palm = further_signals(params.palm, palm, plant, t_s, dt_s, ticks, buffers.palm)
         command, state = control(params.controller, state, Reading(frame, pads, signals))
         past_tare, same_phase = phase != TARING, state.phase == phase
         if not same_phase:
@@ -211,80 +226,32 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
         effort = command.value
         if phase > TARING and past_tare:
             row = recorded & NOT_NEGATIVE
-            _record(columns, row, frame, effort)
+            record(columns, row, frame, effort)
             buffers.phases[row] = phase | state.events << EVENT_SHIFT
             keep_signals(signals, buffers.palm, row)
             recorded += 1
         ticks += 1
         if state.done == 1 or state.guard.stopped == 1:
             break
-        # Keeping the plant before the tick as well would cost compiled code a sixth of its time.
-        plant = move(params.plant, plant, effort, dt_s)
+        before, constant = ticks, effort == last_effort and same_phase and phase >= APPROACH
+        if params.macro_steps == 1 and constant and ticks >= macro.from_tick:
+            at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
+            at, macro = run_macro_step(params, at, macro, pads, columns, buffers.phases)
+            ticks, recorded, effort, plant, sensor, state = at
+            if state.done == 1 or state.guard.stopped == 1:
+                break
+        if ticks == before:
+            # Keeping the plant before the tick as well would cost compiled code a sixth of its time.
+            plant = move(params.plant, plant, effort, dt_s)
         if not is_finite(plant):
             failed = 1
             break
-        if same_phase and phase != SQUEEZE and phase != HOLD:
-            at = FreeProgress(ticks, recorded, effort, plant, sensor, state)
-            at = leap(params, at, frame, columns, buffers.phases)
+        if ticks == before and same_phase and phase != SQUEEZE and phase != HOLD:
+            at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
+            at = run_steady_ticks(params, at, frame, columns, buffers.phases)
             ticks, recorded, effort, plant, sensor, state = at
-    ended = LoopState(ticks, recorded, phase, tare_from, effort, failed)
+    ended = LoopState(ticks, recorded, phase, tare_from, effort, failed, macro)
     return SimulationState(ended, plant, sensor, state, palm)
-
-
-def free_ticks(
-    params: GraspParams, at: FreeProgress, frame: Frame, columns: Table, phases: Any
-) -> FreeProgress:
-    """Run the ticks of free motion that follow that of `frame`, and return where they end: at `at` if there are none.
-
-    In these ticks no force changes, no cell image is taken or arrives, and the controller follows a law that needs
-    neither (see `graspsense.core.free_motion`). What they give is what `grasp` gives tick by tick, to the bit.
-    """
-    free, now = free_from(params.controller, at.controller, frame)
-    if free.kind == CALLED or not _is_free(params, at, frame):
-        return at
-    dt_s, sensor, image_s = params.dt_s, params.sensor, next_image_s(params.sensor, at.sensor)
-    ticks, recorded, effort, plant = at.ticks, at.recorded, at.effort_n, at.plant
-    shown = (at.sensor.encoder_ticks, at.sensor.gap_m, at.sensor.velocity_m_s)
-    phase, capacity, t_s, n_steps = at.controller.phase, len(columns[0]), 0.0, 0
-    motion, contact = plant.motion, plant.contact
-    while ticks < params.max_ticks and recorded < capacity:
-        next_t_s = ticks * dt_s
-        if next_t_s >= image_s:
-            break
-        next_shown = sense_motion(sensor, shown, motion, dt_s)
-        _, gap, velocity = next_shown
-        command, next_now = free_tick(params.controller, free, now, next_t_s, dt_s, gap, velocity)
-        if command != command:
-            break
-        glides, next_motion, next_contact = glide(params.plant, motion, contact, command, dt_s)
-        if not glides:
-            break
-        if motion.speed_rev_s != 0.0:
-            n_steps += 1
-        t_s, shown, now, motion, contact = next_t_s, next_shown, next_now, next_motion, next_contact
-        if phase > TARING:
-            row = recorded & NOT_NEGATIVE
-            columns[0][row], columns[1][row], columns[2][row] = t_s, gap, velocity
-            columns[3][row], columns[8][row] = effort, command
-            phases[row] = phase
-            recorded += 1
-        ticks += 1
-        effort = command
-    if ticks == at.ticks:
-        return at
-    for row in range(at.recorded, recorded):
-        columns[4][row], columns[5][row] = frame.force_left_n, frame.force_right_n
-        columns[6][row], columns[7][row] = frame.edge_left_n, frame.edge_right_n
-    plant = glided(plant, motion, contact, n_steps)
-    state = after_free(params.controller, at.controller, now, effort, t_s)
-    return FreeProgress(ticks, recorded, effort, plant, moved_sensor(at.sensor, shown), state)
-
-
-def _is_free(params: GraspParams, at: FreeProgress, frame: Frame) -> bool:
-    """Return whether nothing is pressed, and the next frame shows the forces of this one unless an image arrives."""
-    contact = at.plant.contact
-    same = frame.force_left_n == contact.left_n and frame.force_right_n == contact.right_n
-    return (same or params.sensor.ideal == 0) and can_glide(params.plant, at.plant, params.dt_s)
 
 
 def before_failure(
@@ -296,7 +263,8 @@ def before_failure(
 ) -> PlantState:
     """Return the plant before the tick in which `loop` failed. `start`, `failed`: the states before and after the call.
 
-    The loop runs again up to that tick and writes the same values to the buffers.
+    The loop runs again up to that tick. Steps over several ticks may end elsewhere then, so that the state is near the
+    one before.
     """
     if start.loop.ticks >= failed.loop.ticks - 1:
         return start.plant
@@ -308,7 +276,8 @@ def has_ended(state: TickState) -> bool:
     return bool(state.done == 1 or state.guard.stopped == 1)
 
 
-def _record(columns: Table, row: int, frame: Frame, command: float) -> None:
+def record(columns: Table, row: int, frame: Frame, command: float) -> None:
+    """Write a row of `COLUMNS`."""
     columns[0][row] = frame.t_s
     columns[1][row] = frame.gap_m
     columns[2][row] = frame.velocity_m_s

@@ -22,7 +22,7 @@ from graspsense.plugin_api import (
     pad_force,
 )
 from graspsense_sim_gripper.drive_models import ENCODER_TICKS
-from graspsense_sim_gripper.dynamics.state import Motion, PlantState
+from graspsense_sim_gripper.dynamics.state import Motion
 from graspsense_sim_gripper.fingertip import CELLS, FIRST_PAD_CELL
 
 VELOCITY_FILTER_S: Final = 0.003
@@ -102,6 +102,15 @@ class PadBuffers(NamedTuple):
     """(k, 2, 22) Counts of the left and the right fingertip in each image."""
 
 
+class Measured(NamedTuple):
+    """What the sensors measure at a tick."""
+
+    motion: Motion
+    left_n: float
+    right_n: float
+    """The forces on the pads."""
+
+
 class PadForces(NamedTuple):
     """Forces of a cell image (N): on the gripping faces, and on the cells of the edges."""
 
@@ -156,7 +165,7 @@ def initial_sensor(link: ScrewLinkage, motion: Motion) -> SensorState:
 def sense(
     params: SensorParams,
     state: SensorState,
-    plant: PlantState,
+    measured: Measured,
     t_s: float,
     dt_s: float,
     effort_n: float,
@@ -166,19 +175,19 @@ def sense(
 
     `effort_n` is the commanded effort (N), which the frame repeats.
     """
-    encoder_ticks, gap, velocity, count, image_t, forces, pending = state
-    encoder_ticks, gap, velocity = sense_motion(params, (encoder_ticks, gap, velocity), plant.motion, dt_s)
-    if params.ideal == 1:
-        left_n, right_n = plant.contact.left_n, plant.contact.right_n
-        force_error_n = params.bias.force_n
-        if force_error_n != 0.0:
-            left_n += force_error_n if left_n > 0.0 else 0.0
-            right_n += force_error_n if right_n > 0.0 else 0.0
-        return Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, 0.0, 0.0, 0), state
+    if params.ideal == 0:
+        state = _with_image(params, state, measured, t_s, pads)
+    return read_frame(params, state, measured, t_s, dt_s, effort_n)
 
+
+def _with_image(
+    params: SensorParams, state: SensorState, measured: Measured, t_s: float, pads: PadBuffers
+) -> SensorState:
+    """Return the state of the sensors with the image that is taken, or that arrives, at `t_s`, if there is one."""
+    encoder_ticks, gap, velocity, count, image_t, forces, pending = state
     due_s = image_due_s(params, state)
     if pending.waiting == 0 and t_s >= due_s:
-        pending = Pending(1, plant.contact.left_n, plant.contact.right_n)
+        pending = Pending(1, measured.left_n, measured.right_n)
     if pending.waiting == 1 and t_s >= due_s + params.clock.delay_s:
         image, noise = pads.images[count], pads.noise[count]
         _write_image(params, params.left, pending.left_n, noise, 0, image[0])
@@ -186,6 +195,22 @@ def sense(
         forces = image_forces(image[0], image[1], pads)
         count, image_t = count + 1, t_s - params.clock.delay_s
         pending = Pending(0, pending.left_n, pending.right_n)
+    return SensorState(encoder_ticks, gap, velocity, count, image_t, forces, pending)
+
+
+def read_frame(
+    params: SensorParams, state: SensorState, measured: Measured, t_s: float, dt_s: float, effort_n: float
+) -> tuple[Frame, SensorState]:
+    """Return the frame at `t_s` (s) and the new state of the sensors, if no cell image is taken or arrives."""
+    motion, left_n, right_n = measured
+    encoder_ticks, gap, velocity, count, image_t, forces, pending = state
+    encoder_ticks, gap, velocity = sense_motion(params, (encoder_ticks, gap, velocity), motion, dt_s)
+    if params.ideal == 1:
+        force_error_n = params.bias.force_n
+        if force_error_n != 0.0:
+            left_n += force_error_n if left_n > 0.0 else 0.0
+            right_n += force_error_n if right_n > 0.0 else 0.0
+        return Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, 0.0, 0.0, 0), state
     left_n, right_n, left_edge_n, right_edge_n = forces
     frame = Frame(t_s, dt_s, gap, velocity, effort_n, left_n, right_n, left_edge_n, right_edge_n, 0)
     return frame, SensorState(encoder_ticks, gap, velocity, count, image_t, forces, pending)

@@ -44,6 +44,7 @@ from graspsense_sim_gripper.loop import (
     SimulationState,
     before_failure,
     has_ended,
+    uses_macro_steps,
 )
 from graspsense_sim_gripper.objects.library import split_number
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
@@ -383,6 +384,7 @@ def _run(
         dt_s=setup.dt_s,
         max_ticks=most_ticks,
         palm=setup.palm,
+        macro_steps=uses_macro_steps(exact, setup.plant.steps),
     )
     progress = SimulationState(NOT_STARTED, setup.state, setup.sensor_state, job.initial, setup.palm_state)
     while True:

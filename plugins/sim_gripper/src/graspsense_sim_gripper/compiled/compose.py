@@ -25,10 +25,13 @@ from graspsense_sim_gripper.dynamics.contact import (
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, Past, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
 from graspsense_sim_gripper.exact.propagate import bind_move
-from graspsense_sim_gripper.loop import FreeProgress, GraspParams, SimulationState, free_ticks, grasp
+from graspsense_sim_gripper.free_ticks import free_ticks, steady_or_free_ticks
+from graspsense_sim_gripper.loop import GraspParams, LoopProgress, SimulationState, grasp
+from graspsense_sim_gripper.macro_ticks import run_macro_step
 from graspsense_sim_gripper.palm import keep_samples, palm_signals
 from graspsense_sim_gripper.problem import ControllerStep
 from graspsense_sim_gripper.sensing import SensorState
+from graspsense_sim_gripper.steady import steady_ticks
 from graspsense_sim_gripper.stepping.advance import advance, move
 from graspsense_sim_gripper.stepping.coast import can_glide, glide
 from graspsense_sim_gripper.stepping.converge import refine_until_converged
@@ -306,11 +309,20 @@ def plant_move(
     over_a_tick: PlantMove = refine_until_converged if converges else advance
     if lags:
         over_a_tick = bind(move, advance=over_a_tick)
+    return bind_reachable(over_a_tick, _object_parts(laws, phases, moving, hardens))
+
+
+def _object_parts(
+    laws: Sequence[Law | OnSum],
+    phases: Sequence[tuple[int, Phase]],
+    moving: Sequence[tuple[int, Moves]],
+    hardens: bool,
+) -> dict[str, Any]:
+    """Return what the contact of the object calls: its force, its events, and the law of the pads."""
     events: dict[str, Any] = {"object_phase": phase_of_all(phases)} if phases else {"has_event": no_event}
     if moving:
         events["object_moves"] = any_moves(moving)
-    parts = {"object_force": sum_of(laws), **events, **pad_parts(hardens)}
-    return bind_reachable(over_a_tick, parts)
+    return {"object_force": sum_of(laws), **events, **pad_parts(hardens)}
 
 
 @lru_cache(maxsize=64)
@@ -337,6 +349,12 @@ def _step_move(composition: Composition) -> PlantMove:
     )
 
 
+def step_parts(composition: Composition) -> dict[str, Any]:
+    """Return what the steps of this plant call."""
+    kinds = composition.kinds
+    return _object_parts(laws_of(kinds), phases_of(kinds), moving_of(kinds), composition.hardens)
+
+
 @lru_cache(maxsize=64)
 def grasp_loop(
     composition: Composition, step: ControllerStep, *, interpreted: bool = True
@@ -357,13 +375,18 @@ def guarded_loop(composition: Composition, step: ControllerStep) -> Callable[...
 @lru_cache(maxsize=64)
 def free_motion(
     composition: Composition, step: ControllerStep
-) -> Callable[[GraspParams, FreeProgress, Frame, Any, Any], FreeProgress] | None:
-    """Return `loop.free_ticks` for the interpreter; None where every tick needs the controller and all sensors."""
+) -> Callable[[GraspParams, LoopProgress, Frame, Any, Any], LoopProgress] | None:
+    """Return `free_ticks` for the interpreter; None where every tick needs the controller and all sensors."""
     parts = free_parts(step)
-    by_steps = composition.shape is None and not composition.converges and not composition.lags
-    if not parts or not by_steps or composition.has_palm:
+    if not parts or not _takes_steps(composition):
         return None
     return bind_reachable(free_ticks, {**parts, "can_glide": can_glide, "glide": glide}, INTERPRETED)
+
+
+def _takes_steps(composition: Composition) -> bool:
+    """Return whether a step of this plant may last several ticks."""
+    by_steps = composition.shape is None and not composition.converges and not composition.lags
+    return by_steps and not composition.has_palm
 
 
 def _loop_of(
@@ -372,9 +395,16 @@ def _loop_of(
     """Return the loop with this plant; `force`: of the object, in the form that suits the interpreter."""
     control = bind_reachable(tick, {"step": step, "events_told": events_of(step)})
     parts: dict[str, Any] = {"move": move, "control": control}
-    leap = free_motion(composition, step) if force else None
-    if leap is not None:
-        parts["leap"] = leap
+    if _takes_steps(composition):
+        own = {"move": move, "control": control, **step_parts(composition)}
+        parts["run_macro_step"] = bind_reachable(run_macro_step, own)
+        if law := free_parts(step):
+            glides = {"can_glide": can_glide, "glide": glide}
+            parts["run_steady_ticks"] = (
+                bind_reachable(steady_or_free_ticks, {**law, **glides}, INTERPRETED)
+                if force
+                else bind_reachable(steady_ticks, law)
+            )
     if composition.has_palm:
         parts |= {"further_signals": palm_signals, "keep_signals": keep_samples}
     loop = bind_reachable(grasp, parts)

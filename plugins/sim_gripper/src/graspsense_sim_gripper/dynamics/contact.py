@@ -433,7 +433,7 @@ def pad_forces(
             left1_n = table_n - right1_n
         elif closure > 0.0:
             left1_n, right1_n = against_left, against_right
-        offset = pushed if offset >= 0.0 else -pushed
+        offset = offset_of_pushed(offset, pushed)
     # Held fast, each finger presses its own half as if the other did the same. Free, both press the whole.
     shift = 2.0 * offset if model.held == 1 else 0.0
     left, missed = _pressed(model, left, closure - shift, speed_m_s, h, still)
@@ -445,6 +445,11 @@ def pad_forces(
     else:
         left1_n, right1_n = max(left.force_n, left1_n), max(left.force_n, right1_n)
     return Contact(left1_n, right1_n, offset, touched, left, right, 0.0, unbalanced)
+
+
+def offset_of_pushed(offset_m: float, pushed_m: float) -> float:
+    """Return the offset of an object that a finger has pushed to this distance from the middle, from the same side."""
+    return pushed_m if offset_m >= 0.0 else -pushed_m
 
 
 def _pressed(

@@ -14,6 +14,9 @@ from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, VERLET, Ste
 STEP_SHARE: Final = 0.34
 """The tolerance of a step is (0.34 accuracy)^1.5, so that the accumulated error of many steps is proportional to the
 accuracy, and smaller."""
+MACRO_SHARE: Final = 0.01
+"""The tolerance of a macro-step is 0.01 accuracy^1.5. Near rest the gap changes so slowly that a small error shifts
+the detected time of rest by many ticks, so it has to be this small."""
 GROWTH_ACCURACY: Final = 0.1
 """From this accuracy upwards, a step in contact may be twice as long as the one before."""
 BALANCE_SHARE: Final = 5e-7
@@ -37,6 +40,8 @@ class Level(NamedTuple):
     """The scheme of the steps, or BY_SCENE."""
     plain: int = 0
     """1: each tick is one step but for events, and no error is estimated."""
+    macro: int = 0
+    """1: where the effort does not change, a step may last several ticks, and its error is then estimated."""
 
 
 class LevelScale(NamedTuple):
@@ -50,21 +55,24 @@ class LevelScale(NamedTuple):
     """As in `Level`, like the next two."""
     scheme: int = BY_SCENE
     plain: int = 0
+    macro: int = 0
 
     def at(self, accuracy: float) -> Level:
         """Return the level for this accuracy."""
         step_tol = accuracy / self.refinement
-        return Level(self.model * accuracy, step_tol, self.min_steps, self.scheme, self.plain)
+        return Level(self.model * accuracy, step_tol, self.min_steps, self.scheme, self.plain, self.macro)
 
 
 FULL_SCALES: Final = (LevelScale(0.0), LevelScale(0.0, 10.0, 4), LevelScale(0.0, 100.0, 32))
 """All terms, with smaller and smaller steps."""
 PLAIN_SCALES: Final = (
+    LevelScale(0.0, scheme=VERLET, plain=1, macro=1),
     LevelScale(0.0, scheme=VERLET, plain=1),
     LevelScale(0.0, scheme=BOGACKI_SHAMPINE, plain=1),
 )
-"""All terms, with a step per tick: they cost least. Where trial grasps show that they suffice, nothing is gained by a
-simpler model or by steps whose error is controlled. With spread, several instances are grasped to show it."""
+"""All terms, with a step per tick and, where the effort is constant, over several ticks: they cost least. Where trial
+grasps show that they suffice, nothing is gained by a simpler model or by steps per tick whose error is controlled. With
+spread, several instances are grasped to show it."""
 THIRD_ORDER: Final = LevelScale(0.0, scheme=BOGACKI_SHAMPINE)
 """All terms, with steps of third order whose error is controlled."""
 HIGH_ACCURACY: Final = 3e-3
@@ -126,7 +134,8 @@ def step_growth(accuracy: float) -> float:
 def steps_for(level: Level, scheme: int, dt_s: float) -> Steps:
     """Return the step control of a level with this scheme, for ticks of `dt_s` seconds."""
     if level.plain == 1:
-        return Steps(math.inf, scheme, dt_s, growth=math.inf)
+        macro_tolerance = MACRO_SHARE * level.step_tol**1.5 if level.macro == 1 else 0.0
+        return Steps(math.inf, scheme, dt_s, growth=math.inf, macro_tolerance=macro_tolerance)
     longest_s = dt_s / level.min_steps if level.min_steps > 1 else math.inf
     tolerance = step_tolerance(level.step_tol)
     if scheme == BOGACKI_SHAMPINE:

@@ -98,7 +98,7 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = UNVERIFIED) -> Red
     scheme = level.scheme
     if scheme == BY_SCENE:
         scheme = _scheme(config.accuracy, rate, contact.number / dt_s, dt_s, config.coulomb_n > 0.0)
-    steps = steps_for(level, scheme, dt_s)
+    steps = _with_settings(steps_for(level, scheme, dt_s), config)
     fastest = max(_swings(grip, model).values(), default=0.0)
     if fastest > 0.0:
         steps = steps._replace(longest_touched_s=angle / fastest)
@@ -106,11 +106,11 @@ def propose(problem: Problem, grip: Grip, scale: LevelScale = UNVERIFIED) -> Red
         accuracy=config.accuracy,
         treatment=treatment,
         point=grip.point,
-        steps=_with_settings(steps, config),
+        steps=steps,
         decisions=decisions,
         scheme=TermDecision(
             term="steps",
-            decision=f"{SCHEMES[scheme]}, a step per tick" if level.plain == 1 else SCHEMES[scheme],
+            decision=_scheme_in_words(scheme, level.plain, steps),
             what="damping rate times tick",
             number=rate * dt_s,
             error=config.accuracy * max(1.0 - scale.model, 0.0),
@@ -179,12 +179,20 @@ def _scheme(accuracy: float, damping_rate: float, frequency: float, dt_s: float,
     return MEAN_FORCE if damping_rate < undamped and not has_friction else VERLET
 
 
+def _scheme_in_words(scheme: int, plain: int, steps: Steps) -> str:
+    if steps.macro_tolerance > 0.0:
+        return f"{SCHEMES[scheme]}, a step per tick; in batches over several ticks"
+    return f"{SCHEMES[scheme]}, a step per tick" if plain == 1 else SCHEMES[scheme]
+
+
 def _with_settings(steps: Steps, config: SimConfig) -> Steps:
     """Return the steps with the scheme, the length and the convergence that the settings prescribe."""
     if config.scheme != "auto":
         steps = steps._replace(scheme=(steps.scheme or TR_BDF2) if config.scheme == "implicit" else VERLET)
     if config.step_s is not None:
         steps = steps._replace(tolerance=math.inf, longest_s=float(config.step_s), growth=math.inf)
+    if config.step_s is not None or config.drive_lag_s > 0.0 or config.acceleration:
+        steps = steps._replace(macro_tolerance=0.0)
     if config.fidelity == "reference":
         steps = steps._replace(
             tolerance=min(steps.tolerance, step_tolerance(REFERENCE_ACCURACY)),

@@ -38,12 +38,14 @@ from graspsense_sim_gripper.loop import (
     COLUMNS,
     EVENT_SHIFT,
     NOT_STARTED,
+    ROWS_AT_ONCE,
     Buffers,
     GraspParams,
     PlantModel,
     SimulationState,
     before_failure,
     has_ended,
+    uses_macro_steps,
 )
 from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers
 from graspsense_sim_gripper.problem import GraspController, GraspSetup, Problem
@@ -262,9 +264,18 @@ class TrialGrasps:
                 contact = progress.plant.contact._replace(left=fresh.left, right=fresh.right)
                 progress = progress._replace(plant=progress.plant._replace(contact=contact))
             plant = made.plant._replace(steps=steps) if exact is None else exact
-            grasp_params = GraspParams(plant, made.sensor, params, setup.dt_s, until, made.palm)
+            grasp_params = GraspParams(
+                plant,
+                made.sensor,
+                params,
+                setup.dt_s,
+                until,
+                made.palm,
+                macro_steps=uses_macro_steps(exact, steps),
+            )
             while not has_ended(progress.controller) and progress.loop.ticks < until:
-                table = np.zeros((len(COLUMNS), min(until - progress.loop.ticks, CAPACITY)))
+                n_rows = min(until - progress.loop.ticks, CAPACITY) + ROWS_AT_ONCE
+                table = np.zeros((len(COLUMNS), n_rows))
                 phases = np.zeros(table.shape[1], np.int64)
                 recorded = (table, phases) if on_arrays else (table.tolist(), phases.tolist())
                 progress = progress._replace(loop=progress.loop._replace(recorded=0))

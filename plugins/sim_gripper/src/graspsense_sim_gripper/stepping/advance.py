@@ -132,7 +132,7 @@ def take_step(
                 return PlantState(state.motion, contact, retry, state.effort_n, state.peak_n), 0.0
         attempt = _without_reversal(start, attempt)
         # A step across an event of a term has an error only where the force jumps, and none that shorter steps reduce.
-        error = 0.0 if changes else relative_error(steps, start, attempt)
+        error = 0.0 if changes else relative_error(steps.tolerance, start, attempt)
         growth = FREE_GROWTH if contact.touched == 0 else steps.growth
         accepted, after_step = accept(error, attempt.duration_s, step, growth, forced)
         if not accepted:
@@ -145,7 +145,7 @@ def take_step(
             after_step = StepState(MIN_CONTACT_STEP_S, after_step.n_steps, after_step.unresolved)
         if changes:
             attempt = _after_event(attempt)
-    return _completed(params, state, start, attempt, after_step), attempt.duration_s
+    return completed(params, state, start, attempt, after_step), attempt.duration_s
 
 
 def _after_event(attempt: Attempt) -> Attempt:
@@ -187,7 +187,7 @@ def _without_reversal(start: Start, attempt: Attempt) -> Attempt:
     )
 
 
-def _completed(
+def completed(
     params: PlantParams, state: PlantState, start: Start, attempt: Attempt, step: StepState
 ) -> PlantState:
     """Return the plant after an accepted step, with the contact, the peak and the ends of travel brought up to date."""

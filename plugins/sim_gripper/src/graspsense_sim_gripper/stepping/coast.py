@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Final
 
 from graspsense.plugin_api import gap_and_rate
-from graspsense_sim_gripper.dynamics.contact import ObjectModel
+from graspsense_sim_gripper.dynamics.contact import ObjectModel, offset_of_pushed
 from graspsense_sim_gripper.dynamics.drive import ARREST_M_S, is_held, stribeck_excess
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState, right_of
 from graspsense_sim_gripper.stepping.control import fits_a_step
@@ -57,8 +57,7 @@ def glide(
         left_n, right_n, offset, _, left, right, _, unbalanced = contact
         if load > 0.0:
             # The finger pushes the object towards the middle.
-            pushed = 0.5 * (motion1.gap_m - reach)
-            offset = pushed if offset >= 0.0 else -pushed
+            offset = offset_of_pushed(offset, 0.5 * (motion1.gap_m - reach))
         contact = Contact(left_n, right_n, offset, touched, left, right, pending, unbalanced)
     return True, motion1, contact
 

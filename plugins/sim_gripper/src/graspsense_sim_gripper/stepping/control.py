@@ -68,7 +68,7 @@ def fits_a_step(steps: Steps, step: StepState, dt: float) -> bool:
     return steps.longest_s >= dt <= step.next_s
 
 
-def relative_error(steps: Steps, start: Start, attempt: Attempt) -> float:
+def relative_error(tolerance: float, start: Start, attempt: Attempt) -> float:
     """Return the error of a step relative to the tolerance, 0 if no error is estimated."""
     if attempt.speed_error_m_s + attempt.force_error_n <= 0.0:
         return 0.0
@@ -82,7 +82,7 @@ def relative_error(steps: Steps, start: Start, attempt: Attempt) -> float:
             attempt.speed_error_m_s / max(speed0, speed1, SPEED_SCALE_M_S),
             attempt.force_error_n / max(load0, load1, FORCE_SCALE_N),
         )
-        / steps.tolerance
+        / tolerance
     )
 
 

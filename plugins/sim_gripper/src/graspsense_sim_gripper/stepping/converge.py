@@ -90,4 +90,5 @@ def _halved(steps: Steps, dt: float) -> Steps:
         steps.settle,
         1.0 + 0.5 * (steps.growth - 1.0),
         0.5 * min(steps.longest_touched_s, dt),
+        0.0,
     )

@@ -44,6 +44,8 @@ class Steps(NamedTuple):
     After a contact at time t_c a step is then at most (growth - 1) (t - t_c) long, however short the first one was."""
     longest_touched_s: float = math.inf
     """The longest step after the object was touched; it resolves the fastest oscillation of a term."""
+    macro_tolerance: float = 0.0
+    """Relative error of a step over several ticks, beyond which it is not taken; 0: no step is longer than a tick."""
 
 
 class PlantParams(NamedTuple):

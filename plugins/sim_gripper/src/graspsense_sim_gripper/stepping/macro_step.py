@@ -1,0 +1,246 @@
+"""Macro-steps: one step of the plant over several ticks in which the effort is constant, with values at each tick.
+
+A controller reads its sensors at every tick, but the motion between the ticks is usually smooth for much longer. Where
+the effort does not change, the plant takes one step over several ticks, and polynomials give what the sensors read at
+the ticks within it (dense output: Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, II.6). A
+macro-step contains no event. Where it would, the plant is advanced tick by tick, which locates the event.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from graspsense.plugin_api import gap_and_rate
+from graspsense_sim_gripper.dynamics.contact import has_event
+from graspsense_sim_gripper.dynamics.drive import is_held
+from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState, right_of
+from graspsense_sim_gripper.sensing import Measured
+from graspsense_sim_gripper.stepping.advance import completed, rests
+from graspsense_sim_gripper.stepping.coast import coast
+from graspsense_sim_gripper.stepping.control import (
+    EXPONENT,
+    MAX_FACTOR,
+    MIN_FACTOR,
+    SAFETY,
+    SMALL_ERROR,
+    relative_error,
+)
+from graspsense_sim_gripper.stepping.events import first, parting
+from graspsense_sim_gripper.stepping.implicit import acceleration_of, force_error, pressed
+from graspsense_sim_gripper.stepping.scheme import (
+    FORCE_SCALE_N,
+    SPEED_SCALE_M_S,
+    Attempt,
+    PlantParams,
+    Start,
+    Steps,
+    comes_to_rest,
+    start_of,
+)
+from graspsense_sim_gripper.stepping.stick import stick
+
+MAX_TICKS: Final = 64
+"""Largest number of ticks in a macro-step."""
+RELAXATION_ERROR: Final = 0.1
+"""The error of a force that relaxes while the fingers are held, as a share of its second difference over the step."""
+GROWTH: Final = 4.0
+"""Largest ratio of successive macro-steps."""
+
+
+class Cubic(NamedTuple):
+    """A cubic polynomial of the fraction s of the macro-step: c0 + s (c1 + s (c2 + s c3))."""
+
+    c0: float
+    c1: float
+    c2: float
+    c3: float
+
+
+class DenseOutput(NamedTuple):
+    """The motion and the forces of the pads within a macro-step, as polynomials of the fraction of it."""
+
+    duration_s: float
+    revolutions: Cubic
+    gap_m: Cubic
+    jacobian_m_rev: Cubic
+    left_n: Cubic
+    right_n: Cubic
+
+
+class MacroStep(NamedTuple):
+    """An attempted macro-step."""
+
+    error: float
+    """Its error relative to the tolerance: at most 1 if the step is accepted; inf if it would contain an event."""
+    after: PlantState
+    values: DenseOutput
+    """The values within it."""
+
+
+def macro_step(params: PlantParams, state: PlantState, effort_n: float, h: float) -> MacroStep:
+    """Return an attempted step of `h`."""
+    if state.contact.touched == 1 and h > params.steps.longest_touched_s:
+        error, middle, after = math.inf, state.contact, state
+    elif state.motion.speed_rev_s == 0.0:
+        error, middle, after = _rested(params, state, effort_n, h)
+    else:
+        error, middle, after = _moved(params, state, effort_n, h)
+    return MacroStep(error, after, dense_output(state, middle, after, h))
+
+
+def _rested(
+    params: PlantParams, state: PlantState, effort_n: float, h: float
+) -> tuple[float, Contact, PlantState]:
+    """Return the relative error of a step in which the fingers are held, the contact half-way, and the plant after."""
+    contact = state.contact
+    if not is_held(params.drive, state.motion, contact, effort_n):
+        return math.inf, contact, state
+    if rests(params.drive, state, effort_n):
+        return 0.0, contact, state
+    if contact.left.force_n <= 0.0 and contact.left_n + contact.right_n > 0.0:
+        return math.inf, contact, state
+    middle, t = stick(params, state, effort_n, 0.5 * h)
+    after, t1 = stick(params, middle, effort_n, 0.5 * h)
+    if t < 0.5 * h or t1 < 0.5 * h or _has_event(contact, after.contact):
+        return math.inf, contact, state
+    load, load1, load2 = _load(contact), _load(middle.contact), _load(after.contact)
+    second_difference_n = abs(load - 2.0 * load1 + load2)
+    return (
+        RELAXATION_ERROR * second_difference_n / (params.steps.macro_tolerance * max(load, FORCE_SCALE_N)),
+        middle.contact,
+        after,
+    )
+
+
+def _moved(
+    params: PlantParams, state: PlantState, effort_n: float, h: float
+) -> tuple[float, Contact, PlantState]:
+    """Return the relative error of a step of moving fingers, the contact half-way, and the plant after it.
+
+    The scheme is of Runge-Kutta-Nystrom type with the nodes 0, 1/2 and 1 and the weights of Simpson's rule; its speeds
+    are those of Kutta's scheme of third order. The third stage is at the end of the path, so that the object has two
+    steps of `h` / 2. The estimate of the error is the difference to the midpoint rule.
+    """
+    drive, model, steps = params
+    link, contact, motion = drive.link, state.contact, state.motion
+    if contact.touched == 1 and contact.left.force_n <= 0.0:
+        # A released object that recovers its shape, which is computed later, or one that a finger pushes.
+        scale = max(abs(motion.speed_rev_s * motion.jacobian_m_rev) / SPEED_SCALE_M_S, 1.0)
+        coasting = PlantParams(drive, model, Steps(scale * steps.macro_tolerance))
+        coasts, after = coast(coasting, state, effort_n, h)
+        if coasts or contact.left_n + contact.right_n > 0.0:
+            return 0.0 if coasts else math.inf, contact, after
+    start = start_of(params, state, effort_n)
+    if comes_to_rest(start):
+        return math.inf, contact, state
+    revolutions, speed, _, jacobian = motion
+    direction, rate = start.direction, start.acceleration
+    gap1, jacobian1 = gap_and_rate(link, revolutions + 0.5 * h * (speed + 0.25 * h * rate))
+    speed1 = speed + 0.5 * h * rate
+    middle = pressed(model, contact, gap1, -speed1 * jacobian1, 0.5 * h)
+    rate1 = acceleration_of(drive, jacobian1, speed1, middle, effort_n, direction)
+    revolutions2 = revolutions + h * (speed + h * (rate + 2.0 * rate1) / 6.0)
+    gap2, jacobian2 = gap_and_rate(link, revolutions2)
+    speed2 = speed + h * (2.0 * rate1 - rate)
+    end = pressed(model, middle, gap2, -speed2 * jacobian2, 0.5 * h)
+    rate2 = acceleration_of(drive, jacobian2, speed2, end, effort_n, direction)
+    speed_end = speed + h * (rate + 4.0 * rate1 + rate2) / 6.0
+    speed_error = h * abs(rate - 2.0 * rate1 + rate2) / 6.0
+    position_error = h * h * abs(rate1 - rate) / 6.0
+    motion2 = Motion(revolutions2, speed_end, gap2, jacobian2)
+    error_n = force_error(start, motion2, end, position_error)
+    attempt = Attempt(motion2, end, h, speed_error * abs(jacobian), error_n)
+    if _contains_event(params, start, middle, attempt):
+        return math.inf, contact, state
+    next_s, n_steps, unresolved = state.step
+    after = completed(params, state, start, attempt, StepState(next_s, n_steps + 1, unresolved))
+    return relative_error(params.steps.macro_tolerance, start, attempt), middle, after
+
+
+def _contains_event(params: PlantParams, start: Start, middle: Contact, attempt: Attempt) -> bool:
+    """Return whether the motion ends, a finger meets or leaves the object, or a term has an event in this step.
+
+    `middle` is the contact half-way.
+    """
+    before, after = start.contact, attempt.contact
+    return (
+        attempt.motion.speed_rev_s * start.direction <= 0.0
+        or start.motion.gap_m > start.meeting_m >= attempt.motion.gap_m
+        or not _pressed_halves(before) == _pressed_halves(middle) == _pressed_halves(after)
+        or _has_event(before, middle)
+        or _has_event(before, after)
+        or parting(params, start, attempt) > 0.0
+        or first(params, start, attempt) > 0.0
+    )
+
+
+def _pressed_halves(contact: Contact) -> tuple[bool, bool]:
+    return contact.left.force_n > 0.0, right_of(contact.left, contact.right).force_n > 0.0
+
+
+def _has_event(before: Contact, after: Contact) -> bool:
+    return before.touched == 1 and has_event(before, after)
+
+
+def _load(contact: Contact) -> float:
+    return 0.5 * (contact.left_n + contact.right_n)
+
+
+def next_ticks(n: int, error: float) -> int:
+    """Return the number of ticks of the next macro-step after one of `n` ticks with this error.
+
+    The same control as that of single steps (`control`), for the error of a third-order scheme.
+    """
+    if not error < math.inf:
+        return n // 2
+    factor = MAX_FACTOR if error <= SMALL_ERROR else SAFETY * error**EXPONENT
+    return min(max(int(n * min(max(factor, MIN_FACTOR), GROWTH)), 1), MAX_TICKS)
+
+
+def dense_output(before: PlantState, middle: Contact, after: PlantState, h: float) -> DenseOutput:
+    """Return the polynomials between two states; `middle` is the contact after half of the time."""
+    revolutions, speed, gap, jacobian = before.motion
+    revolutions1, speed1, gap1, jacobian1 = after.motion
+    contact, contact1 = before.contact, after.contact
+    return DenseOutput(
+        h,
+        _hermite(revolutions, revolutions1, h * speed, h * speed1),
+        _hermite(gap, gap1, h * speed * jacobian, h * speed1 * jacobian1),
+        Cubic(jacobian, jacobian1 - jacobian, 0.0, 0.0),
+        _parabola(contact.left_n, middle.left_n, contact1.left_n),
+        _parabola(contact.right_n, middle.right_n, contact1.right_n),
+    )
+
+
+def constant_values(state: PlantState) -> DenseOutput:
+    """Return the values of a state that does not change."""
+    return dense_output(state, state.contact, state, 1.0)
+
+
+def with_peak(state: PlantState, peak_n: float) -> PlantState:
+    """Return the same state with this largest force on a pad."""
+    return PlantState(state.motion, state.contact, state.step, state.effort_n, peak_n)
+
+
+def values_at(dense: DenseOutput, s: float) -> Measured:
+    """Return what the sensors measure at this fraction of the macro-step."""
+    h, revolutions, gap, jacobian, left, right = dense
+    speed = (revolutions.c1 + s * (2.0 * revolutions.c2 + 3.0 * s * revolutions.c3)) / h
+    motion = Motion(_value(revolutions, s), speed, _value(gap, s), _value(jacobian, s))
+    return Measured(motion, _value(left, s), _value(right, s))
+
+
+def _hermite(x0: float, x1: float, slope0: float, slope1: float) -> Cubic:
+    change = x1 - x0
+    return Cubic(x0, slope0, 3.0 * change - 2.0 * slope0 - slope1, slope0 + slope1 - 2.0 * change)
+
+
+def _parabola(x0: float, middle: float, x1: float) -> Cubic:
+    bend = 2.0 * (x0 + x1 - 2.0 * middle)
+    return Cubic(x0, x1 - x0 - bend, bend, 0.0)
+
+
+def _value(cubic: Cubic, s: float) -> float:
+    c0, c1, c2, c3 = cubic
+    return c0 + s * (c1 + s * (c2 + s * c3))

@@ -1,0 +1,218 @@
+"""Macro-steps: one step over several ticks is accurate, has no event, and gives the values at the ticks within it."""
+
+import math
+from math import inf
+
+import numpy as np
+import pytest
+
+from graspsense.core.run_config import RunConfig
+from graspsense.plugin_api import EFFORT, Command, create, gap_and_rate, revolutions_at
+from graspsense_sim_gripper.batch import job, run_many
+from graspsense_sim_gripper.binding import bind_reachable
+from graspsense_sim_gripper.build import unverified_setup
+from graspsense_sim_gripper.compiled.compose import plant_move, step_parts, uncompressed
+from graspsense_sim_gripper.compiled.padding import composition_of
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
+from graspsense_sim_gripper.stepping.macro_step import macro_step, next_ticks, values_at
+from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, Steps
+from graspsense_sim_gripper.terms.registry import laws_of
+
+CONFIG = SimConfig(sensor="ideal", spread=False)
+TICK = 1e-3
+EFFORT_N = 20.0
+FORCE_STEP = type(create("controller", "force")).step
+MACRO = Steps(inf, longest_s=TICK, growth=inf, macro_tolerance=3e-4)
+
+
+class Plant:
+    """An object of the catalogue between fingers that close under a constant effort."""
+
+    def __init__(self, scene):
+        setup = unverified_setup(CONFIG, scene, 0)
+        composed = composition_of(CONFIG, setup, pad=False)
+        self.params = setup.plant._replace(steps=MACRO)
+        self.macro_step = bind_reachable(macro_step, step_parts(composed))
+        self._move = plant_move(laws_of(setup.kinds), converges=False, lags=False)
+        self._kinds, self._setup = setup.kinds, setup
+
+    def state(self, gap_beyond_m, speed_m_s):
+        """Return fingers that are so much wider than the object, and move at this rate of the gap."""
+        drive = self.params.drive
+        revolutions = revolutions_at(drive.link, self.params.object.width_m + gap_beyond_m)
+        gap, jacobian = gap_and_rate(drive.link, revolutions)
+        return PlantState(
+            Motion(revolutions, speed_m_s / jacobian, gap, jacobian),
+            Contact(0.0, 0.0, 0.0, 0, uncompressed(self._kinds), ()),
+        )
+
+    def after(self, state, seconds, effort_n=EFFORT_N):
+        """Return the plant after this time, in steps of 50 us of third order."""
+        fine = self.params._replace(steps=Steps(inf, BOGACKI_SHAMPINE, 5e-5, growth=inf))
+        return self._move(fine, state, effort_n, seconds)
+
+
+def squeezing(scene="toy"):
+    """Return a plant 20 ms after the contact, and its state."""
+    plant = Plant(scene)
+    return plant, plant.after(plant.state(1e-5, -0.01), 0.02)
+
+
+@pytest.mark.parametrize("case", ["squeezing", "with damping"])
+def test_its_error_decreases_with_the_fourth_power_of_its_length(case):
+    plant, start = squeezing()
+    if case == "with damping":
+        # Without contact, where the damper of the drive is all that there is.
+        drive = plant.params.drive
+        damped = drive._replace(friction=drive.friction._replace(damping_n_s_m=2000.0))
+        plant.params, start = plant.params._replace(drive=damped), plant.state(0.02, -0.01)
+    errors = []
+    for n in (8, 16, 32):
+        step = plant.macro_step(plant.params, start, EFFORT_N, n * TICK)
+        speeds = [
+            now.motion.speed_rev_s * now.motion.jacobian_m_rev
+            for now in (step.after, plant.after(start, n * TICK))
+        ]
+        errors.append(abs(speeds[0] - speeds[1]))
+    assert errors[0] < 1e-6
+    assert 11.0 < errors[1] / errors[0] < 22.0
+    assert 11.0 < errors[2] / errors[1] < 22.0
+
+
+@pytest.mark.parametrize("scene", ["toy", "odwalla:full_open", "water:empty_closed", "block"])
+def test_a_step_that_is_taken_is_as_exact_as_its_tolerance_says(scene):
+    plant, start = squeezing(scene)
+    n = 32
+    while not (step := plant.macro_step(plant.params, start, EFFORT_N, n * TICK)).error <= 1.0:
+        n = next_ticks(n, step.error)
+    expected = plant.after(start, n * TICK)
+    assert n >= 2
+    assert step.after.contact.left_n == pytest.approx(expected.contact.left_n, rel=3e-4)
+    assert step.after.motion.gap_m == pytest.approx(expected.motion.gap_m, abs=1e-8)
+
+
+def test_the_values_within_are_those_of_the_motion():
+    plant, start = squeezing()
+    step = plant.macro_step(plant.params, start, EFFORT_N, 8 * TICK)
+    assert step.error <= 1.0
+    for k in (0, 1, 3, 4, 7, 8):
+        within, expected = values_at(step.values, k / 8), plant.after(start, k * TICK) if k else start
+        assert within.left_n == pytest.approx(expected.contact.left_n, rel=2e-4)
+        assert within.motion.gap_m == pytest.approx(expected.motion.gap_m, abs=2e-9)
+        speed = within.motion.speed_rev_s * within.motion.jacobian_m_rev
+        assert speed == pytest.approx(
+            expected.motion.speed_rev_s * expected.motion.jacobian_m_rev, rel=1e-3, abs=1e-6
+        )
+
+
+def test_fingers_that_friction_holds_stay_while_the_object_relaxes():
+    plant, start = squeezing()
+    revolutions, _, gap, jacobian = start.motion
+    effort_n = start.contact.left_n
+    held = plant.after(start._replace(motion=Motion(revolutions, 0.0, gap, jacobian)), 0.005, effort_n)
+    step = plant.macro_step(plant.params, held, effort_n, 32 * TICK)
+    assert step.error <= 1.0
+    assert step.after.motion == held.motion
+    expected = plant.after(held, 32 * TICK, effort_n)
+    assert expected.contact.left_n < held.contact.left_n
+    assert step.after.contact.left_n == pytest.approx(expected.contact.left_n, rel=1e-4)
+
+
+def just_before(plant, start, effort_n, happened):
+    """Return the plant at most 8 ms before this has happened."""
+    for _ in range(200):
+        after = plant.after(start, 0.008, effort_n)
+        if happened(after):
+            return start
+        start = after
+    raise AssertionError("it did not happen")
+
+
+def test_a_step_that_would_contain_an_event_is_not_taken():
+    toy, egg = Plant("toy"), Plant("egg")
+    squeezed = toy.after(toy.state(1e-5, -0.01), 0.02)
+    opened_m = CONFIG.open_gap_m - toy.params.object.width_m
+    unbroken = egg.after(egg.state(1e-5, -0.01), 0.01, 80.0)
+    cases = {
+        "contact": (toy, toy.state(1e-5, -0.01), 20.0),
+        "rest": (toy, just_before(toy, squeezed, 5.0, lambda now: now.motion.speed_rev_s == 0.0), 5.0),
+        "parting": (toy, just_before(toy, squeezed, -20.0, lambda now: now.contact.left_n == 0.0), -20.0),
+        "end of travel": (toy, toy.state(opened_m - 1e-5, 0.05), -20.0),
+        "breaking": (
+            egg,
+            just_before(
+                egg, unbroken, 80.0, lambda now: now.contact.left.states != unbroken.contact.left.states
+            ),
+            80.0,
+        ),
+    }
+    for what, (plant, start, effort_n) in cases.items():
+        assert math.isinf(plant.macro_step(plant.params, start, effort_n, 0.01).error), what
+
+
+def test_the_number_of_ticks_follows_from_the_error():
+    assert next_ticks(16, 0.0) == 64
+    assert next_ticks(16, 1.0) == 14
+    assert next_ticks(16, 8.0) == 7
+    assert next_ticks(16, inf) == next_ticks(16, math.nan) == 8
+
+
+def test_a_grasp_does_not_depend_on_the_length_of_its_buffers(monkeypatch):
+    law = create("controller", "hybrid")
+    whole = run_many(SimConfig(), law, ["toy"], [3])[0]
+    monkeypatch.setattr(job, "TICKS", 700)
+    parts = run_many(SimConfig(), law, ["toy"], [3])[0]
+    assert whole.reduction.steps.macro_tolerance > 0.0
+    assert parts.state == whole.state
+    np.testing.assert_array_equal(parts.trace.gap_m, whole.trace.gap_m)
+
+
+@pytest.mark.parametrize("settings", [{"pad_delay_s": 0.017}, {"rate_hz": 250.0}, {"rate_hz": 4000.0}])
+def test_images_and_outcome_are_those_of_single_ticks(settings):
+    law = create("controller", "hybrid")
+    many, single = (
+        run_many(SimConfig(**settings, **fidelity), law, ["can:empty_open"], [4])[0]
+        for fidelity in ({}, {"fidelity": "fixed", "scheme": "explicit"})
+    )
+    assert many.reduction.steps.macro_tolerance > 0.0
+    assert many.outcome == single.outcome
+    n = min(len(many.trace.pad_t_s), len(single.trace.pad_t_s)) - 10
+    np.testing.assert_allclose(many.trace.pad_t_s[:n], single.trace.pad_t_s[:n], atol=1e-9)
+    assert many.state.peak_n == pytest.approx(single.state.peak_n, rel=1e-3)
+
+
+class Pulse(type(create("controller", "force"))):
+    """A constant effort that ends as soon as the left pad reads 3 N."""
+
+    free_motion = None
+
+    @staticmethod
+    def step(params, state, reading):
+        command, state = FORCE_STEP(params, state, reading)
+        effort = -20.0 if reading.frame.force_left_n > 3.0 else command.value
+        return Command(EFFORT, effort, inf, inf), state
+
+
+@pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_a_command_within_a_step_takes_effect_in_its_tick(compiled):
+    law = Pulse(create("controller", "force").config)
+    run = RunConfig(grasp_timeout_s=3.0)
+    many, single = (
+        run_many(
+            SimConfig(sensor="ideal", **fidelity),
+            law,
+            ["toy"],
+            [4],
+            compiled=compiled,
+            run=run,
+        )[0]
+        for fidelity in ({"fidelity": "full"}, {"fidelity": "fixed", "scheme": "explicit"})
+    )
+    assert many.reduction.steps.macro_tolerance > 0.0
+    first = int(np.argmax(many.trace.force_left_n > 3.0))
+    assert first == int(np.argmax(single.trace.force_left_n > 3.0))
+    rows = slice(first - 20, first + 20)
+    np.testing.assert_allclose(many.trace.force_left_n[rows], single.trace.force_left_n[rows], rtol=1e-3)
+    # The peak is one that occurred, and not that of the step as it was begun.
+    assert many.state.peak_n == pytest.approx(single.state.peak_n, rel=1e-3)
