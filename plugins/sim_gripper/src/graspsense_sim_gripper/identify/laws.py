@@ -73,6 +73,11 @@ class FreeParameter:
         """Whether it is proportional to the scale of the force: a force, or one per length or speed."""
         return "_n_" in f"{self.name}_"
 
+    @property
+    def is_stiffness(self) -> bool:
+        """Whether it varies with the stiffness of the object."""
+        return self.name in find_term(SLOTS[self.slot])[1].stiffnesses
+
 
 @frozen(kw_only=True)
 class CandidateLaw:
