@@ -20,6 +20,7 @@ from graspsense_sim_gripper.identify.laws import DataScale, memories, static_can
 from graspsense_sim_gripper.identify.prepare import _smooth_course, prepared
 from graspsense_sim_gripper.identify.refuse import shows_memory
 from graspsense_sim_gripper.identify.run import _fit_to_use, _used
+from graspsense_sim_gripper.identify.spread import refits
 from graspsense_sim_gripper.objects.spec import parse_scene
 
 PADS = PadCompliance(15000.0, 0.0, 0.0, 1.0)
@@ -156,6 +157,24 @@ def test_a_ramp_at_one_speed_shows_no_memory_and_a_hold_does():
     assert not shows_memory([ramp, ramp])
     assert shows_memory([ramp, faster])
     assert shows_memory([held])
+
+
+def test_without_one_object_the_common_stiffness_is_the_mean_of_the_others():
+    rng = np.random.default_rng(0)
+
+    def force(closure, k):
+        return (closure > 0.0) * (k * closure + 1e7 * closure**3) + 0.03 * rng.standard_normal(len(closure))
+
+    ready = [
+        prepared(recorded(lambda closure, k=k: force(closure, k)), 0.0)
+        for k in (900.0, 1200.0, 1000.0, 800.0, 1100.0)
+    ]
+    law = static_candidates(scale_of(ready[0]))[2]
+    model = ForwardModel(pads=RIGID_PADS)
+    again = refits(model, fit(model, law, ready), ready, np.random.default_rng(0), has_lag=False)
+
+    # Where it stayed that of all objects, the jackknife would find too little scatter between them.
+    assert np.mean(np.log([one.factors for one in again.fits]), axis=1) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_breaks_give_the_force_of_the_fracture_with_its_spread_and_what_is_left():
