@@ -15,6 +15,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import CandidateScore
+from graspsense_sim_gripper.identify.corners import with_corners
 from graspsense_sim_gripper.identify.fit import LEAST_ERROR, Fitted, Mask, fit, held_out_rms
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.laws import GAS, CandidateLaw, DataScale, memories, static_candidates
@@ -71,7 +72,9 @@ def choose(
         (3 if with_memory else 1) * len(statics) + (STATIC_KEPT + 1) * (1 + len(with_memory)) + 2 * MANY,
         progress,
     )
-    alone = in_threads(lambda one: fit(direct, one, squeezes), statics, counter.done)
+    alone = in_threads(
+        lambda one: fit(direct, with_corners(direct, one, squeezes), squeezes), statics, counter.done
+    )
     rough = alone
     if with_memory:
         # From its own starts, and from the fit without a memory, which has found the corners of the law.

@@ -85,6 +85,8 @@ class CandidateLaw:
 
     free: tuple[FreeParameter, ...]
     fixed: Mapping[tuple[int, str], float] = field(factory=dict)
+    own_starts: tuple[tuple[float, ...], ...] = ()
+    """Values to start from together; if there are none, a fit starts from combinations of those of each parameter."""
 
     @property
     def slots(self) -> tuple[int, ...]:
@@ -166,8 +168,11 @@ class CandidateLaw:
         return numbers
 
     def starts(self) -> list[tuple[float, ...]]:
-        """Return combinations of the values to start from."""
-        return list(product(*(parameter.starts for parameter in self.free)))[:MAX_STARTS]
+        """Return the values to start from."""
+        return (
+            list(self.own_starts)
+            or list(product(*(parameter.starts for parameter in self.free)))[:MAX_STARTS]
+        )
 
     def starting_at(self, values: Mapping[str, float]) -> CandidateLaw:
         """Return the candidate that starts at these values, by label, where it has the parameter."""
@@ -177,7 +182,7 @@ class CandidateLaw:
             else one
             for one in self.free
         )
-        return evolve(self, free=free)
+        return evolve(self, free=free, own_starts=())
 
 
 def _defaults(params: Any) -> dict[str, float]:
