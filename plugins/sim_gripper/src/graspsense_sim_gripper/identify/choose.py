@@ -72,19 +72,7 @@ def choose(
         (3 if with_memory else 1) * len(statics) + (STATIC_KEPT + 1) * (1 + len(with_memory)) + 2 * MANY,
         progress,
     )
-    alone = in_threads(
-        lambda one: fit(direct, with_corners(direct, one, squeezes), squeezes), statics, counter.done
-    )
-    rough = alone
-    if with_memory:
-        # From its own starts, and from the fit without a memory, which has found the corners of the law.
-        roughly = [one.joined(with_memory[1]) for one in statics]
-        roughly += [one.starting_at(_values(own)) for one, own in zip(roughly, alone, strict=True)]
-        tried = in_threads(lambda one: fit(direct, one, squeezes), roughly, counter.done)
-        rough = [
-            min(pair, key=lambda one: one.cost)
-            for pair in zip(tried[: len(statics)], tried[len(statics) :], strict=True)
-        ]
+    rough = _rough(direct, statics, squeezes, with_memory, counter)
     kept = _kept(rough)
     candidates = [
         joined.starting_at(_values(rough[k]))
@@ -118,6 +106,27 @@ def choose(
     ]
     ranked = (*sorted(scores, key=_rank), *sorted(dropped, key=_rank))
     return Choice(fitted=converged, refined=tuple(fits), scores=ranked)
+
+
+def _rough(
+    direct: ForwardModel,
+    statics: Sequence[CandidateLaw],
+    squeezes: Sequence[Squeeze],
+    with_memory: Sequence[CandidateLaw],
+    counter: _Counter,
+) -> list[Fitted]:
+    """Return the direct fit of each law without memory: alone, or with a branch if the squeezes show a memory."""
+    alone = in_threads(
+        lambda one: fit(direct, with_corners(direct, one, squeezes), squeezes), statics, counter.done
+    )
+    if not with_memory:
+        return alone
+    # From its own starts, and from the fit without a memory, which has found the corners of the law.
+    roughly = [one.joined(with_memory[1]) for one in statics]
+    roughly += [one.starting_at(_values(own)) for one, own in zip(roughly, alone, strict=True)]
+    tried = in_threads(lambda one: fit(direct, one, squeezes), roughly, counter.done)
+    pairs = zip(tried[: len(statics)], tried[len(statics) :], strict=True)
+    return [min(pair, key=lambda one: one.cost) for pair in pairs]
 
 
 def _dropped(times: float) -> str:
