@@ -19,7 +19,7 @@ from graspsense_sim_gripper.identify.fracture import fracture_of
 from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import _smooth_course, prepared
 from graspsense_sim_gripper.identify.refuse import shows_memory
-from graspsense_sim_gripper.identify.run import _fit_to_use, _used
+from graspsense_sim_gripper.identify.run import _fit_to_use, _used, share_spread
 from graspsense_sim_gripper.identify.spread import refits
 from graspsense_sim_gripper.objects.spec import parse_scene
 
@@ -205,6 +205,16 @@ def test_breaks_give_the_force_of_the_fracture_with_its_spread_and_what_is_left(
     alone = fracture_of(rigid, fit(rigid, spring, squeezes[:1]), squeezes[:1])
     assert alone.value == pytest.approx(4.0, rel=0.02)
     assert "break 3 objects" in alone.undetermined[0].remedy
+
+
+def test_the_spread_of_the_share_does_not_contain_the_friction_that_every_squeeze_has_anyway():
+    rng = np.random.default_rng(0)
+    true = 0.4 + 0.015 * rng.standard_normal(4000)
+    measured = true * (1.0 + 0.04 * rng.standard_normal(4000))
+    assert np.std(measured) > 0.021
+    assert share_spread(measured.tolist(), 0.04) == pytest.approx(0.015, rel=0.05)
+    assert share_spread((0.4 * (1.0 + 0.04 * rng.standard_normal(4000))).tolist(), 0.045) == 0.0
+    assert share_spread([0.4], 0.04) == 0.0
 
 
 @pytest.mark.slow
