@@ -19,7 +19,7 @@ from graspsense_sim_gripper.identify.fracture import fracture_of
 from graspsense_sim_gripper.identify.laws import DataScale, memories, static_candidates
 from graspsense_sim_gripper.identify.prepare import _smooth_course, prepared
 from graspsense_sim_gripper.identify.refuse import shows_memory
-from graspsense_sim_gripper.identify.run import _fit_to_use, _used, share_spread
+from graspsense_sim_gripper.identify.run import _fit_to_use, _own_settings, _used, share_spread
 from graspsense_sim_gripper.identify.spread import refits
 from graspsense_sim_gripper.objects.spec import parse_scene
 
@@ -135,6 +135,15 @@ def test_pads_that_feel_different_forces_are_noted(share, noted):
 
     assert [one for one in notes if "the two pads differ" in one] == notes
     assert bool(notes) == noted
+
+
+def test_a_setting_that_the_recordings_have_with_another_value_is_not_ignored_silently():
+    squeezes = [evolve(recorded(), gripper={"sensor": "pads", "pad_stiffness_n_m": 30000.0})]
+
+    config, notes = _own_settings(SimConfig(pad_stiffness_n_m=8000.0), squeezes)
+    assert config.pad_stiffness_n_m == 30000.0
+    assert notes == ["gripper.pad_stiffness_n_m is 30000.0 in the recordings, which is used, not 8000.0"]
+    assert _own_settings(SimConfig(), squeezes)[1] == []
 
 
 def test_recordings_without_contact_are_left_out_with_a_note_unless_all_are():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -223,11 +223,21 @@ def _own_settings(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> tup
             "the recordings were made with different settings of the gripper: identify those of one setting together"
         )
     if own and len(own) == len(squeezes):
-        return evolve(config, **own[0]), []
+        return evolve(config, **own[0]), _overruled(config, own[0])
     stiffness = config.pad_stiffness_n_m
     return config, [
         f"the fingertips are taken as {stiffness:.3g} N/m each: -o gripper.pad_stiffness_n_m=VALUE (inf: rigid). "
         "The scene is of the object behind these fingertips"
+    ]
+
+
+def _overruled(config: SimConfig, own: Mapping[str, Any]) -> list[str]:
+    """Return a note on each setting that was given, and which the recordings have with another value."""
+    default = SimConfig()
+    return [
+        f"gripper.{key} is {value} in the recordings, which is used, not {getattr(config, key)}"
+        for key, value in own.items()
+        if getattr(config, key) not in (value, getattr(default, key))
     ]
 
 
