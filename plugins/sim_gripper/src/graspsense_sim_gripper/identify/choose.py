@@ -82,7 +82,7 @@ def choose(
     directly = in_threads(lambda one: fit(direct, one, squeezes), candidates, counter.done)
     least_directly = max(min(one.rms for one in directly), LEAST_ERROR)
     near = [one for one in directly if one.rms <= WORTH_REFINING * least_directly]
-    fits = in_threads(lambda one: fit(model, one.candidate, squeezes, start=one), near, counter.done)
+    fits = in_threads(lambda one: refined(model, one, squeezes), near, counter.done)
     least = max(min(one.rms for one in fits), LEAST_ERROR)
     worth = [one for one in fits if one.rms <= WORTH_TRYING * least and not _adds_nothing(one, fits)]
     judged = in_threads(lambda one: _judged(model, one, squeezes), worth, counter.done)
@@ -127,6 +127,19 @@ def _rough(
     tried = in_threads(lambda one: fit(direct, one, squeezes), roughly, counter.done)
     pairs = zip(tried[: len(statics)], tried[len(statics) :], strict=True)
     return [min(pair, key=lambda one: one.cost) for pair in pairs]
+
+
+def refined(model: ForwardModel, directly: Fitted, squeezes: Sequence[Squeeze]) -> Fitted:
+    """Return the fit of a candidate through the fingertips, from its direct fit.
+
+    The direct fit of a snap-through may prefer the wrong corners, since noise and lag bias it most where the force
+    falls. So the corners are tried once more.
+    """
+    fitted = fit(model, directly.candidate, squeezes, start=directly)
+    law = with_corners(model, directly.candidate, squeezes)
+    if not law.more_starts:
+        return fitted
+    return min(fitted, fit(model, law, squeezes), key=lambda one: one.cost)
 
 
 def _dropped(times: float) -> str:

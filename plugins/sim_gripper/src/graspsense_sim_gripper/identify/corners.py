@@ -8,6 +8,7 @@ starts between two corners of which there is no sample often ends in another min
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -16,7 +17,7 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from graspsense_sim_gripper.identify.forward import ForwardModel
-from graspsense_sim_gripper.identify.laws import SNAP, CandidateLaw
+from graspsense_sim_gripper.identify.laws import SNAP, CandidateLaw, Start
 from graspsense_sim_gripper.identify.prepare import CONTACT_SHARE, Squeeze
 
 Floats = NDArray[np.float64]
@@ -32,7 +33,7 @@ LEAST_SAMPLES: Final = 6
 
 
 def with_corners(model: ForwardModel, law: CandidateLaw, squeezes: Sequence[Squeeze]) -> CandidateLaw:
-    """Return the law with starts at the corners that the squeezes show, if it is a snap-through alone."""
+    """Return the law with further starts at the corners that the squeezes show, if it is a snap-through alone."""
     if law.slots != (SNAP,):
         return law
     loads = [
@@ -41,7 +42,7 @@ def with_corners(model: ForwardModel, law: CandidateLaw, squeezes: Sequence[Sque
     if not loads:
         return law
     depth = float(np.median([compression[-1] for compression, _ in loads]))
-    best: list[tuple[float, tuple[float, ...]]] = []
+    best: list[tuple[float, Start]] = []
     for critical in CRITICAL * depth:
         tried = [_at_corners(loads, float(critical), float(fall)) for fall in FALL * depth]
         best.append(min(tried, key=lambda one: one[0]))
@@ -50,8 +51,10 @@ def with_corners(model: ForwardModel, law: CandidateLaw, squeezes: Sequence[Sque
     order = sorted(minima.tolist(), key=lambda k: best[k][0])[:BEST]
     peak_n = float(np.median([one.peak_n for one in squeezes]))
     units = [peak_n if one.is_force else 1.0 for one in law.free]
-    starts = (tuple(np.multiply(best[k][1], units).tolist()) for k in order if best[k][1])
-    return evolve(law, own_starts=tuple(starts))
+    starts = [best[k][1] for k in order if math.isfinite(best[k][0])]
+    scaled = [Start(tuple(np.multiply(one.values, units).tolist()), one.wider_m) for one in starts]
+    # The error of the width by the force at the contact is itself in error by noise.
+    return evolve(law, more_starts=(*scaled, *(one._replace(wider_m=0.0) for one in scaled)))
 
 
 def _loading(model: ForwardModel, squeeze: Squeeze) -> tuple[Floats, Floats]:
@@ -63,10 +66,8 @@ def _loading(model: ForwardModel, squeeze: Squeeze) -> tuple[Floats, Floats]:
     return compression[part], force[part]
 
 
-def _at_corners(
-    loads: Sequence[tuple[Floats, Floats]], critical: float, fall: float
-) -> tuple[float, tuple[float, ...]]:
-    """Return the sum of the squared residuals, and the numbers of the law for a peak of 1 N, for given corners.
+def _at_corners(loads: Sequence[tuple[Floats, Floats]], critical: float, fall: float) -> tuple[float, Start]:
+    """Return the sum of the squared residuals, and the start for a peak of 1 N, for given corners.
 
     The sum is infinite if the numbers are not those of a snap-through.
     """
@@ -85,5 +86,7 @@ def _at_corners(
         numbers.append(solution)
     offset, k1, drop, k2 = np.median(numbers, axis=0).tolist()
     if min(k1, drop, k2) <= 0.0 or critical + offset / k1 <= 0.0:
-        return np.inf, ()
-    return cost, (k1, critical + offset / k1, drop, fall, k2)
+        return math.inf, Start((), 0.0)
+    # A force at the contact is that of a wider object, whose compression is larger by as much.
+    wider = offset / k1
+    return cost, Start((k1, critical + wider, drop, fall, k2), wider)

@@ -320,8 +320,12 @@ def _starts(problem: _Problem, start: Fitted | None) -> list[Floats]:
             return [known]
         lags = LAG_STARTS if start.lag_s == 0.0 else (start.lag_s / LAG_UNIT_S,)
         return [np.append(known, one) for one in lags]
-    vectors = [np.concatenate([np.log(one), own]) for one in problem.candidate.starts()]
-    if len(vectors) <= STARTS:
-        return vectors
-    costs = np.sum(problem.of_all(np.array(vectors)) ** 2, axis=1)
-    return [vectors[int(k)] for k in np.argsort(costs)[:STARTS]]
+    law = problem.candidate
+    vectors = [np.concatenate([np.log(one), own]) for one in law.starts()]
+    if len(vectors) > STARTS:
+        costs = np.sum(problem.of_all(np.array(vectors)) ** 2, axis=1)
+        vectors = [vectors[int(k)] for k in np.argsort(costs)[:STARTS]]
+    for one in law.more_starts:
+        wider = one.wider_m / problem.depths
+        vectors.append(np.concatenate([np.log(one.values), wider, own[problem.n :]]))
+    return vectors

@@ -79,14 +79,23 @@ class FreeParameter:
         return self.name in find_term(SLOTS[self.slot])[1].stiffnesses
 
 
+class Start(NamedTuple):
+    """Where a fit starts."""
+
+    values: tuple[float, ...]
+    """Of the free parameters."""
+    wider_m: float
+    """By how much the objects are wider than the first estimate."""
+
+
 @frozen(kw_only=True)
 class CandidateLaw:
     """Terms with free and fixed parameters."""
 
     free: tuple[FreeParameter, ...]
     fixed: Mapping[tuple[int, str], float] = field(factory=dict)
-    own_starts: tuple[tuple[float, ...], ...] = ()
-    """Values to start from together; if there are none, a fit starts from combinations of those of each parameter."""
+    more_starts: tuple[Start, ...] = ()
+    """Where a fit starts besides the combinations of the starts of each parameter."""
 
     @property
     def slots(self) -> tuple[int, ...]:
@@ -168,11 +177,8 @@ class CandidateLaw:
         return numbers
 
     def starts(self) -> list[tuple[float, ...]]:
-        """Return the values to start from."""
-        return (
-            list(self.own_starts)
-            or list(product(*(parameter.starts for parameter in self.free)))[:MAX_STARTS]
-        )
+        """Return combinations of the values to start from."""
+        return list(product(*(parameter.starts for parameter in self.free)))[:MAX_STARTS]
 
     def starting_at(self, values: Mapping[str, float]) -> CandidateLaw:
         """Return the candidate that starts at these values, by label, where it has the parameter."""
@@ -182,7 +188,7 @@ class CandidateLaw:
             else one
             for one in self.free
         )
-        return evolve(self, free=free, own_starts=())
+        return evolve(self, free=free, more_starts=())
 
 
 def _defaults(params: Any) -> dict[str, float]:
