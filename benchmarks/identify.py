@@ -4,6 +4,7 @@
     python benchmarks/identify.py --delays 0 0.01 0.025 [...] [--rows FILE] [--markdown docs/identify.md]
     python benchmarks/identify.py --spreads 0 0.3 [...] [--rows FILE] [--markdown docs/identify.md]
     python benchmarks/identify.py --rows FILE --markdown docs/identify.md
+    python benchmarks/identify.py --true-steps 6 [--recordings 30] [--rows FILE] [--markdown docs/identify.md]
     python benchmarks/identify.py --transfer [--rows FILE] [--markdown docs/identify.md] [--png docs/identify.png]
 
 Each scene below is grasped in simulation by the hybrid controller with a hold, with ideal sensors, with PR2 pads, and
@@ -24,6 +25,9 @@ With `--transfer`: four containers of the catalogue are the real world. From 1, 
 a classifier is trained on the recordings, and another on simulated squeezes of the scenes that they were identified as.
 A third is trained on as many simulated squeezes of the true scenes: an identification does no better on average. All
 are tested on 40 other recordings of each container.
+
+With `--true-steps 6`: what is replaced in the identified scenes by the numbers of the true ones, step by step, and what
+rate classifiers trained on six draws of them have.
 """
 
 from __future__ import annotations
@@ -53,6 +57,7 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.identify.gas import combinations
 from graspsense_sim_gripper.identify.laws import SLOTS
 from graspsense_sim_gripper.identify.run import identify
+from graspsense_sim_gripper.objects.library import find as find_object
 from graspsense_sim_gripper.terms.gas import Gas
 
 WIDTH_M: Final = 0.05
@@ -128,6 +133,16 @@ TOLD_APART: Final = 1.03
 FORCE_N: Final = 18.0
 CONTAINERS: Final = ("odwalla:empty_open", "naked:empty_open", "can:empty_open", "water:empty_open")
 TRANSFER_COUNTS: Final = (1, 3, 10, 30)
+TRUE_STEPS: Final[Sequence[tuple[str, Sequence[str] | None]]] = (
+    ("nothing", ()),
+    ("also the spread of the share", ("share_spread",)),
+    ("also offset, mass and friction on the table", ("offset_spread_m", "mass_kg", "friction")),
+    ("also the share of the cells", ("share",)),
+    ("also the width and its spread", ("width_m", "width_spread_m")),
+    ("also the spread of the stiffness", ("stiffness_spread",)),
+    ("everything", None),
+)
+"""What is replaced by the true values in the rows of `--true-steps`, one after the other."""
 TESTED: Final = 40
 SIMULATED: Final = 40
 """Simulated squeezes of each scene, each of another object: with fewer objects, their spreads show less."""
@@ -509,9 +524,43 @@ def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> 
     return rows
 
 
-def simulated_of(scene: str, label: str) -> list[RecordedSqueeze]:
+def true_steps(count: int, tested: int, runs: int, classifier: str = "forest") -> list[dict[str, Any]]:
+    """Return the recognition rates of classifiers trained on scenes identified from so many recordings of each
+    container, of which more and more numbers are replaced by the true ones."""
+    settings = load_pipeline("default", options=[f"classifier.type={classifier}"]).settings
+    extract = settings.features.create().extract
+    pads, total = SENSORS["PR2 pads"], max(TRANSFER_COUNTS) + tested
+    scenes, test = {}, []
+    for name in CONTAINERS:
+        recorded = squeezes_of(name, name, pads, [str(i // 3) for i in range(total)], range(total))
+        scenes[name] = identify(SimConfig(), recorded[:count], lambda *_: None).scene
+        test += [(extract(one.trace), name) for one in recorded[-tested:]]
+    rows = []
+    for step, keys in TRUE_STEPS:
+        if keys is None:
+            scenes = {name: name for name in CONTAINERS}
+        else:
+            scenes = {name: with_true(scene, find_object(name), keys) for name, scene in scenes.items()}
+        right = []
+        for run in range(runs):
+            new = {name: simulated_of(scene, name, 10_000 * (run + 1)) for name, scene in scenes.items()}
+            train = [(extract(one.trace), name) for name, squeezes in new.items() for one in squeezes]
+            right.append(_right(settings, train, test))
+        rows.append({"step": step, "recordings": count, "tested": len(test), "right": right})
+        print(rows[-1], flush=True)
+    return rows
+
+
+def with_true(scene: str, true: Any, keys: Sequence[str]) -> str:
+    """Return the text of a scene with the values that the true object has of these keys."""
+    head, mark, terms = scene.partition("[[terms]]")
+    kept = [line for line in head.splitlines() if line.partition(" = ")[0] not in keys]
+    return "\n".join([*kept, *(f"{key} = {getattr(true, key)}" for key in keys), "", mark + terms])
+
+
+def simulated_of(scene: str, label: str, first: int = 10_000) -> list[RecordedSqueeze]:
     """Return the simulated squeezes of a scene that a classifier is trained on."""
-    seeds = [10_000 + i for i in range(SIMULATED)]
+    seeds = [first + i for i in range(SIMULATED)]
     return squeezes_of(scene, label, SENSORS["PR2 pads"], [str(one) for one in seeds], seeds)
 
 
@@ -539,6 +588,19 @@ def transfer_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     for row in rows:
         rates = [_share(int(row[key]), int(row["tested"])) for key, _ in _CURVES]
         lines.append("| " + " | ".join([str(row["recordings"]), *rates]) + " |")
+    return "\n".join(lines)
+
+
+def true_steps_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of the rates with more and more true values."""
+    lines = [
+        "| true values instead of the identified ones | recognised, mean of the runs | each run |",
+        "|---|---|---|",
+    ]
+    for row in rows:
+        right, tested = row["right"], row["tested"]
+        rate = f"{100.0 * float(np.mean(right)) / tested:.1f} %"
+        lines.append(f"| {row['step']} | {rate} | {', '.join(map(str, right))} of {tested} |")
     return "\n".join(lines)
 
 
@@ -581,6 +643,7 @@ def main() -> None:
         "--spreads", nargs="+", type=float, help="the spreads of the parameters of OWN_SPREADS"
     )
     parser.add_argument("--transfer", action="store_true")
+    parser.add_argument("--true-steps", type=int, metavar="RUNS", help="simulated trainings of each step")
     parser.add_argument("--rows", type=Path, help="append the rows to this file (JSON lines)")
     parser.add_argument(
         "--markdown", type=Path, help="write the tables of --rows to this page, and run nothing"
@@ -599,8 +662,13 @@ def main() -> None:
         asked.sensors = ["PR2 pads"]
     begin = time.monotonic()
     rows: list[Any] = []
-    if asked.transfer:
-        rows = transfer(asked.recordings or TRANSFER_COUNTS, TESTED)
+    if asked.transfer or asked.true_steps:
+        counts = asked.recordings or TRANSFER_COUNTS
+        rows = (
+            true_steps(max(counts), TESTED, asked.true_steps)
+            if asked.true_steps
+            else transfer(counts, TESTED)
+        )
         if asked.rows:
             with asked.rows.open("a", encoding="utf-8") as out:
                 out.writelines(f"{json.dumps(one)}\n" for one in rows)
@@ -623,7 +691,7 @@ def main() -> None:
     if asked.json:
         print(json.dumps({"rows": rows, "made": made}, indent=2))
     else:
-        if not asked.transfer:
+        if not (asked.transfer or asked.true_steps):
             print(_tables(asked)(rows))
         print(f"{made}, {time.monotonic() - begin:.0f} s")
 
@@ -640,7 +708,9 @@ def _publish(asked: argparse.Namespace) -> None:
     rows = [json.loads(line) for line in asked.rows.read_text(encoding="utf-8").splitlines()]
     if asked.png:
         draw_transfer(rows, asked.png)
-    if asked.markdown and asked.transfer:
+    if asked.markdown and asked.true_steps:
+        write_between(asked.markdown, "true steps", true_steps_markdown(rows))
+    elif asked.markdown and asked.transfer:
         write_between(asked.markdown, "transfer", transfer_markdown(rows))
     elif asked.markdown and asked.spreads:
         write_between(asked.markdown, "spreads", spreads_markdown(rows))
