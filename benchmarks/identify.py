@@ -55,8 +55,11 @@ from graspsense.evaluation.intervals import wilson
 from graspsense.plugin_api import RunConfig, create, table_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.identify.gas import combinations
+from graspsense_sim_gripper.identify.interval import student
 from graspsense_sim_gripper.identify.laws import SLOTS
 from graspsense_sim_gripper.identify.run import identify
+from graspsense_sim_gripper.objects.instance import _draws_of_number
+from graspsense_sim_gripper.objects.library import SCENE_IN_MEMORY
 from graspsense_sim_gripper.objects.library import find as find_object
 from graspsense_sim_gripper.terms.gas import Gas
 
@@ -279,15 +282,32 @@ def named(terms: Sequence[Mapping[str, Any]]) -> str:
     return " + ".join(words.get(kind, kind) for kind in kinds)
 
 
+def seeds_of(name: str, sensor: str, count: int, repeat: int) -> list[int]:
+    """Return the seeds of the grasps of a row, which are the numbers of its objects as well.
+
+    They are others in every row: the number of an object fixes its stiffness, whatever its terms.
+    """
+    series = (list(ALL_SCENES).index(name) * 10 + list(SENSORS).index(sensor)) * 100 + count
+    return [100_000 * (series + 1) + 100 * repeat + i for i in range(count)]
+
+
+def mean_is_covered(row: Mapping[str, Any]) -> bool:
+    """Return whether the 90 % interval of Student's t from the stiffness of the row's objects covers the true mean.
+
+    It uses what was drawn and no measurement: where it does not cover, no identification would.
+    """
+    seeds = seeds_of(row["scene"], row["sensor"], row["recordings"], row["repeat"])
+    drawn = np.array([_draws_of_number(SCENE_IN_MEMORY, seed, 2)[0] for seed in seeds])
+    return bool(abs(drawn.mean()) < student(len(drawn) - 1) * drawn.std(ddof=1) / math.sqrt(len(drawn)))
+
+
 def measured(
     name: str, sensor: str, count: int, repeat: int, late_s: float = 0.0, own_spread: float = 0.0
 ) -> Row:
     """Return the row of a scene."""
     terms = drawn(ALL_SCENES[name], repeat)
     text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0, OWN_SPREADS.get(name, ""), own_spread)
-    # Other objects in every row: the number of an object fixes its stiffness, whatever its terms.
-    series = (list(ALL_SCENES).index(name) * 10 + list(SENSORS).index(sensor)) * 100 + count
-    seeds = [100_000 * (series + 1) + 100 * repeat + i for i in range(count)]
+    seeds = seeds_of(name, sensor, count, repeat)
     squeezes = squeezes_of(text, name, SENSORS[sensor], [str(one) for one in seeds], seeds)
     result = identify(SimConfig(), [delayed(one, late_s) for one in squeezes], lambda *_: None)
     chosen = next(one for one in result.candidates if one.chosen)
@@ -375,6 +395,7 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
 
     def line(head: Sequence[str], group: Sequence[Mapping[str, Any]]) -> str:
         apart = [one for one in group if one["told_apart"]]
+        several = [one for one in group if one["recordings"] > 1]
         errors = [abs(value / truth - 1.0) for one in group for _, truth, value, *_ in one["found"]]
         cells = (
             *head,
@@ -382,13 +403,14 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
             _share(sum(one["right_terms"] for one in group), len(group)),
             _share(sum(one["right_terms"] for one in apart), len(apart)),
             _covered_share(group),
+            _share(sum(mean_is_covered(one) for one in several), len(several)),
             f"{100.0 * float(np.median(errors)):.2g} %" if errors else "–",
             f"{float(np.median([one['seconds'] for one in group])):.1f} s",
         )
         return "| " + " | ".join(cells) + " |"
 
     columns = ("scenes", "right terms", "where the data tell them apart", "90 % intervals that cover")
-    columns += ("median error", "median time")
+    columns += ("scenes whose drawn objects cover", "median error", "median time")
 
     def header(head: Sequence[str]) -> list[str]:
         names = (*head, *columns)
