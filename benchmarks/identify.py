@@ -4,6 +4,7 @@
     python benchmarks/identify.py --delays 0 0.01 0.025 [...] [--rows FILE] [--markdown docs/identify.md]
     python benchmarks/identify.py --spreads 0 0.3 [...] [--rows FILE] [--markdown docs/identify.md]
     python benchmarks/identify.py --rows FILE --markdown docs/identify.md
+    python benchmarks/identify.py --true-steps 6 [--recordings 30] [--rows FILE] [--markdown docs/identify.md]
     python benchmarks/identify.py --transfer [--rows FILE] [--markdown docs/identify.md] [--png docs/identify.png]
 
 Each scene below is grasped in simulation by the hybrid controller with a hold, with ideal sensors, with PR2 pads, and
@@ -22,7 +23,11 @@ its logarithm, and their table is that of the spreads that are claimed.
 
 With `--transfer`: four containers of the catalogue are the real world. From 1, 3, 10 and 30 recordings of each,
 a classifier is trained on the recordings, and another on simulated squeezes of the scenes that they were identified as.
-Both are tested on 40 other recordings of each container.
+A third is trained on as many simulated squeezes of the true scenes: an identification does no better on average. All
+are tested on 40 other recordings of each container.
+
+With `--true-steps 6`: what is replaced in the identified scenes by the numbers of the true ones, step by step, and what
+rate classifiers trained on six draws of them have.
 """
 
 from __future__ import annotations
@@ -50,8 +55,12 @@ from graspsense.evaluation.intervals import wilson
 from graspsense.plugin_api import RunConfig, create, table_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.identify.gas import combinations
+from graspsense_sim_gripper.identify.interval import student
 from graspsense_sim_gripper.identify.laws import SLOTS
 from graspsense_sim_gripper.identify.run import identify
+from graspsense_sim_gripper.objects.instance import _draws_of_number
+from graspsense_sim_gripper.objects.library import SCENE_IN_MEMORY
+from graspsense_sim_gripper.objects.library import find as find_object
 from graspsense_sim_gripper.terms.gas import Gas
 
 WIDTH_M: Final = 0.05
@@ -127,9 +136,19 @@ TOLD_APART: Final = 1.03
 FORCE_N: Final = 18.0
 CONTAINERS: Final = ("odwalla:empty_open", "naked:empty_open", "can:empty_open", "water:empty_open")
 TRANSFER_COUNTS: Final = (1, 3, 10, 30)
+TRUE_STEPS: Final[Sequence[tuple[str, Sequence[str] | None]]] = (
+    ("nothing", ()),
+    ("also the spread of the share", ("share_spread",)),
+    ("also offset, mass and friction on the table", ("offset_spread_m", "mass_kg", "friction")),
+    ("also the share of the cells", ("share",)),
+    ("also the width and its spread", ("width_m", "width_spread_m")),
+    ("also the spread of the stiffness", ("stiffness_spread",)),
+    ("everything", None),
+)
+"""What is replaced by the true values in the rows of `--true-steps`, one after the other."""
 TESTED: Final = 40
-SIMULATED_INSTANCES: Final = 10
-SIMULATED_TRIALS: Final = 4
+SIMULATED: Final = 40
+"""Simulated squeezes of each scene, each of another object: with fewer objects, their spreads show less."""
 
 
 @frozen(kw_only=True)
@@ -263,15 +282,32 @@ def named(terms: Sequence[Mapping[str, Any]]) -> str:
     return " + ".join(words.get(kind, kind) for kind in kinds)
 
 
+def seeds_of(name: str, sensor: str, count: int, repeat: int) -> list[int]:
+    """Return the seeds of the grasps of a row, which are the numbers of its objects as well.
+
+    They are others in every row: the number of an object fixes its stiffness, whatever its terms.
+    """
+    series = (list(ALL_SCENES).index(name) * 10 + list(SENSORS).index(sensor)) * 100 + count
+    return [100_000 * (series + 1) + 100 * repeat + i for i in range(count)]
+
+
+def mean_is_covered(row: Mapping[str, Any]) -> bool:
+    """Return whether the 90 % interval of Student's t from the stiffness of the row's objects covers the true mean.
+
+    It uses what was drawn and no measurement: where it does not cover, no identification would.
+    """
+    seeds = seeds_of(row["scene"], row["sensor"], row["recordings"], row["repeat"])
+    drawn = np.array([_draws_of_number(SCENE_IN_MEMORY, seed, 2)[0] for seed in seeds])
+    return bool(abs(drawn.mean()) < student(len(drawn) - 1) * drawn.std(ddof=1) / math.sqrt(len(drawn)))
+
+
 def measured(
     name: str, sensor: str, count: int, repeat: int, late_s: float = 0.0, own_spread: float = 0.0
 ) -> Row:
     """Return the row of a scene."""
     terms = drawn(ALL_SCENES[name], repeat)
     text = scene_text(terms, STIFFNESS_SPREAD if count > 1 else 0.0, OWN_SPREADS.get(name, ""), own_spread)
-    # Other objects in every row: the number of an object fixes its stiffness, whatever its terms.
-    series = (list(ALL_SCENES).index(name) * 10 + list(SENSORS).index(sensor)) * 100 + count
-    seeds = [100_000 * (series + 1) + 100 * repeat + i for i in range(count)]
+    seeds = seeds_of(name, sensor, count, repeat)
     squeezes = squeezes_of(text, name, SENSORS[sensor], [str(one) for one in seeds], seeds)
     result = identify(SimConfig(), [delayed(one, late_s) for one in squeezes], lambda *_: None)
     chosen = next(one for one in result.candidates if one.chosen)
@@ -334,26 +370,47 @@ def _share(part: int, whole: int) -> str:
     return f"{100.0 * part / whole:.0f} % ({part} of {whole}; {100.0 * low:.0f} to {100.0 * high:.0f})"
 
 
+def _covered_share(group: Sequence[Mapping[str, Any]]) -> str:
+    """Return the share of the intervals that cover, with the Wilson interval of the effective number of intervals.
+
+    The intervals of a scene share their error, so that they count as fewer: by the design effect, which is the variance
+    between scenes over that of independent intervals (Korn and Graubard, Survey Methodology 24, 1998).
+    """
+    sizes = np.array([len(one["found"]) for one in group if one["found"]])
+    if not len(sizes):
+        return "–"
+    hits = np.array([sum(_covered([one["found"]])) for one in group if one["found"]])
+    whole, part, scenes = int(sizes.sum()), int(hits.sum()), len(sizes)
+    share = part / whole
+    effective = float(scenes)
+    if scenes > 1 and 0 < part < whole:
+        between = float(np.sum((hits - share * sizes) ** 2)) * scenes / (scenes - 1) / whole**2
+        effective = min(share * (1.0 - share) / max(between, 1e-12), float(whole))
+    low, high = wilson(share * effective, effective)
+    return f"{100.0 * share:.0f} % ({part} of {whole}; {100.0 * low:.0f} to {100.0 * high:.0f})"
+
+
 def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the tables of these rows: by sensor and number of recordings, and by scene."""
 
     def line(head: Sequence[str], group: Sequence[Mapping[str, Any]]) -> str:
         apart = [one for one in group if one["told_apart"]]
-        covered = _covered([one["found"] for one in group])
+        several = [one for one in group if one["recordings"] > 1]
         errors = [abs(value / truth - 1.0) for one in group for _, truth, value, *_ in one["found"]]
         cells = (
             *head,
             str(len(group)),
             _share(sum(one["right_terms"] for one in group), len(group)),
             _share(sum(one["right_terms"] for one in apart), len(apart)),
-            _share(sum(covered), len(covered)),
+            _covered_share(group),
+            _share(sum(mean_is_covered(one) for one in several), len(several)),
             f"{100.0 * float(np.median(errors)):.2g} %" if errors else "–",
             f"{float(np.median([one['seconds'] for one in group])):.1f} s",
         )
         return "| " + " | ".join(cells) + " |"
 
     columns = ("scenes", "right terms", "where the data tell them apart", "90 % intervals that cover")
-    columns += ("median error", "median time")
+    columns += ("scenes whose drawn objects cover", "median error", "median time")
 
     def header(head: Sequence[str]) -> list[str]:
         names = (*head, *columns)
@@ -461,6 +518,8 @@ def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> 
         for seeds in [range(max(TRANSFER_COUNTS) + tested)]
     }
     test = [(extract(one.trace), name) for name in CONTAINERS for one in recorded[name][-tested:]]
+    true = [(extract(one.trace), name) for name in CONTAINERS for one in simulated_of(name, name)]
+    on_true = _right(settings, true, test)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for count in counts:
@@ -471,22 +530,60 @@ def transfer(counts: Sequence[int], tested: int, classifier: str = "forest") -> 
                 path = Path(folder) / f"{k}-{count}.toml"
                 result = identify(SimConfig(), recorded[name][:count], lambda *_: None)
                 path.write_text(result.scene, encoding="utf-8")
-                seeds = [10_000 + i for i in range(SIMULATED_INSTANCES * SIMULATED_TRIALS)]
-                names = [str(i // SIMULATED_TRIALS) for i in range(len(seeds))]
-                new = squeezes_of(str(path), name, pads, names, seeds)
-                simulated += [(extract(one.trace), name) for one in new]
+                simulated += [(extract(one.trace), name) for one in simulated_of(str(path), name)]
             rows.append(
                 {
                     "recordings": count,
                     "tested": len(test),
                     "on_recordings": _right(settings, own, test),
                     "on_identified": _right(settings, simulated, test),
+                    "on_true": on_true,
                     "on_both": _right(settings, [*own, *simulated], test),
                     "seconds": time.monotonic() - begin,
                 }
             )
             print(rows[-1], flush=True)
     return rows
+
+
+def true_steps(count: int, tested: int, runs: int, classifier: str = "forest") -> list[dict[str, Any]]:
+    """Return the recognition rates of classifiers trained on scenes identified from so many recordings of each
+    container, of which more and more numbers are replaced by the true ones."""
+    settings = load_pipeline("default", options=[f"classifier.type={classifier}"]).settings
+    extract = settings.features.create().extract
+    pads, total = SENSORS["PR2 pads"], max(TRANSFER_COUNTS) + tested
+    scenes, test = {}, []
+    for name in CONTAINERS:
+        recorded = squeezes_of(name, name, pads, [str(i // 3) for i in range(total)], range(total))
+        scenes[name] = identify(SimConfig(), recorded[:count], lambda *_: None).scene
+        test += [(extract(one.trace), name) for one in recorded[-tested:]]
+    rows = []
+    for step, keys in TRUE_STEPS:
+        if keys is None:
+            scenes = {name: name for name in CONTAINERS}
+        else:
+            scenes = {name: with_true(scene, find_object(name), keys) for name, scene in scenes.items()}
+        right = []
+        for run in range(runs):
+            new = {name: simulated_of(scene, name, 10_000 * (run + 1)) for name, scene in scenes.items()}
+            train = [(extract(one.trace), name) for name, squeezes in new.items() for one in squeezes]
+            right.append(_right(settings, train, test))
+        rows.append({"step": step, "recordings": count, "tested": len(test), "right": right})
+        print(rows[-1], flush=True)
+    return rows
+
+
+def with_true(scene: str, true: Any, keys: Sequence[str]) -> str:
+    """Return the text of a scene with the values that the true object has of these keys."""
+    head, mark, terms = scene.partition("[[terms]]")
+    kept = [line for line in head.splitlines() if line.partition(" = ")[0] not in keys]
+    return "\n".join([*kept, *(f"{key} = {getattr(true, key)}" for key in keys), "", mark + terms])
+
+
+def simulated_of(scene: str, label: str, first: int = 10_000) -> list[RecordedSqueeze]:
+    """Return the simulated squeezes of a scene that a classifier is trained on."""
+    seeds = [first + i for i in range(SIMULATED)]
+    return squeezes_of(scene, label, SENSORS["PR2 pads"], [str(one) for one in seeds], seeds)
 
 
 def _right(settings: Any, train: Sequence[tuple[Any, str]], test: Sequence[tuple[Any, str]]) -> int:
@@ -502,6 +599,7 @@ _CURVES: Final = (
     ("on_recordings", "the recordings"),
     ("on_identified", "scenes identified from them"),
     ("on_both", "both"),
+    ("on_true", "the true scenes"),
 )
 
 
@@ -512,6 +610,19 @@ def transfer_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     for row in rows:
         rates = [_share(int(row[key]), int(row["tested"])) for key, _ in _CURVES]
         lines.append("| " + " | ".join([str(row["recordings"]), *rates]) + " |")
+    return "\n".join(lines)
+
+
+def true_steps_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of the rates with more and more true values."""
+    lines = [
+        "| true values instead of the identified ones | recognised, mean of the runs | each run |",
+        "|---|---|---|",
+    ]
+    for row in rows:
+        right, tested = row["right"], row["tested"]
+        rate = f"{100.0 * float(np.mean(right)) / tested:.1f} %"
+        lines.append(f"| {row['step']} | {rate} | {', '.join(map(str, right))} of {tested} |")
     return "\n".join(lines)
 
 
@@ -554,6 +665,7 @@ def main() -> None:
         "--spreads", nargs="+", type=float, help="the spreads of the parameters of OWN_SPREADS"
     )
     parser.add_argument("--transfer", action="store_true")
+    parser.add_argument("--true-steps", type=int, metavar="RUNS", help="simulated trainings of each step")
     parser.add_argument("--rows", type=Path, help="append the rows to this file (JSON lines)")
     parser.add_argument(
         "--markdown", type=Path, help="write the tables of --rows to this page, and run nothing"
@@ -572,8 +684,13 @@ def main() -> None:
         asked.sensors = ["PR2 pads"]
     begin = time.monotonic()
     rows: list[Any] = []
-    if asked.transfer:
-        rows = transfer(asked.recordings or TRANSFER_COUNTS, TESTED)
+    if asked.transfer or asked.true_steps:
+        counts = asked.recordings or TRANSFER_COUNTS
+        rows = (
+            true_steps(max(counts), TESTED, asked.true_steps)
+            if asked.true_steps
+            else transfer(counts, TESTED)
+        )
         if asked.rows:
             with asked.rows.open("a", encoding="utf-8") as out:
                 out.writelines(f"{json.dumps(one)}\n" for one in rows)
@@ -596,7 +713,7 @@ def main() -> None:
     if asked.json:
         print(json.dumps({"rows": rows, "made": made}, indent=2))
     else:
-        if not asked.transfer:
+        if not (asked.transfer or asked.true_steps):
             print(_tables(asked)(rows))
         print(f"{made}, {time.monotonic() - begin:.0f} s")
 
@@ -613,7 +730,9 @@ def _publish(asked: argparse.Namespace) -> None:
     rows = [json.loads(line) for line in asked.rows.read_text(encoding="utf-8").splitlines()]
     if asked.png:
         draw_transfer(rows, asked.png)
-    if asked.markdown and asked.transfer:
+    if asked.markdown and asked.true_steps:
+        write_between(asked.markdown, "true steps", true_steps_markdown(rows))
+    elif asked.markdown and asked.transfer:
         write_between(asked.markdown, "transfer", transfer_markdown(rows))
     elif asked.markdown and asked.spreads:
         write_between(asked.markdown, "spreads", spreads_markdown(rows))

@@ -15,6 +15,7 @@ from attrs import evolve, frozen
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import CandidateScore
+from graspsense_sim_gripper.identify.corners import with_corners
 from graspsense_sim_gripper.identify.fit import LEAST_ERROR, Fitted, Mask, fit, held_out_rms
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.laws import GAS, CandidateLaw, DataScale, memories, static_candidates
@@ -71,17 +72,7 @@ def choose(
         (3 if with_memory else 1) * len(statics) + (STATIC_KEPT + 1) * (1 + len(with_memory)) + 2 * MANY,
         progress,
     )
-    alone = in_threads(lambda one: fit(direct, one, squeezes), statics, counter.done)
-    rough = alone
-    if with_memory:
-        # From its own starts, and from the fit without a memory, which has found the corners of the law.
-        roughly = [one.joined(with_memory[1]) for one in statics]
-        roughly += [one.starting_at(_values(own)) for one, own in zip(roughly, alone, strict=True)]
-        tried = in_threads(lambda one: fit(direct, one, squeezes), roughly, counter.done)
-        rough = [
-            min(pair, key=lambda one: one.cost)
-            for pair in zip(tried[: len(statics)], tried[len(statics) :], strict=True)
-        ]
+    rough = _rough(direct, statics, squeezes, with_memory, counter)
     kept = _kept(rough)
     candidates = [
         joined.starting_at(_values(rough[k]))
@@ -91,7 +82,7 @@ def choose(
     directly = in_threads(lambda one: fit(direct, one, squeezes), candidates, counter.done)
     least_directly = max(min(one.rms for one in directly), LEAST_ERROR)
     near = [one for one in directly if one.rms <= WORTH_REFINING * least_directly]
-    fits = in_threads(lambda one: fit(model, one.candidate, squeezes, start=one), near, counter.done)
+    fits = in_threads(lambda one: refined(model, one, squeezes), near, counter.done)
     least = max(min(one.rms for one in fits), LEAST_ERROR)
     worth = [one for one in fits if one.rms <= WORTH_TRYING * least and not _adds_nothing(one, fits)]
     judged = in_threads(lambda one: _judged(model, one, squeezes), worth, counter.done)
@@ -115,6 +106,40 @@ def choose(
     ]
     ranked = (*sorted(scores, key=_rank), *sorted(dropped, key=_rank))
     return Choice(fitted=converged, refined=tuple(fits), scores=ranked)
+
+
+def _rough(
+    direct: ForwardModel,
+    statics: Sequence[CandidateLaw],
+    squeezes: Sequence[Squeeze],
+    with_memory: Sequence[CandidateLaw],
+    counter: _Counter,
+) -> list[Fitted]:
+    """Return the direct fit of each law without memory: alone, or with a branch if the squeezes show a memory."""
+    alone = in_threads(
+        lambda one: fit(direct, with_corners(direct, one, squeezes), squeezes), statics, counter.done
+    )
+    if not with_memory:
+        return alone
+    # From its own starts, and from the fit without a memory, which has found the corners of the law.
+    roughly = [one.joined(with_memory[1]) for one in statics]
+    roughly += [one.starting_at(_values(own)) for one, own in zip(roughly, alone, strict=True)]
+    tried = in_threads(lambda one: fit(direct, one, squeezes), roughly, counter.done)
+    pairs = zip(tried[: len(statics)], tried[len(statics) :], strict=True)
+    return [min(pair, key=lambda one: one.cost) for pair in pairs]
+
+
+def refined(model: ForwardModel, directly: Fitted, squeezes: Sequence[Squeeze]) -> Fitted:
+    """Return the fit of a candidate through the fingertips, from its direct fit.
+
+    The direct fit of a snap-through may prefer the wrong corners, since noise and lag bias it most where the force
+    falls. So the corners are tried once more.
+    """
+    fitted = fit(model, directly.candidate, squeezes, start=directly)
+    law = with_corners(model, directly.candidate, squeezes)
+    if not law.more_starts:
+        return fitted
+    return min(fitted, fit(model, law, squeezes), key=lambda one: one.cost)
 
 
 def _dropped(times: float) -> str:

@@ -4,6 +4,9 @@ The parameters of the object are common to all squeezes. Each squeeze has its ow
 stiffness, since instances and placements differ: these are the spreads of a scene. Residuals are relative to the peak
 of their squeeze, so that every squeeze has the same weight.
 
+The logarithms of the factors have a sum of zero: the common stiffness is the mean. They are combinations of contrasts,
+each of which has that sum, so that every fit has it exactly.
+
 The Jacobian is computed by differences of the logarithms. A width or a factor acts on its own squeeze only, so one
 evaluation of all squeezes gives the derivatives with respect to all widths. The time by which the force lags behind the
 gap is common to all squeezes, where it is fitted.
@@ -30,9 +33,8 @@ STEP: Final = 1e-5
 """Difference of the logarithms in the Jacobian."""
 WIDTH_STEP_SHARE: Final = 1e-5
 """Difference of the width in the Jacobian, as a share of the compression."""
-FACTOR_WEIGHT: Final = 1e-3
-"""Weight with which the logarithms of the factors are held to zero, so that the common stiffness is their mean."""
 FACTOR_RANGE: Final = math.log(10.0)
+"""Of the logarithms of the factors, by which the stiffness of a squeeze differs from the mean."""
 WIDTH_RANGE: Final = 0.7
 """The width may differ from the first estimate by this share of the compression."""
 NO_FORCE: Final = 10.0
@@ -104,7 +106,7 @@ class _Problem:
         self.model, self.candidate, self.squeezes = model, candidate, squeezes
         self.has_lag = has_lag
         self.p, self.n = len(candidate.free), len(squeezes)
-        self.has_factors = self.n > 1
+        self.contrasts = contrasts(self.n)
         self.paths = model.paths(squeezes)
         self.first_widths = np.array([one.width_m for one in squeezes])
         self.depths = np.array([one.depth_m for one in squeezes])
@@ -122,7 +124,7 @@ class _Problem:
         low = [math.log(one.low) for one in self.candidate.free]
         high = [math.log(one.high) for one in self.candidate.free]
         wide = [WIDTH_RANGE] * self.n
-        factors = [FACTOR_RANGE] * (self.n if self.has_factors else 0)
+        factors = [FACTOR_RANGE] * (self.n - 1)
         lag = [MAX_LAG_S / LAG_UNIT_S] if self.has_lag else []
         return (
             np.array([*low, *(-one for one in (*wide, *factors, *lag))]),
@@ -133,7 +135,7 @@ class _Problem:
         """Return the values, widths and factors of a vector, or of each row of a table."""
         p, n = self.p, self.n
         widths = self.first_widths + x[..., p : p + n] * self.depths
-        factors = np.exp(x[..., p + n : p + 2 * n]) if self.has_factors else np.ones_like(widths)
+        factors = np.exp(x[..., p + n : p + 2 * n - 1] @ self.contrasts.T)
         return np.exp(x[..., :p]), widths, factors
 
     def vector(self, fitted: Fitted) -> Floats:
@@ -142,8 +144,10 @@ class _Problem:
             (width - one.width_m) / one.depth_m
             for width, one in zip(fitted.widths_m, self.squeezes, strict=True)
         ]
-        factors = np.log(fitted.factors) if self.has_factors else np.zeros(0)
-        return np.concatenate([np.log(fitted.values), shares, factors])
+        factors = np.log(fitted.factors)
+        is_stiffness = np.array([one.is_stiffness for one in fitted.candidate.free])
+        values = np.log(fitted.values) + float(np.mean(factors)) * is_stiffness
+        return np.concatenate([values, shares, factors @ self.contrasts])
 
     def lags_s(self, x: Floats) -> Floats:
         """Return the lag of a vector, or of each row of a table."""
@@ -151,8 +155,11 @@ class _Problem:
         return lags
 
     def of_all(self, xs: Floats) -> Floats:
-        """Return the residuals of each row of a table of vectors, without those that hold the factors."""
-        values, widths, factors = self.split(xs)
+        """Return the residuals of each row of a table of vectors."""
+        return self._at(xs, *self.split(xs))
+
+    def _at(self, xs: Floats, values: Floats, widths: Floats, factors: Floats) -> Floats:
+        """Return the residuals with these values, widths and factors, and the lags of the vectors."""
         numbers = self.candidate.numbers(np.repeat(values, self.n, axis=0), factors.ravel())
         lags, which = np.unique(self.lags_s(xs), return_inverse=True)
         paths = self.paths
@@ -172,32 +179,34 @@ class _Problem:
     def residuals(self, x: Floats) -> Floats:
         if self._last is None or not np.array_equal(self._last[0], x):
             self._last = x.copy(), self.of_all(x[np.newaxis])[0]
-        factors = x[self.p + self.n : self.p + 2 * self.n] if self.has_factors else x[:0]
-        held = FACTOR_WEIGHT * math.sqrt(self.size / self.n) * factors
-        return np.concatenate([self._last[1], held])
+        return self._last[1]
 
     def jacobian(self, x: Floats) -> Floats:
-        here = self.residuals(x)[: self.size]
-        blocks = [(self.p, WIDTH_STEP_SHARE)]
-        if self.has_factors:
-            blocks.append((self.p + self.n, STEP))
-        moved = np.tile(x, (self.p + len(blocks) + 2 * self.has_lag, 1))
-        moved[range(self.p), range(self.p)] += STEP
+        here, p, n = self.residuals(x), self.p, self.n
+        moved = np.tile(x, (p + 2 + 2 * self.has_lag, 1))
+        moved[range(p), range(p)] += STEP
+        moved[p, p : p + n] += WIDTH_STEP_SHARE
         if self.has_lag:
             moved[-2:, -1] += (-LAG_STEP, LAG_STEP)
-        for row, (first, step) in enumerate(blocks, self.p):
-            moved[row, first : first + self.n] += step
-        there = self.of_all(moved)
-        out = np.zeros((self.size + (self.n if self.has_factors else 0), len(x)))
-        out[: self.size, : self.p] = ((there[: self.p] - here) / STEP).T
-        for row, (first, step) in enumerate(blocks, self.p):
-            out[np.arange(self.size), first + self.of_squeeze] = (there[row] - here) / step
-        if self.has_factors:
-            own = np.arange(self.n)
-            out[self.size + own, self.p + self.n + own] = FACTOR_WEIGHT * math.sqrt(self.size / self.n)
+        values, widths, factors = self.split(moved)
+        factors[p + 1] *= math.exp(STEP)
+        there = self._at(moved, values, widths, factors)
+        out = np.zeros((self.size, len(x)))
+        out[:, :p] = ((there[:p] - here) / STEP).T
+        out[np.arange(self.size), p + self.of_squeeze] = (there[p] - here) / WIDTH_STEP_SHARE
+        by_factor = (there[p + 1] - here) / STEP
+        out[:, p + n : p + 2 * n - 1] = by_factor[:, np.newaxis] * self.contrasts[self.of_squeeze]
         if self.has_lag:
-            out[: self.size, -1] = (there[-1] - there[-2]) / (2.0 * LAG_STEP)
+            out[:, -1] = (there[-1] - there[-2]) / (2.0 * LAG_STEP)
         return out
+
+
+def contrasts(n: int) -> Floats:
+    """Return n - 1 orthonormal columns, each with the sum zero (Helmert)."""
+    from scipy.linalg import helmert
+
+    columns: Floats = helmert(n).T
+    return columns
 
 
 def whole(squeezes: Sequence[Squeeze]) -> list[Mask]:
@@ -248,9 +257,9 @@ def fit(
         widths_m=tuple(widths.tolist()),
         factors=tuple(factors.tolist()),
         cost=float(best.cost),
-        residuals=best.fun[: problem.size],
+        residuals=best.fun,
         lag_s=float(problem.lags_s(best.x)),
-        lag_error_s=_lag_error_s(np.asarray(best.jac), best.fun[: problem.size]) if has_lag else math.nan,
+        lag_error_s=_lag_error_s(np.asarray(best.jac), best.fun) if has_lag else math.nan,
     )
 
 
@@ -263,18 +272,14 @@ def linear_covariance(
     forces of the model are wrong at least, over the peak. A direction that changes no force has a large variance.
     """
     problem = _Problem(model, fitted.candidate, squeezes, whole(squeezes), has_lag=False)
-    jacobian = problem.jacobian(problem.vector(fitted))[: problem.size]
-    p, n = problem.p, problem.n
-    if problem.has_factors:
-        # Changes of the factors whose sum is zero.
-        jacobian = np.hstack([jacobian[:, : p + n], jacobian[:, p + n :] @ (np.eye(n) - 1.0 / n)[:, 1:]])
+    jacobian = problem.jacobian(problem.vector(fitted))
     scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-12)
     _, singular, rows = np.linalg.svd(jacobian / scale, full_matrices=False)
     # The fit follows a part of the residuals' own errors, with as many directions as it has parameters.
     degrees = max(problem.size - jacobian.shape[1], 1)
     error = math.hypot(fitted.rms * math.sqrt(problem.size / degrees), least_error)
     root = (rows.T / np.maximum(singular, SMALLEST_SINGULAR) * error) / scale[:, np.newaxis]
-    covariance: Floats = (root @ root.T)[:p, :p]
+    covariance: Floats = (root @ root.T)[: problem.p, : problem.p]
     return covariance
 
 
@@ -308,17 +313,19 @@ def held_out_rms(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, width_m:
 
 def _starts(problem: _Problem, start: Fitted | None) -> list[Floats]:
     """Return the vectors to start from: that of another fit, or the best of the candidate's own."""
-    n = problem.n
-    factors = np.zeros(n if problem.has_factors else 0)
-    lag = np.zeros(int(problem.has_lag))
+    own = np.zeros(2 * problem.n - 1 + int(problem.has_lag))
     if start is not None:
         known = problem.vector(start)
         if not problem.has_lag:
             return [known]
         lags = LAG_STARTS if start.lag_s == 0.0 else (start.lag_s / LAG_UNIT_S,)
         return [np.append(known, one) for one in lags]
-    vectors = [np.concatenate([np.log(one), np.zeros(n), factors, lag]) for one in problem.candidate.starts()]
-    if len(vectors) <= STARTS:
-        return vectors
-    costs = np.sum(problem.of_all(np.array(vectors)) ** 2, axis=1)
-    return [vectors[int(k)] for k in np.argsort(costs)[:STARTS]]
+    law = problem.candidate
+    vectors = [np.concatenate([np.log(one), own]) for one in law.starts()]
+    if len(vectors) > STARTS:
+        costs = np.sum(problem.of_all(np.array(vectors)) ** 2, axis=1)
+        vectors = [vectors[int(k)] for k in np.argsort(costs)[:STARTS]]
+    for one in law.more_starts:
+        wider = one.wider_m / problem.depths
+        vectors.append(np.concatenate([np.log(one.values), wider, own[problem.n :]]))
+    return vectors

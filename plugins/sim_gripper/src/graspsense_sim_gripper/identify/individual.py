@@ -19,11 +19,9 @@ from graspsense_sim_gripper.identify.choose import Choice, chosen_instead
 from graspsense_sim_gripper.identify.delay import EVIDENCE, Lag, lag_beyond_settings
 from graspsense_sim_gripper.identify.fit import LEAST_ERROR, Fitted, fit
 from graspsense_sim_gripper.identify.forward import ForwardModel
-from graspsense_sim_gripper.identify.laws import SLOTS
 from graspsense_sim_gripper.identify.prepare import Squeeze
 from graspsense_sim_gripper.identify.spread import LEAST_INSTANCES
 from graspsense_sim_gripper.identify.threads import in_threads
-from graspsense_sim_gripper.terms.registry import find_term
 
 Floats = NDArray[np.float64]
 
@@ -101,7 +99,7 @@ def _information(rms: float, free: int, n: int) -> float:
 
 def stiffnesses(fitted: Fitted) -> list[int]:
     """Return the places of the stiffnesses among the free parameters."""
-    return [i for i, one in enumerate(fitted.candidate.free) if is_stiffness(one.slot, one.name)]
+    return [i for i, one in enumerate(fitted.candidate.free) if one.is_stiffness]
 
 
 def reference_stiffness(fitted: Fitted, values: Floats) -> int | None:
@@ -109,15 +107,10 @@ def reference_stiffness(fitted: Fitted, values: Floats) -> int | None:
     return min(stiffnesses(fitted), key=lambda i: float(np.var(values[:, i])), default=None)
 
 
-def is_stiffness(slot: int, name: str) -> bool:
-    """Return whether a parameter varies with the stiffness of the object."""
-    return name in find_term(SLOTS[slot])[1].stiffnesses
-
-
 def _alone(model: ForwardModel, fitted: Fitted, squeeze: Squeeze, i: int) -> Fitted:
     factor = fitted.factors[i]
     own = tuple(
-        value * factor if is_stiffness(one.slot, one.name) else value
+        value * factor if one.is_stiffness else value
         for one, value in zip(fitted.candidate.free, fitted.values, strict=True)
     )
     start = evolve(fitted, values=own, widths_m=(fitted.widths_m[i],), factors=(1.0,))

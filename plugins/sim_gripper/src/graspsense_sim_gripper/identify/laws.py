@@ -73,6 +73,20 @@ class FreeParameter:
         """Whether it is proportional to the scale of the force: a force, or one per length or speed."""
         return "_n_" in f"{self.name}_"
 
+    @property
+    def is_stiffness(self) -> bool:
+        """Whether it varies with the stiffness of the object."""
+        return self.name in find_term(SLOTS[self.slot])[1].stiffnesses
+
+
+class Start(NamedTuple):
+    """Where a fit starts."""
+
+    values: tuple[float, ...]
+    """Of the free parameters."""
+    wider_m: float
+    """By how much the objects are wider than the first estimate."""
+
 
 @frozen(kw_only=True)
 class CandidateLaw:
@@ -80,6 +94,8 @@ class CandidateLaw:
 
     free: tuple[FreeParameter, ...]
     fixed: Mapping[tuple[int, str], float] = field(factory=dict)
+    more_starts: tuple[Start, ...] = ()
+    """Where a fit starts besides the combinations of the starts of each parameter."""
 
     @property
     def slots(self) -> tuple[int, ...]:
@@ -172,7 +188,7 @@ class CandidateLaw:
             else one
             for one in self.free
         )
-        return evolve(self, free=free)
+        return evolve(self, free=free, more_starts=())
 
 
 def _defaults(params: Any) -> dict[str, float]:

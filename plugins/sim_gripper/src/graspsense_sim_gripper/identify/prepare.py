@@ -199,7 +199,8 @@ def prepared(
     after = times[:0] if broken is None else times[broken : broken + 1]
     broken_n = None if broken is None else float(forces[broken])
     progress = _progress(trace, np.append(times[window], after))
-    times, forces, averaged_s2 = _in_blocks(times[window], forces[window], progress, parts.samples)
+    touched = int(np.searchsorted(np.flatnonzero(window), first))
+    times, forces, averaged_s2 = _in_blocks(times[window], forces[window], touched, progress, parts.samples)
     nodes, sample = _nodes(np.append(times, after), progress, parts.nodes)
     sample = sample[: len(times)]
     course = _smooth_course(trace, nodes)
@@ -292,14 +293,19 @@ def _end(trace: Trace, times: Floats, forces: Floats, first: int, last: int) -> 
 
 
 def _in_blocks(
-    times: Floats, values: Floats, progress: tuple[Floats, Floats], samples: int
+    times: Floats, values: Floats, touched: int, progress: tuple[Floats, Floats], samples: int
 ) -> tuple[Floats, Floats, Floats]:
-    """Return times and values of at most this number of means of neighbouring samples, which are evenly spaced in the
-    progress, and the variance of the times of each."""
+    """Return times and values of about this number of means of neighbouring samples, which are evenly spaced in the
+    progress, and the variance of the times of each.
+
+    Those beside the contact, at the sample `touched`, stay single: the force of a damper jumps there, and the mean over
+    a jump would be compared with that of a smooth course.
+    """
     if len(times) <= samples:
         return times, values, np.zeros(len(times))
     block = np.minimum(np.interp(times, *progress) * samples, samples - 1).astype(np.int64)
-    edges = np.flatnonzero(np.diff(block, prepend=-1))
+    beside = np.abs(block - block[touched]) <= 1
+    edges = np.flatnonzero(beside | (np.diff(block, prepend=-1) > 0))
     counts = np.diff(edges, append=len(times))
     mean_s = np.add.reduceat(times, edges) / counts
     variance_s2 = np.add.reduceat((times - np.repeat(mean_s, counts)) ** 2, edges) / counts

@@ -126,7 +126,7 @@ def as_parameters(fitted: Fitted, spreads: Sequence[OwnSpread]) -> list[Identifi
 
 def _covariance(model: ForwardModel, fitted: Fitted, squeeze: Squeeze) -> Floats:
     """Return the covariance of the logarithms of the values that one squeeze has by itself."""
-    errors = LEAST_ERROR_ALONE**2 + corner_errors(fitted, [squeeze]) ** 2
+    errors = LEAST_ERROR_ALONE**2 + corner_errors(model, fitted, [squeeze]) ** 2
     return linear_covariance(model, fitted, [squeeze], LEAST_FORCE_ERROR_ALONE) + np.diag(errors)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -80,26 +80,26 @@ def identify(
     model = ForwardModel(pads=pads)
     model.compile()
     cells = _has_cells(config, squeezes)
-    squeezes, ready, shares, share = _ready(config, _used(squeezes, notes), notes, cells=cells)
+    squeezes, ready, shares = _ready(config, _used(squeezes, notes), notes, cells=cells)
     individual = _chosen(model, ready, progress)
     lag = individual.lag(model, ready)
     if lag.lag_s != 0.0:
-        squeezes, ready, shares, share = _ready(config, squeezes, [], cells=cells, lag_s=lag.lag_s)
+        squeezes, ready, shares = _ready(config, squeezes, [], cells=cells, lag_s=lag.lag_s)
         individual = _chosen(model, ready, progress)
     choice = individual.choice
     progress("computing intervals", 0, 1)
     delay = delay_of(model, choice.fitted, memories(_scale(ready))[0], ready, config.force_delay_s, lag)
-    scale_error = _scale_error(config, drive, ready) if cells else 0.0
-    found = uncertainty(model, choice.fitted, ready, scale_error, lag.error_s, individual.of_each)
+    share_error = _share_error(config, drive, ready) if cells else 0.0
+    scale = share_error / math.sqrt(len(ready))
+    found = uncertainty(model, choice.fitted, ready, scale, lag.error_s, individual.of_each)
     open_ = [*delay.undetermined, *undetermined(choice.fitted, found, ready, shares, cells)]
-    values, parameters = _values(choice.fitted, found, share, shares, cells)
+    values, parameters = _values(choice.fitted, found, shares if cells else (), share_error)
     own, fracture = _between_objects(model, individual, ready, shares)
     parameters += [*([delay.found] if delay.found else []), *as_parameters(choice.fitted, own)]
     if fracture is not None:
         open_, parameters = [*open_, *fracture.undetermined], [*parameters, *fracture.parameters]
-    label = next((one.label for one in squeezes if one.label), "")
     facts = SceneFacts(
-        label=label,
+        label=next((one.label for one in squeezes if one.label), ""),
         fitted=choice.fitted,
         parameters=parameters,
         values=values,
@@ -112,7 +112,7 @@ def identify(
         fracture=fracture,
     )
     return Identification(
-        label=label,
+        label=facts.label,
         scene=scene_text(facts),
         parameters=tuple(parameters),
         candidates=choice.scores,
@@ -143,20 +143,20 @@ def _ready(
     *,
     cells: bool,
     lag_s: float = 0.0,
-) -> tuple[list[RecordedSqueeze], list[Squeeze], list[float], float]:
-    """Return the squeezes that can be fitted, as recorded and prepared, the share of the force that `cells` measure in
-    each, and the common share.
+) -> tuple[list[RecordedSqueeze], list[Squeeze], list[float]]:
+    """Return the squeezes that can be fitted, as recorded and prepared, and the share of the force that `cells` measure
+    in each.
 
     The forces of the prepared ones are whole. A note names each other squeeze. `lag_s`: by how much the force lags
     beyond the delay of the settings. Raises NoSqueeze if there is none.
     """
     kept, ready = _fit_to_use(config, squeezes, notes, lag_s)
     if not cells:
-        return kept, ready, [1.0] * len(ready), 1.0
+        return kept, ready, [1.0] * len(ready)
     drive, _ = drive_and_pads(config)
     shares = _measured_shares(kept, ready, drive)
     share = _share(shares)
-    return kept, [_with_share(one, share) for one in ready], shares, share
+    return kept, [_with_share(one, share) for one in ready], shares
 
 
 def _fit_to_use(
@@ -223,11 +223,21 @@ def _own_settings(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> tup
             "the recordings were made with different settings of the gripper: identify those of one setting together"
         )
     if own and len(own) == len(squeezes):
-        return evolve(config, **own[0]), []
+        return evolve(config, **own[0]), _overruled(config, own[0])
     stiffness = config.pad_stiffness_n_m
     return config, [
         f"the fingertips are taken as {stiffness:.3g} N/m each: -o gripper.pad_stiffness_n_m=VALUE (inf: rigid). "
         "The scene is of the object behind these fingertips"
+    ]
+
+
+def _overruled(config: SimConfig, own: Mapping[str, Any]) -> list[str]:
+    """Return a note on each setting that was given, and which the recordings have with another value."""
+    default = SimConfig()
+    return [
+        f"gripper.{key} is {value} in the recordings, which is used, not {getattr(config, key)}"
+        for key, value in own.items()
+        if getattr(config, key) not in (value, getattr(default, key))
     ]
 
 
@@ -259,8 +269,9 @@ def _has_cells(config: SimConfig, squeezes: Sequence[RecordedSqueeze]) -> bool:
 
 
 def _share(shares: Sequence[float]) -> float:
+    """Return the mean share. The scatter of a median is a quarter larger, which `_share_error` does not count."""
     known = [one for one in shares if math.isfinite(one)]
-    return min(float(np.median(known)), 1.0) if known else 1.0
+    return min(float(np.mean(known)), 1.0) if known else 1.0
 
 
 def _between_objects(
@@ -284,14 +295,13 @@ def _fingertips(config: SimConfig) -> dict[str, float]:
     return {name: float(value) for name, value in values.items() if value is not None}
 
 
-def _scale_error(config: SimConfig, drive: Drive, squeezes: Sequence[Squeeze]) -> float:
-    """Return the relative standard deviation of the share: that of the Coulomb friction over the mean force.
+def _share_error(config: SimConfig, drive: Drive, squeezes: Sequence[Squeeze]) -> float:
+    """Return the relative error of the share of one squeeze: that of the Coulomb friction over the mean force.
 
     The mean is over the way of the fingers, as in the balance of energy that the share follows from.
     """
     mean_n = float(np.median([_mean_over_way(one) for one in squeezes]))
-    single = config.coulomb_spread_n / ((1.0 + drive.friction.load_friction_coefficient) * mean_n)
-    return float(single / math.sqrt(len(squeezes)))
+    return float(config.coulomb_spread_n / ((1.0 + drive.friction.load_friction_coefficient) * mean_n))
 
 
 def _mean_over_way(squeeze: Squeeze) -> float:
@@ -322,9 +332,12 @@ def _scale(squeezes: Sequence[Squeeze]) -> DataScale:
 
 
 def _values(
-    fitted: Fitted, found: Uncertainty, share: float, shares: Sequence[float], cells: bool
+    fitted: Fitted, found: Uncertainty, shares: Sequence[float], share_error: float
 ) -> tuple[dict[str, float], list[IdentifiedParameter]]:
-    """Return the keys of the scene's object, and every identified parameter."""
+    """Return the keys of the scene's object, and every identified parameter.
+
+    `shares`: those of each squeeze, none without cells. `share_error`: the relative error of each.
+    """
     widths = np.array(fitted.widths_m)
     known = np.array([one for one in shares if math.isfinite(one)])
     parameters = [_mean("width_m", "m", widths)]
@@ -336,11 +349,15 @@ def _values(
     between = found.between_objects if math.isfinite(found.between_objects) else found.between_squeezes
     if math.isfinite(between) and between > 0.0:
         values["stiffness_spread"] = between
-    if cells and len(known):
-        values["share"] = share
+    if len(known):
+        values["share"] = _share(shares)
         parameters.append(_mean("share", "", known))
-        if len(known) > 1:
-            values["share_spread"] = float(np.std(known, ddof=1))
+        # The friction of the drive varies in a simulated squeeze, too, and is no scatter of the share.
+        beyond = (
+            float(np.var(known, ddof=1)) - (values["share"] * share_error) ** 2 if len(known) > 1 else 0.0
+        )
+        if beyond > 0.0:
+            values["share_spread"] = math.sqrt(beyond)
     for i, one in enumerate(fitted.candidate.free):
         ends = sorted((one.sign * found.low[i], one.sign * found.high[i]))
         parameters.append(
@@ -354,6 +371,17 @@ def _values(
             )
         )
     return values, parameters
+
+
+def share_spread(shares: Sequence[float], share_error: float) -> float:
+    """Return the standard deviation of the share beyond the relative error of each of these; 0 if there is none.
+
+    The error is that of the friction of the drive. It varies in every simulated squeeze, too.
+    """
+    if len(shares) < 2:
+        return 0.0
+    error = float(np.mean(shares)) * share_error
+    return math.sqrt(max(float(np.var(shares, ddof=1)) - error * error, 0.0))
 
 
 def _mean(name: str, unit: str, values: Any) -> IdentifiedParameter:

@@ -39,6 +39,12 @@ LARGEST: Final = math.log(30.0)
 """A logarithm changes by at most this in proportion to the force. A larger change is one of a value near zero."""
 MOVING_SHARE: Final = 0.3
 """Where the gap changes by at least this share of its largest change between measurements, the fingers move."""
+LEAST_FALLING: Final = 2
+"""Samples on the falling part of a snap-through that determine its line."""
+MEAN_OVER_CORNER: Final = 0.015
+"""Rms error of the mean over a sample in which the law has a corner, over the change of its slope and the distance
+between samples: `Squeeze.at_samples` knows the forces at the ends and in the middle only. The rms is over corners that
+lie anywhere in the sample."""
 PATH_ERROR: Final = 3e-4
 """Standard deviation of the logarithm of a value that the finite number of nodes of a path causes."""
 PATH_FORCE_ERROR: Final = 3e-5
@@ -86,7 +92,7 @@ def uncertainty(
     linear = linear_covariance(model, fitted, squeezes, PATH_FORCE_ERROR)
     covariance = _at_least(again.scale * deviations.T @ deviations, linear * (normal() / factor) ** 2)
     own = _scale_errors(model, fitted, squeezes, force_scale) + PATH_ERROR**2 * np.eye(len(at))
-    own += np.diag(corner_errors(fitted, squeezes) ** 2)
+    own += np.diag(corner_errors(model, fitted, squeezes) ** 2)
     if lag_error_s > 0.0:
         later = fit(model, fitted.candidate, [one.delayed(lag_error_s) for one in squeezes], start=fitted)
         shift = np.log(later.values) - at
@@ -195,17 +201,22 @@ def _area_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze
     return np.outer(shift, shift)
 
 
-def corner_errors(fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
-    """Return the relative errors of the parameters of a snap-through from the distance between two measurements.
+def corner_errors(model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
+    """Return the relative errors of the parameters of a snap-through that the distance between two samples causes.
 
-    A corner of the law lies anywhere between two measurements, and a bootstrap leaves it where it is.
+    With two samples on the falling part, all three lines of the law are determined, and so are their corners. With
+    fewer, the corners that were fitted and the true ones lie anywhere between two samples, and a bootstrap leaves them
+    where they are.
     """
     values = {one.name: value for one, value in zip(fitted.candidate.free, fitted.values, strict=True)}
     if "critical_m" not in values:
         return np.zeros(len(fitted.values))
     ways = [np.abs(np.diff(one.gap_m[one.sample])) for one in squeezes]
     moving = np.concatenate([way[way > MOVING_SHARE * np.max(way)] for way in ways])
-    error_m = float(np.median(moving)) / math.sqrt(12.0 * len(squeezes))
+    share = math.sqrt(1.0 / 6.0)
+    if _on_falling_part(model, fitted, squeezes, values["critical_m"], values["fall_m"]) >= LEAST_FALLING:
+        share = MEAN_OVER_CORNER if any(np.any(one.averaged_s2 > 0.0) for one in squeezes) else 0.0
+    error_m = share * float(np.median(moving)) / math.sqrt(len(squeezes))
     along_n = error_m * (values["k1_n_m"] + values["k2_n_m"])
     errors = {
         "critical_m": error_m / values["critical_m"],
@@ -213,6 +224,18 @@ def corner_errors(fitted: Fitted, squeezes: Sequence[Squeeze]) -> Floats:
         "drop_n": along_n / values["drop_n"],
     }
     return np.array([errors.get(one.name, 0.0) if one.slot == SNAP else 0.0 for one in fitted.candidate.free])
+
+
+def _on_falling_part(
+    model: ForwardModel, fitted: Fitted, squeezes: Sequence[Squeeze], critical_m: float, fall_m: float
+) -> int:
+    """Return how many samples lie on the falling part of a snap-through while the fingers close."""
+    count = 0
+    for squeeze, width in zip(squeezes, fitted.widths_m, strict=True):
+        closure = width - squeeze.gap_m[squeeze.sample]
+        compression = (closure - model.compressed_m(squeeze.force_n))[: int(np.argmax(closure)) + 1]
+        count += int(np.sum((compression > critical_m) & (compression < critical_m + fall_m)))
+    return count
 
 
 def _instances(squeezes: Sequence[Squeeze]) -> int:
