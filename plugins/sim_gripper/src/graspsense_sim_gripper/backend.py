@@ -37,7 +37,7 @@ from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.build import CELL_OFFSET, EFFORT_LIMIT_N, build, device_info, instantiate
 from graspsense_sim_gripper.compiled.compose import INTERPRETED, composed_move, composition, free_motion
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.state import PlantState, is_finite, right_of
+from graspsense_sim_gripper.dynamics.state import Measured, PlantState, is_finite, right_of
 from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
@@ -54,7 +54,6 @@ from graspsense_sim_gripper.reduction.select import select
 from graspsense_sim_gripper.sampled_loop import instability
 from graspsense_sim_gripper.sensing import (
     PAD_COUNTS_PER_N,
-    Measured,
     PadBuffers,
     apply_tare,
     sense,

@@ -21,9 +21,8 @@ from graspsense.plugin_api import (
     TickParams,
     TickState,
 )
-from graspsense_sim_gripper.dynamics.state import PlantState, is_finite
+from graspsense_sim_gripper.dynamics.state import Measured, PlantState, is_finite
 from graspsense_sim_gripper.sensing import (
-    Measured,
     PadBuffers,
     SensorParams,
     SensorState,

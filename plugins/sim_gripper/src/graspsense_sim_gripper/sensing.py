@@ -22,7 +22,7 @@ from graspsense.plugin_api import (
     pad_force,
 )
 from graspsense_sim_gripper.drive_models import ENCODER_TICKS
-from graspsense_sim_gripper.dynamics.state import Motion
+from graspsense_sim_gripper.dynamics.state import Measured, Motion
 from graspsense_sim_gripper.fingertip import CELLS, FIRST_PAD_CELL
 
 VELOCITY_FILTER_S: Final = 0.003
@@ -100,15 +100,6 @@ class PadBuffers(NamedTuple):
     """(k, 44) Standard normal numbers for each image."""
     images: Any
     """(k, 2, 22) Counts of the left and the right fingertip in each image."""
-
-
-class Measured(NamedTuple):
-    """What the sensors measure at a tick."""
-
-    motion: Motion
-    left_n: float
-    right_n: float
-    """The forces on the pads."""
 
 
 class PadForces(NamedTuple):

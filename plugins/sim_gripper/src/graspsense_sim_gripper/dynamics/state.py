@@ -99,6 +99,15 @@ class PlantState(NamedTuple):
     """Largest force on a pad so far."""
 
 
+class Measured(NamedTuple):
+    """What sensors measure of the plant at a tick."""
+
+    motion: Motion
+    left_n: float
+    right_n: float
+    """The forces on the pads."""
+
+
 def is_finite(state: PlantState) -> bool:
     """Return whether the forces on the object and the motion are finite numbers."""
     contact = state.contact

@@ -14,8 +14,7 @@ from typing import Final, NamedTuple
 from graspsense.plugin_api import gap_and_rate
 from graspsense_sim_gripper.dynamics.contact import has_event
 from graspsense_sim_gripper.dynamics.drive import is_held
-from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState, right_of
-from graspsense_sim_gripper.sensing import Measured
+from graspsense_sim_gripper.dynamics.state import Contact, Measured, Motion, PlantState, StepState, right_of
 from graspsense_sim_gripper.stepping.advance import completed, rests
 from graspsense_sim_gripper.stepping.coast import coast
 from graspsense_sim_gripper.stepping.control import (
