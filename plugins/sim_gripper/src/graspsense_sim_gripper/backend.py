@@ -37,7 +37,7 @@ from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.build import CELL_OFFSET, EFFORT_LIMIT_N, build, device_info, instantiate
 from graspsense_sim_gripper.compiled.compose import INTERPRETED, composed_move, composition, free_motion
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.state import Measured, PlantState, is_finite, right_of
+from graspsense_sim_gripper.dynamics.state import PlantReadings, PlantState, is_finite, right_of
 from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
@@ -190,7 +190,7 @@ class SimBackend(BatchBackend[SimConfig]):
         if self._sensor.images >= len(buffers.images):
             self._draw_noise()
         contact = self._state.contact
-        measured = Measured(self._state.motion, contact.left_n, contact.right_n)
+        measured = PlantReadings(self._state.motion, contact.left_n, contact.right_n)
         frame, self._sensor = _sense(
             setup.sensor, self._sensor, measured, self._ticks * dt, dt, effort, buffers
         )

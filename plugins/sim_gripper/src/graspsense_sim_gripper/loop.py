@@ -21,7 +21,7 @@ from graspsense.plugin_api import (
     TickParams,
     TickState,
 )
-from graspsense_sim_gripper.dynamics.state import Measured, PlantState, is_finite
+from graspsense_sim_gripper.dynamics.state import PlantReadings, PlantState, is_finite
 from graspsense_sim_gripper.sensing import (
     PadBuffers,
     SensorParams,
@@ -206,7 +206,7 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
     count = sensor.images
     pads = Pads(sensor.image_t_s, count, images[count - 1][0], images[count - 1][1])
     while ticks < params.max_ticks and recorded < capacity and sensor.images < len(images):
-        measured = Measured(plant.motion, plant.contact.left_n, plant.contact.right_n)
+        measured = PlantReadings(plant.motion, plant.contact.left_n, plant.contact.right_n)
         t_s, last_effort = ticks * dt_s, effort
         frame, sensor = sense(params.sensor, sensor, measured, t_s, dt_s, effort, pad_buffers)
         if sensor.images != count:

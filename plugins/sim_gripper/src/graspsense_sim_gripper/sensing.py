@@ -22,7 +22,7 @@ from graspsense.plugin_api import (
     pad_force,
 )
 from graspsense_sim_gripper.drive_models import ENCODER_TICKS
-from graspsense_sim_gripper.dynamics.state import Measured, Motion
+from graspsense_sim_gripper.dynamics.state import Motion, PlantReadings
 from graspsense_sim_gripper.fingertip import CELLS, FIRST_PAD_CELL
 
 VELOCITY_FILTER_S: Final = 0.003
@@ -156,7 +156,7 @@ def initial_sensor(link: ScrewLinkage, motion: Motion) -> SensorState:
 def sense(
     params: SensorParams,
     state: SensorState,
-    measured: Measured,
+    measured: PlantReadings,
     t_s: float,
     dt_s: float,
     effort_n: float,
@@ -172,7 +172,7 @@ def sense(
 
 
 def _with_image(
-    params: SensorParams, state: SensorState, measured: Measured, t_s: float, pads: PadBuffers
+    params: SensorParams, state: SensorState, measured: PlantReadings, t_s: float, pads: PadBuffers
 ) -> SensorState:
     """Return the state of the sensors with the image that is taken, or that arrives, at `t_s`, if there is one."""
     encoder_ticks, gap, velocity, count, image_t, forces, pending = state
@@ -190,7 +190,12 @@ def _with_image(
 
 
 def read_frame(
-    params: SensorParams, state: SensorState, measured: Measured, t_s: float, dt_s: float, effort_n: float
+    params: SensorParams,
+    state: SensorState,
+    measured: PlantReadings,
+    t_s: float,
+    dt_s: float,
+    effort_n: float,
 ) -> tuple[Frame, SensorState]:
     """Return the frame at `t_s` (s) and the new state of the sensors, if no cell image is taken or arrives."""
     motion, left_n, right_n = measured

@@ -99,7 +99,7 @@ class PlantState(NamedTuple):
     """Largest force on a pad so far."""
 
 
-class Measured(NamedTuple):
+class PlantReadings(NamedTuple):
     """What sensors measure of the plant at a tick."""
 
     motion: Motion

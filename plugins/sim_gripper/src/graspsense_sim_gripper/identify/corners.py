@@ -17,7 +17,7 @@ from attrs import evolve
 from numpy.typing import NDArray
 
 from graspsense_sim_gripper.identify.forward import ForwardModel
-from graspsense_sim_gripper.identify.laws import SNAP, CandidateLaw, Start
+from graspsense_sim_gripper.identify.laws import SNAP, CandidateLaw, FitStart
 from graspsense_sim_gripper.identify.prepare import CONTACT_SHARE, Squeeze
 
 Floats = NDArray[np.float64]
@@ -42,7 +42,7 @@ def with_corners(model: ForwardModel, law: CandidateLaw, squeezes: Sequence[Sque
     if not loads:
         return law
     depth = float(np.median([compression[-1] for compression, _ in loads]))
-    best: list[tuple[float, Start]] = []
+    best: list[tuple[float, FitStart]] = []
     for critical in CRITICAL * depth:
         tried = [_at_corners(loads, float(critical), float(fall)) for fall in FALL * depth]
         best.append(min(tried, key=lambda one: one[0]))
@@ -52,7 +52,7 @@ def with_corners(model: ForwardModel, law: CandidateLaw, squeezes: Sequence[Sque
     peak_n = float(np.median([one.peak_n for one in squeezes]))
     units = [peak_n if one.is_force else 1.0 for one in law.free]
     starts = [best[k][1] for k in order if math.isfinite(best[k][0])]
-    scaled = [Start(tuple(np.multiply(one.values, units).tolist()), one.wider_m) for one in starts]
+    scaled = [FitStart(tuple(np.multiply(one.values, units).tolist()), one.wider_m) for one in starts]
     # The error of the width by the force at the contact is itself in error by noise.
     return evolve(law, more_starts=(*scaled, *(one._replace(wider_m=0.0) for one in scaled)))
 
@@ -66,7 +66,9 @@ def _loading(model: ForwardModel, squeeze: Squeeze) -> tuple[Floats, Floats]:
     return compression[part], force[part]
 
 
-def _at_corners(loads: Sequence[tuple[Floats, Floats]], critical: float, fall: float) -> tuple[float, Start]:
+def _at_corners(
+    loads: Sequence[tuple[Floats, Floats]], critical: float, fall: float
+) -> tuple[float, FitStart]:
     """Return the sum of the squared residuals, and the start for a peak of 1 N, for given corners.
 
     The sum is infinite if the numbers are not those of a snap-through.
@@ -86,7 +88,7 @@ def _at_corners(loads: Sequence[tuple[Floats, Floats]], critical: float, fall: f
         numbers.append(solution)
     offset, k1, drop, k2 = np.median(numbers, axis=0).tolist()
     if min(k1, drop, k2) <= 0.0 or critical + offset / k1 <= 0.0:
-        return math.inf, Start((), 0.0)
+        return math.inf, FitStart((), 0.0)
     # A force at the contact is that of a wider object, whose compression is larger by as much.
     wider = offset / k1
-    return cost, Start((k1, critical + wider, drop, fall, k2), wider)
+    return cost, FitStart((k1, critical + wider, drop, fall, k2), wider)

@@ -79,7 +79,7 @@ class FreeParameter:
         return self.name in find_term(SLOTS[self.slot])[1].stiffnesses
 
 
-class Start(NamedTuple):
+class FitStart(NamedTuple):
     """Where a fit starts."""
 
     values: tuple[float, ...]
@@ -94,7 +94,7 @@ class CandidateLaw:
 
     free: tuple[FreeParameter, ...]
     fixed: Mapping[tuple[int, str], float] = field(factory=dict)
-    more_starts: tuple[Start, ...] = ()
+    more_starts: tuple[FitStart, ...] = ()
     """Where a fit starts besides the combinations of the starts of each parameter."""
 
     @property

@@ -14,7 +14,14 @@ from typing import Final, NamedTuple
 from graspsense.plugin_api import gap_and_rate
 from graspsense_sim_gripper.dynamics.contact import has_event
 from graspsense_sim_gripper.dynamics.drive import is_held
-from graspsense_sim_gripper.dynamics.state import Contact, Measured, Motion, PlantState, StepState, right_of
+from graspsense_sim_gripper.dynamics.state import (
+    Contact,
+    Motion,
+    PlantReadings,
+    PlantState,
+    StepState,
+    right_of,
+)
 from graspsense_sim_gripper.stepping.advance import completed, rests
 from graspsense_sim_gripper.stepping.coast import coast
 from graspsense_sim_gripper.stepping.control import (
@@ -222,12 +229,12 @@ def with_peak(state: PlantState, peak_n: float) -> PlantState:
     return PlantState(state.motion, state.contact, state.step, state.effort_n, peak_n)
 
 
-def values_at(dense: DenseOutput, s: float) -> Measured:
+def values_at(dense: DenseOutput, s: float) -> PlantReadings:
     """Return what the sensors measure at this fraction of the macro-step."""
     h, revolutions, gap, jacobian, left, right = dense
     speed = (revolutions.c1 + s * (2.0 * revolutions.c2 + 3.0 * s * revolutions.c3)) / h
     motion = Motion(_value(revolutions, s), speed, _value(gap, s), _value(jacobian, s))
-    return Measured(motion, _value(left, s), _value(right, s))
+    return PlantReadings(motion, _value(left, s), _value(right, s))
 
 
 def _hermite(x0: float, x1: float, slope0: float, slope1: float) -> Cubic:
