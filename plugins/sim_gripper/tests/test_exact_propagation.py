@@ -401,8 +401,8 @@ def test_the_report_names_the_exact_discretisation(tmp_path):
     rests = {"coulomb_n": 1.0, "breakaway_n": 2.0}
     for change, scheme in (
         ({}, "exact discretisation"),
-        (rests, "Verlet, a step per tick"),
-        ({**rests, "fidelity": "full"}, "Verlet, a step per tick"),
+        (rests, "Verlet, a step per tick; in batches over several ticks"),
+        ({**rests, "fidelity": "full"}, "Verlet, a step per tick; in batches over several ticks"),
     ):
         config = evolve(PEERS, **change)
         report = run_grasp(SimBackend(config), law, RunConfig(seed=1)).report
