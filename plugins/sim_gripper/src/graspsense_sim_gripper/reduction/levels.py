@@ -14,8 +14,8 @@ from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, VERLET, Ste
 STEP_SHARE: Final = 0.34
 """The tolerance of a step is (0.34 accuracy)^1.5, so that the accumulated error of many steps is proportional to the
 accuracy, and smaller."""
-MACRO_SHARE: Final = 0.01
-"""The tolerance of a macro-step is 0.01 accuracy^1.5. Near rest the gap changes so slowly that a small error shifts
+MACRO_SHARE: Final = 3e-4
+"""The tolerance of a macro-step, relative to the accuracy. Near rest the gap changes so slowly that a small error moves
 the detected time of rest by many ticks, so it has to be this small."""
 GROWTH_ACCURACY: Final = 0.1
 """From this accuracy upwards, a step in contact may be twice as long as the one before."""
@@ -134,7 +134,7 @@ def step_growth(accuracy: float) -> float:
 def steps_for(level: Level, scheme: int, dt_s: float) -> Steps:
     """Return the step control of a level with this scheme, for ticks of `dt_s` seconds."""
     if level.plain == 1:
-        macro_tolerance = MACRO_SHARE * level.step_tol**1.5 if level.macro == 1 else 0.0
+        macro_tolerance = MACRO_SHARE * level.step_tol if level.macro == 1 else 0.0
         return Steps(math.inf, scheme, dt_s, growth=math.inf, macro_tolerance=macro_tolerance)
     longest_s = dt_s / level.min_steps if level.min_steps > 1 else math.inf
     tolerance = step_tolerance(level.step_tol)
