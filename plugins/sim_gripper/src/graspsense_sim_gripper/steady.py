@@ -35,6 +35,9 @@ SETTLING_S: Final = 0.1
 ENCODER_SPEED_RTOL: Final = 2e-3
 """Largest relative difference of the present speed from the steady one where an encoder is read: somewhat more than its
 ticks cause. With ideal sensors it is the tolerance of macro-steps."""
+DRIFT_RTOL: Final = 1e-4
+"""Relative change of the steady speed over these ticks that is allowed in any case: it moves the fingers by less than a
+hundredth of the way of a tick."""
 CURVATURE_REV: Final = 1e-3
 """Angle over which the curvature of the linkage is computed."""
 NEWTON_ITERATIONS: Final = 2
@@ -87,7 +90,7 @@ def steady_ticks(
         if not (abs(effort) <= free.effort_limit_n and abs(readings[2]) <= free.speed_limit_m_s):
             return at
     _, change = _steady_speed(params, end, load_n, memory)
-    if not abs(change) <= rtol * abs(speed):
+    if not abs(change) <= max(rtol, DRIFT_RTOL) * abs(speed):
         return at
     t_s = (at.ticks + n - 1) * dt_s
     state = after_free(params.controller, at.controller, (memory, still), effort, t_s)
