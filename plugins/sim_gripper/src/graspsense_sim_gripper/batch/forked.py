@@ -141,8 +141,10 @@ def _serve(answer: Callable[[int], Json], connection: Connection, inherited: Seq
     # As long as this process holds them, the processes at their other ends do not see the caller end.
     for one in inherited:
         one.close()
-    # Ctrl-C reaches every process of the terminal; the caller ends this one.
+    # Ctrl-C reaches every process of the terminal; the caller ends this one. Its own handlers are not for this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
     # A collection would write to, and so copy, the memory that is shared with the caller.
     gc.freeze()
     while True:
