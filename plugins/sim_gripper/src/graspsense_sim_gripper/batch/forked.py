@@ -51,7 +51,7 @@ def can_be_sent(job: Job) -> bool:
 
 
 @frozen
-class Measured:
+class MeasuredNumbers:
     """Extracts the numbers that a compiled feature set measures on a grasp, from which its features follow."""
 
     of_features: CompiledExtraction
@@ -67,7 +67,7 @@ class Measured:
 
 def measuring(job: Job) -> Job:
     """Return the same job, in which a grasp gives what the compiled feature set measured instead of the features."""
-    return job if job.extraction is None else evolve(job, extract=Measured(job.extraction))
+    return job if job.extraction is None else evolve(job, extract=MeasuredNumbers(job.extraction))
 
 
 class ForkedProcess:

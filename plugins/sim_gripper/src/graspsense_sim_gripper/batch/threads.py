@@ -26,7 +26,7 @@ from graspsense.plugin_api import BatchOptions, Controller, FeatureSet, NotCompi
 from graspsense_sim_gripper.batch.forked import (
     REFUSED,
     ForkedProcess,
-    Measured,
+    MeasuredNumbers,
     can_be_sent,
     can_fork,
     measuring,
@@ -278,7 +278,7 @@ class _Batch:
 
     def _answer(self, begin: int) -> list[Any]:
         """Return, in a forked process, the results of the slice that begins at this index, as JSON values."""
-        if self.job.extraction is not None and not isinstance(self.job.extract, Measured):
+        if self.job.extraction is not None and not isinstance(self.job.extract, MeasuredNumbers):
             self.job = self.models.job = measuring(self.job)
         return [
             told(grasp, scene)
