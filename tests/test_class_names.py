@@ -6,6 +6,8 @@ import ast
 from collections import defaultdict
 from pathlib import Path
 
+from sources import parsed, statements
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -14,7 +16,7 @@ def public_classes() -> dict[str, list[str]]:
     files: dict[str, list[str]] = defaultdict(list)
     for folder in (ROOT / "src", *(ROOT / "plugins").glob("*/src"), *(ROOT / "examples").glob("*/src")):
         for path in sorted(folder.rglob("*.py")):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for node in statements(parsed(path)):
                 if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                     files[node.name].append(str(path.relative_to(ROOT)))
     return files
