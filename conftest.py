@@ -1,4 +1,7 @@
-"""What holds for all tests here: none of them judges how fast this machine is."""
+"""What holds for all tests here: none of them judges how fast this machine is, and byte code is kept."""
+
+import os
+import sys
 
 from hypothesis import HealthCheck, settings
 
@@ -7,3 +10,8 @@ settings.register_profile(
     "any-machine", settings.default, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("any-machine")
+
+# Also where the environment says no: else every process that a test starts would compile all it imports anew, and
+# pytest would rewrite every file of tests in each worker of each run.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from html import escape
 from itertools import pairwise
 from pathlib import Path
@@ -27,6 +28,9 @@ LETTER = 7.4
 """Heights and distances, and the width of a letter, in pixels of the drawing."""
 BEND = 16
 """How straight an arrow leaves and enters a box."""
+
+PARTS = ("body", "handlers", "cases", "orelse", "finalbody")
+"""Where a statement has others within it."""
 
 Graph = dict[str, set[str]]
 Place = tuple[float, float]
@@ -62,21 +66,32 @@ def _imports_within(package: Path, name: str, leave_out: set[str]) -> Graph:
 
 def _used(path: Path, package: str) -> Iterator[str]:
     """Yield the subpackages of `package` that a file imports from, but for imports for type checking."""
-    skipped: set[int] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
-            skipped |= {id(inner) for statement in node.body for inner in ast.walk(statement)}
-        elif id(node) in skipped:
-            continue
-        elif isinstance(node, ast.Import):
-            for alias in node.names:
-                parts = alias.name.split(".")
-                if parts[0] == package and len(parts) > 1:
-                    yield parts[1]
+    for module, names in _imports(path):
+        parts = module.split(".")
+        if parts[0] == package:
+            yield from parts[1:2] or names
+
+
+@cache
+def _imports(path: Path) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return the modules that a file imports, each with the names that it imports from it."""
+    found: list[tuple[str, tuple[str, ...]]] = []
+    for node in _statements(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found += [(alias.name, ()) for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            parts = node.module.split(".")
-            if parts[0] == package:
-                yield from parts[1:2] or (alias.name for alias in node.names)
+            found.append((node.module, tuple(alias.name for alias in node.names)))
+    return tuple(found)
+
+
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield every statement below a node that is not for type checking only."""
+    checking = isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+    for part in PARTS[checking:]:
+        inner = getattr(node, part, ())
+        for one in inner if isinstance(inner, list) else ():
+            yield one
+            yield from _statements(one)
 
 
 def reduced(graph: Graph) -> Graph:

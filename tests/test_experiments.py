@@ -456,15 +456,29 @@ grasps = 0
 """
 
 
+def done(folder, name, force, trials, seeds):
+    """Run an experiment in this folder; return the folder of its results."""
+    file = folder / f"{name}.toml"
+    file.write_text(COMPARED.format(force=force, trials=trials, seeds=seeds))
+    run_experiment(read_experiment(str(file)), Results(folder / name), Serial, command=f"run {name}")
+    return folder / name
+
+
 @pytest.fixture(scope="module")
-def compared(tmp_path_factory):
-    """Three experiments: the second has another setting than the first, the third other trials and one more seed."""
-    folder = tmp_path_factory.mktemp("compared")
-    for name, force, trials, seeds in (("weak", 14.0, 2, 2), ("strong", 20.0, 2, 2), ("more", 14.0, 3, 3)):
-        file = folder / f"{name}.toml"
-        file.write_text(COMPARED.format(force=force, trials=trials, seeds=seeds))
-        run_experiment(read_experiment(str(file)), Results(folder / name), Serial, command=f"run {name}")
-    return folder
+def weak(tmp_path_factory):
+    return done(tmp_path_factory.mktemp("compared"), "weak", 14.0, 2, 2)
+
+
+@pytest.fixture(scope="module")
+def strong(weak):
+    """The same with another setting, beside it."""
+    return done(weak.parent, "strong", 20.0, 2, 2)
+
+
+@pytest.fixture(scope="module")
+def compared(weak, strong):
+    """The folder of three experiments: these two, and one of other trials and one more seed than the first."""
+    return done(weak.parent, "more", 14.0, 3, 3).parent
 
 
 @pytest.mark.slow
@@ -516,9 +530,9 @@ def test_each_case_is_compared_with_that_of_the_same_name(file, run, tmp_path):
         assert one["verdict"] == "not shown to differ"
 
 
-def test_a_report_of_results_with_other_settings_says_what_happened_and_what_to_do(compared, run, tmp_path):
+def test_a_report_of_results_with_other_settings_says_what_happened_and_what_to_do(strong, run, tmp_path):
     changed = tmp_path / "changed"
-    subprocess.run(["cp", "-r", compared / "strong", changed], check=True)
+    subprocess.run(["cp", "-r", strong, changed], check=True)
     text = (changed / "experiment.toml").read_text()
     (changed / "experiment.toml").write_text(text.replace("trials = 2", "trials = 1"))
     code, _, err = run("report", changed)
@@ -529,8 +543,8 @@ def test_a_report_of_results_with_other_settings_says_what_happened_and_what_to_
     assert not (changed / "report.html").exists()
 
 
-def test_what_cannot_be_compared_is_refused_in_one_line(compared, run, tmp_path):
-    weak, strong, page = compared / "weak", compared / "strong", tmp_path / "c.html"
+def test_what_cannot_be_compared_is_refused_in_one_line(weak, strong, run, tmp_path):
+    page = tmp_path / "c.html"
     old, changed = tmp_path / "old", tmp_path / "changed"
     for copy in (old, changed):
         subprocess.run(["cp", "-r", strong, copy], check=True)
@@ -540,7 +554,7 @@ def test_what_cannot_be_compared_is_refused_in_one_line(compared, run, tmp_path)
     for arguments, reason in (
         ([weak], "give at least two experiments to compare"),
         (
-            [weak, strong, compared / "weak" / "experiment.toml"],
+            [weak, strong, weak / "experiment.toml"],
             "are the same experiment: name different ones",
         ),
         ([weak, tmp_path], "is not an experiment: there is no experiment.toml"),
@@ -556,5 +570,5 @@ def test_what_cannot_be_compared_is_refused_in_one_line(compared, run, tmp_path)
         assert not page.exists()
 
 
-def test_the_page_of_an_experiment_keeps_its_name_when_it_is_written_again(compared):
-    assert Results(compared / "weak").experiment().name == "weak"
+def test_the_page_of_an_experiment_keeps_its_name_when_it_is_written_again(weak):
+    assert Results(weak).experiment().name == "weak"

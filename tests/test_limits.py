@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+from sources import parsed, statements
+
 ROOT = Path(__file__).parents[1]
 SOURCES = (ROOT / "src", *sorted((ROOT / "plugins").glob("*/src")))
 SIMULATOR = "graspsense_sim_gripper"
@@ -52,12 +54,12 @@ LARGE_TUPLES: dict[str, str] = {}
 def modules() -> Iterator[tuple[str, ast.Module]]:
     for source in SOURCES:
         for path in sorted(source.rglob("*.py")):
-            yield path.relative_to(source).as_posix(), ast.parse(path.read_text())
+            yield path.relative_to(source).as_posix(), parsed(path)
 
 
 def functions() -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
     for name, tree in modules():
-        for node in ast.walk(tree):
+        for node in statements(tree):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 yield f"{name}:{node.name}", node
 
@@ -100,7 +102,7 @@ def test_no_tuple_of_the_simulator_has_too_many_fields():
         f"{name}:{node.name}": fields(node)
         for name, tree in modules()
         if name.startswith(SIMULATOR)
-        for node in ast.walk(tree)
+        for node in statements(tree)
         if isinstance(node, ast.ClassDef)
         and any(isinstance(base, ast.Name) and base.id == "NamedTuple" for base in node.bases)
         and fields(node) > MAX_FIELDS

@@ -12,6 +12,7 @@ from attrs import evolve
 from grippers import Scripted, bottle, squeezing
 
 from graspsense import load_pipeline
+from graspsense.cli.main import main
 from graspsense.cli.run import effort_words, print_trial
 from graspsense.core.config import resolve
 from graspsense.core.dry_run import dry_run
@@ -95,15 +96,23 @@ def test_nothing_there_is_an_outcome_with_reasons_and_exit_code_0():
         (["--gripper", "replay", "-o", "gripper.recording=icub:nowhere.txt"], 2, "nowhere.txt"),
     ],
 )
-def test_a_mistake_says_what_was_found_and_what_to_do(arguments, code, says):
-    done = graspsense("run", *arguments)
-    assert done.returncode == code, done.stderr
-    assert says in done.stderr
-    assert "Traceback" not in done.stderr
+def test_a_mistake_says_what_was_found_and_what_to_do(arguments, code, says, capsys):
     # The same as JSON, for a program.
-    as_json = graspsense("run", "--json", *arguments)
-    assert as_json.returncode == code
-    assert "Traceback" not in as_json.stderr
+    for options in ([], ["--json"]):
+        with pytest.raises(SystemExit) as ended:
+            main(["run", *options, *arguments])
+        said = capsys.readouterr().err
+        assert ended.value.code == code, said
+        assert "Traceback" not in said
+        assert options or says in said
+
+
+def test_a_mistake_ends_the_process_with_its_code():
+    for options in ([], ["--json"]):
+        done = graspsense("run", *options, "--gripper", "pr3")
+        assert done.returncode == 2
+        assert "Did you mean 'pr2'?" in done.stderr
+        assert "Traceback" not in done.stderr
 
 
 @pytest.mark.slow

@@ -149,16 +149,21 @@ def graspsense_feature_sets():
 GRASPSENSE_API = (2, 0)
 
 
-@pytest.fixture
-def recorded(tmp_path, monkeypatch):
-    """One grasp: the trial, the path of its recording, and the plugins."""
-    monkeypatch.setitem(sys.modules, __name__, HERE)
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """One grasp, which no test changes: the trial, the path of its recording, and the plugins."""
+    folder = tmp_path_factory.mktemp("recorded") / "trials"
     options = ["gripper.type=palm", "features.type=shaking", "classifier.type=none"]
-    with IsolatedPlugins() as plugins, Store.open(tmp_path / "trials") as store:
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        IsolatedPlugins() as plugins,
+        Store.open(folder) as store,
+    ):
+        patch.setitem(sys.modules, __name__, HERE)
         plugins.add(HERE, "lab-hand")
         settings = load_pipeline(options=options, plugins=plugins).settings
         trial = record_grasp(store, settings, plugins, labels={}, origin="run").trial
-        (path,) = (tmp_path / "trials" / "recordings").glob("*.mcap")
+        (path,) = (folder / "recordings").glob("*.mcap")
         yield trial, path, plugins
 
 

@@ -23,7 +23,12 @@ def pipeline():
 
 
 @pytest.mark.parametrize(
-    "name", ["odwalla:full_closed", "odwalla:full_open", "can:full_closed", "water:full_open"]
+    "name",
+    [
+        "odwalla:full_closed",
+        "water:full_open",
+        *(pytest.param(one, marks=pytest.mark.slow) for one in ("odwalla:full_open", "can:full_closed")),
+    ],
 )
 def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
     said = pipeline.grasp(object=name, seed=4).prediction
@@ -42,7 +47,7 @@ def test_object_and_state_are_named_at_once_with_the_reason(pipeline, name):
 
 
 @pytest.mark.parametrize("name", ["egg", "block", "toy"])
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_what_it_never_saw_is_unknown(pipeline, name, seed):
     said = pipeline.grasp(object=name, seed=seed).prediction
 

@@ -52,8 +52,19 @@ def assert_identical(one, other):
         np.testing.assert_array_equal(getattr(one.trace, name), getattr(other.trace, name), err_msg=name)
 
 
-@pytest.mark.parametrize("sensor", ["ideal", "pads"])
-@pytest.mark.parametrize("controller", CONTROLLERS)
+# In the quick run each controller, and each sensor, once.
+@pytest.mark.parametrize(
+    ("controller", "sensor"),
+    [
+        ("hybrid", "pads"),
+        ("force", "ideal"),
+        ("velocity", "pads"),
+        *(
+            pytest.param(*pair, marks=pytest.mark.slow)
+            for pair in (("hybrid", "ideal"), ("force", "pads"), ("velocity", "ideal"))
+        ),
+    ],
+)
 def test_a_grasp_with_free_motion_is_the_grasp_tick_by_tick(controller, sensor):
     law = create("controller", controller)
     fast, slow = (CountingBackend(SimConfig(object="can:empty_open", sensor=sensor)) for _ in range(2))
@@ -92,7 +103,12 @@ def test_free_motion_changes_no_bit_of_the_catalogue(controller, sensor):
 
 
 @pytest.mark.parametrize(
-    "settings", [{"drive_lag_s": 0.01}, {"acceleration": True}, {"explain": True}, {"object": "none"}]
+    "settings",
+    [
+        {"drive_lag_s": 0.01},
+        {"object": "none"},
+        *(pytest.param(one, marks=pytest.mark.slow) for one in ({"acceleration": True}, {"explain": True})),
+    ],
 )
 def test_settings_under_which_motion_is_not_free_give_the_same_too(settings):
     law = create("controller", "hybrid", closing_speed_m_s=0.03)

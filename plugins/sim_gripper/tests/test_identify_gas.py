@@ -67,6 +67,7 @@ def behind_pads(length, noise_n):
     return evolve(squeeze, force_n=clean + noise_n), model, law, true
 
 
+@pytest.mark.slow
 def test_intervals_of_a_gas_are_wide_where_the_shell_and_the_gas_do_nearly_the_same():
     squeeze, model, law, true = behind_pads(3.0, 0.03)
     found = uncertainty(model, fit(model, law, [squeeze]), [squeeze])

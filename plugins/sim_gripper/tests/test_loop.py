@@ -64,7 +64,7 @@ def test_with_steps_over_several_ticks_the_plain_loop_and_the_compiled_loop_give
     assert_same(plain.trace, fast.trace)
 
 
-@pytest.mark.parametrize("controller", ["velocity", "force", "hybrid"])
+@pytest.mark.parametrize("controller", [pytest.param("velocity", marks=pytest.mark.slow), "force", "hybrid"])
 def test_steps_over_several_ticks_give_the_features_of_single_ticks(controller):
     # Asked for is 1 %; the times of ticks are whole milliseconds.
     law, features = create("controller", controller), create("feature-set", "chitta")

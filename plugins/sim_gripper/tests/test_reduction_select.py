@@ -60,7 +60,7 @@ def thing(*terms):
     return ObjectSpec(name="made up", width_m=0.05, terms=terms)
 
 
-@pytest.mark.parametrize("accuracy", [0.1, 0.001])
+@pytest.mark.parametrize("accuracy", [0.1, pytest.param(0.001, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("change", "part"), [({"spread": True}, 0.5), ({}, 0.8)])
 def test_a_verified_model_says_what_a_trial_grasp_found(accuracy, change, part):
     """Where the grasp is to differ from what is tried it has the rest of the accuracy."""
@@ -245,20 +245,26 @@ def course(config, contact_force_n):
     )
 
 
-@pytest.fixture
-def stiff(tmp_path):
+@pytest.fixture(scope="module")
+def stiff(tmp_path_factory):
     """Return a config, and the force (N) that its reference meets at a tick of the approach."""
-    scene = tmp_path / "stiff.toml"
+    scene = tmp_path_factory.mktemp("stiff") / "stiff.toml"
     scene.write_text(STIFF)
     config = evolve(CONFIG, object=str(scene), accuracy=0.003, open_gap_m=0.06, pad_stiffness_n_m=3e4)
     reference = evolve(config, fidelity="reference")
     # No threshold above it changes it.
     felt = course(reference, 5.0).left_n
     met_n = float(felt[np.flatnonzero(felt >= 0.4)[0]])
-    # It matters: squeezed a tick later, the grasp is another.
+    return config, met_n
+
+
+@pytest.mark.slow
+def test_it_matters_in_which_tick_this_threshold_is_met(stiff):
+    config, met_n = stiff
+    reference = evolve(config, fidelity="reference")
+    # Squeezed a tick later, the grasp is another.
     error, _ = deviation(course(reference, met_n - 0.08), course(reference, met_n + 0.08))
     assert error > 2.0 * config.accuracy
-    return config, met_n
 
 
 @pytest.mark.slow
@@ -306,21 +312,23 @@ def test_with_spread_a_step_per_tick_is_chosen_if_it_suffices_for_several_instan
 
 
 def test_a_step_per_tick_is_chosen_where_it_is_accurate_enough_and_not_where_it_is_not():
-    soft = thing(SHELL)
     stiff = thing(("elastic", {"k1_n_m": 5e5}), ("maxwell", {"k_n_m": 2e5, "tau_s": 0.01}))
-    tight = selected(evolve(CONFIG, accuracy=1e-4), soft, hybrid())
+    tight = selected(evolve(CONFIG, accuracy=1e-4), thing(SHELL), hybrid())
     assert tight.level == PLAIN_SCALES[0].at(1e-4)
     assert tight.verification.error <= 0.8e-4
-    # Stiffer, the same accuracy needs the third order.
-    rigid = evolve(CONFIG, accuracy=1e-4, pad_stiffness_n_m=math.inf)
-    higher = selected(rigid, thing(("elastic", {"k1_n_m": 2e5})), hybrid())
-    assert higher.steps.scheme == BOGACKI_SHAMPINE
-    assert higher.verification.error <= 0.8e-4
-    controlled = selected(rigid, stiff, hybrid())
+    controlled = selected(evolve(CONFIG, accuracy=1e-4, pad_stiffness_n_m=math.inf), stiff, hybrid())
     assert controlled.steps.tolerance < math.inf
     # Steps without an estimate of their error are valid for the forces that were tried.
     assert tight.valid_for(tight.point.force_n)
     assert not tight.valid_for(10.0 * tight.point.force_n)
+
+
+@pytest.mark.slow
+def test_a_step_per_tick_is_of_third_order_where_the_object_is_stiffer():
+    rigid = evolve(CONFIG, accuracy=1e-4, pad_stiffness_n_m=math.inf)
+    higher = selected(rigid, thing(("elastic", {"k1_n_m": 2e5})), hybrid())
+    assert higher.steps.scheme == BOGACKI_SHAMPINE
+    assert higher.verification.error <= 0.8e-4
 
 
 def test_a_linear_scene_is_discretised_exactly_and_takes_no_steps():
@@ -388,7 +396,7 @@ def test_trial_grasps_end_at_a_limit_of_work_and_the_full_model_runs(monkeypatch
         ("k1_n_m = 1000.0", {}, []),
         ("k1_n_m = 1000.0", {"expected_force_n": 5.0}, ["peak", "trace", "features"]),
         ("k1_n_m = 1000.0", {"step_s": 1e-3}, ["peak", "trace", "features"]),
-        ("k1_n_m = 1000.0", {"fidelity": "reference"}, []),
+        pytest.param("k1_n_m = 1000.0", {"fidelity": "reference"}, [], marks=pytest.mark.slow),
         ("k1_n_m = 1e7", {"pad_stiffness_n_m": math.inf}, ["trace", "features"]),
         (
             'k1_n_m = 1000.0\n[[terms]]\ntype = "slosh"\nmass_kg = 1.0\nfrequency_hz = 1e5',
@@ -413,9 +421,14 @@ def test_the_report_says_which_quantities_are_not_verified(terms, further, unsur
     [
         ({}, 15000.0, ""),
         # On a free mass of 1 kg, the gain times the tick may be at most 2 kg: 1 - 4 is -3.
-        ({"transmission": "straight", "moving_mass_kg": 1.0}, 1900.0, ""),
+        pytest.param({"transmission": "straight", "moving_mass_kg": 1.0}, 1900.0, "", marks=pytest.mark.slow),
         ({"transmission": "straight", "moving_mass_kg": 1.0}, 4000.0, "factor of 2.99 in each tick of 1 ms"),
-        ({"transmission": "straight", "moving_mass_kg": 1.0, "drive_lag_s": 1e-3}, 4000.0, "factor of 1.19"),
+        pytest.param(
+            {"transmission": "straight", "moving_mass_kg": 1.0, "drive_lag_s": 1e-3},
+            4000.0,
+            "factor of 1.19",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_an_unstable_sampled_loop_is_named_in_the_report(gripper, gain, growth, tmp_path):

@@ -19,7 +19,9 @@ def approach(sensor, law=HYBRID, scene="odwalla:full_closed", **settings):
 
 
 @pytest.mark.parametrize("scene", ["odwalla:full_closed", "toy"])
-@pytest.mark.parametrize("speed_m_s", [0.004, 0.01, 0.04])
+@pytest.mark.parametrize(
+    "speed_m_s", [*(pytest.param(v, marks=pytest.mark.slow) for v in (0.004, 0.01)), 0.04]
+)
 def test_the_fingers_arrive_when_they_do_tick_by_tick(scene, speed_m_s):
     # The toy stands off the centre, and a finger pushes it across the table.
     law = create("controller", "hybrid", closing_speed_m_s=speed_m_s)

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from importlib.metadata import packages_distributions
 from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 from string import Template
 from typing import Final
@@ -263,6 +264,9 @@ def _check_importable(name: str) -> None:
         raise ConfigError(f"the name {name!r} is not valid: {package} is a keyword of Python")
     if package in sys.stdlib_module_names:
         raise ConfigError(f"the name {name!r} is taken: Python itself has a module {package}")
+    if package not in sys.modules and find_spec(package) is None:
+        # Asking which distribution has it reads the lists of the files of all, which takes half a second.
+        return
     plugins = {source.distribution for source in installed_sources()}
     others = [
         one for one in packages_distributions().get(package, ()) if canonical(one) not in {name} & plugins

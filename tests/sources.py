@@ -1,0 +1,23 @@
+"""The source files of the project as syntax trees; each is parsed once in a process."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield every statement below a node, at whatever depth; expressions, which hold none, are not searched."""
+    for part in ("body", "handlers", "cases", "orelse", "finalbody"):
+        inner = getattr(node, part, ())
+        # In a lambda and in `a if b else c`, which are expressions, they are no lists.
+        for one in inner if isinstance(inner, list) else ():
+            yield one
+            yield from statements(one)
