@@ -60,10 +60,11 @@ from attrs import asdict, evolve, frozen
 from graspsense import load_pipeline
 from graspsense.core.identification import Identification, RecordedSqueeze
 from graspsense.evaluation.intervals import wilson
+from graspsense.inference import interval_of_mean
 from graspsense.plugin_api import RunConfig, create, table_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.identify.gas import combinations
-from graspsense_sim_gripper.identify.interval import normal, student
+from graspsense_sim_gripper.identify.interval import LEVEL, normal
 from graspsense_sim_gripper.identify.laws import SLOTS
 from graspsense_sim_gripper.identify.run import identify
 from graspsense_sim_gripper.objects.instance import _draws_of_number
@@ -306,7 +307,8 @@ def mean_is_covered(row: Mapping[str, Any]) -> bool:
     """
     seeds = seeds_of(row["scene"], row["sensor"], row["recordings"], row["repeat"])
     drawn = np.array([_draws_of_number(SCENE_IN_MEMORY, seed, 2)[0] for seed in seeds])
-    return bool(abs(drawn.mean()) < student(len(drawn) - 1) * drawn.std(ddof=1) / math.sqrt(len(drawn)))
+    low, high = interval_of_mean(drawn, LEVEL)
+    return low < 0.0 < high
 
 
 def drawn_are_covered(row: Mapping[str, Any]) -> bool | None:

@@ -16,6 +16,7 @@ from graspsense.plugin_api import (
     IdentifiedParameter,
     RecordedSqueeze,
     SqueezeFit,
+    interval_of_mean,
 )
 from graspsense_sim_gripper.build import drive_and_pads
 from graspsense_sim_gripper.config import SimConfig
@@ -29,7 +30,7 @@ from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.fracture import FractureFit, fracture_of
 from graspsense_sim_gripper.identify.individual import Individual, simplest_alone
-from graspsense_sim_gripper.identify.interval import student
+from graspsense_sim_gripper.identify.interval import LEVEL
 from graspsense_sim_gripper.identify.laws import DataScale, memories
 from graspsense_sim_gripper.identify.path_error import without_path_error
 from graspsense_sim_gripper.identify.prepare import FULL, NoSqueeze, Squeeze, prepared, resolution
@@ -398,11 +399,10 @@ def share_spread(shares: Sequence[float], share_error: float) -> float:
 
 def _mean(name: str, unit: str, values: Any) -> IdentifiedParameter:
     """Return the mean of a quantity of each squeeze, with the interval of Student's t; a single one has none."""
-    n, mean = len(values), float(np.mean(values))
-    half = student(n - 1) * float(np.std(values, ddof=1)) / math.sqrt(n) if n > 1 else math.nan
+    n, (low, high) = len(values), interval_of_mean(values, LEVEL)
     basis = f"between {n} squeezes" if n > 1 else "one squeeze: no interval"
     return IdentifiedParameter(
-        name=name, unit=unit, value=mean, low=mean - half, high=mean + half, basis=basis
+        name=name, unit=unit, value=float(np.mean(values)), low=low, high=high, basis=basis
     )
 
 
