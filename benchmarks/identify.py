@@ -464,6 +464,52 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def coverage_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the table of the coverage with the true terms given: by sensor and number of recordings."""
+    columns = (
+        "sensor",
+        "squeezes",
+        "scenes",
+        "90 % intervals that cover",
+        "scenes whose drawn error is covered",
+    )
+    columns += ("intervals that cover there", "and in the other scenes", "weighted by nine and one tenths")
+    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    for sensor, count in product(SENSORS, COUNTS):
+        group = [one for one in rows if one["sensor"] == sensor and one["recordings"] == count]
+        within = [one for one in group if drawn_are_covered(one)]
+        beyond = [one for one in group if drawn_are_covered(one) is False]
+        if not group:
+            continue
+        cells = (
+            *(sensor, str(count), str(len(group)), _covered_share(group)),
+            _share(len(within), len(within) + len(beyond)),
+            *(_hits(within), _hits(beyond), _weighted(within, beyond)),
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def _hits(group: Sequence[Mapping[str, Any]]) -> str:
+    covered = _covered([one["found"] for one in group])
+    return f"{sum(covered)} of {len(covered)}" if covered else "–"
+
+
+def _weighted(within: Sequence[Mapping[str, Any]], beyond: Sequence[Mapping[str, Any]]) -> str:
+    """Return the coverage with the probabilities of both kinds of scenes, and its standard error between scenes."""
+    if len(within) < 2 or len(beyond) < 2:
+        return "–"
+    share = variance = 0.0
+    for weight, group in ((LEVEL, within), (1.0 - LEVEL, beyond)):
+        sizes = np.array([len(one["found"]) for one in group])
+        hits = np.array([sum(_covered([one["found"]])) for one in group])
+        own = float(hits.sum() / sizes.sum())
+        squares = float(np.sum((hits - own * sizes) ** 2)) * len(group) / (len(group) - 1)
+        share += weight * own
+        variance += weight**2 * squares / float(sizes.sum()) ** 2
+    return f"{100.0 * share:.0f} ± {100.0 * math.sqrt(variance):.1f} %"
+
+
 def delays_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the table of the delays: by sensor, number of recordings, and delay."""
     columns = ("sensor", "squeezes", "forces late by", "scenes", "delay used", "not determined")
@@ -755,6 +801,8 @@ def main() -> None:
 
 def _tables(asked: argparse.Namespace) -> Callable[[Sequence[Mapping[str, Any]]], str]:
     """Return what writes the tables of the asked rows."""
+    if asked.true_terms:
+        return coverage_markdown
     if asked.spreads:
         return spreads_markdown
     return delays_markdown if asked.delays else as_markdown
@@ -769,6 +817,8 @@ def _publish(asked: argparse.Namespace) -> None:
         write_between(asked.markdown, "true steps", true_steps_markdown(rows))
     elif asked.markdown and asked.transfer:
         write_between(asked.markdown, "transfer", transfer_markdown(rows))
+    elif asked.markdown and asked.true_terms:
+        write_between(asked.markdown, "coverage", coverage_markdown(rows))
     elif asked.markdown and asked.spreads:
         write_between(asked.markdown, "spreads", spreads_markdown(rows))
     elif asked.markdown and asked.delays:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from attrs import evolve
-from identify import SCENES, scene_text, squeezes_of
+from identify import SCENES, drawn_are_covered, scene_text, seeds_of, squeezes_of
 
 from graspsense.plugin_api import ConfigError
-from graspsense_sim_gripper.build import drive_and_pads
+from graspsense_sim_gripper.build import build, drive_and_pads, instantiate
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.identify.fit import fit
 from graspsense_sim_gripper.identify.forward import ForwardModel
@@ -65,6 +65,17 @@ def test_the_balance_of_energy_gives_the_share_of_the_cells_without_bias(name):
     assert measured_share(ideal.trace, prepared(ideal, 0.0), drive) == pytest.approx(1.0, rel=5e-4)
     cells = squeeze_of(name, sensor="pads", coulomb_spread_n=0.0)
     assert measured_share(cells.trace, prepared(cells, 0.0), drive) == pytest.approx(0.6, rel=4e-3)
+
+
+def test_the_benchmark_knows_the_friction_that_a_squeeze_has_drawn():
+    scene, config = scene_text(SCENES["spring"], 0.0), SimConfig(sensor="pads")
+    for repeat in range(20):
+        (seed,) = seeds_of("spring", "PR2 pads", 1, repeat)
+        drawn = instantiate(build(config, f"{scene}#{seed}"), None, seed).plant.drive.friction.coulomb_n
+        # 90 % of a normal distribution lie within 1.645 standard deviations.
+        within = abs(drawn - config.coulomb_n) < 1.644854 * config.coulomb_spread_n
+        row = {"scene": "spring", "sensor": "PR2 pads", "recordings": 1, "repeat": repeat}
+        assert drawn_are_covered(row) is within
 
 
 @pytest.mark.slow
