@@ -49,8 +49,11 @@ def test_the_nodes_of_a_path_bias_relaxation_times_and_the_error_is_taken_away()
 
 def test_a_recording_with_fewer_ticks_than_nodes_has_no_finer_path():
     squeeze = prepared(squeeze_of("spring", sensor="ideal"), 0.0)
-    assert len(on_all_ticks(squeeze).t_s) > len(squeeze.t_s)
     times, gaps = squeeze.course
+    twice = evolve(squeeze, course=(np.repeat(times, 2), np.repeat(gaps, 2)))
+    for fine in (on_all_ticks(squeeze), on_all_ticks(twice)):
+        assert len(fine.t_s) > len(squeeze.t_s)
+        assert np.min(np.diff(fine.t_s)) > 1e-9
     coarse = evolve(squeeze, course=(times[::100], gaps[::100]))
     model = ForwardModel(pads=drive_and_pads(SimConfig())[1])
     fitted = fit(model, static_candidates(_scale([squeeze]))[0], [squeeze])

@@ -26,6 +26,9 @@ Floats = NDArray[np.float64]
 LARGEST_BIAS: Final = 0.01
 """A larger change of a logarithm is one along a flat valley of the squares, and no error of the path."""
 
+SHORTEST: Final = 0.1
+"""The shortest distance between two nodes, over that of two ticks."""
+
 
 def without_path_error(
     model: ForwardModel, fitted: Fitted, found: Uncertainty, squeezes: Sequence[Squeeze]
@@ -69,6 +72,8 @@ def on_all_ticks(squeeze: Squeeze) -> Squeeze:
     end_s = squeeze.t_s[-1] + math.sqrt(3.0 * squeeze.averaged_s2[-1])
     part = (t_s > squeeze.t_s[0]) & (t_s < end_s)
     nodes = np.concatenate([squeeze.t_s[:1], t_s[part], [end_s]])
+    # Over a step of 1e-15 s, the rate of compression would be arbitrary.
+    nodes = nodes[np.diff(nodes, prepend=-np.inf) > SHORTEST * float(np.median(np.diff(t_s)))]
     gap = np.interp(nodes, t_s, gap)
     return evolve(
         squeeze,
