@@ -1,10 +1,12 @@
 """Many simulated grasps at once, and the time of compiling.
 
-    python benchmarks/simulation.py [--json] [--short] [--only many,compile] [--grasps 10000]
+    python benchmarks/simulation.py [--json] [--short] [--only many,number,compile] [--grasps 4000] [--repeats 10]
 
-Many grasps: the catalogue in turn, with features, on all cores. Compiling: all of the catalogue in a fresh process,
-with an empty cache and a full one. Values that were not measured are null. Only processor times are meaningful on a
-busy machine. `--short` simulates 100 grasps. Other engines: `peers.py`.
+Many grasps (`many`): the catalogue in turn, with features, on one core and on all, with pads and with ideal sensors,
+in turn; the median, the least and the most of the repeats. By their number (`number`): batches of a hundred to
+`--largest` grasps on all cores. Compiling (`compile`): all of the catalogue in a fresh process, with an empty cache and
+a full one. Values that were not measured are null. On a busy machine only processor times are meaningful. `--short`
+simulates 300 grasps once. Other engines: `peers.py`.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ from datetime import date
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from statistics import median
+from typing import Any, Final
 
 from graspsense import __version__
 from graspsense.plugin_api import BatchOptions, create
@@ -32,15 +35,19 @@ from graspsense_sim_gripper.batch.threads import grasps, job_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue
 
+SENSORS: Final = ("ideal", "pads")
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("--short", action="store_true", help="100 grasps, nothing compiled anew")
-    parser.add_argument("--only", default="many,compile")
-    parser.add_argument("--grasps", type=int, default=10_000)
+    parser.add_argument("--short", action="store_true", help="300 grasps once, nothing compiled anew")
+    parser.add_argument("--only", default="many,number,compile")
+    parser.add_argument("--grasps", type=int, default=4000)
+    parser.add_argument("--repeats", type=int, default=10)
+    parser.add_argument("--largest", type=int, default=10_000)
     parser.add_argument("--compile-once", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.compile_once:
@@ -51,13 +58,22 @@ def main() -> None:
     if "compile" in wanted:
         result.update(compiling())
     if "many" in wanted:
-        result.update(many(100 if given.short else given.grasps))
+        result.update(many(300, 1) if given.short else many(given.grasps, given.repeats))
+    if "number" in wanted:
+        result.update(by_number(given.largest))
     result["load_at_the_end"] = os.getloadavg()[0]
     if given.json:
         print(json.dumps(finite(result), indent=2))
         return
     for key, value in result.items():
-        print(f"{key:<34}{value if not isinstance(value, float) else f'{value:.4g}'}")
+        print(f"{key:<32}{in_words(value)}")
+
+
+def in_words(value: Any) -> str:
+    """Return a value of the result as text."""
+    if isinstance(value, dict) and "median" in value:
+        return f"{value['median']:.0f} ({value['least']:.0f} to {value['most']:.0f})"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def made() -> dict[str, Any]:
@@ -90,37 +106,60 @@ def processor() -> str:
 # -------------------------------------------------------------------------------------------------- many
 
 
-def many(n: int) -> dict[str, Any]:
-    """Return grasps a second with features, of ideal and of full sensing; the cost of one by how many there are."""
-    law, features = create("controller", "hybrid"), create("feature-set", "chitta")
-    names = sorted(catalogue())
-    result: dict[str, Any] = {"grasps": n}
-    for sensor, name in (("ideal", "grasps_per_s_ideal"), ("pads", "grasps_per_s_full")):
-        config = SimConfig(sensor=sensor)  # type: ignore[arg-type]
-
-        def run(count: int, config: SimConfig = config) -> tuple[float, float]:
-            scenes = [names[k % len(names)] for k in range(count)]
-            began, spent = time.perf_counter(), time.process_time()
-            options: BatchOptions = {"extract": features.extract}
-            job = job_of(config, law, options, features=features)
-            # As the commands do, which keep no results but their own numbers.
-            for _ in grasps(job, scenes, range(count), True, options):
-                pass
-            return time.perf_counter() - began, time.process_time() - spent
-
-        run(len(names))
-        counts = [c for c in (100, 1000, 10_000, 100_000) if c < n] + [n]
-        by_count = {}
-        for count in counts:
-            wall, cpu = run(count)
-            by_count[str(count)] = {
-                "ms_of_processor_a_grasp": 1e3 * cpu / count,
-                "largest_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-            }
-        result[name] = n / wall
-        result[f"{name}_if_both_cores_were_free"] = (os.cpu_count() or 1) * n / cpu
-        result[f"{name}_by_count"] = by_count
+def many(n: int, repeats: int) -> dict[str, Any]:
+    """Return grasps a second with features, of both sensors and with one worker and many, and the cost by number."""
+    workers, rates = (1, os.cpu_count() or 1), dict[str, list[float]]()
+    for sensor in SENSORS:
+        run_batch(sensor, 100, 1)
+    for _ in range(repeats):
+        for sensor in SENSORS:
+            for count in dict.fromkeys(workers):
+                rates.setdefault(f"grasps_per_s_{sensor}_{count}_workers", []).append(
+                    n / run_batch(sensor, n, count)["s"]
+                )
+    result: dict[str, Any] = {"grasps": n, "repeats": repeats}
+    for name, values in rates.items():
+        result[name] = {"median": median(values), "least": min(values), "most": max(values)}
     return result
+
+
+def by_number(largest: int) -> dict[str, Any]:
+    """Return the time of a grasp in batches of a hundred grasps and more, on all cores, and the memory."""
+    counts = [count for count in (100, 1000, 10_000, 100_000) if count < largest] + [largest]
+    result: dict[str, Any] = {}
+    for sensor in SENSORS:
+        run_batch(sensor, 100, 1)
+        result[f"by_number_{sensor}"] = {
+            str(count): {
+                "ms_on_the_clock_a_grasp": 1e3 * run["s"] / count,
+                "ms_of_processor_a_grasp": 1e3 * run["processor_s"] / count,
+                "largest_memory_mb": run["memory_mb"],
+            }
+            for count in counts
+            for run in [run_batch(sensor, count, os.cpu_count() or 1)]
+        }
+    return result
+
+
+def run_batch(sensor: str, n: int, workers: int) -> dict[str, float]:
+    """Grasp the catalogue in turn with features; return the time on the clock and of all processors, and the memory.
+
+    As the commands do, it keeps no results but their own numbers. The memory is that of the largest process.
+    """
+    law, features = create("controller", "hybrid"), create("feature-set", "chitta")
+    names, config = sorted(catalogue()), SimConfig(sensor=sensor)  # type: ignore[arg-type]
+    scenes = [names[k % len(names)] for k in range(n)]
+    options: BatchOptions = {"extract": features.extract, "workers": workers}
+    began, spent = time.perf_counter(), sum(os.times()[:4])
+    job = job_of(config, law, options, features=features)
+    for _ in grasps(job, scenes, range(n), True, options):
+        pass
+    used = [resource.getrusage(of).ru_maxrss for of in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return {
+        "s": time.perf_counter() - began,
+        "processor_s": sum(os.times()[:4]) - spent,
+        "memory_mb": max(used) / 1024,
+    }
 
 
 # ----------------------------------------------------------------------------------------------- compile

@@ -134,7 +134,13 @@ _TABLE: Final[Table] = {
     "Feature sets": {
         "features": ("Features", "missing"),
         "roles": ("FeatureSet",),
-        "compiled_features": ("CompiledExtraction", "CompiledFeatures", "TickColumns", "compiled_extraction"),
+        "compiled_features": (
+            "CompiledExtraction",
+            "CompiledFeatures",
+            "TickColumns",
+            "columns_of_ticks",
+            "compiled_extraction",
+        ),
         "trace": ("ImageTrace", "SampleTrace", "Trace", "TraceRecorder", "trace_of"),
         "units": ("in_words",),
     },

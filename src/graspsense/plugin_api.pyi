@@ -133,6 +133,7 @@ from graspsense.core.roles import FeatureSet as FeatureSet
 from graspsense.core.compiled_features import CompiledExtraction as CompiledExtraction
 from graspsense.core.compiled_features import CompiledFeatures as CompiledFeatures
 from graspsense.core.compiled_features import TickColumns as TickColumns
+from graspsense.core.compiled_features import columns_of_ticks as columns_of_ticks
 from graspsense.core.compiled_features import compiled_extraction as compiled_extraction
 from graspsense.core.trace import ImageTrace as ImageTrace
 from graspsense.core.trace import SampleTrace as SampleTrace

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from itertools import repeat
-from typing import TYPE_CHECKING, Any, Final, Unpack
+from typing import Any, Final, Unpack
 
 from attrs import evolve
 
@@ -62,9 +62,6 @@ from graspsense_sim_gripper.sensing import (
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
-
-if TYPE_CHECKING:
-    from graspsense_sim_gripper.batch.job import FinishedGrasp
 
 SIDES: Final = ("left", "right")
 
@@ -351,15 +348,7 @@ class SimBackend(BatchBackend[SimConfig]):
                 reason=grasp.reason,
                 extracted=grasp.extracted,
                 trace=grasp.kept,
-                report=_report_of(grasp, scene),
+                report=grasp.report(kinds_in(scene)),
             )
             for grasp, scene in zip(done, scenes, strict=True)
         ]
-
-
-def _report_of(grasp: FinishedGrasp, scene: str) -> dict[str, Any]:
-    """Return the report of a grasp of a batch."""
-    report = model_report(grasp.state, kinds_in(scene))
-    if grasp.reduction is not None:
-        report |= accuracy_report(report, grasp.reduction, grasp.unstable_loop)
-    return report

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -46,6 +46,7 @@ from graspsense_sim_gripper.loop import (
     has_ended,
     uses_macro_steps,
 )
+from graspsense_sim_gripper.model_report import accuracy_report, model_report
 from graspsense_sim_gripper.objects.library import split_number
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers, sample_trace
@@ -84,8 +85,8 @@ class FinishedGrasp:
 
     outcome: Outcome
     reason: str
-    _end: PlantState
-    """The plant at the end of the grasp, as its loop returned it."""
+    _end: PlantState | Callable[[], PlantState]
+    """The plant at the end of the grasp, as its loop returned it, or what reads it from another process' answer."""
     extracted: Extracted
     """What `Job.extract` returned for the trace; None if there is no `Job.extract`."""
     kept: Trace | None
@@ -96,11 +97,21 @@ class FinishedGrasp:
     """The text of `sampled_loop.instability` for the scene."""
     _layout: PaddedLayout | None = None
     """The layout of the terms in `_end`; None: they are those of the object."""
+    _told: Mapping[str, Any] | None = None
+    """The `model_report` of the grasp, if another process has made it."""
 
     @property
     def state(self) -> PlantState:
         """The plant at the end of the grasp, with the true peak force."""
-        return self._end if self._layout is None else unpadded(self._end, self._layout)
+        end = self._end() if callable(self._end) else self._end
+        return end if self._layout is None else unpadded(end, self._layout)
+
+    def report(self, kinds: Sequence[str]) -> dict[str, Any]:
+        """Return the `model_report` of the grasp, with what its model does not verify; `kinds`: those of its terms."""
+        report = dict(self._told) if self._told is not None else model_report(self.state, kinds)
+        if self.reduction is not None:
+            report |= accuracy_report(report, self.reduction, self.unstable_loop)
+        return report
 
     def in_model(self, reduction: Reduction, unstable_loop: str) -> FinishedGrasp:
         """Return the same result with the reduced model, and the text of `sampled_loop.instability` for it."""
@@ -110,6 +121,7 @@ class FinishedGrasp:
             reason=self.reason,
             end=self._end,
             layout=self._layout,
+            told=self._told,
             extracted=self.extracted,
             kept=self.kept,
             reduction=reduction,
@@ -177,6 +189,8 @@ class Scenes:
     """By the name of the scene, with the number of the instance."""
     _unstable: dict[tuple[str, bool], str] = field(factory=dict, init=False)
     """Why the sampled loop is unstable, by `scene_key`."""
+    _initial: dict[tuple[str, bool], PlantState] = field(factory=dict, init=False)
+    """What `initial` returns, by `scene_key`."""
 
     def add(self, scene: str, *, compiled: bool = False) -> None:
         """Select the model of a scene. `compiled`: run the trial grasps compiled, not in the interpreter.
@@ -209,6 +223,13 @@ class Scenes:
                 problem = evolve(problem, number=split_number(scene)[1])
             known = self._problems[scene] = problem, reduction
         return instantiate(*known, seed)
+
+    def initial(self, scene: str) -> PlantState:
+        """Return a state of the plant before a grasp of the scene; its numbers may be those of any seed."""
+        key = scene_key(scene)
+        if key not in self._initial:
+            self._initial[key] = self.setup(scene, 0).state
+        return self._initial[key]
 
     def in_its_model(self, grasp: FinishedGrasp, scene: str, seed: int) -> FinishedGrasp:
         """Return a grasp of a scene together with the reduced model that it was simulated in."""

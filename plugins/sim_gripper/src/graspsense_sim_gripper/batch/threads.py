@@ -1,8 +1,9 @@
 """Simulating many grasps on all cores: compiled if numba is installed, otherwise in the interpreter.
 
-Threads process slices of the batch in turn. A compiled loop runs in its thread without the interpreter lock. Grasps in
-the interpreter run in one process per thread, because loops in one process would wait for the lock. The result of a
-grasp depends on its scene and seed only; the number of workers changes the run time only.
+Threads process slices of the batch in turn. A compiled loop runs in its thread without the interpreter lock; where
+forking is safe and the results can be sent, a large batch of compiled grasps runs in one forked process per thread
+(`forked`). Grasps in the interpreter run in one new process per thread (`worker`). The result of a grasp depends on its
+scene and seed only; the number of workers changes the run time only.
 """
 
 from __future__ import annotations
@@ -15,11 +16,23 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from importlib.util import find_spec
+from queue import SimpleQueue
 from typing import Any, Final, Unpack
 
+import numpy as np
 from attrs import define, field
 
 from graspsense.plugin_api import BatchOptions, Controller, FeatureSet, NotCompilable, RunConfig, entry_point
+from graspsense_sim_gripper.batch.forked import (
+    REFUSED,
+    ForkedProcess,
+    MeasuredNumbers,
+    can_be_sent,
+    can_fork,
+    measuring,
+    results,
+    told,
+)
 from graspsense_sim_gripper.batch.job import (
     FinishedGrasp,
     GraspLoop,
@@ -38,6 +51,7 @@ from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
 from graspsense_sim_gripper.compiled.noise import DrawNoise, compiled_noise, draw_by_numpy
 from graspsense_sim_gripper.compiled.padding import compiled_kinds, composition_of
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.loop import COLUMNS
 from graspsense_sim_gripper.objects.library import kinds_in
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.problem import GraspSetup
@@ -46,12 +60,17 @@ WORTH_COMPILING: Final = 50
 """Number of grasps of one composition from which compiling saves more time than it takes."""
 WORTH_A_PROCESS: Final = 16
 """Number of grasps per worker in the interpreter from which a process, which starts in half a second, saves time."""
+WORTH_FORKING: Final = 500
+"""Number of compiled grasps from which forked processes save time on two cores; they start and end in 20 ms."""
 SLICE: Final = 16
 """Number of grasps that a worker takes at once."""
 MAX_AHEAD: Final = 8
 """Number of slices per worker that may be ahead of the earliest unfinished slice."""
 PROGRESS_S: Final = 0.2
 """Time between two calls of the progress callback."""
+
+Answer = list[FinishedGrasp] | bytes
+"""The results of a slice, or the answer of a forked process with them."""
 
 
 def run_many(
@@ -141,6 +160,8 @@ class _Batch:
     local: threading.local = field(factory=threading.local, init=False)
     """The storage of each thread, and its process for grasps in the interpreter."""
     processes: ExitStack = field(factory=ExitStack, init=False)
+    forked: SimpleQueue[ForkedProcess] = field(factory=SimpleQueue, init=False)
+    """The forked processes that no thread uses at present."""
 
     @models.default
     def _models(self) -> Scenes:
@@ -155,17 +176,21 @@ class _Batch:
         self._plan()
         slices = range(0, total, SLICE)
         workers = max(1, min(self.workers, len(slices)))
-        running: dict[Future[list[FinishedGrasp]], int] = {}
-        ready: dict[int, list[FinishedGrasp]] = {}
+        running: dict[Future[Answer], int] = {}
+        ready: dict[int, Answer] = {}
         asked = given = finished = 0
         with self.processes, ThreadPoolExecutor(max_workers=workers) as pool:
+            # A thread starts with the first slice that is submitted, and processes are forked before.
+            if self._worth_forking(workers, progress):
+                self._fork(workers)
+            run = self._slice if self.forked.empty() else self._forked_slice
             try:
                 while True:
                     # Two slices per worker, one in reserve: few results wait, and an interruption takes effect soon.
                     while len(running) < 2 * workers and asked < min(
                         len(slices), given + MAX_AHEAD * workers
                     ):
-                        running[pool.submit(self._slice, slices[asked])] = asked
+                        running[pool.submit(run, slices[asked])] = asked
                         asked += 1
                     if progress is not None:
                         progress(finished, total)
@@ -174,11 +199,11 @@ class _Batch:
                     for future in wait(running, PROGRESS_S, FIRST_COMPLETED).done:
                         k = running.pop(future)
                         ready[k] = future.result()
-                        finished += len(ready[k])
+                        finished += len(self._part(slices[k]))
                     while given in ready:
-                        part = slice(slices[given], slices[given] + SLICE)
-                        done = zip(ready.pop(given), self.scenes[part], self.seeds[part], strict=True)
-                        yield from (self.models.in_its_model(*one) for one in done)
+                        part = self._part(slices[given])
+                        done = zip(self._read(ready.pop(given), part), part, strict=True)
+                        yield from (self.models.in_its_model(grasp, *one) for grasp, one in done)
                         given += 1
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
@@ -217,16 +242,83 @@ class _Batch:
             except NotCompilable as error:
                 self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
 
+    def _worth_forking(self, workers: int, progress: Callable[[int, int], None] | None) -> bool:
+        """Return whether forked processes run the grasps; all code is compiled then."""
+        worth = workers > 1 and len(self.scenes) >= WORTH_FORKING and all(self.is_compiled.values())
+        may_be_sent = can_be_sent(self.job) and (self.job.extract is None or self.measure is not None)
+        if not (worth and may_be_sent and can_fork()):
+            return False
+        # In a thread, so that `progress` is called while code is compiled. It has ended before a process is forked.
+        with ThreadPoolExecutor(max_workers=1) as pool:
+            compiling = pool.submit(self._one_of_each)
+            while not wait([compiling], PROGRESS_S).done:
+                if progress is not None:
+                    progress(0, len(self.scenes))
+        return compiling.result()
+
+    def _one_of_each(self) -> bool:
+        """Run a grasp of each composition, which compiles its loop. Return whether all of them could be compiled."""
+        missing = set(self.is_compiled)
+        for scene, seed in zip(self.scenes, self.seeds, strict=True):
+            if not missing:
+                break
+            setup = self.models.setup(scene, seed)
+            composition = composition_of(self.job.config, setup)
+            if composition in missing and self._compiled(setup) is None:
+                return False
+            missing.discard(composition)
+        return True
+
+    def _fork(self, workers: int) -> None:
+        processes: list[ForkedProcess] = []
+        for _ in range(workers):
+            process = self.processes.enter_context(ForkedProcess(self._answer, tuple(processes)))
+            processes.append(process)
+            self.forked.put(process)
+
+    def _answer(self, begin: int) -> list[Any]:
+        """Return, in a forked process, the results of the slice that begins at this index, as JSON values."""
+        if self.job.extraction is not None and not isinstance(self.job.extract, MeasuredNumbers):
+            self.job = self.models.job = measuring(self.job)
+        return [
+            told(grasp, scene)
+            for grasp, (scene, _) in zip(self._slice(begin), self._part(begin), strict=True)
+        ]
+
+    def _forked_slice(self, begin: int) -> Answer:
+        """Return the answer of a forked process for a slice, or the results if it cannot run the slice."""
+        process = self.forked.get()
+        try:
+            answer = process.answer(begin)
+        finally:
+            self.forked.put(process)
+        return self._slice(begin) if answer == REFUSED else answer
+
+    def _read(self, answer: Answer, part: Sequence[tuple[str, int]]) -> list[FinishedGrasp]:
+        """Return the results in an answer for these scenes and seeds."""
+        if not isinstance(answer, bytes):
+            return answer
+        form, pattern = self.job.extraction, None
+        if form is not None and self.measure is not None:
+            # What is measured on no ticks has the same type.
+            pattern = self.measure(form.params, np.zeros((len(COLUMNS), 1)), np.zeros(1, np.int64), 0)
+        return results(answer, form, pattern, (self.models.initial(scene) for scene, _ in part))
+
+    def _part(self, begin: int) -> list[tuple[str, int]]:
+        """Return the scene and the seed of each grasp of the slice that begins at this index."""
+        part = slice(begin, begin + SLICE)
+        return list(zip(self.scenes[part], self.seeds[part], strict=True))
+
     def _worth(self, n: int) -> bool:
         return n >= WORTH_COMPILING if self.compiled is None else self.compiled
 
     def _slice(self, begin: int) -> list[FinishedGrasp]:
         """Run the grasps of the slice that begins at this index."""
-        scenes, seeds = self.scenes[begin : begin + SLICE], self.seeds[begin : begin + SLICE]
+        part = self._part(begin)
         done: dict[int, FinishedGrasp] = {}
         plain: list[int] = []
         # All at first: between the loops of two grasps, the processor's caches hold little of the code for this.
-        setups = [self.models.setup(*grasp) for grasp in zip(scenes, seeds, strict=True)]
+        setups = [self.models.setup(*grasp) for grasp in part]
         for i, setup in enumerate(setups):
             grasp = self._compiled(setup)
             if grasp is None:
@@ -234,9 +326,9 @@ class _Batch:
             else:
                 done[i] = grasp
         if plain:
-            grasps = self._plain([scenes[i] for i in plain], [seeds[i] for i in plain])
+            grasps = self._plain([part[i] for i in plain])
             done.update(zip(plain, grasps, strict=True))
-        return [done[i] for i in range(len(scenes))]
+        return [done[i] for i in range(len(part))]
 
     def _compiled(self, setup: GraspSetup) -> FinishedGrasp | None:
         """Return the result of a compiled grasp; None if it has to run in the interpreter."""
@@ -271,17 +363,17 @@ class _Batch:
         plain = sum(n for composition, n in self.counts.items() if not self.is_compiled[composition])
         return self.workers > 1 and plain >= WORTH_A_PROCESS * self.workers
 
-    def _plain(self, scenes: Sequence[str], seeds: Sequence[int]) -> list[FinishedGrasp]:
+    def _plain(self, grasps: Sequence[tuple[str, int]]) -> list[FinishedGrasp]:
         local = self.local
         if self._worth_processes() and not getattr(local, "without_process", False):
             try:
                 if not hasattr(local, "process"):
                     local.process = self.processes.enter_context(PlainProcess(self.models))
-                return local.process.run(scenes, seeds)  # type: ignore[no-any-return]
+                return local.process.run(*zip(*grasps, strict=True))  # type: ignore[no-any-return]
             except NotHandedOver as error:
                 local.without_process = True
                 self.notes[f"plain grasps run on one core: {error}"] = None
-        return [grasp_plain(self.job, self.models.setup(*grasp)) for grasp in zip(scenes, seeds, strict=True)]
+        return [grasp_plain(self.job, self.models.setup(*grasp)) for grasp in grasps]
 
     def _storage(self) -> Storage:
         if not hasattr(self.local, "storage"):

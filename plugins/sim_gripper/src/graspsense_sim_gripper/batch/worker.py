@@ -23,6 +23,7 @@ from attrs import asdict, evolve, fields
 
 from graspsense.plugin_api import Controller, GraspEvent, Outcome, Phase, RunConfig, Trace, create, recipe_of
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, finished, grasp_plain
+from graspsense_sim_gripper.batch.nested import like
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.reduction.cache import restored, stored
 
@@ -110,7 +111,7 @@ class PlainProcess:
             trace = _read_trace(traces) if job.traces or job.extract is not None else None
             if trace is not None:
                 trace = evolve(trace, events=tuple(_event(*event) for event in told))
-            results.append(finished(job, Outcome(outcome), reason, _like(initial, values), trace=trace))
+            results.append(finished(job, Outcome(outcome), reason, like(initial, values), trace=trace))
         return results
 
 
@@ -221,11 +222,3 @@ def _write_trace(to: IO[bytes], trace: Trace) -> None:
 def _read_trace(of: IO[bytes]) -> Trace:
     parts: dict[str, Any] = {name: np.lib.format.read_array(of, allow_pickle=False) for name in _ARRAYS}
     return Trace(**parts)
-
-
-def _like(pattern: Json, values: Json) -> Json:
-    """Return nested lists of values as nested tuples of the same types as `pattern`."""
-    if not isinstance(pattern, tuple):
-        return values
-    parts = [_like(*one) for one in zip(pattern, values, strict=True)]
-    return type(pattern)(*parts) if hasattr(pattern, "_fields") else tuple(parts)
