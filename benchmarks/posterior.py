@@ -76,12 +76,13 @@ from paper_model import (
 from scipy.stats import norm
 from sklearn.linear_model import LogisticRegression
 
-from graspsense.evaluation.intervals import Z
+from graspsense.evaluation.intervals import Z, wilson
 from graspsense.experiments.paper.published import published
 from graspsense.inference import (
     Prior,
     contraction,
     effective_sample_size,
+    interval_of_mean,
     rank_histogram,
     rank_of,
     uniformity_p,
@@ -528,9 +529,7 @@ def _odds(on: Any, w: Any) -> dict[str, float]:
     The interval is Wilson's of a share of as many independent particles as the effective sample size.
     """
     p, n = float(w[on].sum()), effective_sample_size(w)
-    centre = (p + Z * Z / (2 * n)) / (1 + Z * Z / n)
-    half = Z / (1 + Z * Z / n) * math.sqrt(p * (1 - p) / n + Z * Z / (4 * n * n))
-    low, high = max(centre - half, 0.0), min(centre + half, 1.0)
+    low, high = wilson(p * n, n)
     prior = (1.0 - OFF_BELOW) / OFF_BELOW
     return {
         "probability": p,
@@ -562,14 +561,10 @@ def _mean_of(values: list[float]) -> dict[str, Any] | None:
 
     None for fewer than two.
     """
-    from scipy.stats import t
-
-    v, n = np.array(values), len(values)
+    n = len(values)
     if n < 2:
         return None
-    half = float(t.ppf(0.975, n - 1) * v.std(ddof=1) / math.sqrt(n))
-    mean = float(v.mean())
-    return {"mean": mean, "interval": [mean - half, mean + half], "replicates": n}
+    return {"mean": float(np.mean(values)), "interval": list(interval_of_mean(values, 0.95)), "replicates": n}
 
 
 def _calibration(ranks: Mapping[str, list[float]]) -> dict[str, Any]:

@@ -9,6 +9,9 @@ from graspsense.inference import (
     Prior,
     contraction,
     effective_sample_size,
+    half_width,
+    interval_of_mean,
+    predictive_p,
     rank_histogram,
     rank_of,
     uniformity_p,
@@ -59,3 +62,18 @@ def test_calibration_detects_posteriors_that_are_too_narrow_or_too_wide(
         sample = rng.normal(observed / 2.0, width * np.sqrt(0.5), 200)
         ranks.append(rank_of(truth, sample, np.ones(200)))
     assert (uniformity_p(rank_histogram(ranks)) > 0.01) is calibrated
+
+
+def test_the_interval_of_a_mean_is_that_of_student() -> None:
+    # t(2, 0.95) = 2.920, and the standard error of 1, 2, 3 is 1 / sqrt(3).
+    low, high = interval_of_mean([1.0, 2.0, 3.0], 0.90)
+    assert (low + high) / 2.0 == pytest.approx(2.0)
+    assert high - low == pytest.approx(2.0 * 2.91999 / np.sqrt(3.0), rel=1e-5)
+    assert np.isnan(interval_of_mean([1.0], 0.90)).all()
+    assert half_width(0.90) == pytest.approx(1.644854, rel=1e-6)
+    assert half_width(0.90, 10**6) == pytest.approx(half_width(0.90), rel=1e-5)
+
+
+def test_a_predictive_p_value_counts_simulated_values_that_reach_the_recorded_one() -> None:
+    simulated = [[1.0, 5.0], [2.0, 6.0], [3.0, 7.0], [4.0, 8.0]]
+    assert predictive_p(simulated, [3.0, 9.0]).tolist() == [0.5, 0.0]

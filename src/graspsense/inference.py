@@ -1,4 +1,7 @@
-"""Simulation-based inference: priors, weighted samples of a posterior, and the check that an inference is calibrated.
+"""Simulation-based inference: priors, weighted samples of a posterior, intervals, and checks of an inference.
+
+The posterior of the model of the paper (`benchmarks/posterior.py`) and identified scenes (`graspsense identify`) share
+what is here.
 
 The calibration is that of S. Talts, M. Betancourt, D. Simpson, A. Vehtari and A. Gelman, "Validating Bayesian Inference
 Algorithms with Simulation-Based Calibration" (2018): true values are drawn from the prior and data from the model. The
@@ -7,6 +10,7 @@ rank of each true value within its posterior sample is then uniformly distribute
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -96,6 +100,40 @@ def contraction(prior: Prior, values: ArrayLike, weights: ArrayLike) -> Contract
         posterior=(low, middle, high),
         contraction=1.0 - variance / float(law.var()),
     )
+
+
+def half_width(level: float, degrees: int | None = None) -> float:
+    """Return half the width of a central interval of this level, in standard deviations.
+
+    It is that of Student's t with so many degrees of freedom, or, without them, of the normal distribution.
+    """
+    from scipy.stats import norm, t
+
+    quantile = 0.5 + 0.5 * level
+    return float(norm.ppf(quantile) if degrees is None else t.ppf(quantile, degrees))
+
+
+def interval_of_mean(values: ArrayLike, level: float) -> tuple[float, float]:
+    """Return the interval of the mean of independent values (Student's t); NaN for a single one."""
+    import numpy as np
+
+    v = np.asarray(values, dtype=np.float64)
+    mean, n = float(v.mean()), len(v)
+    if n < 2:
+        return math.nan, math.nan
+    half = half_width(level, n - 1) * float(np.std(v, ddof=1)) / math.sqrt(n)
+    return mean - half, mean + half
+
+
+def predictive_p(simulated: ArrayLike, recorded: ArrayLike) -> NDArray[np.float64]:
+    """Return the posterior predictive p-values: the shares of the simulated rows that are at least the recorded one.
+
+    Each column is a statistic (Gelman, Meng and Stern, Statistica Sinica 6, 1996).
+    """
+    import numpy as np
+
+    shares: NDArray[np.float64] = np.mean(np.asarray(simulated) >= np.asarray(recorded), axis=0)
+    return shares
 
 
 def rank_of(truth: float, values: ArrayLike, weights: ArrayLike) -> float:

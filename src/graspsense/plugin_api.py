@@ -89,6 +89,7 @@ _TABLE: Final[Table] = {
             "SqueezeFit",
             "Undetermined",
         ),
+        ".inference": ("half_width", "interval_of_mean", "predictive_p"),
     },
     "Emulated devices": {
         "emulated": ("EmulatedDevice",),

@@ -81,6 +81,9 @@ from graspsense.core.identification import PredictiveCheck as PredictiveCheck
 from graspsense.core.identification import RecordedSqueeze as RecordedSqueeze
 from graspsense.core.identification import SqueezeFit as SqueezeFit
 from graspsense.core.identification import Undetermined as Undetermined
+from graspsense.inference import half_width as half_width
+from graspsense.inference import interval_of_mean as interval_of_mean
+from graspsense.inference import predictive_p as predictive_p
 
 # Emulated devices
 from graspsense.core.emulated import EmulatedDevice as EmulatedDevice

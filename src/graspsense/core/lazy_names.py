@@ -20,6 +20,7 @@ Table = Mapping[str, Mapping[str, tuple[str, ...]]]
 """What names are for, the module that defines them, and the names.
 
 A module is one of `graspsense.core`, or, with a dot, one of another package of graspsense: `testing.model_gripper`.
+With a dot before it, it is one beside the packages: `.inference`.
 """
 
 
@@ -56,4 +57,6 @@ class LazyNames:
 
 
 def _module(home: str) -> str:
+    if home.startswith("."):
+        return f"graspsense{home}"
     return f"graspsense.{home}" if "." in home else f"graspsense.core.{home}"

@@ -2,7 +2,7 @@
 
 Each simulated set has as many squeezes as were recorded. Its parameters are a draw of the identified ones, its objects
 and placements are drawn from the spreads, and it follows the recorded paths of the gap. The p-value of a statistic is
-the share of sets whose mean is at least that of the recorded set (Gelman, Meng and Stern, Statistica Sinica 6, 1996).
+that of the mean over a set.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import PredictiveCheck
+from graspsense.plugin_api import PredictiveCheck, predictive_p
 from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.prepare import Squeeze
@@ -52,7 +52,7 @@ def predictive_checks(
             rows.append(_statistics(squeeze, noisy))
         means.append(np.mean(rows, axis=0))
         every.append(rows)
-    at_least = np.mean(np.array(means) >= recorded.mean(axis=0), axis=0)
+    p_values = predictive_p(means, recorded.mean(axis=0))
     simulated = np.array(every).reshape(-1, len(STATISTICS))
     return tuple(
         PredictiveCheck(
@@ -60,7 +60,7 @@ def predictive_checks(
             unit=unit,
             recorded=tuple(recorded[:, k].tolist()),
             simulated=tuple(simulated[:, k].tolist()),
-            p=float(at_least[k]),
+            p=float(p_values[k]),
         )
         for k, (name, unit) in enumerate(STATISTICS)
     )

@@ -14,7 +14,7 @@ import numpy as np
 from attrs import evolve, frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import CandidateScore
+from graspsense.plugin_api import CandidateScore, ConfigError
 from graspsense_sim_gripper.identify.corners import with_corners
 from graspsense_sim_gripper.identify.fit import LEAST_ERROR, Fitted, Mask, fit, held_out_rms
 from graspsense_sim_gripper.identify.forward import ForwardModel
@@ -63,8 +63,13 @@ def choose(
     *,
     has_memory: bool,
     progress: Callable[[int, int], None],
+    only: str = "",
 ) -> Choice:
-    """Return the chosen fit. `has_memory`: whether the squeezes can determine a term with a memory."""
+    """Return the chosen fit.
+
+    `has_memory`: whether the squeezes can determine a term with a memory. `only`: the name of the candidate that is
+    fitted without a choice.
+    """
     direct = evolve(model, direct=True)
     statics = static_candidates(scale)
     with_memory = memories(scale) if has_memory else []
@@ -73,12 +78,15 @@ def choose(
         progress,
     )
     rough = _rough(direct, statics, squeezes, with_memory, counter)
-    kept = _kept(rough)
+    kept = list(range(len(statics))) if only else _kept(rough)
     candidates = [
         joined.starting_at(_values(rough[k]))
         for k in kept
         for joined in (statics[k], *_joined(statics[k], with_memory))
+        if only in ("", joined.name)
     ]
+    if not candidates:
+        raise ConfigError(f"no candidate for these squeezes has the terms {only}")
     directly = in_threads(lambda one: fit(direct, one, squeezes), candidates, counter.done)
     least_directly = max(min(one.rms for one in directly), LEAST_ERROR)
     near = [one for one in directly if one.rms <= WORTH_REFINING * least_directly]

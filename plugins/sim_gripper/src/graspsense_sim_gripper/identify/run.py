@@ -16,6 +16,7 @@ from graspsense.plugin_api import (
     IdentifiedParameter,
     RecordedSqueeze,
     SqueezeFit,
+    interval_of_mean,
 )
 from graspsense_sim_gripper.build import drive_and_pads
 from graspsense_sim_gripper.config import SimConfig
@@ -29,8 +30,9 @@ from graspsense_sim_gripper.identify.fit import Fitted
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.fracture import FractureFit, fracture_of
 from graspsense_sim_gripper.identify.individual import Individual, simplest_alone
-from graspsense_sim_gripper.identify.interval import student
+from graspsense_sim_gripper.identify.interval import LEVEL
 from graspsense_sim_gripper.identify.laws import DataScale, memories
+from graspsense_sim_gripper.identify.path_error import without_path_error
 from graspsense_sim_gripper.identify.prepare import FULL, NoSqueeze, Squeeze, prepared, resolution
 from graspsense_sim_gripper.identify.random_effects import OwnSpread, as_parameters, own_spreads
 from graspsense_sim_gripper.identify.refuse import shows_memory, undetermined
@@ -68,39 +70,39 @@ def identify(
     squeezes: Sequence[RecordedSqueeze],
     progress: Progress,
     block: Sequence[RecordedSqueeze] = (),
+    only: str = "",
 ) -> Identification:
     """Return the object of these squeezes; `config` is that of a gripper whose recordings say nothing of their own.
 
-    `block` are squeezes of a rigid block, from which the fingertips are identified before. A recording without contact,
-    or with too few measurements of the force, is left out with a note. Raises ConfigError if all are.
+    `block`: squeezes of a rigid block, from which the fingertips are identified before. `only`: the terms, as in the
+    table of candidates, if they are not chosen. A note names a recording without contact, or with too few measurements
+    of the force, which is left out. Raises ConfigError if all are.
     """
     begin = time.monotonic()
     config, notes = _settings(config, squeezes, block)
     drive, pads = drive_and_pads(config)
-    model = ForwardModel(pads=pads)
-    model.compile()
+    (model := ForwardModel(pads=pads)).compile()
     cells = _has_cells(config, squeezes)
     squeezes, ready, shares = _ready(config, _used(squeezes, notes), notes, cells=cells)
-    individual = _chosen(model, ready, progress)
+    individual = _chosen(model, ready, progress, only)
     lag = individual.lag(model, ready)
     if lag.lag_s != 0.0:
         squeezes, ready, shares = _ready(config, squeezes, [], cells=cells, lag_s=lag.lag_s)
-        individual = _chosen(model, ready, progress)
+        individual = _chosen(model, ready, progress, only)
     choice = individual.choice
     progress("computing intervals", 0, 1)
     delay = delay_of(model, choice.fitted, memories(_scale(ready))[0], ready, config.force_delay_s, lag)
     share_error = _share_error(config, drive, ready) if cells else 0.0
-    scale = share_error / math.sqrt(len(ready))
-    found = uncertainty(model, choice.fitted, ready, scale, lag.error_s, individual.of_each)
-    open_ = [*delay.undetermined, *undetermined(choice.fitted, found, ready, shares, cells)]
-    values, parameters = _values(choice.fitted, found, shares if cells else (), share_error)
+    fitted, found = _with_uncertainty(model, individual, ready, share_error, lag.error_s)
+    open_ = [*delay.undetermined, *undetermined(fitted, found, ready, shares, cells)]
+    values, parameters = _values(fitted, found, shares if cells else (), share_error)
     own, fracture = _between_objects(model, individual, ready, shares)
-    parameters += [*([delay.found] if delay.found else []), *as_parameters(choice.fitted, own)]
+    parameters += [*([delay.found] if delay.found else []), *as_parameters(fitted, own)]
     if fracture is not None:
         open_, parameters = [*open_, *fracture.undetermined], [*parameters, *fracture.parameters]
     facts = SceneFacts(
         label=next((one.label for one in squeezes if one.label), ""),
-        fitted=choice.fitted,
+        fitted=fitted,
         parameters=parameters,
         values=values,
         gripper=_fingertips(config),
@@ -117,23 +119,37 @@ def identify(
         parameters=tuple(parameters),
         candidates=choice.scores,
         undetermined=tuple(open_),
-        fits=tuple(_fits(model, choice.fitted, ready)),
-        checks=predictive_checks(model, choice.fitted, found, ready),
+        fits=tuple(_fits(model, fitted, ready)),
+        checks=predictive_checks(model, fitted, found, ready),
         draws=found.draws,
         notes=tuple(notes),
         seconds=time.monotonic() - begin,
     )
 
 
-def _chosen(model: ForwardModel, squeezes: Sequence[Squeeze], progress: Progress) -> Individual:
+def _chosen(model: ForwardModel, squeezes: Sequence[Squeeze], progress: Progress, only: str) -> Individual:
     choice = choose(
         model,
         squeezes,
         _scale(squeezes),
         has_memory=shows_memory(squeezes),
         progress=lambda done, total: progress("fitting candidates", done, total),
+        only=only,
     )
     return simplest_alone(model, choice, squeezes)
+
+
+def _with_uncertainty(
+    model: ForwardModel,
+    individual: Individual,
+    squeezes: Sequence[Squeeze],
+    share_error: float,
+    lag_error_s: float,
+) -> tuple[Fitted, Uncertainty]:
+    """Return the chosen fit and its uncertainty, both without the error of the path."""
+    fitted, scale = individual.choice.fitted, share_error / math.sqrt(len(squeezes))
+    found = uncertainty(model, fitted, squeezes, scale, lag_error_s, individual.of_each)
+    return without_path_error(model, fitted, found, squeezes)
 
 
 def _ready(
@@ -352,12 +368,9 @@ def _values(
     if len(known):
         values["share"] = _share(shares)
         parameters.append(_mean("share", "", known))
-        # The friction of the drive varies in a simulated squeeze, too, and is no scatter of the share.
-        beyond = (
-            float(np.var(known, ddof=1)) - (values["share"] * share_error) ** 2 if len(known) > 1 else 0.0
-        )
+        beyond = share_spread(known.tolist(), share_error)
         if beyond > 0.0:
-            values["share_spread"] = math.sqrt(beyond)
+            values["share_spread"] = beyond
     for i, one in enumerate(fitted.candidate.free):
         ends = sorted((one.sign * found.low[i], one.sign * found.high[i]))
         parameters.append(
@@ -386,11 +399,10 @@ def share_spread(shares: Sequence[float], share_error: float) -> float:
 
 def _mean(name: str, unit: str, values: Any) -> IdentifiedParameter:
     """Return the mean of a quantity of each squeeze, with the interval of Student's t; a single one has none."""
-    n, mean = len(values), float(np.mean(values))
-    half = student(n - 1) * float(np.std(values, ddof=1)) / math.sqrt(n) if n > 1 else math.nan
+    n, (low, high) = len(values), interval_of_mean(values, LEVEL)
     basis = f"between {n} squeezes" if n > 1 else "one squeeze: no interval"
     return IdentifiedParameter(
-        name=name, unit=unit, value=mean, low=mean - half, high=mean + half, basis=basis
+        name=name, unit=unit, value=float(np.mean(values)), low=low, high=high, basis=basis
     )
 
 

@@ -21,6 +21,8 @@ from graspsense_sim_gripper.identify.prepare import Squeeze
 SMALLEST: Final = 0.05
 LEAST_WORK_J: Final = 1e-4
 """Below this work the balance says nothing."""
+SPEED_TICKS: Final = 6
+"""Ticks before and after one over which its speed is measured."""
 
 
 def measured_share(trace: Trace, squeeze: Squeeze, drive: Drive) -> float:
@@ -39,7 +41,8 @@ def measured_share(trace: Trace, squeeze: Squeeze, drive: Drive) -> float:
     friction = drive.friction
     excess = np.array([stribeck_excess(friction, float(v))[0] for v in speed])
     lost = friction.coulomb_n + excess + friction.damping_n_s_m * speed
-    driven_j = float(np.sum((trace.effort_n[part][:-1] - lost) * closing))
+    # The effort that a tick shows is that of the step before it.
+    driven_j = float(np.sum((trace.effort_n[part][1:] - lost) * closing))
     begin, end = (_kinetic_j(trace, squeeze, drive, k) for k in (part.start, part.stop - 1))
     force = np.interp(times[part], squeeze.t_s[squeeze.sample], squeeze.force_n)
     measured_j = float(np.sum(0.5 * (force[1:] + force[:-1]) * closing))
@@ -51,11 +54,12 @@ def measured_share(trace: Trace, squeeze: Squeeze, drive: Drive) -> float:
 
 
 def _kinetic_j(trace: Trace, squeeze: Squeeze, drive: Drive, k: int) -> float:
-    """Return the kinetic energy of the drive at a tick."""
+    """Return the kinetic energy of the drive at a tick: the mean speed over as many ticks before as after it, which a
+    constant acceleration does not change."""
     gap = float(trace.gap_m[k])
     _, jacobian = gap_and_rate(drive.link, revolutions_at(drive.link, gap))
-    width = 10
-    low, high = max(k - width, 0), min(k + 2, len(trace.t_s) - 1)
+    half = min(SPEED_TICKS, k, len(trace.t_s) - 1 - k)
+    low, high = k - half, k + half
     elapsed = float(trace.t_s[high] - trace.t_s[low])
     speed = float(trace.gap_m[low] - trace.gap_m[high]) / elapsed if elapsed > 0.0 else 0.0
     return 0.5 * drive.inertia / (jacobian * jacobian) * speed * speed

@@ -1,0 +1,90 @@
+"""Errors that all squeezes have in common, which no scatter shows: of the nodes of a path, and of the share."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from attrs import evolve
+from identify import SCENES, drawn_are_covered, scene_text, seeds_of, squeezes_of
+
+from graspsense.plugin_api import ConfigError
+from graspsense_sim_gripper.build import build, drive_and_pads, instantiate
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.identify.fit import fit
+from graspsense_sim_gripper.identify.forward import ForwardModel
+from graspsense_sim_gripper.identify.laws import memories, static_candidates
+from graspsense_sim_gripper.identify.path_error import on_all_ticks, path_bias
+from graspsense_sim_gripper.identify.prepare import prepared
+from graspsense_sim_gripper.identify.run import _scale, identify
+from graspsense_sim_gripper.identify.share import measured_share
+
+
+def squeeze_of(name, **gripper):
+    """Return a simulated squeeze of a scene of the benchmark, whose cells measure a share of 0.6 of the force."""
+    text = scene_text(SCENES[name], 0.0).replace("share_spread = 0.01", "share_spread = 0.0")
+    (squeeze,) = squeezes_of(text, name, gripper, ["1"], [7])
+    return squeeze
+
+
+def errors_of(name):
+    """Return the errors of the fitted logarithms, with an ideal sensor, before and after that of the path is taken."""
+    squeeze = prepared(squeeze_of(name, sensor="ideal"), 0.0)
+    model = ForwardModel(pads=drive_and_pads(SimConfig())[1])
+    scale = _scale([squeeze])
+    (two,) = (one for one in memories(scale) if sum(free.name == "tau_s" for free in one.free) == 2)
+    candidate = static_candidates(scale)[0].joined(two)
+    fitted = fit(model, candidate, [squeeze])
+    terms = SCENES[name]
+    true = [terms[0]["k1_n_m"], *(term[key] for term in terms[1:] for key in ("k_n_m", "tau_s"))]
+    before = np.log(np.array(fitted.values) / true)
+    return before, before - path_bias(model, fitted, [squeeze])
+
+
+def test_the_nodes_of_a_path_bias_relaxation_times_and_the_error_is_taken_away():
+    before, after = errors_of("two branches")
+    # Noise-free forces: what is left of the error is that of the simulation.
+    assert np.abs(before).max() > 5e-4
+    assert np.abs(after).max() < 1e-4
+
+
+def test_a_recording_with_fewer_ticks_than_nodes_has_no_finer_path():
+    squeeze = prepared(squeeze_of("spring", sensor="ideal"), 0.0)
+    times, gaps = squeeze.course
+    twice = evolve(squeeze, course=(np.repeat(times, 2), np.repeat(gaps, 2)))
+    for fine in (on_all_ticks(squeeze), on_all_ticks(twice)):
+        assert len(fine.t_s) > len(squeeze.t_s)
+        assert np.min(np.diff(fine.t_s)) > 1e-9
+    coarse = evolve(squeeze, course=(times[::100], gaps[::100]))
+    model = ForwardModel(pads=drive_and_pads(SimConfig())[1])
+    fitted = fit(model, static_candidates(_scale([squeeze]))[0], [squeeze])
+    assert not path_bias(model, fitted, [coarse]).any()
+
+
+@pytest.mark.parametrize("name", ["spring", "stiffening"])
+def test_the_balance_of_energy_gives_the_share_of_the_cells_without_bias(name):
+    # The friction is that of the settings: with a spread, it would scatter the share by 4 %.
+    drive, _ = drive_and_pads(SimConfig())
+    ideal = squeeze_of(name, sensor="ideal", coulomb_spread_n=0.0)
+    assert measured_share(ideal.trace, prepared(ideal, 0.0), drive) == pytest.approx(1.0, rel=5e-4)
+    cells = squeeze_of(name, sensor="pads", coulomb_spread_n=0.0)
+    assert measured_share(cells.trace, prepared(cells, 0.0), drive) == pytest.approx(0.6, rel=4e-3)
+
+
+def test_the_benchmark_knows_the_friction_that_a_squeeze_has_drawn():
+    scene, config = scene_text(SCENES["spring"], 0.0), SimConfig(sensor="pads")
+    for repeat in range(20):
+        (seed,) = seeds_of("spring", "PR2 pads", 1, repeat)
+        drawn = instantiate(build(config, f"{scene}#{seed}"), None, seed).plant.drive.friction.coulomb_n
+        # 90 % of a normal distribution lie within 1.645 standard deviations.
+        within = abs(drawn - config.coulomb_n) < 1.644854 * config.coulomb_spread_n
+        row = {"scene": "spring", "sensor": "PR2 pads", "recordings": 1, "repeat": repeat}
+        assert drawn_are_covered(row) is within
+
+
+@pytest.mark.slow
+def test_given_terms_are_not_chosen():
+    squeeze = squeeze_of("creeping", sensor="ideal")
+    found = identify(SimConfig(), [squeeze], lambda *_: None, only="elastic (k1)")
+    assert [one.terms for one in found.candidates if one.chosen] == ["elastic (k1)"]
+    with pytest.raises(ConfigError, match="no candidate"):
+        identify(SimConfig(), [squeeze], lambda *_: None, only="elastic (k7)")
