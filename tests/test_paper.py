@@ -148,6 +148,7 @@ def test_a_claim_is_built_in_only_where_a_figure_that_gives_it_is_not_zero():
     assert basis(summary, "stiction", "stiction") == "predicted"
 
 
+@pytest.mark.slow
 def test_without_the_figures_that_give_them_the_claims_do_not_hold():
     """Static friction holds the gripper, and an object that is off the centre meets one finger first."""
     ours = read_experiment("stiction").cases[0].settings.gripper.config

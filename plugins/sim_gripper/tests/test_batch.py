@@ -65,6 +65,7 @@ def test_the_number_of_workers_decides_nothing_to_the_bit():
         ]
 
 
+@pytest.mark.slow
 def test_what_is_drawn_may_keep_a_column_of_the_trace():
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
     scenes, seeds = mixed(SLICE)
