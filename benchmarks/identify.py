@@ -448,7 +448,7 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
 
     def header(head: Sequence[str]) -> list[str]:
         names = (*head, *columns)
-        return ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
+        return table_head(names)
 
     lines = header(("sensor", "squeezes"))
     for sensor in SENSORS:
@@ -464,6 +464,11 @@ def as_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def table_head(columns: Sequence[str]) -> list[str]:
+    """Return the first lines of a table in Markdown."""
+    return ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+
+
 def coverage_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the table of the coverage with the true terms given: by sensor and number of recordings."""
     columns = (
@@ -474,7 +479,7 @@ def coverage_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
         "scenes whose drawn error is covered",
     )
     columns += ("intervals that cover there", "and in the other scenes", "weighted by nine and one tenths")
-    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    lines = table_head(columns)
     for sensor, count in product(SENSORS, COUNTS):
         group = [one for one in rows if one["sensor"] == sensor and one["recordings"] == count]
         within = [one for one in group if drawn_are_covered(one)]
@@ -515,7 +520,7 @@ def delays_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     columns = ("sensor", "squeezes", "forces late by", "scenes", "delay used", "not determined")
     columns += ("90 % intervals of the delay that cover", "median error of the delay", "right terms")
     columns += ("90 % intervals of the parameters that cover",)
-    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    lines = table_head(columns)
     for key in sorted(
         {(list(SENSORS).index(one["sensor"]), one["recordings"], one["late_s"]) for one in rows}
     ):
@@ -552,7 +557,7 @@ def spreads_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
         "claimed of another parameter",
     )
     columns += ("90 % intervals that cover", "median of what was claimed")
-    lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+    lines = table_head(columns)
     keys = {
         (list(SENSORS).index(one["sensor"]), one["recordings"], one["scene"], one["own_spread"])
         for one in rows
@@ -686,7 +691,7 @@ _CURVES: Final = (
 def transfer_markdown(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the table of the transfer."""
     names = ["recordings a class", *(f"trained on {name}" for _, name in _CURVES)]
-    lines = ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
+    lines = table_head(names)
     for row in rows:
         rates = [_share(int(row[key]), int(row["tested"])) for key, _ in _CURVES]
         lines.append("| " + " | ".join([str(row["recordings"]), *rates]) + " |")

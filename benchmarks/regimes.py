@@ -214,13 +214,13 @@ def _case(
 
 
 def run(bench: Bench, file: Path, scenes: int, first: int) -> list[Row]:
-    """Measure the scenes that the file does not hold yet, and append them; return all rows."""
+    """Measure scenes until the file holds as many, and append them; return all rows.
+
+    The file may be the rows of several runs, one after the other.
+    """
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-    first = rows[0]["scene"] if rows else first
-    known = {row["scene"] for row in rows}
-    for number in range(first, first + scenes):
-        if number in known:
-            continue
+    begin = rows[-1]["scene"] + 1 if rows else first
+    for number in range(begin, begin + scenes - len(rows)):
         row = measured(bench, number)
         rows.append(row)
         with file.open("a") as out:

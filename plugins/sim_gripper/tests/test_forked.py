@@ -106,6 +106,22 @@ print(json.dumps([batch() == whole, len(forked)]))
     ) == [True, 2]
 
 
+def test_without_a_further_process_threads_run_the_grasps():
+    assert said_by(
+        """
+import os
+whole, real = batch(worth=10 * N), os.fork
+def refused():
+    raise BlockingIOError(11, "Resource temporarily unavailable")
+os.fork = refused
+none = batch() == whole and forked == []
+left = [1]
+os.fork = lambda: real() if left and left.pop() else refused()
+print(json.dumps([none, batch() == whole, len(forked)]))
+"""
+    ) == [True, True, 1]
+
+
 def test_a_named_tuple_that_is_measured_comes_back_as_one():
     assert said_by(
         """

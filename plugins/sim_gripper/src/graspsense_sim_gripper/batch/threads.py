@@ -14,7 +14,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from importlib.util import find_spec
 from queue import SimpleQueue
 from typing import Any, Final, Unpack
@@ -270,11 +270,14 @@ class _Batch:
         return True
 
     def _fork(self, workers: int) -> None:
+        """Fork as many processes, or fewer if the system allows no more; without any, threads run the grasps."""
         processes: list[ForkedProcess] = []
-        for _ in range(workers):
-            process = self.processes.enter_context(ForkedProcess(self._answer, tuple(processes)))
-            processes.append(process)
-            self.forked.put(process)
+        # OSError: no memory, or the limit of processes.
+        with suppress(OSError):
+            for _ in range(workers):
+                process = self.processes.enter_context(ForkedProcess(self._answer, tuple(processes)))
+                processes.append(process)
+                self.forked.put(process)
 
     def _answer(self, begin: int) -> list[Any]:
         """Return, in a forked process, the results of the slice that begins at this index, as JSON values."""
