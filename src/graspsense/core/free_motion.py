@@ -2,8 +2,7 @@
 
 A controller may declare it with `Controller.free_motion`, in a form that needs few numbers. A simulator then runs most
 ticks of a grasp without composing a reading and without supervision, and gives the same commands and states as `step`.
-In a batch it also looks for the speed at which the law holds the fingers steady, by calling it with speeds that the
-fingers do not have, and runs the ticks of a steady approach at once.
+In a batch it runs many ticks of an approach at once, with the command of each from this law.
 A controller without this declaration is called in every tick.
 """
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 from graspsense.plugin_api import CALLED, TARING, Frame, after_free, free_from, free_tick
+from graspsense_sim_gripper.approach import approach_ticks
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
 from graspsense_sim_gripper.loop import NOT_NEGATIVE, GraspParams, LoopProgress, PlantModel, Table
 from graspsense_sim_gripper.sensing import moved_sensor, next_image_s, sense_motion
-from graspsense_sim_gripper.steady import steady_ticks
 from graspsense_sim_gripper.stepping.coast import glided
 
 
@@ -85,10 +85,10 @@ def _is_free(params: GraspParams, at: LoopProgress, frame: Frame) -> bool:
     return (same or params.sensor.ideal == 0) and can_glide(params.plant, at.plant, params.dt_s)
 
 
-def steady_or_free_ticks(
+def approach_or_free_ticks(
     params: GraspParams, at: LoopProgress, frame: Frame, columns: Table, phases: Any
 ) -> LoopProgress:
-    """Run what compiled code does: `steady_ticks` where steps may last several ticks, else `free_ticks`, to the bit."""
+    """Run what compiled code does: `approach_ticks` where steps may last several ticks, otherwise `free_ticks`."""
     if params.macro_steps == 1:
-        return steady_ticks(params, at, frame, columns, phases)
+        return approach_ticks(params, at, frame, columns, phases)
     return free_ticks(params, at, frame, columns, phases)

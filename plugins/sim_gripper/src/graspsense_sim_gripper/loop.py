@@ -61,8 +61,8 @@ class GraspParams(NamedTuple):
     palm: Any = ()
     """`PalmParams`; () without an accelerometer."""
     macro_steps: int = 0
-    """1: steps of the plant may last several ticks (`macro_ticks`), and the ticks of a steady approach are run at once
-    (`steady`)."""
+    """1: steps of the plant may last several ticks (`macro_ticks`), and the ticks of an approach are run at once
+    (`approach`)."""
 
 
 class MacroControl(NamedTuple):
@@ -187,8 +187,8 @@ move: Callable[[PlantModel, PlantState, float, float], PlantState] = move_unboun
 control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = control_unbound
 run_macro_step: Callable[..., tuple[LoopProgress, MacroControl]] = _no_macro_steps
 """`macro_ticks.run_macro_step` where a step may last several ticks."""
-run_steady_ticks: Callable[[GraspParams, LoopProgress, Frame, Table, Any], LoopProgress] = _every_tick
-"""`steady.steady_ticks`, in the interpreter `free_ticks.steady_or_free_ticks`, where several ticks are run at once."""
+run_approach_ticks: Callable[[GraspParams, LoopProgress, Frame, Table, Any], LoopProgress] = _every_tick
+"""`approach.approach_ticks`, in the interpreter `free_ticks.approach_or_free_ticks`, where ticks are run at once."""
 
 
 def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
@@ -247,7 +247,7 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
             break
         if ticks == before and same_phase and phase != SQUEEZE and phase != HOLD:
             at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
-            at = run_steady_ticks(params, at, frame, columns, buffers.phases)
+            at = run_approach_ticks(params, at, frame, columns, buffers.phases)
             ticks, recorded, effort, plant, sensor, state = at
     ended = LoopState(ticks, recorded, phase, tare_from, effort, failed, macro)
     return SimulationState(ended, plant, sensor, state, palm)

@@ -227,9 +227,10 @@ def sense_motion(
     if ticks != encoder_ticks:
         # Over one encoder tick the linkage is linear to a tenth of a picometre.
         moved = -gap
-        gap = motion.gap_m - motion.jacobian_m_rev * (motion.revolutions - ticks / ENCODER_TICKS)
+        gap = motion.gap_m - motion.jacobian_m_rev * (motion.revolutions - ticks * (1.0 / ENCODER_TICKS))
         moved += gap
-    velocity += dt_s / (VELOCITY_FILTER_S + dt_s) * (moved / dt_s - velocity)
+    # A division for all ticks, which a compiler takes out of the loop.
+    velocity += (moved - dt_s * velocity) * (1.0 / (VELOCITY_FILTER_S + dt_s))
     return ticks, gap, velocity
 
 

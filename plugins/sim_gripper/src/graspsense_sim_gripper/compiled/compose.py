@@ -13,6 +13,7 @@ from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 from graspsense.plugin_api import Frame, bind, events_of, free_parts, maker, tick
+from graspsense_sim_gripper.approach import approach_ticks
 from graspsense_sim_gripper.binding import Constructors, bind_reachable
 from graspsense_sim_gripper.dynamics.contact import (
     BalanceSearch,
@@ -25,13 +26,12 @@ from graspsense_sim_gripper.dynamics.contact import (
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, Past, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
 from graspsense_sim_gripper.exact.propagate import bind_move
-from graspsense_sim_gripper.free_ticks import free_ticks, steady_or_free_ticks
+from graspsense_sim_gripper.free_ticks import approach_or_free_ticks, free_ticks
 from graspsense_sim_gripper.loop import GraspParams, LoopProgress, SimulationState, grasp
 from graspsense_sim_gripper.macro_ticks import run_macro_step
 from graspsense_sim_gripper.palm import keep_samples, palm_signals
 from graspsense_sim_gripper.problem import ControllerStep
 from graspsense_sim_gripper.sensing import SensorState
-from graspsense_sim_gripper.steady import steady_ticks
 from graspsense_sim_gripper.stepping.advance import advance, move
 from graspsense_sim_gripper.stepping.coast import can_glide, glide
 from graspsense_sim_gripper.stepping.converge import refine_until_converged
@@ -400,10 +400,10 @@ def _loop_of(
         parts["run_macro_step"] = bind_reachable(run_macro_step, own)
         if law := free_parts(step):
             glides = {"can_glide": can_glide, "glide": glide}
-            parts["run_steady_ticks"] = (
-                bind_reachable(steady_or_free_ticks, {**law, **glides}, INTERPRETED)
+            parts["run_approach_ticks"] = (
+                bind_reachable(approach_or_free_ticks, {**law, **glides}, INTERPRETED)
                 if force
-                else bind_reachable(steady_ticks, law)
+                else bind_reachable(approach_ticks, law)
             )
     if composition.has_palm:
         parts |= {"further_signals": palm_signals, "keep_signals": keep_samples}

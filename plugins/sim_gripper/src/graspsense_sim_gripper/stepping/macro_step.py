@@ -34,6 +34,7 @@ from graspsense_sim_gripper.stepping.control import (
 )
 from graspsense_sim_gripper.stepping.events import first, parting
 from graspsense_sim_gripper.stepping.implicit import acceleration_of, force_error, pressed
+from graspsense_sim_gripper.stepping.polynomial import Cubic, derivative, hermite, parabola, value
 from graspsense_sim_gripper.stepping.scheme import (
     FORCE_SCALE_N,
     SPEED_SCALE_M_S,
@@ -52,15 +53,6 @@ RELAXATION_ERROR: Final = 0.1
 """The error of a force that relaxes while the fingers are held, as a share of its second difference over the step."""
 GROWTH: Final = 4.0
 """Largest ratio of successive macro-steps."""
-
-
-class Cubic(NamedTuple):
-    """A cubic polynomial of the fraction s of the macro-step: c0 + s (c1 + s (c2 + s c3))."""
-
-    c0: float
-    c1: float
-    c2: float
-    c3: float
 
 
 class DenseOutput(NamedTuple):
@@ -211,11 +203,11 @@ def dense_output(before: PlantState, middle: Contact, after: PlantState, h: floa
     contact, contact1 = before.contact, after.contact
     return DenseOutput(
         h,
-        _hermite(revolutions, revolutions1, h * speed, h * speed1),
-        _hermite(gap, gap1, h * speed * jacobian, h * speed1 * jacobian1),
+        hermite(revolutions, revolutions1, h * speed, h * speed1),
+        hermite(gap, gap1, h * speed * jacobian, h * speed1 * jacobian1),
         Cubic(jacobian, jacobian1 - jacobian, 0.0, 0.0),
-        _parabola(contact.left_n, middle.left_n, contact1.left_n),
-        _parabola(contact.right_n, middle.right_n, contact1.right_n),
+        parabola(contact.left_n, middle.left_n, contact1.left_n),
+        parabola(contact.right_n, middle.right_n, contact1.right_n),
     )
 
 
@@ -232,21 +224,6 @@ def with_peak(state: PlantState, peak_n: float) -> PlantState:
 def values_at(dense: DenseOutput, s: float) -> PlantReadings:
     """Return what the sensors measure at this fraction of the macro-step."""
     h, revolutions, gap, jacobian, left, right = dense
-    speed = (revolutions.c1 + s * (2.0 * revolutions.c2 + 3.0 * s * revolutions.c3)) / h
-    motion = Motion(_value(revolutions, s), speed, _value(gap, s), _value(jacobian, s))
-    return PlantReadings(motion, _value(left, s), _value(right, s))
-
-
-def _hermite(x0: float, x1: float, slope0: float, slope1: float) -> Cubic:
-    change = x1 - x0
-    return Cubic(x0, slope0, 3.0 * change - 2.0 * slope0 - slope1, slope0 + slope1 - 2.0 * change)
-
-
-def _parabola(x0: float, middle: float, x1: float) -> Cubic:
-    bend = 2.0 * (x0 + x1 - 2.0 * middle)
-    return Cubic(x0, x1 - x0 - bend, bend, 0.0)
-
-
-def _value(cubic: Cubic, s: float) -> float:
-    c0, c1, c2, c3 = cubic
-    return c0 + s * (c1 + s * (c2 + s * c3))
+    speed = derivative(revolutions, s) / h
+    motion = Motion(value(revolutions, s), speed, value(gap, s), value(jacobian, s))
+    return PlantReadings(motion, value(left, s), value(right, s))

@@ -9,6 +9,8 @@ where phi1(z) = (exp(z) - 1)/z and phi2(z) = (phi1(z) - 1)/z (Hochbruck and Oste
 
 from __future__ import annotations
 
+import math
+
 
 def phi1(x: float, decay: float) -> float:
     """Return phi1(-x) for decay = exp(-x), the weight of the mean rate."""
@@ -22,3 +24,14 @@ def phi_ramp(x: float, decay: float) -> float:
         return x * (1.0 - 0.5 * x) / 6.0
     per_x = 1.0 / x
     return 2.0 * per_x - (2.0 * per_x + 1.0) * ((1.0 - decay) * per_x)
+
+
+def phi_1_2(x: float) -> tuple[float, float]:
+    """Return phi1(-x) and phi2(-x), the weights of a constant rate in the value after a step and in its integral."""
+    if abs(x) < 1e-2:
+        return (
+            1.0 - 0.5 * x * (1.0 - x / 3.0 * (1.0 - 0.25 * x)),
+            0.5 - x / 6.0 * (1.0 - 0.25 * x * (1.0 - 0.2 * x)),
+        )
+    first = (1.0 - math.exp(-x)) / x
+    return first, (1.0 - first) / x

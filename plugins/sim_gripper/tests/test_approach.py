@@ -1,0 +1,62 @@
+"""Ticks of an approach that are run at once give what the same ticks give one by one, with the encoder's noise too."""
+
+import numpy as np
+import pytest
+
+from graspsense.plugin_api import APPROACH, create
+from graspsense_sim_gripper.batch import run_many
+from graspsense_sim_gripper.config import SimConfig
+
+TICK_BY_TICK = {"fidelity": "fixed", "scheme": "explicit"}
+HYBRID = create("controller", "hybrid")
+RINGING = create("controller", "hybrid", velocity_gain_n_s_m=1500.0, integral_gain_n_m=1e5)
+"""Gains with which the loop of the speed is hardly damped."""
+ENCODER_TICK_M = 0.34e-6
+"""The gap of one tick of the encoder is smaller at every gap of an approach."""
+
+
+def approach(sensor, law, scene, **settings):
+    """Return the grasp, and the columns of its approach."""
+    grasp = run_many(SimConfig(sensor=sensor, **settings), law, [scene], [7])[0]
+    rows = grasp.trace.phase == APPROACH
+    return grasp, grasp.trace.gap_m[rows], grasp.trace.velocity_m_s[rows]
+
+
+def closing_at(speed_m_s):
+    return create("controller", "hybrid", closing_speed_m_s=speed_m_s)
+
+
+@pytest.mark.parametrize("sensor", ["ideal", "pads"])
+@pytest.mark.parametrize(
+    ("law", "scene"),
+    [
+        pytest.param(closing_at(0.04), "odwalla:full_closed", id="fast"),
+        # The toy stands off the centre, and a finger pushes it across the table.
+        pytest.param(closing_at(0.04), "toy", id="pushed"),
+        pytest.param(closing_at(0.004), "toy", id="slow", marks=pytest.mark.slow),
+        pytest.param(HYBRID, "odwalla:full_closed", id="default", marks=pytest.mark.slow),
+        # A constant effort above friction accelerates the fingers up to the contact.
+        pytest.param(create("controller", "force"), "odwalla:full_closed", id="accelerating"),
+        pytest.param(RINGING, "odwalla:full_closed", id="ringing"),
+        # Near the limit of 0.2 m/s, which the guard enforces.
+        pytest.param(closing_at(0.199), "odwalla:full_closed", id="limit"),
+    ],
+)
+def test_the_fingers_move_as_they_do_tick_by_tick(sensor, law, scene):
+    at_once, gap, velocity = approach(sensor, law, scene)
+    single, expected_gap, expected = approach(sensor, law, scene, **TICK_BY_TICK)
+    assert at_once.outcome == single.outcome
+    assert at_once.state.step.n_steps < 0.3 * len(at_once.trace.t_s)
+    # The contact is detected in the same tick: what the encoder's noise does to the motion is followed.
+    assert len(gap) == len(expected_gap)
+    shown_m = 0.0 if sensor == "ideal" else ENCODER_TICK_M
+    np.testing.assert_allclose(gap, expected_gap, rtol=0.0, atol=shown_m + 2e-7)
+    np.testing.assert_allclose(velocity, expected, rtol=0.0, atol=2e-5 if sensor == "ideal" else 1.5e-4)
+
+
+@pytest.mark.parametrize("law", [HYBRID, RINGING], ids=["default", "ringing"])
+def test_the_speed_that_the_encoder_shows_scatters_as_tick_by_tick(law):
+    _, _, velocity = approach("pads", law, "odwalla:full_closed")
+    _, _, expected = approach("pads", law, "odwalla:full_closed", **TICK_BY_TICK)
+    assert np.std(velocity[300:]) == pytest.approx(np.std(expected[300:]), rel=0.01)
+    assert np.mean(velocity[300:]) == pytest.approx(np.mean(expected[300:]), rel=1e-5)
