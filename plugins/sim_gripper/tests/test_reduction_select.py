@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from attrs import evolve, frozen
-from selection import error_of
+from selection import error_of, record_of
 
 from graspsense.core.checkpoints import with_checkpoints
 from graspsense.core.runner import run_grasp
@@ -58,6 +58,20 @@ def selected(config, spec, controller):
 
 def thing(*terms):
     return ObjectSpec(name="made up", width_m=0.05, terms=terms)
+
+
+@pytest.mark.parametrize("accuracy", [0.1, 0.001])
+def test_without_spread_the_trial_grasp_is_the_grasp_that_runs(accuracy):
+    # Only steps over several ticks may end elsewhere: a trial grasp stops once shortly before the contact.
+    config, law, odwalla = evolve(CONFIG, accuracy=accuracy), hybrid(), find("odwalla:full_closed")
+    problem, model = problem_of(config, odwalla), selected(config, odwalla, law)
+    trial = verify.trial_grasps(problem, law, compiled=False, padding=None)
+    # An approach with other steps was simulated before, and is not used.
+    trial.record(evolve(model, steps=model.steps._replace(macro_tolerance=0.0)))
+    job = Job(config=config, controller=law.controller, run=law.run, extract=None, traces=True)
+    ran = record_of(grasp_plain(job, instantiate(problem, model, 0)), 1.0 / config.rate_hz)
+    assert trial.record(model).outcome == ran.outcome
+    assert deviation(trial.record(model), ran)[0] < 1e-9
 
 
 @pytest.mark.parametrize("accuracy", [0.1, pytest.param(0.001, marks=pytest.mark.slow)])

@@ -1,7 +1,7 @@
 """Trial grasps of the nominal object, in one reduced model after another.
 
 A trial grasp uses ideal sensors and the controller of the run. It begins with open fingers and ends with the release.
-The approach depends on the steps, but not on the reduced model. It is therefore simulated once per step tolerance.
+The approach depends on the steps, but not on the reduced model. It is therefore simulated once for the same steps.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ from graspsense_sim_gripper.reduction.error import GraspRecord, deviation
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.own_features import OwnFeatures, beyond, own_features
 from graspsense_sim_gripper.sensing import Bias, PadBuffers
-from graspsense_sim_gripper.stepping.scheme import VERLET, Steps
+from graspsense_sim_gripper.stepping.scheme import Steps
 from graspsense_sim_gripper.term_failure import TermFailed, not_finite_in_tick
 
 _LOG: Final = logging.getLogger(__name__)
@@ -140,8 +140,8 @@ class TrialGrasps:
     _records: dict[Any, GraspRecord] = field(factory=dict, init=False)
     _features: dict[Any, OwnFeatures | None] = field(factory=dict, init=False)
     """The features of the pipeline in the grasps of `_records`."""
-    _starts: dict[float, _Stage] = field(factory=dict, init=False)
-    """The grasp shortly before the first contact, by the step tolerance of the approach."""
+    _starts: dict[Steps | None, _Stage] = field(factory=dict, init=False)
+    """The grasp shortly before the first contact, by the steps of the approach; all have one where `only_near`."""
     work: int = field(default=0, init=False)
     """Ticks and steps of all trial grasps so far."""
     _reported_s: float = field(factory=time.monotonic, init=False)
@@ -186,10 +186,10 @@ class TrialGrasps:
     def _grasp(self, reduction: Reduction, force_n: float, travel: float) -> GraspRecord:
         """Simulate what `record` returns. Raises NotCompilable."""
         setup = reduced(self.setup, reduction)
-        tolerance = math.inf if self.only_near else setup.plant.steps.tolerance
-        if tolerance not in self._starts:
-            self._starts[tolerance] = self._approach(setup)
-        start = self._starts[tolerance]
+        steps = None if self.only_near else _approach_steps(setup)
+        if steps not in self._starts:
+            self._starts[steps] = self._approach(setup)
+        start = self._starts[steps]
         bias = Bias(force_n, travel, setup.plant.object.width_m)
         setup = evolve(setup, sensor=setup.sensor._replace(bias=bias))
         until = start.progress.loop.ticks + self._max_ticks()
@@ -224,8 +224,7 @@ class TrialGrasps:
 
     def _closed_in(self, setup: GraspSetup, from_open: bool) -> tuple[_Stage, bool]:
         """Return the grasp shortly before the first contact, or at its end, and whether it reached the contact."""
-        # Without contact the motion is smooth, and long steps suffice.
-        steps = setup.plant.steps._replace(scheme=VERLET, longest_s=math.inf)
+        steps = _approach_steps(setup)
         reach = setup.plant.object.width_m + 2.0 * abs(setup.state.contact.offset_m)
         state, link = setup.state, setup.plant.drive.link
         if not from_open:
@@ -356,6 +355,11 @@ def trial_grasps(
         padding=padding,
         features=controller.features,
     )
+
+
+def _approach_steps(setup: GraspSetup) -> Steps:
+    """Return the steps up to the contact: without contact the motion is smooth, and long ones suffice."""
+    return setup.plant.steps._replace(longest_s=math.inf)
 
 
 def _ideal_buffers(on_arrays: bool) -> tuple[PadBuffers, Any]:
