@@ -51,7 +51,8 @@ def test_the_fingers_move_as_they_do_tick_by_tick(sensor, law, scene):
     assert len(gap) == len(expected_gap)
     shown_m = 0.0 if sensor == "ideal" else ENCODER_TICK_M
     np.testing.assert_allclose(gap, expected_gap, rtol=0.0, atol=shown_m + 2e-7)
-    np.testing.assert_allclose(velocity, expected, rtol=0.0, atol=2e-5 if sensor == "ideal" else 1.5e-4)
+    # The friction is linear to a tolerance that is relative to the speed.
+    np.testing.assert_allclose(velocity, expected, rtol=3e-4, atol=1e-6 if sensor == "ideal" else 1.5e-4)
 
 
 @pytest.mark.parametrize("law", [HYBRID, RINGING], ids=["default", "ringing"])

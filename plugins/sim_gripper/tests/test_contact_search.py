@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -13,7 +14,9 @@ from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, 
 from graspsense_sim_gripper.dynamics.state import ContactState
 from graspsense_sim_gripper.objects.library import find
 from graspsense_sim_gripper.reduction.levels import balance_rtol
+from graspsense_sim_gripper.terms.elastic import Elastic, elastic
 from graspsense_sim_gripper.terms.foam import Foam, foam
+from graspsense_sim_gripper.terms.loss import Loss, loss
 from graspsense_sim_gripper.terms.maxwell import Maxwell, MaxwellState, maxwell
 from graspsense_sim_gripper.terms.term import NoState
 from graspsense_sim_gripper.terms.worn import Worn, WornState, worn
@@ -52,6 +55,36 @@ def test_the_first_touch_of_a_worn_shell_compresses_it_by_no_more_than_the_finge
     assert unbalanced == 0
     assert 0.0 < after.compression_m <= closure_m
     assert after.states[0].work_j <= 2200.0 * closure_m**2
+
+
+def rate_error(lengths, duration_s=0.3):
+    """Return the error of the force on a damped spring behind pads whose closure is known, after steps like these."""
+    pads_n_m, k_n_m, c_n_s_m, w, depth = 1.5e4, 2000.0, 100.0, 20.0, 1e-3
+    body = ObjectModel(0.06, 0.0, PadCompliance(pads_n_m), (Elastic(k_n_m, 0.0), Loss(c_n_s_m)))
+    solve = bind_reachable(solve_contact, {"object_force": sum_of([elastic, loss])})
+
+    def compression(t):
+        return depth * (2.0 + math.sin(w * t))
+
+    def force(t):
+        return k_n_m * compression(t) + c_n_s_m * depth * w * math.cos(w * t)
+
+    state = ContactState(compression(0.0), force(0.0), 0.0, (NoState(), NoState()), 0.0, 0.0)
+    t, n = 0.0, 0
+    while t < duration_s - 1e-9:
+        h = min(lengths[n % len(lengths)], duration_s - t)
+        t, n = t + h, n + 1
+        state, unbalanced = solve(body, state, compression(t) + force(t) / pads_n_m, 0.0, h)
+        assert unbalanced == 0
+    return abs(state.force_n - force(t))
+
+
+@pytest.mark.parametrize(("ratio", "order"), [(1.0, 3), (1.4, 3), (4.0, 2)])
+def test_the_rate_that_a_damper_needs_is_of_third_order_where_steps_grow_slowly(ratio, order):
+    # What the first steps know less well has relaxed long before the end.
+    errors = [rate_error((h, ratio * h)) for h in (2e-3, 1e-3, 5e-4)]
+    for coarse, fine in itertools.pairwise(errors):
+        assert coarse / fine == pytest.approx(2.0**order, rel=0.25)
 
 
 def test_an_object_that_relaxes_is_balanced_with_two_evaluations_of_its_law():

@@ -239,7 +239,7 @@ def all_active(terms: Sequence[Any]) -> tuple[Switchable, ...]:
 def uncompressed(kinds: Sequence[str]) -> ContactState:
     """Return the state of an object of these terms that nothing has pressed yet."""
     states = (NO_STATE, *(find_term(kind)[1].at_rest for kind in kinds))
-    return ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0, Past(0.0, 0.0, math.inf))
+    return ContactState(0.0, 0.0, 0.0, states, 0.0, 0.0, Past(0.0, 0.0, math.inf, math.inf))
 
 
 # ------------------------------------------------------------------------------------------ plant and loop

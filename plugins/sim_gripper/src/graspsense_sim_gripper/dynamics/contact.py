@@ -3,7 +3,8 @@
 The pads' compression and the object's add up to the closure (the object's width less the gap), and both carry one
 force. The object's mass is negligible beside the drive's inertia, so this balance is algebraic; `solve_contact` solves
 it by a bracketed secant search. The rate of the compression, which dampers of the object need, is a backward difference
-of second order (BDF2 with variable steps).
+with variable steps: of third order (BDF3), of second where a step is more than `MAX_GROWTH` times the one before, and
+of first where there is no step before.
 
 An object that is free stands on a table: the finger that touches first pushes it, against the friction of the table,
 until both fingers touch. An object that is held fast stays where it is, and each finger presses its own half.
@@ -38,6 +39,9 @@ UNBALANCED_RTOL: Final = 1e-6
 MIN_SLOPE_N_M: Final = 1e-9
 MIN_SLOPE_SHARE: Final = 1e-3
 """The least slope of the balance with which a secant step is taken, absolute and relative to the pads' stiffness."""
+MAX_GROWTH: Final = 1.5
+"""Largest ratio of two steps with which the rate is of third order: BDF3 is stable up to 1.534 (Calvo, Grande and
+Grigorieff 1990)."""
 EQUAL_GUESSES: Final = 10.0
 """Multiple of the tolerance of the balance by which two guesses of the compression may differ and count as equal."""
 CONTACT_TOL_M: Final = 1e-10
@@ -226,7 +230,7 @@ def _right_restarted(right: Halves) -> Halves:
 
 def _restarted(half: ContactState) -> ContactState:
     d, force, slope, states, pad, branch, past = half
-    return ContactState(d, force, slope, states, pad, branch, Past(past.rate_m_s, 0.0, math.inf))
+    return ContactState(d, force, slope, states, pad, branch, Past(past.rate_m_s, 0.0, math.inf, math.inf))
 
 
 def solve_contact(
@@ -244,7 +248,7 @@ def solve_contact(
     # A finger that is still behind where the object stood presses it only if the object has not recovered so far.
     if force >= 0.0 and (force <= 0.0 or force0 > 0.0 or closure_m >= d0):
         return ContactState(
-            closure_m, force, slope, states, pad0, branch0, Past(past.rate_m_s, 0.0, math.inf)
+            closure_m, force, slope, states, pad0, branch0, Past(past.rate_m_s, 0.0, math.inf, math.inf)
         ), 0
     return _release_from_rigid_pads(model, now, force, closure_m, speed_m_s, h) if h > 0.0 else (now, 0)
 
@@ -263,7 +267,7 @@ def _release_from_rigid_pads(
         d1 = closure_m
         force, states = object_force(model.terms, states0, d0, d1, h, speed_m_s)
         if force >= 0.0:
-            past = Past(now.past.rate_m_s, 0.0, math.inf)
+            past = Past(now.past.rate_m_s, 0.0, math.inf, math.inf)
             return ContactState(d1, force, search.slope_n_m, states, now.pad_m, branch0, past), 0
         total = _release_slope(search.slope_n_m, force, force0, d0, closure_m)
         _, last, last_n, slope, _, lower, upper, n = search
@@ -272,7 +276,7 @@ def _release_from_rigid_pads(
     d1 = search.compression_m
     # No force, but NaN where a law gave no finite one, so that it is noticed.
     none = force - force
-    past = Past((d1 - d0) / h, 0.0, math.inf)
+    past = Past((d1 - d0) / h, 0.0, math.inf, math.inf)
     free = ContactState(d1, none, search.slope_n_m, states, 0.0, branch0, past)
     return free, _unbalanced(force, 0.0, 0.0)
 
@@ -301,13 +305,17 @@ def _press_through_pads(
 ) -> tuple[ContactState, int]:
     """Return the object behind compliant pads: pressed or separated, whichever of the two is consistent."""
     pads = model.pads
-    d0, force0, slope, _, pad0, branch0, (rate0, change0, span) = now
+    d0, force0, slope, _, pad0, branch0, (rate0, change0, span, before) = now
     pressed = force0 > 0.0
     over, base = h, d0
     if pressed:
         ahead = h / (h + span)
         over = h / (1.0 + ahead)
         base += over * ahead * rate0
+        if h <= MAX_GROWTH * span and before < math.inf:
+            third = h / (h + span + before)
+            over = h / (1.0 + ahead + third)
+            base = d0 + over * ((ahead + third) * rate0 + 0.5 * third * (h + span) * change0)
     stiffness, push, creep = pads.stiffness_n_m, pads.stiffness_n_m * closure_m, _NO_CREEP
     creeps = pads.damping_n_s_m > 0.0 or pads.branch_n_m > 0.0
     if creeps:
@@ -341,11 +349,11 @@ def _press_through_pads(
     if not pressed:
         pad = creep.free_pad_m
         branch = branch0 * creep.decay + (creep.mean_n_m + creep.ramp_n_m) * (pad - pad0)
-        past = Past(rate, 0.0, math.inf)
+        past = Past(rate, 0.0, math.inf, math.inf)
         return ContactState(d1, force - force, slope, states, pad, branch, past), unbalanced
-    past = Past(rate, 0.0 if span == math.inf else 2.0 * (rate - rate0) / (h + span), h)
+    past = Past(rate, 0.0 if span == math.inf else 2.0 * (rate - rate0) / (h + span), h, span)
     if force0 <= 0.0:
-        past = Past(rate, 0.0, math.inf)
+        past = Past(rate, 0.0, math.inf, math.inf)
     if not creeps:
         return ContactState(d1, force, slope, states, pad0, branch0, past), unbalanced
     pad = closure_m - d1

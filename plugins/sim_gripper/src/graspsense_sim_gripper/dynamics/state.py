@@ -29,6 +29,8 @@ class Past(NamedTuple):
     """Change of the mean rate from the step before it to that step, divided by the time from middle to middle."""
     span_s: float = math.inf
     """Duration of that step; inf if it says nothing about the next one."""
+    before_s: float = math.inf
+    """Duration of the step before it; inf if the change says nothing about the next step."""
 
 
 class ContactState(NamedTuple):

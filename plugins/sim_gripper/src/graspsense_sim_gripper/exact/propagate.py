@@ -343,7 +343,7 @@ def _store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_
         states,
         pad_m,
         branch_n,
-        Past(before.past.rate_m_s, 0.0, math.inf),
+        Past(before.past.rate_m_s, 0.0, math.inf, math.inf),
     )
     # An object that is held on the centre line has two halves in the same state.
     right = _both_same(contact.right, left)

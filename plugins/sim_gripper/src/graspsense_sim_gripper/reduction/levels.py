@@ -14,11 +14,13 @@ from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, VERLET, Ste
 STEP_SHARE: Final = 0.34
 """The tolerance of a step is (0.34 accuracy)^1.5, so that the accumulated error of many steps is proportional to the
 accuracy, and smaller."""
-MACRO_SHARE: Final = 3e-4
+MACRO_SHARE: Final = 1e-3
 """The tolerance of a macro-step, relative to the accuracy. Near rest the gap changes so slowly that a small error moves
 the detected time of rest by many ticks, so it has to be this small."""
 GROWTH_ACCURACY: Final = 0.1
 """From this accuracy upwards, a step in contact may be twice as long as the one before."""
+PLAIN_GROWTH: Final = 2.0
+"""Largest ratio of the short steps after a contact, up to a step per tick."""
 BALANCE_SHARE: Final = 5e-7
 """The tolerance of the balance of forces, relative to the accuracy of the steps."""
 MAX_BALANCE_RTOL: Final = 5e-9
@@ -135,7 +137,7 @@ def steps_for(level: Level, scheme: int, dt_s: float) -> Steps:
     """Return the step control of a level with this scheme, for ticks of `dt_s` seconds."""
     if level.plain == 1:
         macro_tolerance = MACRO_SHARE * level.step_tol if level.macro == 1 else 0.0
-        return Steps(math.inf, scheme, dt_s, growth=math.inf, macro_tolerance=macro_tolerance)
+        return Steps(math.inf, scheme, dt_s, growth=PLAIN_GROWTH, macro_tolerance=macro_tolerance)
     longest_s = dt_s / level.min_steps if level.min_steps > 1 else math.inf
     tolerance = step_tolerance(level.step_tol)
     if scheme == BOGACKI_SHAMPINE:

@@ -138,7 +138,7 @@ def take_step(
         if not accepted:
             return PlantState(state.motion, contact, after_step, state.effort_n, state.peak_n), 0.0
         meets = state.motion.gap_m > start.meeting_m >= attempt.motion.gap_m
-        if (changes or meets) and steps.tolerance < math.inf:
+        if (changes or meets) and steps.growth < math.inf:
             after_step = after_contact(steps, after_step)
         elif changes:
             # The force is still that of the law before the event; a step this short takes over the one after it.

@@ -3,8 +3,8 @@
 Bogacki and Shampine, Appl. Math. Lett. 2, 1989. The error is the difference to the embedded formula of second order;
 the fourth stage is the first one of the next step. A term integrates its own state from the beginning of the step to
 each stage, along the path to the stage's position. The errors of the positions cancel in the sum of the stages as
-those of a spring's force do, so that the order holds for terms with a memory too. If the pads have a damper, the order
-is two, since the rate of their compression is a backward difference.
+those of a spring's force do, so that the order holds for terms with a memory too, and for dampers behind pads, whose
+rate is a backward difference of third order.
 """
 
 from __future__ import annotations

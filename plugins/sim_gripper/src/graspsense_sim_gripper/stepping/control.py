@@ -36,6 +36,8 @@ LONG_STEP_S: Final = 10.0
 """Longer steps are not limited any more."""
 CONTACT_STEP_S: Final = 0.01
 """Length of the first step after a contact, for a tolerance of 1."""
+CONTACT_SHARE: Final = 0.01
+"""The same as a share of the longest step, where no error is estimated."""
 MIN_CONTACT_STEP_S: Final = 1e-8
 """Smallest length of that step; over a shorter one the rate of a compression is mostly rounding."""
 MAX_STEPS: Final = 20_000
@@ -110,5 +112,7 @@ def accept(error: float, h: float, last: StepState, growth: float, forced: bool)
 
 def after_contact(steps: Steps, step: StepState) -> StepState:
     """Return the state of the control after a contact: a damper begins to relax there, which needs short steps."""
-    first = max(CONTACT_STEP_S * steps.tolerance, MIN_CONTACT_STEP_S)
+    estimated = steps.tolerance < math.inf
+    first = CONTACT_STEP_S * steps.tolerance if estimated else CONTACT_SHARE * steps.longest_s
+    first = max(first, MIN_CONTACT_STEP_S)
     return StepState(min(step.next_s, first), step.n_steps, step.unresolved)
