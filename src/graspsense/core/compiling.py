@@ -16,6 +16,7 @@ by name for this.
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import os
 import re
@@ -148,7 +149,9 @@ def first_call(*, slp_vectorize: bool = False) -> Iterator[None]:
     from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
     config: Any = numba.config
-    before = config.SLP_VECTORIZE
+    before, collects = config.SLP_VECTORIZE, gc.isenabled()
+    # The compiler makes millions of objects, nearly all of which remain until it has ended.
+    gc.disable()
     if slp_vectorize:
         config.SLP_VECTORIZE = 1
     try:
@@ -162,6 +165,8 @@ def first_call(*, slp_vectorize: bool = False) -> Iterator[None]:
         raise NotCompilable(f"the compiler refuses {where}: {reason}") from error
     finally:
         config.SLP_VECTORIZE = before
+        if collects:
+            gc.enable()
 
 
 def entry_point(compiled: Callable[..., Any]) -> Callable[..., Any]:
@@ -201,9 +206,12 @@ class _Compilation:
         key = self._key(function, "inner" if n_places else "cold")
         if key not in _COMPILED:
             named = self._named(function, key)
-            inline = self._inline(function.__code__, n_places)
+            # It imports numba.
+            from graspsense.core.linked_code import LinkedCompiler
+
+            options = self._flags(function) | self._inline(function.__code__, n_places)
             _COMPILED[key] = self.numba.njit(
-                named, no_cpython_wrapper=True, **inline, **self._flags(function)
+                named, no_cpython_wrapper=True, pipeline_class=LinkedCompiler, **options
             )
         return _COMPILED[key]
 
