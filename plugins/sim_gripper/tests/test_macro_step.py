@@ -15,7 +15,7 @@ from graspsense_sim_gripper.compiled.compose import plant_move, step_parts, unco
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
-from graspsense_sim_gripper.stepping.macro_step import macro_step, next_ticks, values_at
+from graspsense_sim_gripper.stepping.macro_step import HALF, macro_step, next_ticks, values_at
 from graspsense_sim_gripper.stepping.scheme import BOGACKI_SHAMPINE, Steps
 from graspsense_sim_gripper.terms.registry import laws_of
 
@@ -85,7 +85,7 @@ def test_a_step_that_is_taken_is_as_exact_as_its_tolerance_says(scene):
     plant, start = squeezing(scene)
     n = 32
     while not (step := plant.macro_step(plant.params, start, EFFORT_N, n * TICK)).error <= 1.0:
-        n = next_ticks(n, step.error)
+        n = next_ticks(n, step.error, step.event_share)
     expected = plant.after(start, n * TICK)
     assert n >= 2
     assert step.after.contact.left_n == pytest.approx(expected.contact.left_n, rel=3e-4)
@@ -152,10 +152,22 @@ def test_a_step_that_would_contain_an_event_is_not_taken():
 
 
 def test_the_number_of_ticks_follows_from_the_error():
-    assert next_ticks(16, 0.0) == 64
-    assert next_ticks(16, 1.0) == 14
-    assert next_ticks(16, 8.0) == 7
-    assert next_ticks(16, inf) == next_ticks(16, math.nan) == 8
+    assert next_ticks(16, 0.0, HALF) == 64
+    assert next_ticks(16, 1.0, HALF) == 14
+    assert next_ticks(16, 8.0, HALF) == 7
+    assert next_ticks(16, inf, HALF) == next_ticks(16, math.nan, HALF) == 8
+    assert next_ticks(16, inf, 0.7) == 11
+    assert next_ticks(16, inf, 0.999) == 15
+
+
+@pytest.mark.parametrize("before_m", [3e-4, 1.3e-3])
+def test_a_step_that_is_repeated_ends_shortly_before_an_event_whose_place_is_known(before_m):
+    plant = Plant("toy")
+    start = plant.state(CONFIG.open_gap_m - plant.params.object.width_m - before_m, 0.05)
+    too_long = plant.macro_step(plant.params, start, -20.0, 64 * TICK)
+    n = next_ticks(64, too_long.error, too_long.event_share)
+    assert plant.macro_step(plant.params, start, -20.0, n * TICK).error <= 1.0
+    assert plant.after(start, (n + 2) * TICK, -20.0).motion.gap_m == pytest.approx(CONFIG.open_gap_m, abs=1e-12)
 
 
 def test_a_grasp_does_not_depend_on_the_length_of_its_buffers(monkeypatch):

@@ -172,16 +172,17 @@ def _after_tick(way: Approach, motion: Motion, effort_n: float, dt_s: float) -> 
     """Return the motion after a tick under this effort."""
     revolutions, speed, _, jacobian = motion
     begin, per_rev, gap, force, resistance, gain, gain2, _ = way
-    # None of these waits for the effort, which changes the angle in a tick by little.
+    # None of these waits for the effort, which a processor knows last. It changes the angle in a tick by little.
     way_rev = dt_s * speed
-    s = (revolutions + way_rev - begin) * per_rev
+    coasted_rev = revolutions + way_rev
+    s = (coasted_rev - begin) * per_rev
     jacobian1 = derivative(gap, s) * per_rev
     middle = jacobian + way_rev * (gap.c2 + 1.5 * gap.c3) * (per_rev * per_rev)
-    push = middle * (force - resistance * speed * jacobian - effort_n)
-    more = gain2 * push
+    push = middle * (force - resistance * speed * jacobian)
+    by_speed, by_angle = gain * middle, gain2 * middle
     return Motion(
-        revolutions + (way_rev + more),
-        speed + gain * push,
-        value(gap, s) + jacobian1 * more,
+        (coasted_rev + gain2 * push) - by_angle * effort_n,
+        (speed + gain * push) - by_speed * effort_n,
+        (value(gap, s) + jacobian1 * (gain2 * push)) - (jacobian1 * by_angle) * effort_n,
         jacobian1,
     )

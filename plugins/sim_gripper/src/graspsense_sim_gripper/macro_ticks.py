@@ -22,6 +22,7 @@ from graspsense_sim_gripper.loop import (
 )
 from graspsense_sim_gripper.sensing import SensorState, next_image_s, read_frame
 from graspsense_sim_gripper.stepping.macro_step import (
+    HALF,
     MAX_TICKS,
     MacroStep,
     constant_values,
@@ -30,6 +31,7 @@ from graspsense_sim_gripper.stepping.macro_step import (
     values_at,
     with_peak,
 )
+from graspsense_sim_gripper.stepping.scheme import PlantParams, Steps
 
 FIRST_TICKS: Final = 2
 """Number of ticks in the first macro-step."""
@@ -52,19 +54,21 @@ def run_macro_step(
     most = min(params.max_ticks - at.ticks, _ticks_to_image(params, at.sensor, at.ticks))
     if most < FIRST_TICKS:
         return at, now
-    n = min(now.length, most)
-    step = MacroStep(math.inf, at.plant, constant_values(at.plant))
+    n, event = min(now.length, most), False
+    step = MacroStep(math.inf, 0.0, at.plant, constant_values(at.plant))
     while n >= FIRST_TICKS and not step.error <= 1.0:
         step = macro_step(params.plant, at.plant, at.effort_n, n * params.dt_s)
         if not step.error <= 1.0:
-            n = next_ticks(n, step.error)
+            event = event or not step.error < math.inf
+            n = next_ticks(n, step.error, step.event_share)
     if not step.error <= 1.0:
         wait = min(2 * now.wait, MAX_WAIT)
         return at, MacroControl(FIRST_TICKS, at.ticks + wait, wait)
     # A step that an image cut short does not shorten the next one.
-    length = max(next_ticks(n, step.error), now.length if n == most else FIRST_TICKS)
+    length = max(next_ticks(n, step.error, HALF), now.length if n == most else FIRST_TICKS)
     after = _ticks_within(params, at, step, n, pads, columns, phases)
-    if after.effort_n != at.effort_n:
+    # The step ends shortly before the event.
+    if event or after.effort_n != at.effort_n:
         length = FIRST_TICKS
     return after, MacroControl(length, after.ticks, 1)
 
@@ -88,10 +92,20 @@ def _ticks_within(
         recorded, ticks, k = recorded + 1, ticks + 1, k + 1
     after = step.after
     if command_n != effort or state.done == 1 or state.guard.stopped == 1:
-        after = move(params.plant, plant, effort, (k - 1) * dt_s)
+        after = move(_held_at_once(params.plant, plant), plant, effort, (k - 1) * dt_s)
         if state.done == 0 and state.guard.stopped == 0:
             after = move(params.plant, after, command_n, dt_s)
     return LoopProgress(ticks, recorded, command_n, with_peak(after, max(after.peak_n, peak)), sensor, state)
+
+
+def _held_at_once(model: PlantParams, plant: PlantState) -> PlantParams:
+    """Return the model in which fingers at rest are held in one step, as a longer macro-step has shown to suffice."""
+    drive, body, (tolerance, scheme, longest_s, settle, growth, touched_s, macro_tolerance) = model
+    if plant.motion.speed_rev_s == 0.0:
+        longest_s = math.inf
+    return PlantParams(
+        drive, body, Steps(tolerance, scheme, longest_s, settle, growth, touched_s, macro_tolerance)
+    )
 
 
 def _ticks_to_image(params: GraspParams, sensor: SensorState, ticks: int) -> int:

@@ -14,6 +14,8 @@ from __future__ import annotations
 import math
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from graspsense.plugin_api import (
     Frame,
     ScrewLinkage,
@@ -222,15 +224,17 @@ def sense_motion(
         if params.bias.force_n != 0.0:
             gap += params.bias.travel_share * min(gap - params.bias.from_m, 0.0)
         return encoder_ticks, gap, velocity
-    moved = 0.0
-    ticks = float(math.floor(motion.revolutions * ENCODER_TICKS))
+    # A division for all ticks, which a compiler takes out of the loop. Few operations wait for the motion, which is
+    # known last; `math.floor` would convert to an integer and back.
+    share = 1.0 / (VELOCITY_FILTER_S + dt_s)
+    velocity -= (dt_s * share) * velocity
+    angle = motion.revolutions * ENCODER_TICKS
+    ticks = float(np.floor(angle))
     if ticks != encoder_ticks:
         # Over one encoder tick the linkage is linear to a tenth of a picometre.
-        moved = -gap
-        gap = motion.gap_m - motion.jacobian_m_rev * (motion.revolutions - ticks * (1.0 / ENCODER_TICKS))
-        moved += gap
-    # A division for all ticks, which a compiler takes out of the loop.
-    velocity += (moved - dt_s * velocity) * (1.0 / (VELOCITY_FILTER_S + dt_s))
+        gap_before = gap
+        gap = motion.gap_m - (motion.jacobian_m_rev * (1.0 / ENCODER_TICKS)) * (angle - ticks)
+        velocity += share * (gap - gap_before)
     return ticks, gap, velocity
 
 

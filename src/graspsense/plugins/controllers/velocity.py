@@ -109,7 +109,7 @@ def closing_effort(
     """Return the effort (N) of the velocity loop, and its integral (N) after this tick."""
     speed, gain, integral_gain, limit, _ = loop
     error = speed + velocity_m_s
-    integral_n += integral_gain * error * dt_s
+    integral_n += (integral_gain * dt_s) * error
     if integral_n > limit:
         integral_n = limit
     elif integral_n < -limit:

@@ -182,6 +182,11 @@ object_moves: Callable[[Any], bool] = _nothing_moves
 """Whether a term moves in a free object (see `Term.moves`); the composition of a scene binds it where one can."""
 
 
+def is_pressed(contact: Contact) -> bool:
+    """Return whether the fingers press the object, or one of them a half of an object that is held fast."""
+    return contact.left.force_n > 0.0 or right_of(contact.left, contact.right).force_n > 0.0
+
+
 def has_event(before: Contact, after: Contact) -> bool:
     """Return whether a term of the object has an event between these contacts (see `Term.phase`)."""
     return object_phase(before.left.states) != object_phase(after.left.states) or object_phase(

@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 from graspsense.plugin_api import gap_and_rate
-from graspsense_sim_gripper.dynamics.contact import has_event, is_touched, restarted
+from graspsense_sim_gripper.dynamics.contact import has_event, is_pressed, is_touched, restarted
 from graspsense_sim_gripper.dynamics.drive import Drive, is_held
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState, StepState
 from graspsense_sim_gripper.stepping.bogacki_shampine import bogacki_shampine
@@ -133,7 +133,9 @@ def take_step(
         attempt = _without_reversal(start, attempt)
         # A step across an event of a term has an error only where the force jumps, and none that shorter steps reduce.
         error = 0.0 if changes else relative_error(steps.tolerance, start, attempt)
-        growth = FREE_GROWTH if contact.touched == 0 else steps.growth
+        growth = steps.growth
+        if not is_pressed(attempt.contact):
+            growth = FREE_GROWTH if steps.tolerance < math.inf else math.inf
         accepted, after_step = accept(error, attempt.duration_s, step, growth, forced)
         if not accepted:
             return PlantState(state.motion, contact, after_step, state.effort_n, state.peak_n), 0.0

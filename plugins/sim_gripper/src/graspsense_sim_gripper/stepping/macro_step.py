@@ -53,6 +53,8 @@ RELAXATION_ERROR: Final = 0.1
 """The error of a force that relaxes while the fingers are held, as a share of its second difference over the step."""
 GROWTH: Final = 4.0
 """Largest ratio of successive macro-steps."""
+HALF: Final = 0.5
+"""The share of a step after which an event is assumed that is only known to be in it."""
 
 
 class DenseOutput(NamedTuple):
@@ -71,6 +73,8 @@ class MacroStep(NamedTuple):
 
     error: float
     """Its error relative to the tolerance: at most 1 if the step is accepted; inf if it would contain an event."""
+    event_share: float
+    """The share of its duration up to that event, as far as it is known."""
     after: PlantState
     values: DenseOutput
     """The values within it."""
@@ -79,33 +83,34 @@ class MacroStep(NamedTuple):
 def macro_step(params: PlantParams, state: PlantState, effort_n: float, h: float) -> MacroStep:
     """Return an attempted step of `h`."""
     if state.contact.touched == 1 and h > params.steps.longest_touched_s:
-        error, middle, after = math.inf, state.contact, state
+        error, share, middle, after = math.inf, HALF, state.contact, state
     elif state.motion.speed_rev_s == 0.0:
-        error, middle, after = _rested(params, state, effort_n, h)
+        error, share, middle, after = _rested(params, state, effort_n, h)
     else:
-        error, middle, after = _moved(params, state, effort_n, h)
-    return MacroStep(error, after, dense_output(state, middle, after, h))
+        error, share, middle, after = _moved(params, state, effort_n, h)
+    return MacroStep(error, share, after, dense_output(state, middle, after, h))
 
 
 def _rested(
     params: PlantParams, state: PlantState, effort_n: float, h: float
-) -> tuple[float, Contact, PlantState]:
-    """Return the relative error of a step in which the fingers are held, the contact half-way, and the plant after."""
+) -> tuple[float, float, Contact, PlantState]:
+    """Return what `_moved` does for a step in which the fingers are held."""
     contact = state.contact
     if not is_held(params.drive, state.motion, contact, effort_n):
-        return math.inf, contact, state
+        return math.inf, HALF, contact, state
     if rests(params.drive, state, effort_n):
-        return 0.0, contact, state
+        return 0.0, HALF, contact, state
     if contact.left.force_n <= 0.0 and contact.left_n + contact.right_n > 0.0:
-        return math.inf, contact, state
+        return math.inf, HALF, contact, state
     middle, t = stick(params, state, effort_n, 0.5 * h)
     after, t1 = stick(params, middle, effort_n, 0.5 * h)
     if t < 0.5 * h or t1 < 0.5 * h or _has_event(contact, after.contact):
-        return math.inf, contact, state
+        return math.inf, HALF, contact, state
     load, load1, load2 = _load(contact), _load(middle.contact), _load(after.contact)
     second_difference_n = abs(load - 2.0 * load1 + load2)
     return (
         RELAXATION_ERROR * second_difference_n / (params.steps.macro_tolerance * max(load, FORCE_SCALE_N)),
+        HALF,
         middle.contact,
         after,
     )
@@ -113,8 +118,8 @@ def _rested(
 
 def _moved(
     params: PlantParams, state: PlantState, effort_n: float, h: float
-) -> tuple[float, Contact, PlantState]:
-    """Return the relative error of a step of moving fingers, the contact half-way, and the plant after it.
+) -> tuple[float, float, Contact, PlantState]:
+    """Return error and event of a step of moving fingers (see `MacroStep`), the contact half-way, and the plant after.
 
     The scheme is of Runge-Kutta-Nystrom type with the nodes 0, 1/2 and 1 and the weights of Simpson's rule; its speeds
     are those of Kutta's scheme of third order. The third stage is at the end of the path, so that the object has two
@@ -128,10 +133,10 @@ def _moved(
         coasting = PlantParams(drive, model, Steps(scale * steps.macro_tolerance))
         coasts, after = coast(coasting, state, effort_n, h)
         if coasts or contact.left_n + contact.right_n > 0.0:
-            return 0.0 if coasts else math.inf, contact, after
+            return 0.0 if coasts else math.inf, HALF, contact, after
     start = start_of(params, state, effort_n)
     if comes_to_rest(start):
-        return math.inf, contact, state
+        return math.inf, HALF, contact, state
     revolutions, speed, _, jacobian = motion
     direction, rate = start.direction, start.acceleration
     gap1, jacobian1 = gap_and_rate(link, revolutions + 0.5 * h * (speed + 0.25 * h * rate))
@@ -149,28 +154,32 @@ def _moved(
     motion2 = Motion(revolutions2, speed_end, gap2, jacobian2)
     error_n = force_error(start, motion2, end, position_error)
     attempt = Attempt(motion2, end, h, speed_error * abs(jacobian), error_n)
-    if _contains_event(params, start, middle, attempt):
-        return math.inf, contact, state
+    share = _event_share(params, start, middle, attempt)
+    if share > 0.0:
+        return math.inf, share, contact, state
     next_s, n_steps, unresolved = state.step
     after = completed(params, state, start, attempt, StepState(next_s, n_steps + 1, unresolved))
-    return relative_error(params.steps.macro_tolerance, start, attempt), middle, after
+    return relative_error(params.steps.macro_tolerance, start, attempt), HALF, middle, after
 
 
-def _contains_event(params: PlantParams, start: Start, middle: Contact, attempt: Attempt) -> bool:
-    """Return whether the motion ends, a finger meets or leaves the object, or a term has an event in this step.
+def _event_share(params: PlantParams, start: Start, middle: Contact, attempt: Attempt) -> float:
+    """Return the share of this step up to its first event, as far as it is known; 0 if there is none.
 
-    `middle` is the contact half-way.
+    The motion ends, a finger meets or leaves the object, or a term has an event. `middle` is the contact half-way.
     """
     before, after = start.contact, attempt.contact
-    return (
+    if _has_event(before, middle) or _has_event(before, after):
+        return HALF
+    share = parting(params, start, attempt)
+    if share == 0.0:
+        share = first(params, start, attempt)
+    if share == 0.0 and (
         attempt.motion.speed_rev_s * start.direction <= 0.0
         or start.motion.gap_m > start.meeting_m >= attempt.motion.gap_m
         or not _pressed_halves(before) == _pressed_halves(middle) == _pressed_halves(after)
-        or _has_event(before, middle)
-        or _has_event(before, after)
-        or parting(params, start, attempt) > 0.0
-        or first(params, start, attempt) > 0.0
-    )
+    ):
+        share = HALF
+    return share
 
 
 def _pressed_halves(contact: Contact) -> tuple[bool, bool]:
@@ -185,13 +194,13 @@ def _load(contact: Contact) -> float:
     return 0.5 * (contact.left_n + contact.right_n)
 
 
-def next_ticks(n: int, error: float) -> int:
-    """Return the number of ticks of the next macro-step after one of `n` ticks with this error.
+def next_ticks(n: int, error: float, event_share: float) -> int:
+    """Return the number of ticks of the next macro-step after one of `n` ticks with this error and event.
 
     The same control as that of single steps (`control`), for the error of a third-order scheme.
     """
     if not error < math.inf:
-        return n // 2
+        return min(int(n * event_share), n - 1)
     factor = MAX_FACTOR if error <= SMALL_ERROR else SAFETY * error**EXPONENT
     return min(max(int(n * min(max(factor, MIN_FACTOR), GROWTH)), 1), MAX_TICKS)
 

@@ -41,8 +41,8 @@ class Steps(NamedTuple):
     growth: float = 2.0
     """Largest ratio of a step to the last one while something is touched.
 
-    After a contact at time t_c a step is then at most (growth - 1) (t - t_c) long, however short the first one was. inf:
-    a contact does not shorten the next step."""
+    After a contact at time t_c a step is then at most (growth - 1) (t - t_c) long, however short the first one was.
+    inf: a contact does not shorten the next step."""
     longest_touched_s: float = math.inf
     """The longest step after the object was touched; it resolves the fastest oscillation of a term."""
     macro_tolerance: float = 0.0
