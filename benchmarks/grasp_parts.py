@@ -91,7 +91,7 @@ def parts(config: SimConfig, repeats: int) -> dict[str, float]:
         return of_slice
 
     def noise(draw: Any) -> Callable[[int], None]:
-        return of_each(lambda setup: draw(setup.noise(), storage.buffers.pads.noise))
+        return of_each(lambda setup: draw(setup.noise(storage.rng), storage.buffers.pads.noise))
 
     def loop_only(begin: int) -> float:
         in_loop[0] = 0.0

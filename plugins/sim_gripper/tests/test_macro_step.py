@@ -167,7 +167,9 @@ def test_a_step_that_is_repeated_ends_shortly_before_an_event_whose_place_is_kno
     too_long = plant.macro_step(plant.params, start, -20.0, 64 * TICK)
     n = next_ticks(64, too_long.error, too_long.event_share)
     assert plant.macro_step(plant.params, start, -20.0, n * TICK).error <= 1.0
-    assert plant.after(start, (n + 2) * TICK, -20.0).motion.gap_m == pytest.approx(CONFIG.open_gap_m, abs=1e-12)
+    assert plant.after(start, (n + 2) * TICK, -20.0).motion.gap_m == pytest.approx(
+        CONFIG.open_gap_m, abs=1e-12
+    )
 
 
 def test_a_grasp_does_not_depend_on_the_length_of_its_buffers(monkeypatch):

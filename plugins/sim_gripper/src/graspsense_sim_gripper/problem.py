@@ -75,13 +75,14 @@ class GraspSetup:
         """Whether the gripper has an accelerometer."""
         return bool(self.palm)
 
-    def noise(self) -> np.random.Generator:
+    def noise(self, by: np.random.Generator | None = None) -> np.random.Generator:
         """Return the generator of the noise of the cell images: standard normal numbers, 2 CELLS for each image.
 
-        Every call returns the same generator, which then begins anew.
+        Every call returns the same generator, which then begins anew: `by`, a PCG64, or that of the seed.
         """
-        self.rng.bit_generator.state = self.noise_state
-        return self.rng
+        rng = self.rng if by is None else by
+        rng.bit_generator.state = self.noise_state
+        return rng
 
     def palm_noise(self) -> PalmNoise:
         """Return a function that draws the noise of the palm in the next ticks, as many as it is asked for.

@@ -24,7 +24,7 @@ from attrs import evolve, frozen
 
 from graspsense.plugin_api import CompiledExtraction, Outcome, Trace, columns_of_ticks
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job
-from graspsense_sim_gripper.batch.nested import like
+from graspsense_sim_gripper.batch.nested import from_text, like, text_of
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.model_report import model_report
 from graspsense_sim_gripper.objects.library import kinds_in
@@ -107,7 +107,7 @@ def told(grasp: FinishedGrasp, scene: str) -> Json:
     """Return a result as JSON values. The state is text in it, since few callers read it."""
     state = grasp.state
     report = model_report(state, kinds_in(scene))
-    return grasp.outcome.value, grasp.reason, grasp.extracted, report, json.dumps(state)
+    return grasp.outcome.value, grasp.reason, grasp.extracted, report, text_of(state)
 
 
 def results(
@@ -132,7 +132,7 @@ def results(
 
 
 def _state(text: str, pattern: PlantState) -> PlantState:
-    state: PlantState = like(pattern, json.loads(text))
+    state: PlantState = from_text(pattern, text)
     return state
 
 

@@ -271,6 +271,8 @@ class Storage:
     draw_noise: DrawNoise = draw_by_numpy
     """Draws the noise of the first images of a grasp."""
     buffers: Buffers = field(factory=_new_buffers)
+    rng: np.random.Generator = field(factory=lambda: np.random.Generator(np.random.PCG64(0)))
+    """Draws the noise of all grasps in turn: compiled code takes a generator that it has not seen before slowly."""
 
 
 def grasp_compiled(
@@ -383,9 +385,9 @@ def _run(
     job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage, on_arrays: bool
 ) -> tuple[SimulationState, Buffers]:
     """Run the loop to the end of the grasp, with longer buffers where those of the storage do not suffice."""
-    noise, ideal = setup.noise(), setup.sensor.ideal == 1
-    buffers = storage.buffers
+    ideal, buffers = setup.sensor.ideal == 1, storage.buffers
     if not ideal:
+        noise = setup.noise(storage.rng)
         storage.draw_noise(noise, buffers.pads.noise)
     buffers.pads.images[-1] = math.nan
     buffers.pads.left_zero[:] = buffers.pads.right_zero[:] = CELL_OFFSET[0]

@@ -8,6 +8,7 @@ scene and seed only; the number of workers changes the run time only.
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 import warnings
@@ -64,6 +65,8 @@ WORTH_FORKING: Final = 500
 """Number of compiled grasps from which forked processes save time on two cores; they start and end in 20 ms."""
 SLICE: Final = 16
 """Number of grasps that a worker takes at once."""
+FORKED_SLICE: Final = 64
+"""Largest number that a forked process takes at once. They take 20 ms, so an interruption still takes effect soon."""
 MAX_AHEAD: Final = 8
 """Number of slices per worker that may be ahead of the earliest unfinished slice."""
 PROGRESS_S: Final = 0.2
@@ -162,6 +165,8 @@ class _Batch:
     processes: ExitStack = field(factory=ExitStack, init=False)
     forked: SimpleQueue[ForkedProcess] = field(factory=SimpleQueue, init=False)
     """The forked processes that no thread uses at present."""
+    slice: int = field(default=SLICE, init=False)
+    """Number of grasps that a worker takes at once."""
 
     @models.default
     def _models(self) -> Scenes:
@@ -174,8 +179,7 @@ class _Batch:
         """
         total = len(self.scenes)
         self._plan()
-        slices = range(0, total, SLICE)
-        workers = max(1, min(self.workers, len(slices)))
+        workers = max(1, min(self.workers, math.ceil(total / SLICE)))
         running: dict[Future[Answer], int] = {}
         ready: dict[int, Answer] = {}
         asked = given = finished = 0
@@ -184,6 +188,7 @@ class _Batch:
             if self._worth_forking(workers, progress):
                 self._fork(workers)
             run = self._slice if self.forked.empty() else self._forked_slice
+            slices = range(0, total, self.slice)
             try:
                 while True:
                     # Two slices per worker, one in reserve: few results wait, and an interruption takes effect soon.
@@ -272,6 +277,8 @@ class _Batch:
     def _fork(self, workers: int) -> None:
         """Fork as many processes, or fewer if the system allows no more; without any, threads run the grasps."""
         processes: list[ForkedProcess] = []
+        # Several for each, so that none waits long for the last of the others.
+        self.slice = min(max(len(self.scenes) // (4 * workers), SLICE), FORKED_SLICE)
         # OSError: no memory, or the limit of processes.
         with suppress(OSError):
             for _ in range(workers):
@@ -309,7 +316,7 @@ class _Batch:
 
     def _part(self, begin: int) -> list[tuple[str, int]]:
         """Return the scene and the seed of each grasp of the slice that begins at this index."""
-        part = slice(begin, begin + SLICE)
+        part = slice(begin, begin + self.slice)
         return list(zip(self.scenes[part], self.seeds[part], strict=True))
 
     def _worth(self, n: int) -> bool:

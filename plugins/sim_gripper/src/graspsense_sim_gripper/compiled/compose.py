@@ -231,9 +231,12 @@ def any_moves(moving: Sequence[tuple[int, Moves]]) -> Moves:
     return combined
 
 
+NOTHING_LUMPED: Final = Switchable(0, LumpedSpringDamper(0.0, 0.0))
+
+
 def all_active(terms: Sequence[Any]) -> tuple[Switchable, ...]:
     """Return the parameters of these terms as the sum of `laws_of` takes them: all kept, and nothing lumped."""
-    return (Switchable(0, LumpedSpringDamper(0.0, 0.0)), *(Switchable(1, params) for params in terms))
+    return (NOTHING_LUMPED, *[Switchable(1, params) for params in terms])
 
 
 def uncompressed(kinds: Sequence[str]) -> ContactState:
