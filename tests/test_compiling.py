@@ -1,10 +1,12 @@
 """Compiling a function with all it calls: what is compiled, what is refused, and what is loaded from disk."""
 
+import gc
 import math
 import os
 import subprocess
 import sys
 import textwrap
+import threading
 import warnings
 from enum import IntEnum
 
@@ -152,6 +154,50 @@ def test_compiling_raises_no_warning_and_gives_what_the_interpreter_gives():
 
 
 @pytest.mark.usefixtures("_numba")
+def _checked(x):
+    if x < 0.0:
+        raise ValueError("below zero", x)
+    return x
+
+
+def _twice_checked(x):
+    return 2.0 * _checked(x)
+
+
+def test_a_called_function_raises_with_values_as_soon_as_it_is_compiled(tmp_path, monkeypatch):
+    # Nothing is loaded from disk, where numba itself gives called functions what they need for it.
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    compiled = compile_function(_twice_checked)
+    with pytest.raises(ValueError) as raised, first_call():
+        compiled(-1.0)
+    assert raised.value.args == ("below zero", -1.0)
+    assert compiled(2.0) == 4.0
+
+
+@pytest.mark.parametrize("collects", [True, False])
+def test_garbage_is_collected_afterwards_if_it_was_before(collects):
+    def entered(inside, leave):
+        with first_call():
+            inside.set()
+            leave.wait(60.0)
+
+    before = gc.isenabled()
+    (gc.enable if collects else gc.disable)()
+    try:
+        inside, leave = threading.Event(), threading.Event()
+        other = threading.Thread(target=entered, args=(inside, leave))
+        with first_call():
+            other.start()
+            assert inside.wait(60.0)
+            assert not gc.isenabled()
+        assert not gc.isenabled()
+        leave.set()
+        other.join()
+        assert gc.isenabled() == collects
+    finally:
+        (gc.enable if before else gc.disable)()
+
+
 def test_code_compiled_under_other_options_is_other_code():
     assert compile_function(_sum_of_ones)(3) == 3.0
     with pytest.raises(ZeroDivisionError):

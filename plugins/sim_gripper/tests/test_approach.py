@@ -43,16 +43,29 @@ def closing_at(speed_m_s):
     ],
 )
 def test_the_fingers_move_as_they_do_tick_by_tick(sensor, law, scene):
-    at_once, gap, velocity = approach(sensor, law, scene)
-    single, expected_gap, expected = approach(sensor, law, scene, **TICK_BY_TICK)
+    agree(sensor, law, scene)
+
+
+@pytest.mark.parametrize(("rate_hz", "speed_m_s"), [(200.0, 0.04), (500.0, 0.1)])
+def test_a_run_of_long_ticks_ends_with_the_polynomial_of_the_linkage(rate_hz, speed_m_s):
+    # The Jacobian changes by more than its polynomial is made for in fewer ticks than a run may have: beyond it, gaps
+    # were 7 um off. Single ticks of this length have errors of their own.
+    agree("ideal", closing_at(speed_m_s), "toy", gap_error_m=5e-7, speed_error_m_s=2e-4, rate_hz=rate_hz)
+
+
+def agree(sensor, law, scene, gap_error_m=3e-7, speed_error_m_s=1e-6, **settings):
+    """Assert that an approach is that of the same ticks one by one, within these errors and what the encoder adds."""
+    at_once, gap, velocity = approach(sensor, law, scene, **settings)
+    single, expected_gap, expected = approach(sensor, law, scene, **TICK_BY_TICK, **settings)
     assert at_once.outcome == single.outcome
-    assert at_once.state.step.n_steps < 0.3 * len(at_once.trace.t_s)
+    assert at_once.state.step.n_steps < 0.4 * len(at_once.trace.t_s)
     # The contact is detected in the same tick: what the encoder's noise does to the motion is followed.
     assert len(gap) == len(expected_gap)
-    shown_m = 0.0 if sensor == "ideal" else ENCODER_TICK_M
-    np.testing.assert_allclose(gap, expected_gap, rtol=0.0, atol=shown_m + 2e-7)
+    if sensor != "ideal":
+        gap_error_m, speed_error_m_s = gap_error_m + ENCODER_TICK_M, speed_error_m_s + 1.5e-4
+    np.testing.assert_allclose(gap, expected_gap, rtol=0.0, atol=gap_error_m)
     # The friction is linear to a tolerance that is relative to the speed.
-    np.testing.assert_allclose(velocity, expected, rtol=3e-4, atol=1e-6 if sensor == "ideal" else 1.5e-4)
+    np.testing.assert_allclose(velocity, expected, rtol=3e-4, atol=speed_error_m_s)
 
 
 @pytest.mark.parametrize("law", [HYBRID, RINGING], ids=["default", "ringing"])

@@ -20,6 +20,7 @@ import gc
 import hashlib
 import os
 import re
+import threading
 import types
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
@@ -86,6 +87,9 @@ class CompileOptions:
     """The requirement that brings numba, named to a user who does not have it."""
 
 
+_COLLECTING: Final = threading.Lock()
+_COLLECTED: Final[list[bool]] = []
+"""Whether garbage was collected before, once for each context in which it is not."""
 _COMPILED: dict[str, Callable[..., Any]] = {}
 """What this process has compiled, by fingerprint, options and role, so that an entry is never out of date."""
 
@@ -149,13 +153,12 @@ def first_call(*, slp_vectorize: bool = False) -> Iterator[None]:
     from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
     config: Any = numba.config
-    before, collects = config.SLP_VECTORIZE, gc.isenabled()
-    # The compiler makes millions of objects, nearly all of which remain until it has ended.
-    gc.disable()
+    before = config.SLP_VECTORIZE
     if slp_vectorize:
         config.SLP_VECTORIZE = 1
     try:
-        yield
+        with _no_collection():
+            yield
     except (NumbaError, UnsupportedBytecodeError) as error:
         places = re.findall(r'(?:File "|Raised from )([^"]+?)(?:", line | \()(\d+)', str(error))
         where = ":".join(places[-1]) if places else "a place it does not name"
@@ -165,8 +168,23 @@ def first_call(*, slp_vectorize: bool = False) -> Iterator[None]:
         raise NotCompilable(f"the compiler refuses {where}: {reason}") from error
     finally:
         config.SLP_VECTORIZE = before
-        if collects:
-            gc.enable()
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Collect no garbage: the compiler makes millions of objects, nearly all of which remain until it has ended.
+
+    Contexts in several threads may overlap; the last that ends restores what was before the first.
+    """
+    with _COLLECTING:
+        _COLLECTED.append(_COLLECTED[0] if _COLLECTED else gc.isenabled())
+        gc.disable()
+    try:
+        yield
+    finally:
+        with _COLLECTING:
+            if _COLLECTED.pop() and not _COLLECTED:
+                gc.enable()
 
 
 def entry_point(compiled: Callable[..., Any]) -> Callable[..., Any]:
@@ -198,7 +216,12 @@ class _Compilation:
             # Only the outermost function is kept on disk, since the others are inside it, and only it needs the
             # wrapper for calls from the interpreter, which takes longer to compile than most functions.
             with _cache_folder(self.numba, function) as is_kept:
-                _COMPILED[key] = self.numba.njit(named, cache=is_kept, **self._flags(function))
+                _COMPILED[key] = self.numba.njit(
+                    named,
+                    cache=is_kept,
+                    pipeline_class=_linked_code().OutermostCompiler,
+                    **self._flags(function),
+                )
         return _COMPILED[key]
 
     def _inner(self, function: types.FunctionType, n_places: int) -> Callable[..., Any]:
@@ -206,12 +229,9 @@ class _Compilation:
         key = self._key(function, "inner" if n_places else "cold")
         if key not in _COMPILED:
             named = self._named(function, key)
-            # It imports numba.
-            from graspsense.core.linked_code import LinkedCompiler
-
             options = self._flags(function) | self._inline(function.__code__, n_places)
             _COMPILED[key] = self.numba.njit(
-                named, no_cpython_wrapper=True, pipeline_class=LinkedCompiler, **options
+                named, no_cpython_wrapper=True, pipeline_class=_linked_code().LinkedCompiler, **options
             )
         return _COMPILED[key]
 
@@ -257,6 +277,13 @@ class _Compilation:
             "forceinline": once or (n_places > 0 and size <= inlining.short_code),
             "inline": "always" if n_places == 1 and code in inlining.before_typing else "never",
         }
+
+
+def _linked_code() -> types.ModuleType:
+    """Return the module with the compilers, which imports numba."""
+    from graspsense.core import linked_code
+
+    return linked_code
 
 
 @cache

@@ -12,6 +12,7 @@ from numba import _dynfunc  # type: ignore[attr-defined]
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import register_pass
+from numba.core.environment import lookup_environment
 from numba.core.typed_passes import NativeLowering
 
 
@@ -51,6 +52,30 @@ class LinkedLowering(NativeLowering):
         return True
 
 
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
+class OutermostLowering(NativeLowering):
+    """Lowers a function into which all that it calls is linked."""
+
+    _name = "outermost_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower the function, and give each linked one its environment, by which it prints and raises with values."""
+        super().run_pass(state)  # type: ignore[no-untyped-call]
+        library = state.library
+        for variable in library._final_module.global_variables:
+            environment = lookup_environment(variable.name)  # type: ignore[no-untyped-call]
+            if environment is not None:
+                library.codegen.set_env(variable.name, environment)
+        return True
+
+
+def _with_lowering(passes: Any, lowering: type[NativeLowering]) -> list[Any]:
+    """Return the pipeline with this lowering in place of that of numba."""
+    passes.passes = [(lowering if one is NativeLowering else one, name) for one, name in passes.passes]
+    passes.finalize()
+    return [passes]
+
+
 class LinkedCompiler(Compiler):
     """The compiler of a function that only compiled code calls."""
 
@@ -62,8 +87,13 @@ class LinkedCompiler(Compiler):
         state.library = LinkedLibrary(codegen, name)  # type: ignore[no-untyped-call]
         state.library.enable_object_caching()
         (passes,) = super().define_pipelines()  # type: ignore[no-untyped-call]
-        passes.passes = [
-            (LinkedLowering if one is NativeLowering else one, name) for one, name in passes.passes
-        ]
-        passes.finalize()
-        return [passes]
+        return _with_lowering(passes, LinkedLowering)
+
+
+class OutermostCompiler(Compiler):
+    """The compiler of a function that the interpreter calls."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the passes of numba, with `OutermostLowering` in place of its own lowering."""
+        (passes,) = super().define_pipelines()  # type: ignore[no-untyped-call]
+        return _with_lowering(passes, OutermostLowering)

@@ -3,7 +3,7 @@
 In each of them the sensors are read and the law gives the command, as tick by tick, but the equation of motion is
 simplified: the friction is linear in the speed, about that at the beginning, and the linkage is a cubic polynomial of
 the motor's angle. So a tick is solved in a closed form, with the acceleration at its middle. The run ends where the
-speed has changed by more than the linear friction allows.
+speed has changed by more than the linear friction allows, and at the end of the polynomial.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MIN_TICKS: Final = 4
 MAX_TICKS: Final = ROWS_AT_ONCE
 """Fewest and most ticks that are run at once."""
 LINKAGE_CHANGE: Final = 0.02
-"""Largest relative change of the Jacobian of the linkage in a run. Its polynomial is right to some 1e-7 then."""
+"""Largest relative change of the Jacobian of the linkage in a run. The gap of its polynomial is right to 10 nm then."""
 
 
 class Approach(NamedTuple):
@@ -70,8 +70,9 @@ def approach_ticks(
         command, next_now = free_tick(params.controller, free, now, t_s, dt_s, next_shown[1], next_shown[2])
         moved = _after_tick(way, motion, command, dt_s)
         change = abs(moved.speed_rev_s * moved.jacobian_m_rev - first_m_s)
+        beyond = (moved.revolutions - way.begin_rev) * way.per_rev > 1.0
         # NaN too: the law says that free motion has ended.
-        if not change <= way.speed_change_m_s or moved.gap_m <= nearest:
+        if not change <= way.speed_change_m_s or moved.gap_m <= nearest or beyond:
             break
         shown, now, motion = next_shown, next_now, moved
         row = (at.recorded + i) & NOT_NEGATIVE

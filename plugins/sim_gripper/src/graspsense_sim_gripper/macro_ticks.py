@@ -99,7 +99,7 @@ def _ticks_within(
 
 
 def _held_at_once(model: PlantParams, plant: PlantState) -> PlantParams:
-    """Return the model in which fingers at rest are held in one step, as a longer macro-step has shown to suffice."""
+    """Return the model in which fingers at rest are held in one step. A macro-step showed how little relaxes."""
     drive, body, (tolerance, scheme, longest_s, settle, growth, touched_s, macro_tolerance) = model
     if plant.motion.speed_rev_s == 0.0:
         longest_s = math.inf

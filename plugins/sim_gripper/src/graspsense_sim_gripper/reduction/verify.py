@@ -1,7 +1,7 @@
 """Trial grasps of the nominal object, in one reduced model after another.
 
 A trial grasp uses ideal sensors and the controller of the run. It begins with open fingers and ends with the release.
-The approach depends on the steps, but not on the reduced model. It is therefore simulated once for the same steps.
+The approach depends on the steps, but not on the reduced model. It is therefore simulated once for each set of steps.
 """
 
 from __future__ import annotations

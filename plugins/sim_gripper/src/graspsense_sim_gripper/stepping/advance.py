@@ -22,7 +22,7 @@ from graspsense_sim_gripper.stepping.control import (
     next_length,
     relative_error,
 )
-from graspsense_sim_gripper.stepping.events import first, parting
+from graspsense_sim_gripper.stepping.events import first, parting, pressing
 from graspsense_sim_gripper.stepping.mean_force import mean_force
 from graspsense_sim_gripper.stepping.scheme import (
     BOGACKI_SHAMPINE,
@@ -125,6 +125,8 @@ def take_step(
             if not changes:
                 # The path of Verlet is known in advance, and it ends at the other events by itself.
                 fraction = parting(params, start, attempt)
+                if fraction == 0.0:
+                    fraction = pressing(params, start, attempt)
                 if fraction == 0.0 and steps.scheme != VERLET:
                     fraction = first(params, start, attempt)
             if fraction > 0.0:

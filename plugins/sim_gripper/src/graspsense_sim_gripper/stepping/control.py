@@ -29,7 +29,8 @@ SMALL_ERROR: Final = 1e-3
 EXPONENT: Final = -1.0 / 3.0
 """The error of a step is proportional to the third power of its length."""
 FREE_GROWTH: Final = 4.0
-"""Largest ratio of a step to the last one while nothing is touched."""
+"""Largest ratio of a step to the last one while nothing is pressed, where errors are estimated; there is no limit where
+they are not."""
 MIN_STEP_S: Final = 1e-10
 """Length at which a step is accepted regardless of its error, which is then rounding."""
 LONG_STEP_S: Final = 10.0
@@ -110,9 +111,15 @@ def accept(error: float, h: float, last: StepState, growth: float, forced: bool)
     return True, StepState(step, n + 1, unresolved + 1)
 
 
-def after_contact(steps: Steps, step: StepState) -> StepState:
-    """Return the state of the control after a contact: a damper begins to relax there, which needs short steps."""
+def contact_step_s(steps: Steps) -> float:
+    """Return the length of the first step after a contact: a damper begins to relax there, which needs short steps."""
+    if steps.growth == math.inf:
+        return math.inf
     estimated = steps.tolerance < math.inf
     first = CONTACT_STEP_S * steps.tolerance if estimated else CONTACT_SHARE * steps.longest_s
-    first = max(first, MIN_CONTACT_STEP_S)
-    return StepState(min(step.next_s, first), step.n_steps, step.unresolved)
+    return max(first, MIN_CONTACT_STEP_S)
+
+
+def after_contact(steps: Steps, step: StepState) -> StepState:
+    """Return the state of the control after a contact."""
+    return StepState(min(step.next_s, contact_step_s(steps)), step.n_steps, step.unresolved)

@@ -1,4 +1,4 @@
-"""Events that end a step: a contact, an end of the travel, a reversal, the release of the object.
+"""Events that end a step: a contact, an end of the travel, a reversal, the release of the object, a contact after it.
 
 The equation of motion changes at an event, so no step goes beyond it. The explicit scheme knows its path in advance and
 ends at the event (`drift`). For an implicit scheme, `first` returns the fraction of the step at which the event lies.
@@ -12,6 +12,7 @@ from graspsense.plugin_api import gap_and_rate
 from graspsense_sim_gripper.dynamics.contact import CONTACT_TOL_M
 from graspsense_sim_gripper.dynamics.drive import ARREST_M_S
 from graspsense_sim_gripper.dynamics.state import ContactState, Motion, right_of
+from graspsense_sim_gripper.stepping.control import contact_step_s
 from graspsense_sim_gripper.stepping.scheme import Attempt, PlantParams, Start, end_of_travel
 
 NEWTON_ITERATIONS: Final = 4
@@ -89,6 +90,32 @@ def parting(params: PlantParams, start: Start, attempt: Attempt) -> float:
     if beyond <= CONTACT_TOL_M:
         return 0.0
     return min(max(1.0 - beyond / (gap1 - gap), MIN_FRACTION), MAX_FRACTION)
+
+
+def pressing(params: PlantParams, start: Start, attempt: Attempt) -> float:
+    """Return the fraction of a step at which a finger presses an object again that has not recovered its shape.
+
+    0 if none does. A step that begins at this contact is the first after it, and no longer than that.
+    """
+    gap, gap1 = start.motion.gap_m, attempt.motion.gap_m
+    before, after = start.contact, attempt.contact
+    if before.touched == 0 or gap1 >= gap:
+        return 0.0
+    right0, right1 = right_of(before.left, before.right), right_of(after.left, after.right)
+    left = before.left.force_n <= 0.0 < after.left.force_n
+    right = right0.force_n <= 0.0 < right1.force_n
+    if not (left or right):
+        return 0.0
+    model, h = params.object, attempt.duration_s
+    shift = 2.0 * before.offset_m if model.held == 1 else 0.0
+    half = before.left if left else right0
+    apart = _gap_beyond(half, gap - model.width_m + (shift if left else -shift))
+    if apart <= CONTACT_TOL_M:
+        first_s = contact_step_s(params.steps)
+        return first_s / h if first_s < h else 0.0
+    # The end of the object comes towards the finger as it recovers.
+    closing = gap - gap1 - h * half.past.rate_m_s
+    return min(max(apart / max(closing, apart), MIN_FRACTION), MAX_FRACTION)
 
 
 def _gap_beyond(half: ContactState, opened_m: float) -> float:

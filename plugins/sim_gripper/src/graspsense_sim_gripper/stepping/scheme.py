@@ -39,7 +39,7 @@ class Steps(NamedTuple):
     settle: float = 0.0
     """Relative change of speed and force at which the halving of steps ends; 0: steps are not halved."""
     growth: float = 2.0
-    """Largest ratio of a step to the last one while something is touched.
+    """Largest ratio of a step to the last one while something is pressed.
 
     After a contact at time t_c a step is then at most (growth - 1) (t - t_c) long, however short the first one was.
     inf: a contact does not shorten the next step."""
