@@ -416,8 +416,14 @@ def test_trial_grasps_end_at_a_limit_of_work_and_the_full_model_runs(monkeypatch
             {},
             ["peak", "trace", "features"],
         ),
+        # The finest trial grasps miss it too, and agree.
+        (
+            'k1_n_m = 3200.0\n[[terms]]\ntype = "slosh"\nmass_kg = 0.05\nfrequency_hz = 1480.0',
+            {"rate_hz": 465.0},
+            ["peak", "trace", "features"],
+        ),
     ],
-    ids=["soft", "beyond its force", "forced steps", "reference", "bounces", "term dropped"],
+    ids=["soft", "beyond its force", "forced steps", "reference", "bounces", "too fast", "too fast for its ticks"],
 )
 def test_the_report_says_which_quantities_are_not_verified(terms, further, unsure, tmp_path):
     scene = tmp_path / "scene.toml"

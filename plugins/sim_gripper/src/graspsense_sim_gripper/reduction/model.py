@@ -91,16 +91,15 @@ class Reduction:
     def not_verified(self) -> tuple[str, ...]:
         """Those of `QUANTITIES`, or the features of the pipeline, whose accuracy no trial grasp has verified.
 
-        There are none for a reference. The peak force of a contact that bounces within a tick is right, unless a term
-        was dropped as too fast.
+        There are none for a reference. A term that was dropped as too fast is missing in the trial grasps too. The peak
+        force of a contact that bounces within a tick is right without such a term.
         """
-        if self.verification is not None:
+        too_fast = any(math.isinf(one.error) for one in self.decisions)
+        if self.verification is not None and not too_fast:
             return self.verification.features
         if self.steps.settle > 0.0:
             return ()
-        if math.isinf(self.contact.error) and all(math.isfinite(one.error) for one in self.decisions):
-            return QUANTITIES[1:]
-        return QUANTITIES
+        return QUANTITIES[1:] if math.isinf(self.contact.error) and not too_fast else QUANTITIES
 
     def with_exact_discretisation(self) -> Reduction:
         """Return the same reduction for a scene that is discretised exactly, without time steps."""
