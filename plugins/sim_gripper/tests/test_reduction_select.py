@@ -423,7 +423,15 @@ def test_trial_grasps_end_at_a_limit_of_work_and_the_full_model_runs(monkeypatch
             ["peak", "trace", "features"],
         ),
     ],
-    ids=["soft", "beyond its force", "forced steps", "reference", "bounces", "too fast", "too fast for its ticks"],
+    ids=[
+        "soft",
+        "beyond its force",
+        "forced steps",
+        "reference",
+        "bounces",
+        "too fast",
+        "too fast for its ticks",
+    ],
 )
 def test_the_report_says_which_quantities_are_not_verified(terms, further, unsure, tmp_path):
     scene = tmp_path / "scene.toml"
