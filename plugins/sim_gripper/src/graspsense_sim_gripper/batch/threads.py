@@ -165,7 +165,7 @@ class _Batch:
     processes: ExitStack = field(factory=ExitStack, init=False)
     forked: SimpleQueue[ForkedProcess] = field(factory=SimpleQueue, init=False)
     """The forked processes that no thread uses at present."""
-    slice: int = field(default=SLICE, init=False)
+    slice_size: int = field(default=SLICE, init=False)
     """Number of grasps that a worker takes at once."""
 
     @models.default
@@ -188,7 +188,7 @@ class _Batch:
             if self._worth_forking(workers, progress):
                 self._fork(workers)
             run = self._slice if self.forked.empty() else self._forked_slice
-            slices = range(0, total, self.slice)
+            slices = range(0, total, self.slice_size)
             try:
                 while True:
                     # Two slices per worker, one in reserve: few results wait, and an interruption takes effect soon.
@@ -278,7 +278,7 @@ class _Batch:
         """Fork as many processes, or fewer if the system allows no more; without any, threads run the grasps."""
         processes: list[ForkedProcess] = []
         # Several for each, so that none waits long for the last of the others.
-        self.slice = min(max(len(self.scenes) // (4 * workers), SLICE), FORKED_SLICE)
+        self.slice_size = min(max(len(self.scenes) // (4 * workers), SLICE), FORKED_SLICE)
         # OSError: no memory, or the limit of processes.
         with suppress(OSError):
             for _ in range(workers):
@@ -316,7 +316,7 @@ class _Batch:
 
     def _part(self, begin: int) -> list[tuple[str, int]]:
         """Return the scene and the seed of each grasp of the slice that begins at this index."""
-        part = slice(begin, begin + self.slice)
+        part = slice(begin, begin + self.slice_size)
         return list(zip(self.scenes[part], self.seeds[part], strict=True))
 
     def _worth(self, n: int) -> bool:
