@@ -604,3 +604,17 @@ def test_steps_are_short_after_a_contact_and_whole_ticks_soon_afterwards():
     assert short[0] + short[1] > 6
     assert short[3:] == [1] * 5
     assert fixed == [2] + [1] * 7
+
+
+@pytest.mark.parametrize("before_m", [0.0, 1e-15, 1e-12])
+def test_the_steps_from_a_contact_that_is_off_by_rounding_are_those_from_the_contact(before_m):
+    # The search for the contact went on in steps of down to 3e-11 s, over which the rate of compression is rounding.
+    terms, laws = (Elastic(4e4, 0.0), Surface(30.0, 410.0, 11.0, 4e4)), (elastic, surface)
+    body = ObjectModel(0.05, 0.4, PadCompliance(1e5), terms)
+    params = PlantParams(drive(), body, Steps(3.4e-5, BOGACKI_SHAMPINE, growth=1.03))
+    start = at(0.05 + before_m, (NoState(), OscillatorState(0.0, 0.0)), speed_m_s=-0.038)
+    after = run(params, start, 2.0, 3.4e-3, laws, dt=3.4e-3)
+    fine = run(params._replace(steps=Steps(inf, VERLET, 1e-6)), start, 2.0, 3.4e-3, laws, dt=3.4e-3)
+    assert after.step.n_steps < 250
+    assert after.step.unresolved == 0
+    assert after.peak_n == pytest.approx(fine.peak_n, rel=1e-4)

@@ -52,13 +52,18 @@ def drift(params: PlantParams, start: Start, h: float) -> tuple[Motion, float]:
 
 
 def first(params: PlantParams, start: Start, attempt: Attempt) -> float:
-    """Return the fraction of an implicit step at which an event lies, by the secant; 0 if there is none."""
+    """Return the fraction of an implicit step at which an event lies, by the secant; 0 if there is none.
+
+    A step that begins at a contact is the first after it, and no longer than that.
+    """
     revolutions, speed, gap, jacobian = start.motion
     revolutions1, speed1, gap1, jacobian1 = attempt.motion
     direction, meeting = start.direction, start.meeting_m
     end = end_of_travel(params.drive, direction)
     fraction = 0.0
     if gap > meeting and gap1 < meeting - CONTACT_TOL_M:
+        if gap - meeting <= CONTACT_TOL_M:
+            return _first_step(params, attempt)
         fraction = (gap - meeting) / (gap - gap1)
     elif (revolutions1 - end) * direction * abs(jacobian) > CONTACT_TOL_M:
         fraction = (end - revolutions) / (revolutions1 - revolutions)
@@ -111,11 +116,16 @@ def pressing(params: PlantParams, start: Start, attempt: Attempt) -> float:
     half = before.left if left else right0
     apart = _gap_beyond(half, gap - model.width_m + (shift if left else -shift))
     if apart <= CONTACT_TOL_M:
-        first_s = contact_step_s(params.steps)
-        return first_s / h if first_s < h else 0.0
+        return _first_step(params, attempt)
     # The end of the object comes towards the finger as it recovers.
     closing = gap - gap1 - h * half.past.rate_m_s
     return min(max(apart / max(closing, apart), MIN_FRACTION), MAX_FRACTION)
+
+
+def _first_step(params: PlantParams, attempt: Attempt) -> float:
+    """Return the fraction of a step that is the first after a contact, 0 if the step is no longer than that."""
+    first_s = contact_step_s(params.steps)
+    return first_s / attempt.duration_s if first_s < attempt.duration_s else 0.0
 
 
 def _gap_beyond(half: ContactState, opened_m: float) -> float:
