@@ -39,14 +39,14 @@ def test_the_quantities_are_those_of_the_motion_whatever_the_clock():
     touches = (0.0005 + 0.625 / STIFFNESS) / SPEED
     rests = 0.1 + TAU * math.log(SPEED / 1e-4)
     for dt in (1e-3, 2e-4):
-        found = squeeze(dt).quantities()
+        found = squeeze(dt).quantities
         assert found["delta_t"] == pytest.approx(rests - touches, abs=1e-5)
         assert found["p_first"] == pytest.approx(0.045 - 0.625 / STIFFNESS, abs=1e-9)
 
 
 @pytest.mark.parametrize("late", [1e-4, 3.7e-4, 9e-4])
 def test_when_the_clock_ticks_hardly_matters(late):
-    one, other = squeeze(late=late).quantities(), squeeze().quantities()
+    one, other = squeeze(late=late).quantities, squeeze().quantities
     for name, value in one.items():
         assert value == pytest.approx(other[name], rel=2e-4), name
 
@@ -103,7 +103,7 @@ def test_a_rest_before_the_hold_is_not_the_one_that_is_meant():
         left_n=force,
         right_n=force,
         hold_from=int(np.sum(phase < HOLD)),
-    ).quantities()
+    ).quantities
     assert found["f_steady"] == pytest.approx(wanted["f_steady"], rel=1e-3)
     assert found["p_steady"] == pytest.approx(wanted["p_steady"], abs=1.5e-5)
     assert found["df_dt"] == pytest.approx(wanted["df_dt"], rel=0.01)
@@ -111,7 +111,7 @@ def test_a_rest_before_the_hold_is_not_the_one_that_is_meant():
 
 def test_at_rest_from_the_very_contact_on_there_is_no_rate():
     creeping = evolve(squeeze(), speed_m_s=np.full(1000, -5e-5))
-    found = creeping.quantities()
+    found = creeping.quantities
     assert found["delta_t"] == 0.0
     assert math.isnan(found["dp_dt"])
     assert math.isnan(found["df_dt"])
@@ -130,7 +130,7 @@ def test_they_are_the_feature_sets_own_to_a_tick():
         right_n=trace.force_right_n,
         n_rows=int(np.sum(trace.phase <= HOLD)),
         peak_n=0.0,
-    ).quantities()
+    ).quantities
     # The feature set's rest is told from the way in 50 ms, which begins a little before the speed is as low.
     assert found["delta_t"] == pytest.approx(drawn["delta_t"], abs=0.05)
     assert found["p_first"] == pytest.approx(drawn["p_first"], abs=1.5e-5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -42,7 +43,14 @@ def measure_buffers(params: Any, columns: Table, phases: Any, n: int) -> Any:
 
 def compiled_measure(form: CompiledExtraction) -> Callable[[Any, Any, Any, int], Any]:
     """Return `measure_buffers` of an extraction, compiled. Raises NotCompilable."""
-    compiled = compile_function(bind(measure_buffers, measure=form.measure))
+    return _compiled_measure(form.measure, form.params)
+
+
+@lru_cache(maxsize=16)
+def _compiled_measure(
+    what: Callable[[Any, TickColumns], Any], params: Any
+) -> Callable[[Any, Any, Any, int], Any]:
+    compiled = compile_function(bind(measure_buffers, measure=what))
     with generating():
-        compiled(form.params, np.zeros((len(COLUMNS), 1)), np.zeros(1, np.int64), 0)
+        compiled(params, np.zeros((len(COLUMNS), 1)), np.zeros(1, np.int64), 0)
     return entry_point(compiled)

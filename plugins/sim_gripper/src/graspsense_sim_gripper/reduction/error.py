@@ -13,7 +13,7 @@ between ticks, so that the error does not jump by a tick, and that code cannot b
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -68,8 +68,9 @@ class GraspRecord:
     hold_from: int = 0
     """The row with which the hold begins, or `n_rows` if there is none. A rest counts that lasts into the hold."""
 
+    @cached_property
     def quantities(self) -> dict[str, float]:
-        """Return the six features and the peak force, by the names of `SCALES`; NaN for an undefined feature."""
+        """The six features and the peak force, by the names of `SCALES`; NaN for an undefined feature."""
         values = dict.fromkeys(SCALES, math.nan)
         values["peak"] = self.peak_n
         first = self._contact()
@@ -117,17 +118,20 @@ class GraspRecord:
         speed = np.abs(self.speed_m_s[: self.n_rows]) - REST_SPEED_M_S
         window = round(REST_WINDOW_S / self.dt_s)
         begin = math.ceil(first)
-        moving = [begin - 1, *(np.flatnonzero(speed[begin:] > 0.0) + begin).tolist(), self.n_rows]
-        for i, following in pairwise(moving):
-            if following - i > window and following > self._shown_from():
-                stops = i + float(speed[i] / (speed[i] - speed[i + 1])) if speed[i] > 0.0 else first
-                return max(stops, first), i >= begin
-        return None
+        moving = np.concatenate(([begin - 1], begin + np.flatnonzero(speed[begin:] > 0.0), [self.n_rows]))
+        rests = np.flatnonzero((np.diff(moving) > window) & (moving[1:] > self._shown_from()))
+        if not len(rests):
+            return None
+        i = int(moving[rests[0]])
+        stops = i + float(speed[i] / (speed[i] - speed[i + 1])) if speed[i] > 0.0 else first
+        return max(stops, first), i >= begin
 
 
 def _at(column: NDArray[np.float64], place: float) -> float:
-    """Return the value of a column at a row with a fraction, by linear interpolation."""
-    return float(np.interp(place, np.arange(len(column)), column))
+    """Return the value of a column at a row with a fraction, by linear interpolation; at its ends beyond them."""
+    i = min(max(math.floor(place), 0), len(column) - 1)
+    before, after = float(column[i]), float(column[min(i + 1, len(column) - 1)])
+    return before + min(max(place - i, 0.0), 1.0) * (after - before)
 
 
 def deviation(grasp: GraspRecord, expected: GraspRecord) -> tuple[float, str]:
@@ -138,8 +142,8 @@ def deviation(grasp: GraspRecord, expected: GraspRecord) -> tuple[float, str]:
     if grasp.outcome != expected.outcome:
         return math.inf, "outcome"
     errors = {}
-    wanted = expected.quantities()
-    for name, value in grasp.quantities().items():
+    wanted = expected.quantities
+    for name, value in grasp.quantities.items():
         if not (math.isnan(wanted[name]) and math.isnan(value)):
             errors[name] = abs(value - wanted[name]) / max(abs(wanted[name]), SCALES[name])
     n = min(len(grasp.gap_m), len(expected.gap_m))

@@ -10,12 +10,14 @@ Trial grasps have neither cell images nor further signals. A feature set that ne
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import CHANNELS, Features, FeatureSet
+from graspsense.plugin_api import CHANNELS, Features, FeatureSet, NotCompilable, compiled_extraction
+from graspsense_sim_gripper.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.loop import COLUMNS, EVENT_SHIFT
 from graspsense_sim_gripper.recorded_trace import recorded_trace
 from graspsense_sim_gripper.reduction.error import UNIT_SCALES
@@ -34,34 +36,59 @@ class OwnFeatures(NamedTuple):
     """The features of one grasp."""
 
     features: Features
-    later: Features
-    """Those of the same grasp, sampled half a tick later."""
+    later: Callable[[], Features]
+    """Returns those of the same grasp, sampled half a tick later."""
 
 
 def own_features(
-    feature_set: FeatureSet[Any], table: NDArray[np.float64], phases: NDArray[np.float64]
+    feature_set: FeatureSet[Any],
+    table: NDArray[np.float64],
+    phases: NDArray[np.float64],
+    *,
+    compiled: bool = False,
 ) -> OwnFeatures | None:
     """Return the features of a grasp that ideal sensors read; None if the set needs further channels, or fails.
 
-    `table`, shape (columns, n), and `phases`, shape (n,), are those of `loop.Buffers`.
+    `table`, shape (columns, n), and `phases`, shape (n,), are those of `loop.Buffers`. `compiled`: use the compiled
+    form of the set where it has one.
     """
     # The entry of a set may declare the channels instead of its class.
     required = {channel.name for channel in getattr(feature_set, "requires", ())}
     if not required <= READ:
         return None
     numbers = phases.astype(np.int64) & ((1 << EVENT_SHIFT) - 1)
+    extract = _from_columns if compiled else _from_trace
+    try:
+        features = extract(feature_set, np.array(table), numbers)
+    except Exception:
+        # A set that fails on every grasp is reported where the grasp itself is extracted from.
+        return None
+    return OwnFeatures(features, lambda: extract(feature_set, _half_a_tick_later(table), numbers))
+
+
+def _half_a_tick_later(table: NDArray[np.float64]) -> NDArray[np.float64]:
     later = np.array(table)
     later[:, :-1] = 0.5 * (table[:, :-1] + table[:, 1:])
     later[list(HELD)] = table[list(HELD)]
     later[0] = table[0] + 0.5 * (table[0, 1] - table[0, 0] if table.shape[1] > 1 else 0.0)
+    return later
+
+
+def _from_columns(
+    feature_set: FeatureSet[Any], table: NDArray[np.float64], phases: NDArray[np.int64]
+) -> Features:
+    form = compiled_extraction(feature_set.extract)
+    if form is None:
+        return _from_trace(feature_set, table, phases)
     try:
-        return OwnFeatures(*(_extracted(feature_set, one, numbers) for one in (np.array(table), later)))
-    except Exception:
-        # A set that fails on every grasp is reported where the grasp itself is extracted from.
-        return None
+        measured = compiled_measure(form)(form.params, table, phases, table.shape[1])
+    except NotCompilable:
+        return _from_trace(feature_set, table, phases)
+    features: Features = form.result(measured)
+    return features
 
 
-def _extracted(
+def _from_trace(
     feature_set: FeatureSet[Any], table: NDArray[np.float64], phases: NDArray[np.int64]
 ) -> Features:
     none = np.zeros(0)
@@ -76,8 +103,12 @@ def beyond(grasp: OwnFeatures | None, expected: OwnFeatures | None, accuracy: fl
     """
     if grasp is None or expected is None:
         return NOT_READ
+    try:
+        half_later = expected.later()
+    except Exception:
+        return NOT_READ
     names, values = expected.features.names, expected.features.values
-    found, later = (dict(zip(one.names, one.values, strict=True)) for one in (grasp.features, expected.later))
+    found, later = (dict(zip(one.names, one.values, strict=True)) for one in (grasp.features, half_later))
     return tuple(
         name
         for name, value, unit in zip(names, values, expected.features.units, strict=True)

@@ -11,11 +11,12 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property, lru_cache
 from typing import Final
 
-from attrs import evolve, frozen
+from attrs import frozen
 
 from graspsense_sim_gripper.compiled.compose import contact_solver, hardens, uncompressed
 from graspsense_sim_gripper.dynamics.contact import ObjectModel
 from graspsense_sim_gripper.reduction.candidates import without_term
+from graspsense_sim_gripper.reduction.levels import MAX_BALANCE_RTOL
 from graspsense_sim_gripper.terms.term import WorkingPoint
 
 HOLD_S: Final = 1.0
@@ -24,6 +25,8 @@ SQUEEZE_S: Final = 3.0
 """The longest duration of a squeeze: controllers give up after it."""
 POINTS: Final = 24
 """Number of equal steps of a closing path."""
+SEARCH_POINTS: Final = 12
+"""The same where the depth for a force is searched."""
 EARLY_POINTS: Final = 3
 """Number of further points within the first of these steps, to resolve the beginning of the contact."""
 MAX_CHANGE: Final = 0.5
@@ -65,9 +68,10 @@ class Grip:
     def __init__(
         self, model: ObjectModel, kinds: tuple[str, ...], force_n: float, speed_m_s: float, mass_kg: float
     ) -> None:
-        self.model, self.kinds = model, kinds
+        # The forces are compared to parts of the accuracy, so their balance need not be that of a reference.
+        self.model, self.kinds = model._replace(balance_rtol=MAX_BALANCE_RTOL), kinds
         self.mass_kg = mass_kg
-        self.paths, self.point = _paths(model, kinds, force_n, max(speed_m_s, MIN_SPEED_M_S), mass_kg)
+        self.paths, self.point = _paths(self.model, kinds, force_n, max(speed_m_s, MIN_SPEED_M_S), mass_kg)
         self._alternatives: list[list[tuple[str, float]]] | None = None
 
     @cached_property
@@ -148,14 +152,11 @@ def damping(grip: Grip, model: ObjectModel, dt_s: float) -> float:
     depth, speed = fast.closures[-1], fast.speeds[0]
     back = min(speed * dt_s, 0.5 * depth)
     moving = _path(depth - back, (depth - back) / speed, 0.0)
-    last = evolve(
-        moving,
-        closures=(*moving.closures, depth),
-        times=(*moving.times, moving.times[-1] + back / speed),
-        speeds=(*moving.speeds, speed),
-    )
-    still = evolve(last, speeds=(*moving.speeds, 0.0))
-    forces = [list(forces_along(model, grip.kinds, path))[-1] for path in (last, still)]
+    press, contact, before = contact_solver(grip.kinds, hardens(model)), uncompressed(grip.kinds), 0.0
+    for closure, t in zip(moving.closures, moving.times, strict=True):
+        contact, _ = press(model, contact, closure, speed, t - before)
+        before = t
+    forces = [press(model, contact, depth, rate, back / speed)[0].force_n for rate in (speed, 0.0)]
     return abs(forces[0] - forces[1]) / speed
 
 
@@ -189,7 +190,7 @@ def _depth(model: ObjectModel, kinds: Sequence[str], force_n: float, speed_m_s: 
     most = depth = MAX_DEPTH * max(model.width_m, 1e-4)
     for _ in range(MAX_WALKS):
         duration = depth / speed_m_s if speed_m_s > 0.0 else SQUEEZE_S
-        path = _path(depth, duration, 0.0)
+        path = _path(depth, duration, 0.0, SEARCH_POINTS)
         reached, largest_n = _reached(path.closures, forces_along(model, kinds, path), force_n)
         if reached is None:
             if depth == most:
@@ -219,11 +220,11 @@ def _reached(
     return None, largest_n
 
 
-def _path(depth_m: float, duration_s: float, hold_s: float) -> ProbePath:
-    """Return a path that closes at constant speed and then rests, with points further and further apart."""
+def _path(depth_m: float, duration_s: float, hold_s: float, n: int = POINTS) -> ProbePath:
+    """Return a path that closes at constant speed in `n` steps and then rests, at points further and further apart."""
     speed = depth_m / duration_s
-    early = (4.0**-k / POINTS for k in range(EARLY_POINTS, 0, -1))
-    shares = [*early, *((k + 1) / POINTS for k in range(POINTS))]
+    early = (4.0**-k / n for k in range(EARLY_POINTS, 0, -1))
+    shares = [*early, *((k + 1) / n for k in range(n))]
     times = [duration_s * share for share in shares]
     closures = [depth_m * share for share in shares]
     speeds = [speed] * len(shares)

@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import define, evolve, field
+from numpy.typing import NDArray
 
 from graspsense.plugin_api import (
     CONTACT_FORCE_N,
@@ -31,7 +32,7 @@ from graspsense_sim_gripper.compiled.compose import composition, grasp_loop
 from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
 from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.state import Motion
+from graspsense_sim_gripper.dynamics.state import Motion, PlantState
 from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.loop import (
@@ -66,9 +67,12 @@ MIN_CLOSING_M_S: Final = 0.01
 """The remaining time of an approach is estimated with this closing speed, or with a higher present one."""
 MAX_HOLD_S: Final = 0.3
 """A longer hold is shortened to this in a trial grasp."""
-TICKS_AT_ONCE: Final = 500
-"""Largest number of ticks of the approach between two checks of the distance."""
-CAPACITY: Final = 512
+CLOSED_AT_ONCE: Final = 0.9
+"""Share of the distance to the object that the fingers close in at their present speed before it is checked again; a
+quarter of it where they touched the object meanwhile."""
+LEAST_TICKS: Final = 32
+"""An approach ends where fewer ticks than this are left: repeating them costs less than a further check."""
+CAPACITY: Final = 1024
 """Largest number of ticks in a buffer; after each buffer the work is counted."""
 MOST_WORK: Final = 1_000_000
 """Largest number of ticks and steps of all trial grasps of one object together: about a minute in the interpreter. It
@@ -136,12 +140,12 @@ class TrialGrasps:
     features: FeatureSet[Any] | None = None
     """The feature set of the pipeline; None: only the features of the paper are compared."""
     only_near: bool = False
-    """Whether they begin `NEAR_M` from the object, and the approach is simulated once for all steps."""
+    """Whether they begin `NEAR_M` from the object, with no approach that is simulated apart."""
     _records: dict[Any, GraspRecord] = field(factory=dict, init=False)
     _features: dict[Any, OwnFeatures | None] = field(factory=dict, init=False)
     """The features of the pipeline in the grasps of `_records`."""
     _starts: dict[Steps | None, _Stage] = field(factory=dict, init=False)
-    """The grasp shortly before the first contact, by the steps of the approach; all have one where `only_near`."""
+    """The grasp shortly before the first contact, by the steps of the approach; one for all where `only_near`."""
     work: int = field(default=0, init=False)
     """Ticks and steps of all trial grasps so far."""
     _reported_s: float = field(factory=time.monotonic, init=False)
@@ -194,18 +198,16 @@ class TrialGrasps:
         setup = evolve(setup, sensor=setup.sensor._replace(bias=bias))
         until = start.progress.loop.ticks + self._max_ticks()
         end = self._runner(setup, start.from_open)(setup.plant.steps, start, until)
+        rows = np.concatenate(end.rows, axis=1)
         if self.features is not None and force_n == 0.0:
-            *columns, phases = np.concatenate(end.rows, axis=1)
             self._features[reduction.treatment, reduction.steps] = own_features(
-                self.features, np.array(columns), phases
+                self.features, rows[:-1], rows[-1], compiled=self.compiled
             )
-        return _record(end, bias, setup.dt_s)
+        return _record(end, rows, bias, setup.dt_s)
 
     def of(self, setup: GraspSetup) -> TrialGrasps:
-        """Return trial grasps of another instance of the object, which begin near it and share one approach.
-
-        Their work is added to that of these.
-        """
+        """Return trial grasps of another instance of the object, which begin near it. Their work is added to that of
+        these."""
         other = evolve(self, setup=setup, only_near=True)
         other.work = self.work
         return other
@@ -216,37 +218,39 @@ class TrialGrasps:
     def _approach(self, setup: GraspSetup) -> _Stage:
         """Return the grasp shortly before the first contact; it begins near the object if it would take too long."""
         if self.only_near:
-            return self._closed_in(setup, from_open=False)[0]
-        stage, came_near = self._closed_in(setup, from_open=True)
+            return self._begun_near(setup)
+        stage, came_near = self._closed_in(setup, self._begun(setup.state, setup, from_open=True))
         if not came_near and not has_ended(stage.progress.controller):
-            stage, _ = self._closed_in(setup, from_open=False)
+            stage, _ = self._closed_in(setup, self._begun_near(setup))
         return stage
 
-    def _closed_in(self, setup: GraspSetup, from_open: bool) -> tuple[_Stage, bool]:
-        """Return the grasp shortly before the first contact, or at its end, and whether it reached the contact."""
-        steps = _approach_steps(setup)
-        reach = setup.plant.object.width_m + 2.0 * abs(setup.state.contact.offset_m)
+    def _begun_near(self, setup: GraspSetup) -> _Stage:
+        """Return a grasp that begins `NEAR_M` from the object."""
         state, link = setup.state, setup.plant.drive.link
-        if not from_open:
-            near = revolutions_at(link, min(state.motion.gap_m, reach + NEAR_M))
-            state = state._replace(motion=Motion(near, state.motion.speed_rev_s, *gap_and_rate(link, near)))
-        run = self._runner(setup, from_open)
+        near = revolutions_at(link, min(state.motion.gap_m, _reach_m(setup) + NEAR_M))
+        state = state._replace(motion=Motion(near, state.motion.speed_rev_s, *gap_and_rate(link, near)))
+        return self._begun(state, setup, from_open=False)
+
+    def _begun(self, state: PlantState, setup: GraspSetup, *, from_open: bool) -> _Stage:
         controller = first_state(self.controller.controller.init())
-        stage = _Stage(
-            SimulationState(NOT_STARTED, state, setup.sensor_state, controller, setup.palm_state),
-            (),
-            from_open,
-        )
+        progress = SimulationState(NOT_STARTED, state, setup.sensor_state, controller, setup.palm_state)
+        return _Stage(progress, (), from_open)
+
+    def _closed_in(self, setup: GraspSetup, stage: _Stage) -> tuple[_Stage, bool]:
+        """Return the grasp shortly before the first contact, or at its end, and whether it reached the contact."""
+        steps, reach = _approach_steps(setup), _reach_m(setup)
+        run, share = self._runner(setup, stage.from_open), CLOSED_AT_ONCE
         while not has_ended(stage.progress.controller) and stage.progress.loop.ticks < self._max_ticks():
             motion = stage.progress.plant.motion
             closing = max(-motion.speed_rev_s * motion.jacobian_m_rev, MIN_CLOSING_M_S)
-            ticks_left = 0.5 * (motion.gap_m - reach) / (closing * setup.dt_s)
-            if ticks_left < 2.0:
+            ticks = share * (motion.gap_m - reach) / (closing * setup.dt_s)
+            if ticks < LEAST_TICKS:
                 return stage, True
-            after = run(steps, stage, stage.progress.loop.ticks + min(int(ticks_left), TICKS_AT_ONCE))
+            after = run(steps, stage, stage.progress.loop.ticks + min(int(ticks), CAPACITY))
             if after.progress.plant.contact.touched == 1:
-                return stage, True
-            stage = after
+                share *= 0.25
+            else:
+                stage = after
         return stage, False
 
     def _runner(self, setup: GraspSetup, from_open: bool) -> Callable[[Steps, _Stage, int], _Stage]:
@@ -357,6 +361,11 @@ def trial_grasps(
     )
 
 
+def _reach_m(setup: GraspSetup) -> float:
+    """Return the gap (m) at which the nearer finger touches the object."""
+    return setup.plant.object.width_m + 2.0 * abs(setup.state.contact.offset_m)
+
+
 def _approach_steps(setup: GraspSetup) -> Steps:
     """Return the steps up to the contact: without contact the motion is smooth, and long ones suffice."""
     return setup.plant.steps._replace(longest_s=math.inf)
@@ -377,20 +386,24 @@ def _palm_buffers(on_arrays: bool, ticks: int) -> PalmBuffers:
     return PalmBuffers(noise, samples) if on_arrays else PalmBuffers(noise.tolist(), samples.tolist())
 
 
-def _record(end: _Stage, bias: Bias, dt_s: float) -> GraspRecord:
-    """Return the record of a grasp, from which the errors of the readings are subtracted."""
-    columns, progress = np.concatenate(end.rows, axis=1), end.progress
+def _record(end: _Stage, columns: NDArray[np.float64], bias: Bias, dt_s: float) -> GraspRecord:
+    """Return the record of a grasp with these rows, from which the errors of the readings are subtracted."""
+    progress, phases = end.progress, np.mod(columns[-1], 1 << EVENT_SHIFT)
     gap_m, left_n, right_n = (
         columns[COLUMNS.index(name)] for name in ("gap_m", "force_left_n", "force_right_n")
     )
-    share, phases = bias.travel_share, np.mod(columns[-1], 1 << EVENT_SHIFT)
+    if bias.travel_share != 0.0:
+        share = bias.travel_share
+        gap_m = gap_m + (bias.from_m - np.minimum(gap_m, bias.from_m)) * share / (1.0 + share)
+    if bias.force_n != 0.0:
+        left_n, right_n = (np.where(force != 0.0, force - bias.force_n, 0.0) for force in (left_n, right_n))
     return GraspRecord(
         outcome=int(progress.controller.law.outcome) if progress.controller.guard.stopped == 0 else -1,
         dt_s=dt_s,
-        gap_m=gap_m + (bias.from_m - np.minimum(gap_m, bias.from_m)) * share / (1.0 + share),
+        gap_m=gap_m,
         speed_m_s=columns[COLUMNS.index("velocity_m_s")],
-        left_n=np.where(left_n != 0.0, left_n - bias.force_n, 0.0),
-        right_n=np.where(right_n != 0.0, right_n - bias.force_n, 0.0),
+        left_n=left_n,
+        right_n=right_n,
         n_rows=int(np.sum(phases <= HOLD)),
         hold_from=int(np.sum(phases < HOLD)),
         peak_n=progress.plant.peak_n,
