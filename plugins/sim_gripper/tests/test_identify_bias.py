@@ -28,7 +28,7 @@ def squeeze_of(name, **gripper):
 
 def errors_of(name):
     """Return the errors of the fitted logarithms, with an ideal sensor, before and after that of the path is taken."""
-    squeeze = prepared(squeeze_of(name, sensor="ideal"), 0.0)
+    squeeze = prepared(squeeze_of(name, sensor="ideal", accuracy=1e-3), 0.0)
     model = ForwardModel(pads=drive_and_pads(SimConfig())[1])
     scale = _scale([squeeze])
     (two,) = (one for one in memories(scale) if sum(free.name == "tau_s" for free in one.free) == 2)

@@ -12,6 +12,8 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Final
 
+from attrs import evolve
+
 from graspsense.plugin_api import gap_and_rate, revolutions_at
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.contact import ObjectModel, pad_compression
@@ -22,6 +24,7 @@ from graspsense_sim_gripper.reduction.candidates import named, simpler_pads, wit
 from graspsense_sim_gripper.reduction.levels import (
     BY_SCENE,
     FULL_SCALES,
+    PLAIN_SCALES,
     UNVERIFIED,
     LevelScale,
     step_growth,
@@ -156,6 +159,16 @@ def fixed(problem: Problem) -> Reduction:
         ),
         level=level,
     )
+
+
+def plain(problem: Problem) -> Reduction:
+    """Return the model with every term and a step per tick, without examining the object.
+
+    Raises TypeError if there is no object.
+    """
+    level, dt_s = PLAIN_SCALES[0].at(problem.model_config.accuracy), _nominal(problem).dt_s
+    steps = _with_settings(steps_for(level, VERLET, dt_s), problem.model_config)
+    return evolve(fixed(problem), steps=steps, level=level)
 
 
 def _mass_kg(drive: Drive, gap_m: float) -> float:

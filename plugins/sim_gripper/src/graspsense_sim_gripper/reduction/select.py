@@ -1,9 +1,10 @@
 """Selecting the reduced model of an object: the first level whose trial grasp is accurate enough.
 
-The first trial grasp uses the full model. It gives the speed at the first contact and the peak force, for which models
-are proposed. Each proposed model is then simulated in a trial grasp, and compared with a trial grasp in the full model
-with finer steps. A step per tick with every term is tried first, since it costs least; then levels from the largest
-tolerances to the smallest.
+The first trial grasp has every term and a step per tick. It gives the speed at the contact and the peak force, for
+which models are proposed; a second one, in the full model with finer steps, corrects them where it has others. Each
+proposed model is then simulated in a trial grasp, and compared with a trial grasp in the full model with finer steps. A
+step per tick with every term is tried first, since it costs least; then levels from the largest tolerances to the
+smallest.
 
 A model that passes is tried twice more, with a controller that reads slightly larger and slightly smaller values of
 force and travel. This finds a threshold that is met so closely that an error of this size makes the grasp continue a
@@ -33,7 +34,7 @@ from graspsense_sim_gripper.reduction.levels import FULL_SCALES, REFERENCE_SCALE
 from graspsense_sim_gripper.reduction.model import DROPPED, Reduction, TermDecision, Verification
 from graspsense_sim_gripper.reduction.own_features import NOT_READ
 from graspsense_sim_gripper.reduction.probe import Grip
-from graspsense_sim_gripper.reduction.propose import fixed, grip_of, propose
+from graspsense_sim_gripper.reduction.propose import fixed, grip_of, plain, propose
 from graspsense_sim_gripper.reduction.verify import (
     MOST_WORK,
     Sensitivity,
@@ -62,6 +63,8 @@ MOST_FOR_FEATURES: Final = 2
 that shorter steps do not give is one that depends on ticks."""
 
 _SELECTED: Final = ReductionCache()
+_UNKNOWN: Final = (None, None)
+"""What `_gripped` returns for a trial grasp that fails; `grip_of` then has the values of the paper."""
 
 
 def select(
@@ -131,23 +134,43 @@ def _select_within_limit(problem: Problem, trial: TrialGrasps) -> Reduction:
 
 def _select(problem: Problem, trial: TrialGrasps) -> Reduction:
     """Return the model as `select` does, without the cache."""
-    config, grip = problem.model_config, grip_of(problem)
-    reference = propose(problem, grip, _reference_scale(config, FULL_SCALES[0]))
-    not_verified = config.has_forced_steps or config.fidelity == "reference"
-    if not_verified or math.isinf(reference.contact.error):
+    config = problem.model_config
+    if config.has_forced_steps or config.fidelity == "reference":
+        return propose(problem, grip_of(problem))
+    scale = _reference_scale(config, FULL_SCALES[0])
+    expected = _gripped(trial, plain(problem))
+    grip = grip_of(problem, *expected)
+    reference = propose(problem, grip, scale)
+    if math.isinf(reference.contact.error):
+        expected, grip = _UNKNOWN, grip_of(problem)
+        reference = propose(problem, grip, scale)
+    if math.isinf(reference.contact.error):
         return propose(problem, grip)
+    found = _gripped(trial, reference)
+    if found == _UNKNOWN:
+        return propose(problem, grip)
+    if found != expected:
+        grip = grip_of(problem, *found)
+        reference = propose(problem, grip, scale)
+        if math.isinf(reference.contact.error):
+            return propose(problem, grip)
+    return _best(problem, grip, trial)
+
+
+def _gripped(trial: TrialGrasps, reduction: Reduction) -> tuple[float | None, float | None]:
+    """Return the peak force and the speed at the contact of a trial grasp in this model, to two digits.
+
+    They suffice: similar grasps then get the same proposals. `_UNKNOWN` if the grasp fails; a controller that raises
+    does so in the grasp of the run as well, and is reported there. Raises TooMuchWork.
+    """
     try:
-        first = trial.record(reference)
+        grasp = trial.record(reduction)
     except TooMuchWork:
         raise
     except Exception:
-        # A controller that raises does so in the grasp as well, and is reported there.
-        return propose(problem, grip)
-    grip = grip_of(problem, _two_digits(first.peak_n), _two_digits(first.contact_speed_m_s()))
-    reference = propose(problem, grip, _reference_scale(config, FULL_SCALES[0]))
-    if math.isinf(reference.contact.error):
-        return propose(problem, grip)
-    return _best(problem, grip, trial)
+        return _UNKNOWN
+    force_n, speed_m_s = (float(f"{value:.1e}") for value in (grasp.peak_n, grasp.contact_speed_m_s()))
+    return (force_n, speed_m_s) if math.isfinite(force_n + speed_m_s) else _UNKNOWN
 
 
 def _best(problem: Problem, grip: Grip, trial: TrialGrasps) -> Reduction:
@@ -293,11 +316,6 @@ def _reference_scale(config: SimConfig, scale: LevelScale) -> LevelScale:
 def _accepted_share(config: SimConfig) -> float:
     """Return the share of the accuracy by which trial grasps may differ."""
     return ACCEPTED_WITH_SPREAD if config.spread else ACCEPTED
-
-
-def _two_digits(value: float) -> float:
-    """Return the value rounded to two digits, which suffice: similar grasps then get the same proposals."""
-    return float(f"{value:.1e}")
 
 
 def _culprit(problem: Problem, grip: Grip, trial: TrialGrasps) -> str:

@@ -296,7 +296,11 @@ class TrialGrasps:
                             setup.dt_s,
                         )
                     )
-                rows = (*rows, np.vstack(recorded)[:, : progress.loop.recorded])
+                n = progress.loop.recorded
+                rows = (
+                    *rows,
+                    np.vstack((np.asarray(written.columns)[:, :n], np.asarray(written.phases)[:n])),
+                )
                 self._count(start, progress)
             return _Stage(progress, rows, from_open)
 

@@ -6,10 +6,11 @@ ends at the event (`drift`). For an implicit scheme, `first` returns the fractio
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from graspsense.plugin_api import gap_and_rate
-from graspsense_sim_gripper.dynamics.contact import CONTACT_TOL_M
+from graspsense_sim_gripper.dynamics.contact import CONTACT_TOL_M, MIN_SLOPE_N_M
 from graspsense_sim_gripper.dynamics.drive import ARREST_M_S
 from graspsense_sim_gripper.dynamics.state import ContactState, Motion, right_of
 from graspsense_sim_gripper.stepping.control import contact_step_s
@@ -20,6 +21,8 @@ NEWTON_ITERATIONS: Final = 4
 MIN_FRACTION: Final = 0.01
 MAX_FRACTION: Final = 0.99
 """A repeated step is shorter by at least a hundredth, and no shorter than a hundredth."""
+MIN_PARTING: Final = 1e-3
+"""The same up to the time at which a finger leaves the object, which is known well from the force before."""
 
 
 def drift(params: PlantParams, start: Start, h: float) -> tuple[Motion, float]:
@@ -62,7 +65,7 @@ def first(params: PlantParams, start: Start, attempt: Attempt) -> float:
     end = end_of_travel(params.drive, direction)
     fraction = 0.0
     if gap > meeting and gap1 < meeting - CONTACT_TOL_M:
-        if gap - meeting <= CONTACT_TOL_M:
+        if gap - meeting <= CONTACT_TOL_M and params.steps.growth < math.inf:
             return _first_step(params, attempt)
         fraction = (gap - meeting) / (gap - gap1)
     elif (revolutions1 - end) * direction * abs(jacobian) > CONTACT_TOL_M:
@@ -87,14 +90,26 @@ def parting(params: PlantParams, start: Start, attempt: Attempt) -> float:
     )
     if not (left or right):
         return 0.0
-    model = params.object
+    model, opening = params.object, gap1 - gap
     shift = 2.0 * after.offset_m if model.held == 1 else 0.0
-    beyond = _gap_beyond(after.left, gap1 - model.width_m + shift) if left else 0.0
+    # The first of two halves to part, and its end, from which the fingers are furthest away after the step.
+    share, beyond = 1.0, 0.0
+    if left:
+        share = _unloads_after(before.left, model.pads.stiffness_n_m) / opening
+        beyond = _gap_beyond(after.left, gap1 - model.width_m + shift)
     if right:
-        beyond = max(beyond, _gap_beyond(right_of(after.left, after.right), gap1 - model.width_m - shift))
+        half, half1 = right_of(before.left, before.right), right_of(after.left, after.right)
+        share = min(share, _unloads_after(half, model.pads.stiffness_n_m) / opening)
+        beyond = max(beyond, _gap_beyond(half1, gap1 - model.width_m - shift))
     if beyond <= CONTACT_TOL_M:
         return 0.0
-    return min(max(1.0 - beyond / (gap1 - gap), MIN_FRACTION), MAX_FRACTION)
+    return min(max(min(share, 1.0 - beyond / opening), MIN_PARTING), MAX_FRACTION)
+
+
+def _unloads_after(half: ContactState, pads_n_m: float) -> float:
+    """Return by how much (m) the fingers open until this half bears no force, by its stiffness in the last step."""
+    compliance = 1.0 / max(half.slope_n_m, MIN_SLOPE_N_M) + 1.0 / pads_n_m
+    return half.force_n * compliance
 
 
 def pressing(params: PlantParams, start: Start, attempt: Attempt) -> float:

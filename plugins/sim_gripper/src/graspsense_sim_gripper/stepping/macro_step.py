@@ -47,7 +47,7 @@ from graspsense_sim_gripper.stepping.scheme import (
 )
 from graspsense_sim_gripper.stepping.stick import stick
 
-MAX_TICKS: Final = 64
+MAX_TICKS: Final = 128
 """Largest number of ticks in a macro-step."""
 RELAXATION_ERROR: Final = 0.1
 """The error of a force that relaxes while the fingers are held, as a share of its second difference over the step."""
