@@ -82,13 +82,18 @@ class GraspRecord:
             return values
         steady, moved = rest
         values["p_steady"] = _at(self.gap_m, steady)
-        force = 0.5 * (self.left_n + self.right_n)
+        force = self.force_n
         values["f_steady"] = _at(force, max(steady + REST_WINDOW_S / self.dt_s, self._shown_from()))
         values["delta_t"] = (steady - first) * self.dt_s
         if moved:
             values["dp_dt"] = (values["p_steady"] - values["p_first"]) / values["delta_t"]
             values["df_dt"] = (values["f_steady"] - _at(force, first)) / values["delta_t"]
         return values
+
+    @cached_property
+    def force_n(self) -> NDArray[np.float64]:
+        """The mean force of both pads."""
+        return 0.5 * (self.left_n + self.right_n)
 
     def contact_speed_m_s(self) -> float:
         """Return the closing speed (m/s) at the tick before the first force on a pad; 0 if there is none."""
@@ -134,6 +139,10 @@ def _at(column: NDArray[np.float64], place: float) -> float:
     return before + min(max(place - i, 0.0), 1.0) * (after - before)
 
 
+def _rms(values: NDArray[np.float64]) -> float:
+    return math.sqrt(float(values @ values) / len(values))
+
+
 def deviation(grasp: GraspRecord, expected: GraspRecord) -> tuple[float, str]:
     """Return the largest relative error of all quantities, and the name of that quantity.
 
@@ -148,9 +157,8 @@ def deviation(grasp: GraspRecord, expected: GraspRecord) -> tuple[float, str]:
             errors[name] = abs(value - wanted[name]) / max(abs(wanted[name]), SCALES[name])
     n = min(len(grasp.gap_m), len(expected.gap_m))
     if n > 0:
-        forces, others = (0.5 * (record.left_n[:n] + record.right_n[:n]) for record in (grasp, expected))
-        rms = float(np.sqrt(np.mean((forces - others) ** 2)))
-        errors["trace"] = rms / max(float(np.sqrt(np.mean(others**2))), TRACE_SCALE_N)
+        others = expected.force_n[:n]
+        errors["trace"] = _rms(grasp.force_n[:n] - others) / max(_rms(others), TRACE_SCALE_N)
     worst, quantity = 0.0, "nothing"
     for name, error in errors.items():
         # `not <=` instead of `>`: NaN counts as the largest error.

@@ -59,7 +59,7 @@ def own_features(
     numbers = phases.astype(np.int64) & ((1 << EVENT_SHIFT) - 1)
     extract = _from_columns if compiled else _from_trace
     try:
-        features = extract(feature_set, np.array(table), numbers)
+        features = extract(feature_set, table, numbers)
     except Exception:
         # A set that fails on every grasp is reported where the grasp itself is extracted from.
         return None

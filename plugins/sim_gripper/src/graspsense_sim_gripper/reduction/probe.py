@@ -26,7 +26,7 @@ SQUEEZE_S: Final = 3.0
 POINTS: Final = 24
 """Number of equal steps of a closing path."""
 SEARCH_POINTS: Final = 12
-"""The same where the depth for a force is searched."""
+"""The same where only the end of the path counts."""
 EARLY_POINTS: Final = 3
 """Number of further points within the first of these steps, to resolve the beginning of the contact."""
 MAX_CHANGE: Final = 0.5
@@ -151,7 +151,7 @@ def damping(grip: Grip, model: ObjectModel, dt_s: float) -> float:
     fast = grip.paths[1]
     depth, speed = fast.closures[-1], fast.speeds[0]
     back = min(speed * dt_s, 0.5 * depth)
-    moving = _path(depth - back, (depth - back) / speed, 0.0)
+    moving = _path(depth - back, (depth - back) / speed, 0.0, SEARCH_POINTS)
     press, contact, before = contact_solver(grip.kinds, hardens(model)), uncompressed(grip.kinds), 0.0
     for closure, t in zip(moving.closures, moving.times, strict=True):
         contact, _ = press(model, contact, closure, speed, t - before)
