@@ -16,7 +16,6 @@ from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance, 
 from graspsense_sim_gripper.dynamics.drive import Drive, Friction, sliding_friction, stribeck_excess
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState
 from graspsense_sim_gripper.reduction.levels import LevelScale, steps_for
-from graspsense_sim_gripper.stepping.advance import take_steps
 from graspsense_sim_gripper.stepping.scheme import (
     BOGACKI_SHAMPINE,
     MEAN_FORCE,
@@ -619,17 +618,3 @@ def test_the_steps_from_a_contact_that_is_off_by_rounding_are_those_from_the_con
     assert after.step.n_steps < 250
     assert after.step.unresolved == 0
     assert after.peak_n == pytest.approx(fine.peak_n, rel=1e-4)
-
-
-@pytest.mark.parametrize("pads_n_m", [inf, 1e4])
-def test_the_time_at_which_a_finger_leaves_an_object_is_found_in_few_attempts(pads_n_m):
-    # Where the finger is beyond the object's end is a parabola there, and a secant of it needed 14 with pads.
-    body = ObjectModel(0.05, 0.0, PadCompliance(pads_n_m), (Elastic(2000.0, 0.0), Maxwell(3000.0, 0.5)))
-    params, laws = PlantParams(drive(), body, a_step_per_tick()), (elastic, maxwell)
-    state = run(params, at(0.0501, (NoState(), MaxwellState(0.0))), 40.0, 0.5, laws)
-    attempts, take = [], bind_reachable(take_steps, {"object_force": sum_of(laws)})
-    while state.contact.left.force_n > 0.0:
-        state, n = take(params, state, -40.0, TICK)
-        attempts.append(n)
-    assert max(attempts[:-1]) <= 2
-    assert attempts[-1] <= 12

@@ -121,5 +121,5 @@ def contact_step_s(steps: Steps) -> float:
 
 
 def after_contact(steps: Steps, step: StepState) -> StepState:
-    """Return the state of the control after a contact."""
-    return StepState(min(step.next_s, contact_step_s(steps)), step.n_steps, step.unresolved)
+    """Return the state of the control after a contact or an event, whatever the length of the step that located it."""
+    return StepState(contact_step_s(steps), step.n_steps, step.unresolved)

@@ -6,11 +6,10 @@ ends at the event (`drift`). For an implicit scheme, `first` returns the fractio
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 from graspsense.plugin_api import gap_and_rate
-from graspsense_sim_gripper.dynamics.contact import CONTACT_TOL_M, MIN_SLOPE_N_M
+from graspsense_sim_gripper.dynamics.contact import CONTACT_TOL_M
 from graspsense_sim_gripper.dynamics.drive import ARREST_M_S
 from graspsense_sim_gripper.dynamics.state import ContactState, Motion, right_of
 from graspsense_sim_gripper.stepping.control import contact_step_s
@@ -21,8 +20,6 @@ NEWTON_ITERATIONS: Final = 4
 MIN_FRACTION: Final = 0.01
 MAX_FRACTION: Final = 0.99
 """A repeated step is shorter by at least a hundredth, and no shorter than a hundredth."""
-MIN_PARTING: Final = 1e-3
-"""The same up to the time at which a finger leaves the object, which is known well from the force before."""
 
 
 def drift(params: PlantParams, start: Start, h: float) -> tuple[Motion, float]:
@@ -55,18 +52,13 @@ def drift(params: PlantParams, start: Start, h: float) -> tuple[Motion, float]:
 
 
 def first(params: PlantParams, start: Start, attempt: Attempt) -> float:
-    """Return the fraction of an implicit step at which an event lies, by the secant; 0 if there is none.
-
-    A step that begins at a contact is the first after it, and no longer than that.
-    """
+    """Return the fraction of an implicit step at which an event lies, by the secant; 0 if there is none."""
     revolutions, speed, gap, jacobian = start.motion
     revolutions1, speed1, gap1, jacobian1 = attempt.motion
     direction, meeting = start.direction, start.meeting_m
     end = end_of_travel(params.drive, direction)
     fraction = 0.0
     if gap > meeting and gap1 < meeting - CONTACT_TOL_M:
-        if gap - meeting <= CONTACT_TOL_M and params.steps.growth < math.inf:
-            return _first_step(params, attempt)
         fraction = (gap - meeting) / (gap - gap1)
     elif (revolutions1 - end) * direction * abs(jacobian) > CONTACT_TOL_M:
         fraction = (end - revolutions) / (revolutions1 - revolutions)
@@ -90,26 +82,14 @@ def parting(params: PlantParams, start: Start, attempt: Attempt) -> float:
     )
     if not (left or right):
         return 0.0
-    model, opening = params.object, gap1 - gap
+    model = params.object
     shift = 2.0 * after.offset_m if model.held == 1 else 0.0
-    # The first of two halves to part, and its end, from which the fingers are furthest away after the step.
-    share, beyond = 1.0, 0.0
-    if left:
-        share = _unloads_after(before.left, model.pads.stiffness_n_m) / opening
-        beyond = _gap_beyond(after.left, gap1 - model.width_m + shift)
+    beyond = _gap_beyond(after.left, gap1 - model.width_m + shift) if left else 0.0
     if right:
-        half, half1 = right_of(before.left, before.right), right_of(after.left, after.right)
-        share = min(share, _unloads_after(half, model.pads.stiffness_n_m) / opening)
-        beyond = max(beyond, _gap_beyond(half1, gap1 - model.width_m - shift))
+        beyond = max(beyond, _gap_beyond(right_of(after.left, after.right), gap1 - model.width_m - shift))
     if beyond <= CONTACT_TOL_M:
         return 0.0
-    return min(max(min(share, 1.0 - beyond / opening), MIN_PARTING), MAX_FRACTION)
-
-
-def _unloads_after(half: ContactState, pads_n_m: float) -> float:
-    """Return by how much (m) the fingers open until this half bears no force, by its stiffness in the last step."""
-    compliance = 1.0 / max(half.slope_n_m, MIN_SLOPE_N_M) + 1.0 / pads_n_m
-    return half.force_n * compliance
+    return min(max(1.0 - beyond / (gap1 - gap), MIN_FRACTION), MAX_FRACTION)
 
 
 def pressing(params: PlantParams, start: Start, attempt: Attempt) -> float:
@@ -131,16 +111,11 @@ def pressing(params: PlantParams, start: Start, attempt: Attempt) -> float:
     half = before.left if left else right0
     apart = _gap_beyond(half, gap - model.width_m + (shift if left else -shift))
     if apart <= CONTACT_TOL_M:
-        return _first_step(params, attempt)
+        first_s = contact_step_s(params.steps)
+        return first_s / h if first_s < h else 0.0
     # The end of the object comes towards the finger as it recovers.
     closing = gap - gap1 - h * half.past.rate_m_s
     return min(max(apart / max(closing, apart), MIN_FRACTION), MAX_FRACTION)
-
-
-def _first_step(params: PlantParams, attempt: Attempt) -> float:
-    """Return the fraction of a step that is the first after a contact, 0 if the step is no longer than that."""
-    first_s = contact_step_s(params.steps)
-    return first_s / attempt.duration_s if first_s < attempt.duration_s else 0.0
 
 
 def _gap_beyond(half: ContactState, opened_m: float) -> float:
