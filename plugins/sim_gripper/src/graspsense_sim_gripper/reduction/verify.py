@@ -209,8 +209,7 @@ class TrialGrasps:
         return _record(end, rows, bias, setup.dt_s)
 
     def of(self, setup: GraspSetup) -> TrialGrasps:
-        """Return trial grasps of another instance of the object, which begin near it. Their work is added to that of
-        these."""
+        """Return trial grasps of another instance of the object, which begin near it and go on counting the work."""
         other = evolve(self, setup=setup, only_near=True)
         other.work, other._loops = self.work, self._loops
         return other

@@ -48,7 +48,7 @@ from graspsense_sim_gripper.stepping.scheme import (
 from graspsense_sim_gripper.stepping.stick import stick
 
 MAX_TICKS: Final = 128
-"""Largest number of ticks in a macro-step."""
+"""Largest number of ticks in a macro-step; no more than the rows that `loop.ROWS_AT_ONCE` keeps free."""
 RELAXATION_ERROR: Final = 0.1
 """The error of a force that relaxes while the fingers are held, as a share of its second difference over the step."""
 GROWTH: Final = 4.0
