@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
-from graspsense.plugin_api import RELEASE, Command, Pads, Reading, TickParams, TickState
+from graspsense.plugin_api import Command, Pads, Reading, TickParams, TickState
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.loop import (
     EVENT_SHIFT,
@@ -35,9 +35,6 @@ from graspsense_sim_gripper.stepping.scheme import PlantParams, Steps
 
 FIRST_TICKS: Final = 2
 """Number of ticks in the first macro-step."""
-RELEASE_ERROR: Final = 10.0
-"""The error of a macro-step after the hold, relative to the tolerance, up to which it is accepted: no feature depends
-on when the fingers rest there."""
 MAX_WAIT: Final = 16
 """Most ticks to wait after a macro-step that was not accepted."""
 
@@ -58,18 +55,17 @@ def run_macro_step(
     if most < FIRST_TICKS:
         return at, now
     n, event = min(now.length, most), False
-    allowed = RELEASE_ERROR if at.controller.phase == RELEASE else 1.0
     step = MacroStep(math.inf, 0.0, at.plant, constant_values(at.plant))
-    while n >= FIRST_TICKS and not step.error <= allowed:
+    while n >= FIRST_TICKS and not step.error <= 1.0:
         step = macro_step(params.plant, at.plant, at.effort_n, n * params.dt_s)
-        if not step.error <= allowed:
+        if not step.error <= 1.0:
             event = event or not step.error < math.inf
-            n = next_ticks(n, step.error / allowed, step.event_share)
-    if not step.error <= allowed:
+            n = next_ticks(n, step.error, step.event_share)
+    if not step.error <= 1.0:
         wait = min(2 * now.wait, MAX_WAIT)
         return at, MacroControl(FIRST_TICKS, at.ticks + wait, wait)
     # A step that an image cut short does not shorten the next one.
-    length = max(next_ticks(n, step.error / allowed, HALF), now.length if n == most else FIRST_TICKS)
+    length = max(next_ticks(n, step.error, HALF), now.length if n == most else FIRST_TICKS)
     after = _ticks_within(params, at, step, n, pads, columns, phases)
     # The step ends shortly before the event.
     if event or after.effort_n != at.effort_n:
