@@ -86,13 +86,14 @@ def _our_engine(config: SimConfig, setting: str) -> Engine:
 # ------------------------------------------------------------------------- loops as a user would write them
 
 
-def _empty() -> tuple[Any, Any, Any]:
+def empty() -> tuple[Any, Any, Any]:
+    """Return arrays for the trace: positions, forces and efforts."""
     return np.zeros(TICKS), np.zeros(TICKS), np.zeros(TICKS)
 
 
 def _engine(name: str, setting: str, loop: Callable[..., None], scene: PeerScene) -> Engine:
     def grasp() -> Run:
-        xs, forces, us = _empty()
+        xs, forces, us = empty()
         loop(scene.start, xs, forces, us)
         return Run(x=xs, force=forces, u=us)
 
@@ -100,7 +101,7 @@ def _engine(name: str, setting: str, loop: Callable[..., None], scene: PeerScene
     return Engine(name=name, setting=setting, grasp=grasp)
 
 
-def _settle(scene: PeerScene) -> Any:
+def settled(scene: PeerScene) -> Any:
     """Return a compiled function that applies what is due, as often as modes change in turn.
 
     `happened` is an event that was located and applied a moment ago. A root that lies a rounding error before the
@@ -126,7 +127,7 @@ def _settle(scene: PeerScene) -> Any:
 
 def euler(scene: PeerScene, count: int) -> Engine:
     """Return a semi-implicit Euler loop: the speeds first, then the positions. Events count from the end of a step."""
-    rates, output, settle, n_guards = scene.rates, scene.output, _settle(scene), scene.n_guards
+    rates, output, settle, n_guards = scene.rates, scene.output, settled(scene), scene.n_guards
     h, positions = TICK / count, scene.positions
 
     @njit
@@ -197,7 +198,7 @@ def _rk4_step(scene: PeerScene) -> Any:
 
 def rk4(scene: PeerScene, count: int) -> Engine:
     """Return a classical Runge-Kutta loop of fixed steps. Events count from the end of a step."""
-    output, settle, step, n_guards = scene.output, _settle(scene), _rk4_step(scene), scene.n_guards
+    output, settle, step, n_guards = scene.output, settled(scene), _rk4_step(scene), scene.n_guards
     h = TICK / count
 
     @njit
@@ -222,7 +223,7 @@ def rk4(scene: PeerScene, count: int) -> Engine:
 def located_rk4(scene: PeerScene, count: int) -> Engine:
     """Return a Runge-Kutta loop that ends a step at the first event in it; with many steps, the reference."""
     output, guards, jump, n_guards = scene.output, scene.guards, scene.jump, scene.n_guards
-    settle, step = _settle(scene), _rk4_step(scene)
+    settle, step = settled(scene), _rk4_step(scene)
     whole = TICK / count
 
     @njit
@@ -291,9 +292,9 @@ def _piecewise(scene: PeerScene, solve: Callable[..., tuple[float, Any, int]]) -
     `solve(s, u, mode, t)` integrates from `t` (s) to the end of the tick, or to the first event before it, and returns
     the time, the state and the number of the event (-1: none).
     """
-    xs, forces, us = _empty()
+    xs, forces, us = empty()
     s, mode, g = scene.start.copy(), np.zeros(MODES, np.int64), np.zeros(scene.n_guards)
-    settle = _settle(scene)
+    settle = settled(scene)
     integral, since = 0.0, -1.0
     for tick in range(TICKS):
         x, v, force = scene.output(s, mode)
@@ -446,7 +447,7 @@ def mujoco_engine(scene: PeerScene, integrator: str, count: int, *, native: bool
     mj_step = ctypes.CDLL(str(library)).mj_step
     mj_step.argtypes, mj_step.restype = (ctypes.c_size_t, ctypes.c_size_t), None
     model_at, data_at = model._address, data._address
-    rates, output, settle, n_guards = scene.rates, scene.output, _settle(scene), scene.n_guards
+    rates, output, settle, n_guards = scene.rates, scene.output, settled(scene), scene.n_guards
     inertia, own = scene.inertia, native
 
     @njit
@@ -476,7 +477,7 @@ def mujoco_engine(scene: PeerScene, integrator: str, count: int, *, native: bool
 
     def grasp() -> Run:
         mujoco.mj_resetData(model, data)
-        xs, forces, us = _empty()
+        xs, forces, us = empty()
         loop(scene.start, xs, forces, us, data.qpos, data.qvel, data.qfrc_applied)
         return Run(x=xs, force=forces, u=us)
 

@@ -85,7 +85,7 @@ def made() -> dict[str, Any]:
         "graspsense": __version__,
         "load_at_the_start": round(os.getloadavg()[0], 1),
     }
-    for name in ("numpy", "numba", "scipy", "mujoco", "scikit-sundae"):
+    for name in ("numpy", "numba", "scipy", "mujoco", "scikit-sundae", "drake"):
         try:
             found[name] = version(name)
         except PackageNotFoundError:
