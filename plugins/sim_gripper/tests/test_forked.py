@@ -97,10 +97,10 @@ print(json.dumps([batch() == whole, len(forked)]))
 def test_what_fails_in_a_process_is_run_here():
     assert said_by(
         """
-whole, told, here = batch(worth=10 * N), threads.told, os.getpid()
-def failing(grasp, scene):
-    raise ValueError("not JSON")
-threads.told = failing
+whole = batch(worth=10 * N)
+def failing(grasps):
+    raise ValueError("not a number")
+threads.answer_of = failing
 print(json.dumps([batch() == whole, len(forked)]))
 """
     ) == [True, 2]

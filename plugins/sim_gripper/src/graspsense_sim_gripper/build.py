@@ -204,12 +204,11 @@ def _plant(
     gripper = _gripper(config)
     drive = gripper.drive
     if config.spread:
-        friction_n = max(
-            drive.friction.coulomb_n + config.coulomb_spread_n * float(rng.standard_normal()), 0.0
-        )
-        breakaway_n = max(float(config.breakaway_n), friction_n)
-        friction = drive.friction._replace(coulomb_n=friction_n, breakaway_n=breakaway_n)
-        drive = drive._replace(friction=friction)
+        # `_replace` would take several times as long.
+        link, inertia, (coulomb_n, _, *rest), closed_rev, open_rev, lag_s = drive
+        coulomb_n = max(coulomb_n + config.coulomb_spread_n * float(rng.standard_normal()), 0.0)
+        friction = Friction(coulomb_n, max(float(config.breakaway_n), coulomb_n), *rest)
+        drive = Drive(link, inertia, friction, closed_rev, open_rev, lag_s)
     if instance is None:
         # A negative width: the fingers close without touching anything.
         model = ObjectModel(-1.0, 0.0, gripper.pads, all_active(()))

@@ -2,8 +2,8 @@
 
 Nearly half of the time of a compiled grasp is Python around its loop, so threads keep few cores busy. A forked process
 begins with all that this one has: the models, and the machine code of the loops. It is asked for the slice of the batch
-that begins at some index, and answers with the results as JSON. A trace, or what Python code extracted from one, cannot
-be sent; what a compiled feature set measured can.
+that begins at some index, and answers with the numbers of its results, and with JSON for the rest. A trace, or what
+Python code extracted from one, cannot be sent; what a compiled feature set measured can.
 """
 
 from __future__ import annotations
@@ -15,25 +15,47 @@ import signal
 import sys
 import threading
 import warnings
+from array import array
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from multiprocessing.connection import Connection
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from attrs import evolve, frozen
 
 from graspsense.plugin_api import CompiledExtraction, Outcome, Trace, columns_of_ticks
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job
-from graspsense_sim_gripper.batch.nested import from_text, like, text_of
+from graspsense_sim_gripper.batch.nested import append_numbers, filled
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.model_report import model_report
 from graspsense_sim_gripper.objects.library import kinds_in
+from graspsense_sim_gripper.reduction.model import Reduction
 
 Json = Any
 """A value that JSON can represent."""
 
-REFUSED: Final = b""
+
+class Answer(NamedTuple):
+    """The results of a slice as another process sends them."""
+
+    rest: bytes
+    """JSON: for each grasp outcome, reason, model report, and how many numbers it has measured and in its state."""
+    numbers: bytes
+    """An array of doubles: for each grasp what was measured, and the state of the plant at its end."""
+
+
+REFUSED: Final = Answer(b"", b"")
 """The answer to a slice that cannot be run in another process. The caller then runs it."""
+
+
+class InModel(NamedTuple):
+    """What the process that asks knows of a grasp of an answer."""
+
+    initial: PlantState
+    """The plant before it begins; its numbers may be others."""
+    reduction: Reduction | None
+    unstable_loop: str
+    """As in `FinishedGrasp`."""
 
 
 def can_fork() -> bool:
@@ -73,7 +95,7 @@ def measuring(job: Job) -> Job:
 class ForkedProcess:
     """A forked process that answers for slices of a batch. Use it as a context manager, which ends the process."""
 
-    def __init__(self, answer: Callable[[int], Json], others: Sequence[ForkedProcess]) -> None:
+    def __init__(self, answer: Callable[[int], Answer], others: Sequence[ForkedProcess]) -> None:
         """Fork. `answer(begin)` returns what is sent; `others`: the processes that were forked before."""
         context = multiprocessing.get_context("fork")
         self._asks, answers = context.Pipe()
@@ -93,50 +115,66 @@ class ForkedProcess:
         self._process.kill()
         self._process.join()
 
-    def answer(self, begin: int) -> bytes:
+    def answer(self, begin: int) -> Answer:
         """Return the answer for the slice that begins at this index; `REFUSED` if the process cannot give it."""
         try:
             self._asks.send_bytes(str(begin).encode())
-            return self._asks.recv_bytes()
+            return Answer(self._asks.recv_bytes(), self._asks.recv_bytes())
         except (OSError, EOFError):
             # Another program has ended it, for example the system because memory was short.
             return REFUSED
 
 
-def told(grasp: FinishedGrasp, scene: str) -> Json:
-    """Return a result as JSON values. The state is text in it, since few callers read it."""
-    state = grasp.state
-    report = model_report(state, kinds_in(scene))
-    return grasp.outcome.value, grasp.reason, grasp.extracted, report, text_of(state)
+def answer_of(grasps: Iterable[tuple[FinishedGrasp, str]]) -> Answer:
+    """Return the answer with the results of grasps, each given with its scene."""
+    rest: list[Json] = []
+    numbers: list[float] = []
+    for grasp, scene in grasps:
+        state, begin = grasp.state, len(numbers)
+        if grasp.extracted is not None:
+            append_numbers(numbers, grasp.extracted)
+        measured = len(numbers) - begin
+        append_numbers(numbers, state)
+        lengths = measured, len(numbers) - begin - measured
+        rest.append((grasp.outcome.value, grasp.reason, model_report(state, kinds_in(scene)), *lengths))
+    return Answer(json.dumps(rest).encode(), array("d", numbers).tobytes())
 
 
 def results(
-    answer: bytes, form: CompiledExtraction | None, pattern: Any, initial: Iterable[PlantState]
+    answer: Answer, form: CompiledExtraction | None, pattern: Any, models: Iterable[InModel]
 ) -> list[FinishedGrasp]:
     """Return the results in an answer.
 
-    `form`: the extraction of the job, and `pattern` a tuple of the type that it measures. `initial`: the plant of each
-    grasp before it begins.
+    `form`: the extraction of the job, and `pattern` a tuple of the type that it measures. `models`: what is known of
+    each grasp.
     """
-    return [
-        FinishedGrasp(
-            outcome=Outcome(outcome),
-            reason=reason,
-            end=partial(_state, end, state),
-            extracted=None if form is None else form.result(like(pattern, measured)),
-            kept=None,
-            told=report,
+    numbers, begin, found = array("d", answer.numbers), 0, []
+    for (outcome, reason, report, measured, of_state), known in zip(
+        json.loads(answer.rest), models, strict=True
+    ):
+        state, end = begin + measured, begin + measured + of_state
+        found.append(
+            FinishedGrasp(
+                outcome=Outcome(outcome),
+                reason=reason,
+                end=partial(_state, known.initial, numbers[state:end]),
+                extracted=None if form is None else form.result(filled(pattern, numbers[begin:state])),
+                kept=None,
+                told=report,
+                reduction=known.reduction,
+                unstable_loop=known.unstable_loop,
+            )
         )
-        for (outcome, reason, measured, report, end), state in zip(json.loads(answer), initial, strict=True)
-    ]
+        begin = end
+    return found
 
 
-def _state(text: str, pattern: PlantState) -> PlantState:
-    state: PlantState = from_text(pattern, text)
+def _state(pattern: PlantState, numbers: Iterable[float]) -> PlantState:
+    state: PlantState = filled(pattern, numbers)
     return state
 
 
-def _serve(answer: Callable[[int], Json], connection: Connection, inherited: Sequence[Connection]) -> None:
+def _serve(answer: Callable[[int], Answer], connection: Connection, inherited: Sequence[Connection]) -> None:
     """Answer the requests of the connection until it ends."""
     # As long as this process holds them, the processes at their other ends do not see the caller end.
     for one in inherited:
@@ -153,11 +191,12 @@ def _serve(answer: Callable[[int], Json], connection: Connection, inherited: Seq
         except (EOFError, OSError):
             return
         try:
-            reply = json.dumps(answer(begin)).encode()
+            reply = answer(begin)
         except Exception:
             # The caller runs the slice again, which raises the exception where it can be handled.
             reply = REFUSED
         try:
-            connection.send_bytes(reply)
+            for part in reply:
+                connection.send_bytes(part)
         except OSError:
             return

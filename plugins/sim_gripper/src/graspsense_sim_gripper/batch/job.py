@@ -113,7 +113,7 @@ class FinishedGrasp:
             report |= accuracy_report(report, self.reduction, self.unstable_loop)
         return report
 
-    def in_model(self, reduction: Reduction, unstable_loop: str) -> FinishedGrasp:
+    def in_model(self, reduction: Reduction | None, unstable_loop: str) -> FinishedGrasp:
         """Return the same result with the reduced model, and the text of `sampled_loop.instability` for it."""
         # `evolve` would take three times as long.
         return FinishedGrasp(
@@ -231,15 +231,15 @@ class Scenes:
             self._initial[key] = self.setup(scene, 0).state
         return self._initial[key]
 
-    def in_its_model(self, grasp: FinishedGrasp, scene: str, seed: int) -> FinishedGrasp:
-        """Return a grasp of a scene together with the reduced model that it was simulated in."""
+    def model_of(self, scene: str, seed: int) -> tuple[Reduction | None, str]:
+        """Return the reduced model of a scene, and the text of `sampled_loop.instability` for it."""
         key = scene_key(scene)
         _, reduction = self._scenes[key]
         if reduction is None:
-            return grasp
+            return None, ""
         if key not in self._unstable:
             self._unstable[key] = instability(self.setup(scene, seed), self.job.grasp_controller, reduction)
-        return grasp.in_model(reduction, self._unstable[key])
+        return reduction, self._unstable[key]
 
 
 def scene_key(scene: str) -> tuple[str, bool]:

@@ -1,10 +1,8 @@
-"""Named tuples from the nested lists that JSON makes of them, or from the text of their numbers."""
+"""Nested tuples from a list of their numbers, or from the nested lists that JSON makes of them."""
 
 from __future__ import annotations
 
-from array import array
-from base64 import b64decode, b64encode
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 
@@ -19,34 +17,35 @@ def like(pattern: Any, values: Any) -> Any:
     return type(pattern)(*parts) if hasattr(pattern, "_fields") else tuple(parts)
 
 
-def text_of(values: tuple[Any, ...]) -> str:
-    """Return the numbers in nested tuples as text. That is faster than JSON."""
-    return b64encode(array("d", _numbers(values, [])).tobytes()).decode()
+def append_numbers(to: list[float], values: Any) -> None:
+    """Append the numbers in nested tuples, in order; `values` may also be a number."""
+    if isinstance(values, tuple):
+        for value in values:
+            if isinstance(value, tuple):
+                append_numbers(to, value)
+            else:
+                to.append(value)
+    else:
+        to.append(values)
 
 
-def from_text(pattern: Any, text: str) -> Any:
-    """Return what `text_of` was given, as nested tuples and numbers of the same types as in `pattern`.
+def filled(pattern: Any, numbers: Iterable[float]) -> Any:
+    """Return numbers as nested tuples and numbers of the same types as in `pattern`.
 
-    Raises ValueError if the numbers of values differ.
+    Raises ValueError if there are more or fewer numbers than in the pattern.
     """
-    numbers = array("d", b64decode(text))
-    if len(numbers) != len(_numbers(pattern, [])):
-        raise ValueError(f"{len(numbers)} numbers for a state of {len(_numbers(pattern, []))}")
-    return _filled(pattern, iter(numbers))
-
-
-def _numbers(values: tuple[Any, ...], found: list[float]) -> list[float]:
-    for value in values:
-        if isinstance(value, tuple):
-            _numbers(value, found)
-        else:
-            found.append(value)
-    return found
+    rest = iter(numbers)
+    try:
+        values = _filled(pattern, rest)
+    except StopIteration:
+        raise ValueError("fewer numbers than in the pattern") from None
+    if next(rest, None) is not None:
+        raise ValueError("more numbers than in the pattern")
+    return values
 
 
 def _filled(pattern: Any, numbers: Iterator[float]) -> Any:
     if not isinstance(pattern, tuple):
-        number = next(numbers)
-        return int(number) if isinstance(pattern, int) else number
+        return type(pattern)(next(numbers))
     parts = [_filled(part, numbers) for part in pattern]
     return type(pattern)(*parts) if hasattr(pattern, "_fields") else tuple(parts)

@@ -26,13 +26,15 @@ from attrs import define, field
 from graspsense.plugin_api import BatchOptions, Controller, FeatureSet, NotCompilable, RunConfig, entry_point
 from graspsense_sim_gripper.batch.forked import (
     REFUSED,
+    Answer,
     ForkedProcess,
+    InModel,
     MeasuredNumbers,
+    answer_of,
     can_be_sent,
     can_fork,
     measuring,
     results,
-    told,
 )
 from graspsense_sim_gripper.batch.job import (
     FinishedGrasp,
@@ -71,9 +73,6 @@ MAX_AHEAD: Final = 8
 """Number of slices per worker that may be ahead of the earliest unfinished slice."""
 PROGRESS_S: Final = 0.2
 """Time between two calls of the progress callback."""
-
-Answer = list[FinishedGrasp] | bytes
-"""The results of a slice, or the answer of a forked process with them."""
 
 
 def run_many(
@@ -180,8 +179,8 @@ class _Batch:
         total = len(self.scenes)
         self._plan()
         workers = max(1, min(self.workers, math.ceil(total / SLICE)))
-        running: dict[Future[Answer], int] = {}
-        ready: dict[int, Answer] = {}
+        running: dict[Future[list[FinishedGrasp] | Answer], int] = {}
+        ready: dict[int, list[FinishedGrasp] | Answer] = {}
         asked = given = finished = 0
         with self.processes, ThreadPoolExecutor(max_workers=workers) as pool:
             # A thread starts with the first slice that is submitted, and processes are forked before.
@@ -206,9 +205,7 @@ class _Batch:
                         ready[k] = future.result()
                         finished += len(self._part(slices[k]))
                     while given in ready:
-                        part = self._part(slices[given])
-                        done = zip(self._read(ready.pop(given), part), part, strict=True)
-                        yield from (self.models.in_its_model(grasp, *one) for grasp, one in done)
+                        yield from self._read(ready.pop(given), self._part(slices[given]))
                         given += 1
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
@@ -286,16 +283,14 @@ class _Batch:
                 processes.append(process)
                 self.forked.put(process)
 
-    def _answer(self, begin: int) -> list[Any]:
-        """Return, in a forked process, the results of the slice that begins at this index, as JSON values."""
+    def _answer(self, begin: int) -> Answer:
+        """Return, in a forked process, the results of the slice that begins at this index."""
         if self.job.extraction is not None and not isinstance(self.job.extract, MeasuredNumbers):
             self.job = self.models.job = measuring(self.job)
-        return [
-            told(grasp, scene)
-            for grasp, (scene, _) in zip(self._slice(begin), self._part(begin), strict=True)
-        ]
+        scenes = (scene for scene, _ in self._part(begin))
+        return answer_of(zip(self._slice(begin), scenes, strict=True))
 
-    def _forked_slice(self, begin: int) -> Answer:
+    def _forked_slice(self, begin: int) -> list[FinishedGrasp] | Answer:
         """Return the answer of a forked process for a slice, or the results if it cannot run the slice."""
         process = self.forked.get()
         try:
@@ -304,15 +299,20 @@ class _Batch:
             self.forked.put(process)
         return self._slice(begin) if answer == REFUSED else answer
 
-    def _read(self, answer: Answer, part: Sequence[tuple[str, int]]) -> list[FinishedGrasp]:
-        """Return the results in an answer for these scenes and seeds."""
-        if not isinstance(answer, bytes):
-            return answer
+    def _read(
+        self, answer: list[FinishedGrasp] | Answer, part: Sequence[tuple[str, int]]
+    ) -> list[FinishedGrasp]:
+        """Return the results of these scenes and seeds, each with its model."""
+        models = self.models
+        if not isinstance(answer, Answer):
+            done = zip(answer, part, strict=True)
+            return [grasp.in_model(*models.model_of(*one)) for grasp, one in done]
         form, pattern = self.job.extraction, None
         if form is not None and self.measure is not None:
             # What is measured on no ticks has the same type.
             pattern = self.measure(form.params, np.zeros((len(COLUMNS), 1)), np.zeros(1, np.int64), 0)
-        return results(answer, form, pattern, (self.models.initial(scene) for scene, _ in part))
+        known = (InModel(models.initial(scene), *models.model_of(scene, seed)) for scene, seed in part)
+        return results(answer, form, pattern, known)
 
     def _part(self, begin: int) -> list[tuple[str, int]]:
         """Return the scene and the seed of each grasp of the slice that begins at this index."""

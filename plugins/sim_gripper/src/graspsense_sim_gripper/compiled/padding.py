@@ -8,15 +8,18 @@ first, so that a term that is switched off changes no bit.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import Final, NamedTuple
 
 from graspsense_sim_gripper.compiled.compose import Composition, composition
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.dynamics.state import ContactState, PlantState
+from graspsense_sim_gripper.dynamics.contact import ObjectModel
+from graspsense_sim_gripper.dynamics.state import Contact, ContactState, PlantState
 from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.objects.library import catalogue
 from graspsense_sim_gripper.problem import GraspSetup
+from graspsense_sim_gripper.stepping.scheme import PlantParams
 from graspsense_sim_gripper.terms.registry import find_term, in_order
 from graspsense_sim_gripper.terms.switchable import Switchable
 from graspsense_sim_gripper.terms.term import TermState
@@ -29,6 +32,8 @@ class Filler(NamedTuple):
     state: TermState
 
 
+TermStates = tuple[TermState, ...]
+"""The states of the terms of an object, or of one half of it."""
 NOTHING: Final = Filler(Switchable(0, None), None)
 
 
@@ -84,19 +89,18 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
     layout = layout_of(setup, kinds)
     if setup.kinds == layout.kinds:
         return setup
-    plant, state = setup.plant, setup.state
-    own = plant.object.terms
+    drive, (width_m, table_n, pads, own, held, overshoots, rtol), steps = setup.plant
     terms = tuple([own[i] if i >= 0 else filler.params for i, filler in layout.sources])
-    plant = plant._replace(object=plant.object._replace(terms=terms))
-    left = _padded_state(state.contact.left, layout)
-    right = tuple([_padded_state(half, layout) for half in state.contact.right])
-    state = state._replace(contact=state.contact._replace(left=left, right=right))
-    # `evolve` would take a quarter of the time of this function.
+    # Here and below, `evolve` and `_replace` would take several times as long.
+    model = ObjectModel(width_m, table_n, pads, terms, held, overshoots, rtol)
     return GraspSetup(
         kinds=layout.kinds,
         terms=setup.terms,
-        plant=plant,
-        state=state,
+        plant=PlantParams(drive, model, steps),
+        state=_with_term_states(
+            setup.state,
+            lambda states: tuple([states[i] if i >= 0 else f.state for i, f in layout.sources]),
+        ),
         sensor=setup.sensor,
         sensor_state=setup.sensor_state,
         dt_s=setup.dt_s,
@@ -109,20 +113,21 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
 
 def unpadded(state: PlantState, layout: PaddedLayout) -> PlantState:
     """Return the state of the plant after a grasp in this layout, with the states of the object's own terms only."""
-    contact = state.contact
-    left = _unpadded_state(contact.left, layout)
-    right = tuple([_unpadded_state(half, layout) for half in contact.right])
-    return state._replace(contact=contact._replace(left=left, right=right))
+    return _with_term_states(
+        state, lambda states: tuple([states[i] if i >= 0 else rest for i, rest in layout.places])
+    )
 
 
-def _padded_state(contact: ContactState, layout: PaddedLayout) -> ContactState:
-    own = contact.states
-    return contact._replace(states=tuple([own[i] if i >= 0 else f.state for i, f in layout.sources]))
-
-
-def _unpadded_state(contact: ContactState, layout: PaddedLayout) -> ContactState:
-    states = contact.states
-    return contact._replace(states=tuple([states[i] if i >= 0 else rest for i, rest in layout.places]))
+def _with_term_states(state: PlantState, of: Callable[[TermStates], TermStates]) -> PlantState:
+    """Return the state of the plant with `of(states)` in place of the states of the terms, in each half."""
+    motion, contact, step, effort_n, peak_n = state
+    left_n, right_n, offset_m, touched, left, right, pending_s, unbalanced = contact
+    halves = []
+    for half in (left, *right):
+        compression_m, force_n, slope_n_m, states, pad_m, branch_n, past = half
+        halves.append(ContactState(compression_m, force_n, slope_n_m, of(states), pad_m, branch_n, past))
+    contact = Contact(left_n, right_n, offset_m, touched, halves[0], tuple(halves[1:]), pending_s, unbalanced)
+    return PlantState(motion, contact, step, effort_n, peak_n)
 
 
 @lru_cache(maxsize=256)
