@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 from identify import SCENES, drawn_are_covered, scene_text, seeds_of, squeezes_of
+from identify_intervals import coverage, larger
 
 from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.build import build, drive_and_pads, instantiate
@@ -79,6 +80,12 @@ def test_the_benchmark_knows_the_friction_that_a_squeeze_has_drawn():
         within = abs(drawn - config.coulomb_n) < 1.644854 * config.coulomb_spread_n
         row = {"scene": "spring", "sensor": "PR2 pads", "recordings": 1, "repeat": repeat}
         assert drawn_are_covered(row) is within
+
+
+@pytest.mark.parametrize("squeezes", [2, 3, 10])
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 100.0])
+def test_an_interval_covers_at_least_what_it_says_however_much_objects_differ(squeezes, ratio):
+    assert 0.899 < coverage(larger, squeezes, ratio) < 0.98
 
 
 @pytest.mark.slow
