@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 from identify import SCENES, drawn_are_covered, scene_text, seeds_of, squeezes_of
+from identify_intervals import coverage, larger
 
 from graspsense.plugin_api import ConfigError
 from graspsense_sim_gripper.build import build, drive_and_pads, instantiate
@@ -13,7 +14,7 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.identify.fit import fit
 from graspsense_sim_gripper.identify.forward import ForwardModel
 from graspsense_sim_gripper.identify.laws import memories, static_candidates
-from graspsense_sim_gripper.identify.path_error import on_all_ticks, path_bias
+from graspsense_sim_gripper.identify.path_error import NODES_PER_TICK, on_fine_path, path_bias
 from graspsense_sim_gripper.identify.prepare import prepared
 from graspsense_sim_gripper.identify.run import _scale, identify
 from graspsense_sim_gripper.identify.share import measured_share
@@ -31,11 +32,12 @@ def errors_of(name):
     squeeze = prepared(squeeze_of(name, sensor="ideal", accuracy=1e-3), 0.0)
     model = ForwardModel(pads=drive_and_pads(SimConfig())[1])
     scale = _scale([squeeze])
-    (two,) = (one for one in memories(scale) if sum(free.name == "tau_s" for free in one.free) == 2)
-    candidate = static_candidates(scale)[0].joined(two)
+    true = [value for term in SCENES[name] for key, value in term.items() if key != "type"]
+    keys = [key for term in SCENES[name] for key in term if key != "type"]
+    spring = static_candidates(scale)[0]
+    joined = (spring.joined(one) for one in memories(scale))
+    (candidate,) = (one for one in joined if [free.name for free in one.free] == keys)
     fitted = fit(model, candidate, [squeeze])
-    terms = SCENES[name]
-    true = [terms[0]["k1_n_m"], *(term[key] for term in terms[1:] for key in ("k_n_m", "tau_s"))]
     before = np.log(np.array(fitted.values) / true)
     return before, before - path_bias(model, fitted, [squeeze])
 
@@ -47,12 +49,18 @@ def test_the_nodes_of_a_path_bias_relaxation_times_and_the_error_is_taken_away()
     assert np.abs(after).max() < 1e-4
 
 
+def test_the_force_of_a_damper_right_after_the_contact_needs_nodes_between_the_ticks():
+    before, after = errors_of("creeping and damped")
+    assert np.abs(before).max() > 1e-3
+    assert np.abs(after).max() < 3e-4
+
+
 def test_a_recording_with_fewer_ticks_than_nodes_has_no_finer_path():
     squeeze = prepared(squeeze_of("spring", sensor="ideal"), 0.0)
     times, gaps = squeeze.course
     twice = evolve(squeeze, course=(np.repeat(times, 2), np.repeat(gaps, 2)))
-    for fine in (on_all_ticks(squeeze), on_all_ticks(twice)):
-        assert len(fine.t_s) > len(squeeze.t_s)
+    for fine in (on_fine_path(squeeze), on_fine_path(twice)):
+        assert len(fine.t_s) > NODES_PER_TICK * len(squeeze.t_s)
         assert np.min(np.diff(fine.t_s)) > 1e-9
     coarse = evolve(squeeze, course=(times[::100], gaps[::100]))
     model = ForwardModel(pads=drive_and_pads(SimConfig())[1])
@@ -79,6 +87,12 @@ def test_the_benchmark_knows_the_friction_that_a_squeeze_has_drawn():
         within = abs(drawn - config.coulomb_n) < 1.644854 * config.coulomb_spread_n
         row = {"scene": "spring", "sensor": "PR2 pads", "recordings": 1, "repeat": repeat}
         assert drawn_are_covered(row) is within
+
+
+@pytest.mark.parametrize("squeezes", [2, 3, 10])
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 100.0])
+def test_an_interval_covers_at_least_what_it_says_however_much_objects_differ(squeezes, ratio):
+    assert 0.899 < coverage(larger, squeezes, ratio) < 0.98
 
 
 @pytest.mark.slow

@@ -1,6 +1,6 @@
 """Uncertainty: from squeeze to squeeze and from object to object by leaving them out in turn, within one by bootstrap.
 
-With three or more squeezes the interval is that of the delete-a-group jackknife (Shao and Tu, The Jackknife and
+With two or more squeezes the interval is that of the delete-a-group jackknife (Shao and Tu, The Jackknife and
 Bootstrap, 1995, section 2.3) with Student's t, on the logarithms. A group is an object if there are three of them,
 otherwise a squeeze. The scatter between groups is usually many times the standard deviation that one fit gives itself.
 One squeeze shows no such scatter: blocks of its residuals are drawn again. No interval is smaller than that of the
@@ -46,10 +46,11 @@ MEAN_OVER_CORNER: Final = 0.015
 between samples: `Squeeze.at_samples` knows the forces at the ends and in the middle only. The rms is over corners that
 lie anywhere in the sample."""
 PATH_ERROR: Final = 3e-4
-"""Standard deviation of the logarithm of a value that the finite number of nodes of a path causes."""
+"""Standard deviation of the logarithm of a value that the finite number of nodes of a path causes, at least."""
 PATH_FORCE_ERROR: Final = 3e-5
-"""The same of the force, over the peak. With both, nine of ten intervals from one squeeze with ideal sensors cover
-(66 values of `benchmarks/identify.py --first 340` and `--first 500`)."""
+"""The same of the force, over the peak. With both, the intervals from one squeeze with an ideal sensor cover more than
+nine of ten (`benchmarks/identify.py --true-terms --sensors ideal --recordings 1`): `path_error` takes most of the error
+away, and what is left is mostly that of the simulated recordings. No recording of a real sensor is as exact."""
 
 
 @frozen(kw_only=True, eq=False)
