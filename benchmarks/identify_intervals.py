@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from graspsense_sim_gripper.identify.interval import normal, student
-from graspsense_sim_gripper.identify.spread import _at_least
+from graspsense_sim_gripper.identify.spread import at_least
 
 Floats = NDArray[np.float64]
 Rule = Callable[[Floats, int], Floats]
@@ -36,7 +36,7 @@ CLAIM: Final = 0.05
 def larger(scatter: Floats, degrees: int) -> Floats:
     """Return the squared half width of `identify`, for scatters in units of the variance of the fit."""
     least = np.array([[(normal() / student(degrees)) ** 2]])
-    return np.array([_at_least(np.array([[one]]), least)[0, 0] for one in scatter]) * student(degrees) ** 2
+    return np.array([at_least(np.array([[one]]), least)[0, 0] for one in scatter]) * student(degrees) ** 2
 
 
 def scatter_only(scatter: Floats, degrees: int) -> Floats:

@@ -74,6 +74,9 @@ MAX_AHEAD: Final = 8
 PROGRESS_S: Final = 0.2
 """Time between two calls of the progress callback."""
 
+Results = list[FinishedGrasp] | Answer
+"""The results of a slice, or the answer of a forked process with them."""
+
 
 def run_many(
     config: SimConfig,
@@ -179,8 +182,8 @@ class _Batch:
         total = len(self.scenes)
         self._plan()
         workers = max(1, min(self.workers, math.ceil(total / SLICE)))
-        running: dict[Future[list[FinishedGrasp] | Answer], int] = {}
-        ready: dict[int, list[FinishedGrasp] | Answer] = {}
+        running: dict[Future[Results], int] = {}
+        ready: dict[int, Results] = {}
         asked = given = finished = 0
         with self.processes, ThreadPoolExecutor(max_workers=workers) as pool:
             # A thread starts with the first slice that is submitted, and processes are forked before.
@@ -290,7 +293,7 @@ class _Batch:
         scenes = (scene for scene, _ in self._part(begin))
         return answer_of(zip(self._slice(begin), scenes, strict=True))
 
-    def _forked_slice(self, begin: int) -> list[FinishedGrasp] | Answer:
+    def _forked_slice(self, begin: int) -> Results:
         """Return the answer of a forked process for a slice, or the results if it cannot run the slice."""
         process = self.forked.get()
         try:
@@ -299,9 +302,7 @@ class _Batch:
             self.forked.put(process)
         return self._slice(begin) if answer == REFUSED else answer
 
-    def _read(
-        self, answer: list[FinishedGrasp] | Answer, part: Sequence[tuple[str, int]]
-    ) -> list[FinishedGrasp]:
+    def _read(self, answer: Results, part: Sequence[tuple[str, int]]) -> list[FinishedGrasp]:
         """Return the results of these scenes and seeds, each with its model."""
         models = self.models
         if not isinstance(answer, Answer):

@@ -91,7 +91,7 @@ def uncertainty(
     deviations = table - table.mean(axis=0)
     factor, basis = again.factor, again.basis
     linear = linear_covariance(model, fitted, squeezes, PATH_FORCE_ERROR)
-    covariance = _at_least(again.scale * deviations.T @ deviations, linear * (normal() / factor) ** 2)
+    covariance = at_least(again.scale * deviations.T @ deviations, linear * (normal() / factor) ** 2)
     own = _scale_errors(model, fitted, squeezes, force_scale) + PATH_ERROR**2 * np.eye(len(at))
     own += np.diag(corner_errors(model, fitted, squeezes) ** 2)
     if lag_error_s > 0.0:
@@ -125,7 +125,7 @@ def _changed(logs: Floats) -> Floats:
     return factors
 
 
-def _at_least(covariance: Floats, other: Floats) -> Floats:
+def at_least(covariance: Floats, other: Floats) -> Floats:
     """Return the covariance with each variance not smaller than in the other.
 
     In a flat valley of the squares, a refit stays where it begins and does not scatter, and a few squeezes may agree by

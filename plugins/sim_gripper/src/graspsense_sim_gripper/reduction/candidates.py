@@ -73,14 +73,8 @@ def reduce_plant(plant: PlantParams, kinds: Sequence[str], reduction: Reduction)
     """Return the plant of an instance with the reduced model and its steps; `plant` has all terms."""
     steps, model = reduction.steps, reduce_model(plant.object, kinds, reduction)
     if steps.settle == 0.0:
-        model = _balanced(model, model.overshoots, balance_rtol(reduction.level.step_tol))
+        model = model._replace(balance_rtol=balance_rtol(reduction.level.step_tol))
     return PlantParams(plant.drive, model, steps)
-
-
-def _balanced(model: ObjectModel, overshoots: int, rtol: float) -> ObjectModel:
-    """Return the model with these two values; `_replace` would take several times as long."""
-    width_m, table_friction_n, pads, terms, held, _, _ = model
-    return ObjectModel(width_m, table_friction_n, pads, terms, held, overshoots, rtol)
 
 
 def reduce_model(model: ObjectModel, kinds: Sequence[str], reduction: Reduction) -> ObjectModel:
@@ -92,7 +86,7 @@ def reduce_model(model: ObjectModel, kinds: Sequence[str], reduction: Reduction)
             model = named(treatment, without_term(model, kinds, i, reduction.point))
     if reduction.treatment[-1] != KEPT:
         model = named(reduction.treatment[-1], simpler_pads(model))
-    return _balanced(model, 1 if reduction.oscillates else 0, model.balance_rtol)
+    return model._replace(overshoots=1 if reduction.oscillates else 0)
 
 
 def _dropped(model: ObjectModel, i: int) -> ObjectModel:
