@@ -22,12 +22,13 @@ from graspsense.plugin_api import create, entry_point
 from graspsense_sim_gripper.batch.job import Scenes, Storage, grasp_compiled
 from graspsense_sim_gripper.batch.threads import SLICE, job_of
 from graspsense_sim_gripper.compiled.extraction import compiled_measure
+from graspsense_sim_gripper.compiled.generator import compiled_generator
 from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
-from graspsense_sim_gripper.compiled.noise import compiled_noise, draw_by_numpy
 from graspsense_sim_gripper.compiled.padding import composition_of, padded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue
 from graspsense_sim_gripper.problem import GraspSetup
+from graspsense_sim_gripper.random_numbers import NumpyGenerator
 
 GRASPS: Final = 220
 
@@ -59,11 +60,11 @@ def parts(config: SimConfig, repeats: int) -> dict[str, float]:
     """Return the microseconds of a grasp and of its parts."""
     law, features = create("controller", "hybrid"), create("feature-set", "chitta")
     job = job_of(config, law, {"extract": features.extract}, features=features)
-    names, scenes = sorted(catalogue()), Scenes(job)
+    names, scenes = sorted(catalogue()), Scenes(job, generator_of=compiled_generator())
     for name in names:
         scenes.add(name, compiled=True)
     setups = [scenes.setup(names[k % len(names)], k) for k in range(GRASPS)]
-    composition, storage = composition_of(config, setups[0]), Storage(compiled_noise())
+    composition, storage = composition_of(config, setups[0]), Storage()
     compiled, measure = compiled_loop(composition, type(law).step), compiled_measure(job.extraction)
     with compiling(composition):
         grasp_compiled(job, setups[0], compiled, storage, measure)
@@ -90,9 +91,6 @@ def parts(config: SimConfig, repeats: int) -> dict[str, float]:
 
         return of_slice
 
-    def noise(draw: Any) -> Callable[[int], None]:
-        return of_each(lambda setup: draw(setup.noise(storage.rng), storage.buffers.pads.noise))
-
     def loop_only(begin: int) -> float:
         in_loop[0] = 0.0
         whole(begin, timed_loop)
@@ -105,8 +103,11 @@ def parts(config: SimConfig, repeats: int) -> dict[str, float]:
         "filling the layout, by itself": of_each(padded),
     }
     if config.sensor == "pads":
-        ways["noise of the first images, by itself"] = noise(compiled_noise())
-        ways["the same by numpy's own loop"] = noise(draw_by_numpy)
+        table = storage.buffers.pads.noise
+        ways["noise of the first images, by itself"] = of_each(lambda setup: setup.noise().fill(table))
+        ways["the same by numpy's own generator"] = of_each(
+            lambda setup: NumpyGenerator(setup.seed).fill(table)
+        )
     return {name: 1e6 * least / GRASPS for name, least in leasts(ways, repeats).items()}
 
 

@@ -35,6 +35,7 @@ from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.objects.spec import ObjectSpec
 from graspsense_sim_gripper.palm import AT_REST, palm_params
 from graspsense_sim_gripper.problem import GraspSetup, Problem
+from graspsense_sim_gripper.random_numbers import Generator, GeneratorOf, NumpyGenerator
 from graspsense_sim_gripper.reduction.candidates import reduce_plant
 from graspsense_sim_gripper.reduction.levels import step_tolerance
 from graspsense_sim_gripper.reduction.model import Reduction
@@ -101,7 +102,7 @@ def problem_of(config: SimConfig, spec: ObjectSpec | None, number: int | None = 
     model_config = evolve(config, **_NOT_OF_THE_MODEL)
     nominal = None
     if spec is not None:
-        nominal = _setup(evolve(model_config, spread=False), sample(spec, None), np.random.default_rng(0))
+        nominal = _setup(evolve(model_config, spread=False), sample(spec, None), 0, NumpyGenerator(0))
         if number is not None:
             # A numbered instance differs from the nominal object, like the instances that a seed draws.
             model_config = evolve(model_config, spread=True)
@@ -122,26 +123,32 @@ def _examples(config: SimConfig, spec: ObjectSpec | None) -> tuple[GraspSetup, .
         return ()
     setups = []
     for seed in range(EXAMPLES):
-        rng = np.random.default_rng(seed)
+        rng = NumpyGenerator(seed)
         instance = sample(spec, rng)
         with suppress(ConfigError):
             _check_fit(config, instance)
-            setups.append(_setup(config, instance, rng))
+            setups.append(_setup(config, instance, seed, rng))
     return tuple(setups)
 
 
-def instantiate(problem: Problem, reduction: Reduction | None, seed: int) -> GraspSetup:
+def instantiate(
+    problem: Problem,
+    reduction: Reduction | None,
+    seed: int,
+    generator_of: GeneratorOf = NumpyGenerator,
+) -> GraspSetup:
     """Return the grasp with this seed, of an instance in its reduced model; `reduction` None: with all its terms.
+
+    `generator_of`: draws all that the seed gives.
 
     Raises ConfigError for an object of a scene file that the open fingers would cut into.
     """
-    # The same as `default_rng(seed)` in two thirds of its time.
-    config, rng = problem.config, np.random.Generator(np.random.PCG64(seed))
+    config, rng = problem.config, generator_of(seed)
     instance = None
     if problem.spec is not None:
         instance = sample(problem.spec, rng if config.spread else None, problem.number)
         _check_fit(config, instance)
-    return _setup(config, instance, rng, reduction)
+    return _setup(config, instance, seed, rng, reduction)
 
 
 def unverified_setup(config: SimConfig, scene: str | ObjectSpec | None, seed: int) -> GraspSetup:
@@ -155,7 +162,11 @@ def unverified_setup(config: SimConfig, scene: str | ObjectSpec | None, seed: in
 
 
 def _setup(
-    config: SimConfig, instance: Instance | None, rng: np.random.Generator, reduction: Reduction | None = None
+    config: SimConfig,
+    instance: Instance | None,
+    seed: int,
+    rng: Generator,
+    reduction: Reduction | None = None,
 ) -> GraspSetup:
     """Return the grasp of an instance in its reduced model; `reduction` None: with all its terms."""
     plant, state = _plant(config, instance, rng)
@@ -174,8 +185,8 @@ def _setup(
         sensor=sensor,
         sensor_state=_gripper(config).sensor_state,
         dt_s=1.0 / config.rate_hz,
+        seed=seed,
         rng=rng,
-        noise_state=rng.bit_generator.state,
         **palm,
     )
 
@@ -194,9 +205,7 @@ def _check_fit(config: SimConfig, instance: Instance) -> None:
         )
 
 
-def _plant(
-    config: SimConfig, instance: Instance | None, rng: np.random.Generator
-) -> tuple[PlantParams, PlantState]:
+def _plant(config: SimConfig, instance: Instance | None, rng: Generator) -> tuple[PlantParams, PlantState]:
     """Return the parameters of the plant, and its state before the grasp: open, at rest, without contact.
 
     With spread, the Coulomb friction of the trial is drawn here.
@@ -206,7 +215,7 @@ def _plant(
     if config.spread:
         # `_replace` would take several times as long.
         link, inertia, (coulomb_n, _, *rest), closed_rev, open_rev, lag_s = drive
-        coulomb_n = max(coulomb_n + config.coulomb_spread_n * float(rng.standard_normal()), 0.0)
+        coulomb_n = max(coulomb_n + config.coulomb_spread_n * float(rng.standard_normal(1)[0]), 0.0)
         friction = Friction(coulomb_n, max(float(config.breakaway_n), coulomb_n), *rest)
         drive = Drive(link, inertia, friction, closed_rev, open_rev, lag_s)
     if instance is None:
@@ -292,7 +301,7 @@ def _inertia(config: SimConfig) -> float:
     return 4.0 * math.pi * math.pi * config.rotor_kg_m2
 
 
-def _sensor(config: SimConfig, instance: Instance | None, rng: np.random.Generator) -> SensorParams:
+def _sensor(config: SimConfig, instance: Instance | None, rng: Generator) -> SensorParams:
     """Return the sensors of a grasp. The offsets of the cells and the time of the first image are drawn here."""
     period = float(config.pad_period_s)
     if config.sensor == "ideal":
@@ -308,7 +317,7 @@ def _sensor(config: SimConfig, instance: Instance | None, rng: np.random.Generat
     return SensorParams(
         ideal=0,
         link=_linkage(config),
-        clock=ImageClock(float(rng.random()) * period, period, float(config.pad_delay_s)),
+        clock=ImageClock(rng.random() * period, period, float(config.pad_delay_s)),
         share=float(instance.share) if instance else 1.0,
         noise_counts=float(config.noise_counts),
         left=PadCells(shares, offsets[0]),

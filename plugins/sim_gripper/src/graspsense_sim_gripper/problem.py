@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, Final
 
@@ -15,6 +15,7 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.objects.spec import ObjectSpec, TermParams
 from graspsense_sim_gripper.palm import NUMBERS
+from graspsense_sim_gripper.random_numbers import Generator
 from graspsense_sim_gripper.sensing import SensorParams, SensorState
 from graspsense_sim_gripper.stepping.scheme import PlantParams
 
@@ -61,10 +62,9 @@ class GraspSetup:
     sensor: SensorParams
     sensor_state: SensorState
     dt_s: float
-    rng: np.random.Generator
-    """The generator of the seed, from which all of the above was drawn."""
-    noise_state: Mapping[str, Any]
-    """The state of the generator after that, with which the noise of the cells begins."""
+    seed: int
+    rng: Generator
+    """The generator of the seed, after all of the above was drawn from it. The noise of the cells follows."""
     palm: Any = ()
     """`PalmParams` of a gripper with an accelerometer, otherwise ()."""
     palm_state: Any = ()
@@ -75,23 +75,19 @@ class GraspSetup:
         """Whether the gripper has an accelerometer."""
         return bool(self.palm)
 
-    def noise(self, by: np.random.Generator | None = None) -> np.random.Generator:
-        """Return the generator of the noise of the cell images: standard normal numbers, 2 CELLS for each image.
+    def noise(self) -> Generator:
+        """Return a generator of the noise of the cell images: standard normal numbers, 2 CELLS for each image.
 
-        Every call returns the same generator, which then begins anew: `by`, a PCG64, or that of the seed.
+        Those of all calls give the same numbers.
         """
-        rng = self.rng if by is None else by
-        rng.bit_generator.state = self.noise_state
-        return rng
+        return self.rng.copy()
 
     def palm_noise(self) -> PalmNoise:
         """Return a function that draws the noise of the palm in the next ticks, as many as it is asked for.
 
         Its numbers are another stream of the same seed, so that all others are the same without an accelerometer.
         """
-        seed = self.rng.bit_generator.seed_seq
-        assert isinstance(seed, np.random.SeedSequence)
-        rng = np.random.default_rng(np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, 0)))
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(0,)))
         return lambda ticks: rng.standard_normal((ticks, NUMBERS))
 
 

@@ -30,7 +30,6 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.build import CELL_OFFSET, build, device_info, instantiate
 from graspsense_sim_gripper.compiled.compose import grasp_loop, guarded_loop
-from graspsense_sim_gripper.compiled.noise import DrawNoise, draw_by_numpy
 from graspsense_sim_gripper.compiled.padding import PaddedLayout, composition_of, layout_of, padded, unpadded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
@@ -57,6 +56,7 @@ from graspsense_sim_gripper.problem import (
     PalmNoise,
     Problem,
 )
+from graspsense_sim_gripper.random_numbers import GeneratorOf, NumpyGenerator
 from graspsense_sim_gripper.recorded_trace import recorded_trace
 from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.reduction.select import select
@@ -183,6 +183,8 @@ class Scenes:
     job: Job
     selected: Mapping[tuple[str, bool], Reduction | None] = field(factory=dict)
     """Models that were selected elsewhere, by `scene_key`."""
+    generator_of: GeneratorOf = NumpyGenerator
+    """Draws what a seed gives."""
     _scenes: dict[tuple[str, bool], tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
     """By `scene_key`."""
     _problems: dict[str, tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
@@ -222,7 +224,7 @@ class Scenes:
             if key[1]:
                 problem = evolve(problem, number=split_number(scene)[1])
             known = self._problems[scene] = problem, reduction
-        return instantiate(*known, seed)
+        return instantiate(*known, seed, self.generator_of)
 
     def initial(self, scene: str) -> PlantState:
         """Return a state of the plant before a grasp of the scene; its numbers may be those of any seed."""
@@ -268,11 +270,7 @@ def _new_buffers() -> Buffers:
 class Storage:
     """The buffers of a thread. Its grasps use them one after the other."""
 
-    draw_noise: DrawNoise = draw_by_numpy
-    """Draws the noise of the first images of a grasp."""
     buffers: Buffers = field(factory=_new_buffers)
-    rng: np.random.Generator = field(factory=lambda: np.random.Generator(np.random.PCG64(0)))
-    """Draws the noise of all grasps in turn: compiled code takes a generator that it has not seen before slowly."""
 
 
 def grasp_compiled(
@@ -387,8 +385,8 @@ def _run(
     """Run the loop to the end of the grasp, with longer buffers where those of the storage do not suffice."""
     ideal, buffers = setup.sensor.ideal == 1, storage.buffers
     if not ideal:
-        noise = setup.noise(storage.rng)
-        storage.draw_noise(noise, buffers.pads.noise)
+        noise = setup.noise()
+        noise.fill(buffers.pads.noise)
     buffers.pads.images[-1] = math.nan
     buffers.pads.left_zero[:] = buffers.pads.right_zero[:] = CELL_OFFSET[0]
     palm_noise = None

@@ -50,8 +50,8 @@ from graspsense_sim_gripper.batch.job import (
 from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.compiled.compose import Composition
 from graspsense_sim_gripper.compiled.extraction import compiled_measure
+from graspsense_sim_gripper.compiled.generator import compiled_generator
 from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
-from graspsense_sim_gripper.compiled.noise import DrawNoise, compiled_noise, draw_by_numpy
 from graspsense_sim_gripper.compiled.padding import compiled_kinds, composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.loop import COLUMNS
@@ -154,8 +154,6 @@ class _Batch:
     """Remarks on how the grasps ran, as keys, so that each is given once."""
     measure: Measure | None = field(default=None, init=False)
     """The compiled form of `Job.extraction`."""
-    draw_noise: DrawNoise = field(default=draw_by_numpy, init=False)
-    """Draws the noise of the cell images of compiled grasps."""
     models: Scenes = field(init=False)
     counts: Counter[Composition] = field(factory=Counter, init=False)
     """Number of grasps of each composition."""
@@ -239,8 +237,7 @@ class _Batch:
         """Compile what each compiled grasp does before and after its loop."""
         if find_spec("numba") is None:
             return
-        if self.job.config.sensor != "ideal":
-            self.draw_noise = compiled_noise()
+        self.models.generator_of = compiled_generator()
         if self.job.extraction is not None:
             try:
                 self.measure = compiled_measure(self.job.extraction)
@@ -388,5 +385,5 @@ class _Batch:
 
     def _storage(self) -> Storage:
         if not hasattr(self.local, "storage"):
-            self.local.storage = Storage(self.draw_noise)
+            self.local.storage = Storage()
         return self.local.storage  # type: ignore[no-any-return]

@@ -104,8 +104,8 @@ def padded(setup: GraspSetup, kinds: tuple[str, ...] | None = None) -> GraspSetu
         sensor=setup.sensor,
         sensor_state=setup.sensor_state,
         dt_s=setup.dt_s,
+        seed=setup.seed,
         rng=setup.rng,
-        noise_state=setup.noise_state,
         palm=setup.palm,
         palm_state=setup.palm_state,
     )

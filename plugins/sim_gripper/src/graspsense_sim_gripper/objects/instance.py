@@ -11,6 +11,7 @@ import numpy as np
 from attrs import frozen
 
 from graspsense_sim_gripper.objects.spec import ObjectSpec, TermParams
+from graspsense_sim_gripper.random_numbers import Generator
 
 GRAVITY_M_S2: Final = 9.80665
 PAD_CELLS: Final = 15
@@ -39,7 +40,7 @@ class Instance:
     """Position of the contact on the pad, in rows from its middle."""
 
 
-def sample(spec: ObjectSpec, rng: np.random.Generator | None, number: int | None = None) -> Instance:
+def sample(spec: ObjectSpec, rng: Generator | None, number: int | None = None) -> Instance:
     """Return an instance that `rng` draws from the spreads of the spec; without `rng`, one with the nominal values.
 
     With a number it is one particular object. Its stiffness, its width and the parameters with a spread of their own
