@@ -99,6 +99,7 @@ def run(arguments: list[str]) -> None:
     from graspsense_c45.plugin import C45
     from graspsense_sim_gripper.backend import SimBackend
     from graspsense_sim_gripper.batch import job, threads
+    from graspsense_sim_gripper.compiled import loop_code
 
     SPENT["start: interpreter and imports"] = processor_s()
     for owner, name, part in (
@@ -113,7 +114,7 @@ def run(arguments: list[str]) -> None:
         (model, "train", "training around the fit"),
     ):
         setattr(owner, name, timed(part, getattr(owner, name)))
-    threads.compiling = loading(threads.compiling)  # type: ignore[assignment]
+    loop_code.generating = loading(loop_code.generating)
     sys.argv = ["graspsense", *arguments]
     with contextlib.suppress(SystemExit):
         command()
@@ -150,12 +151,12 @@ def counted(part: str) -> Iterator[None]:
             STACK[-1] += spent
 
 
-def loading(compiling: Callable[..., Any]) -> Callable[..., Any]:
+def loading(generating: Callable[..., Any]) -> Callable[..., Any]:
     @contextlib.contextmanager
-    def counted_loading(composition: Any) -> Iterator[None]:
+    def counted_loading(**options: Any) -> Iterator[None]:
         # In a thread of the batch, while the main thread waits in `run_many`.
         begun = processor_s()
-        with compiling(composition):
+        with generating(**options):
             yield
         spent = processor_s() - begun
         SPENT["loading the compiled loop"] = SPENT.get("loading the compiled loop", 0.0) + spent

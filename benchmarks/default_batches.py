@@ -22,7 +22,7 @@ from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import RunConfig, create
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, Storage, grasp_compiled, grasp_plain
 from graspsense_sim_gripper.build import build
-from graspsense_sim_gripper.compiled.jit import compiled_loop
+from graspsense_sim_gripper.compiled.loop_code import compiled_loop
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.problem import GraspController, GraspSetup

@@ -18,12 +18,14 @@ from collections.abc import Callable
 from datetime import date
 from typing import Any, Final
 
-from graspsense.plugin_api import create, entry_point
+from timed_loop import TimedLoop
+
+from graspsense.plugin_api import create
 from graspsense_sim_gripper.batch.job import Scenes, Storage, grasp_compiled
 from graspsense_sim_gripper.batch.threads import SLICE, job_of
 from graspsense_sim_gripper.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.compiled.generator import compiled_generator
-from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
+from graspsense_sim_gripper.compiled.loop_code import CompiledLoop, compiled_loop
 from graspsense_sim_gripper.compiled.padding import composition_of, padded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue
@@ -65,21 +67,14 @@ def parts(config: SimConfig, repeats: int) -> dict[str, float]:
         scenes.add(name, compiled=True)
     setups = [scenes.setup(names[k % len(names)], k) for k in range(GRASPS)]
     composition, storage = composition_of(config, setups[0]), Storage()
-    compiled, measure = compiled_loop(composition, type(law).step), compiled_measure(job.extraction)
-    with compiling(composition):
-        grasp_compiled(job, setups[0], compiled, storage, measure)
-    loop, in_loop = entry_point(compiled), [0.0]
-
-    def timed_loop(*arguments: Any) -> Any:
-        began = time.thread_time()
-        end = loop(*arguments)
-        in_loop[0] += time.thread_time() - began
-        return end
+    loop, measure = compiled_loop(composition, type(law).step), compiled_measure(job.extraction)
+    grasp_compiled(job, setups[0], loop, storage, measure)
+    timed_loop = TimedLoop(loop)
 
     def sampled(begin: int) -> list[GraspSetup]:
         return [scenes.setup(names[k % len(names)], k) for k in range(begin, min(begin + SLICE, GRASPS))]
 
-    def whole(begin: int, loop: Any = loop) -> None:
+    def whole(begin: int, loop: CompiledLoop = loop) -> None:
         for setup in sampled(begin):
             composition_of(config, setup)
             grasp_compiled(job, setup, loop, storage, measure)
@@ -92,9 +87,9 @@ def parts(config: SimConfig, repeats: int) -> dict[str, float]:
         return of_slice
 
     def loop_only(begin: int) -> float:
-        in_loop[0] = 0.0
+        timed_loop.spent_s = 0.0
         whole(begin, timed_loop)
-        return in_loop[0]
+        return timed_loop.spent_s
 
     ways: dict[str, Callable[[int], Any]] = {
         "whole grasp": whole,

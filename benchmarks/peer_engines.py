@@ -22,9 +22,9 @@ from peer_scenes import MODES, SCENES, PeerScene, law
 from scipy.integrate import solve_ivp
 from simulation_scene import KC, LIGHT, TICK, TICKS, X0, B, C, K, Law, M, Run
 
-from graspsense.plugin_api import RunConfig, entry_point
+from graspsense.plugin_api import RunConfig
 from graspsense_sim_gripper.batch.job import Job, Scenes, Storage, grasp_compiled
-from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
+from graspsense_sim_gripper.compiled.loop_code import compiled_loop
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 
@@ -69,12 +69,10 @@ def _our_engine(config: SimConfig, setting: str) -> Engine:
     composition = composition_of(config, setup)
     loop = compiled_loop(composition, Law.step)
     storage = Storage()
-    with compiling(composition):
-        grasp_compiled(job, setup, loop, storage)
-    ready = entry_point(loop)
+    grasp_compiled(job, setup, loop, storage)
 
     def grasp() -> Run:
-        trace = grasp_compiled(job, setup, ready, storage).trace
+        trace = grasp_compiled(job, setup, loop, storage).trace
         part = slice(0, TICKS)
         return Run(
             x=config.open_gap_m - trace.gap_m[part], force=trace.force_left_n[part], u=trace.command[part]

@@ -155,7 +155,7 @@ def seconds_of(bench: Bench, job: Job, setup: GraspSetup) -> float:
         else:
             full = padded(setup, KINDS)
             loop = bench.loop_of(job.config, full, type(job.controller).step)
-            grasp_once(job, full, loop, bench.storage, on_arrays=True)
+            grasp_once(job, full, loop, bench.storage)
         spent.append(time.thread_time() - began)
     return float(np.median(spent))
 

@@ -98,7 +98,7 @@ class Grasps:
             else:
                 full = padded(setup, KINDS)
                 loop = self.bench.loop_of(self.job.config, full, type(self.job.controller).step)
-                done = grasp_once(self.job, full, loop, self.bench.storage, on_arrays=True)
+                done = grasp_once(self.job, full, loop, self.bench.storage)
             self.features.append(done.extracted)
             self.outcomes.append(done.outcome)
             report = model_report(done.state, KINDS if self.bench else setup.kinds)

@@ -29,12 +29,13 @@ from typing import Any, Final
 
 import numpy as np
 from attrs import evolve, frozen
+from timed_loop import TimedLoop
 
-from graspsense.plugin_api import HOLD, ConfigError, RunConfig, create, entry_point
+from graspsense.plugin_api import HOLD, ConfigError, RunConfig, create
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Storage, grasp_once
 from graspsense_sim_gripper.build import instantiate, problem_of
 from graspsense_sim_gripper.compiled.compose import Composition
-from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
+from graspsense_sim_gripper.compiled.loop_code import compiled_loop
 from graspsense_sim_gripper.compiled.padding import composition_of, padded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.spec import ObjectSpec
@@ -205,7 +206,7 @@ class Bench:
         job = Job(config=config, controller=controller, run=run, extract=None, traces=True)
         full = padded(setup, KINDS)
         loop = self.loop_of(config, full, type(controller).step)
-        return grasp_once(job, full, loop, self.storage, on_arrays=True), setup, reduction, job
+        return grasp_once(job, full, loop, self.storage), setup, reduction, job
 
     def costs_s(self, grasps: Sequence[tuple[GraspSetup, Job]]) -> list[float]:
         """Return the seconds that each takes in the loop that is compiled for its model, measured in turn."""
@@ -217,17 +218,9 @@ class Bench:
 
     def _cost_s(self, setup: GraspSetup, job: Job) -> float:
         loop = self.loop_of(job.config, setup, type(job.controller).step)
-        spent = 0.0
-
-        def timed(*args: Any) -> Any:
-            nonlocal spent
-            began = time.thread_time()
-            result = loop(*args)
-            spent += time.thread_time() - began
-            return result
-
-        grasp_once(job, setup, timed, self.storage, on_arrays=True)
-        return spent
+        timed = TimedLoop(loop)
+        grasp_once(job, setup, timed, self.storage)
+        return timed.spent_s
 
     def loop_of(self, config: SimConfig, setup: GraspSetup, step: Any) -> Any:
         """Return the compiled loop of a padded setup."""
@@ -238,10 +231,8 @@ class Bench:
             controller = create("controller", "hybrid")
             short = RunConfig(grasp_timeout_s=0.01)
             job = Job(config=config, controller=controller, run=short, extract=None, traces=True)
-            with compiling(composition):
-                grasp_once(job, setup, loop, self.storage, on_arrays=True)
-            # As in a batch: without a look at the types of the arguments, and with buffers that exist already.
-            self.compiled[composition] = entry_point(loop)
+            grasp_once(job, setup, loop, self.storage)
+            self.compiled[composition] = loop
             self.compile_s += time.process_time() - began
         return self.compiled[composition]
 

@@ -20,7 +20,7 @@ from graspsense_sim_gripper.batch import threads, worker
 from graspsense_sim_gripper.batch.job import Job, Scenes, grasp_plain
 from graspsense_sim_gripper.batch.threads import SLICE, WORTH_A_PROCESS, run_many
 from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
-from graspsense_sim_gripper.compiled import jit
+from graspsense_sim_gripper.compiled import loop_code
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue, shipped_scenes
@@ -295,7 +295,7 @@ def test_what_fails_in_another_process_is_said():
 def test_without_numba_the_plain_loop_runs_and_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "numba", None)
     # What this process has compiled before it would use without numba as well.
-    jit.compiled_loop.cache_clear()
+    loop_code.compiled_loop.cache_clear()
     monkeypatch.setattr(threads, "WORTH_COMPILING", 2)
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
     with pytest.warns(UserWarning, match=r"plain Python on one core.*numba is not installed"):

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
 from graspsense_sim_gripper.compiled import generator
 from graspsense_sim_gripper.compiled.generator import CompiledGenerator, compiled_generator
 from graspsense_sim_gripper.random_numbers import NumpyGenerator
-from hypothesis import given
-from hypothesis import strategies as st
 
 pytest.importorskip("numba", reason="the compiled generator needs the extra `fast`")
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import pytest
 
-from graspsense_sim_gripper.batch.nested import append_numbers, filled
+from graspsense_sim_gripper.nested import append_numbers, filled
 
 
 class Inner(NamedTuple):

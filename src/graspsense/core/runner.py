@@ -143,11 +143,14 @@ def overdue(run: RunConfig) -> str:
     )
 
 
-def ended_by_itself(state: TickState) -> tuple[Outcome, str]:
-    """Return the outcome of a grasp that its controller or the guard ended, and the reason if it needs one."""
-    if state.guard.stopped:
+def ended_by_itself(stopped: int, outcome: int) -> tuple[Outcome, str]:
+    """Return the outcome of a grasp that its controller or the guard ended, and the reason if it needs one.
+
+    `stopped`: that of the guard (`GuardState`); `outcome`: that of the controller.
+    """
+    if stopped:
         return Outcome.ABORTED, "the controller commanded NaN, so the guard stopped the grasp"
-    return Outcome(state.law.outcome), ""
+    return Outcome(outcome), ""
 
 
 def run_grasp(
@@ -289,7 +292,7 @@ class _Grasp:
             # A lost gripper may still receive commands, so it is commanded to relax.
             self._let_go(opens=not lost and not self.state.done)
         if ending is None:
-            ending = ended_by_itself(self.state)
+            ending = ended_by_itself(self.state.guard.stopped, self.state.law.outcome)
         failed = ending[0] in (Outcome.DEVICE_LOST, Outcome.ABORTED)
         if self.stop_reason and not failed:
             return Outcome.RECOGNISED, self.stop_reason
@@ -469,7 +472,7 @@ class _Grasp:
 
     def _recording_ended(self) -> tuple[Outcome, str]:
         if self.state.law.outcome != RUNNING:
-            return ended_by_itself(self.state)
+            return ended_by_itself(self.state.guard.stopped, self.state.law.outcome)
         if self.state.law.phase == SQUEEZE:
             return Outcome.NEVER_STEADY, "the recording ended before the fingers came to rest"
         return Outcome.NOTHING_THERE, "the recording ended before both pads were in contact"

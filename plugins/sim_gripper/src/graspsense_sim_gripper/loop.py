@@ -122,6 +122,31 @@ class SimulationState(NamedTuple):
     """`PalmState`; () without an accelerometer."""
 
 
+class Ending(NamedTuple):
+    """What is read of the state in which the loop ends, each time."""
+
+    ticks: int
+    recorded: int
+    images: int
+    """Numbers of ticks, of recorded rows and of cell images so far."""
+    failed: int
+    """As in `LoopState`."""
+    ended: int
+    """1: the controller or the guard has ended the grasp."""
+    stopped: int
+    """As in `GuardState`."""
+    outcome: int
+    """That of the controller."""
+
+
+class LoopEnd(NamedTuple):
+    """How the loop ended. What takes time to make of compiled code's numbers is made when it is called for."""
+
+    ending: Ending
+    state: Callable[[], SimulationState]
+    plant: Callable[[], PlantState]
+
+
 class Buffers(NamedTuple):
     """The memory that the loop writes to: arrays in compiled code, lists in the interpreter."""
 
@@ -258,16 +283,41 @@ def before_failure(
     params: GraspParams,
     start: SimulationState,
     buffers: Buffers,
-    failed: SimulationState,
+    failed_at: int,
 ) -> PlantState:
-    """Return the plant before the tick in which `loop` failed. `start`, `failed`: the states before and after the call.
+    """Return the plant before the tick in which `loop` failed, the number of ticks `failed_at`; it began at `start`.
 
     The loop runs again up to that tick. Steps over several ticks may end elsewhere then, so that the state is near the
     one before.
     """
-    if start.loop.ticks >= failed.loop.ticks - 1:
+    if start.loop.ticks >= failed_at - 1:
         return start.plant
-    return loop(params._replace(max_ticks=failed.loop.ticks - 1), start, buffers).plant
+    return loop(params._replace(max_ticks=failed_at - 1), start, buffers).plant
+
+
+def ending(state: SimulationState) -> Ending:
+    """Return what is always read of a state in which the loop ended."""
+    loop, controller = state.loop, state.controller
+    return Ending(
+        loop.ticks,
+        loop.recorded,
+        state.sensor.images,
+        loop.failed,
+        1 if has_ended(controller) else 0,
+        controller.guard.stopped,
+        controller.law.outcome,
+    )
+
+
+def run_plain(
+    loop: Callable[[GraspParams, SimulationState, Buffers], SimulationState],
+    params: GraspParams,
+    progress: SimulationState,
+    buffers: Buffers,
+) -> LoopEnd:
+    """Run a loop in the interpreter from a state to its end."""
+    state = loop(params, progress, buffers)
+    return LoopEnd(ending(state), lambda: state, lambda: state.plant)
 
 
 def has_ended(state: TickState) -> bool:

@@ -17,18 +17,17 @@ import threading
 import warnings
 from array import array
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any, Final, NamedTuple
 
+import numpy as np
 from attrs import evolve, frozen
 
 from graspsense.plugin_api import CompiledExtraction, Outcome, Trace, columns_of_ticks
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job
-from graspsense_sim_gripper.batch.nested import append_numbers, filled
+from graspsense_sim_gripper.compiled.padding import PaddedLayout
 from graspsense_sim_gripper.dynamics.state import PlantState
-from graspsense_sim_gripper.model_report import model_report
-from graspsense_sim_gripper.objects.library import kinds_in
+from graspsense_sim_gripper.nested import Stored, append_numbers, filled
 from graspsense_sim_gripper.reduction.model import Reduction
 
 Json = Any
@@ -39,7 +38,7 @@ class Answer(NamedTuple):
     """The results of a slice as another process sends them."""
 
     rest: bytes
-    """JSON: for each grasp outcome, reason, model report, and how many numbers it has measured and in its state."""
+    """JSON: for each grasp outcome, reason, and how many numbers it has measured and in its state."""
     numbers: bytes
     """An array of doubles: for each grasp what was measured, and the state of the plant at its end."""
 
@@ -52,7 +51,9 @@ class InModel(NamedTuple):
     """What the process that asks knows of a grasp of an answer."""
 
     initial: PlantState
-    """The plant before it begins; its numbers may be others."""
+    """The plant before it begins, padded; its numbers may be others."""
+    layout: PaddedLayout
+    """That of `initial`."""
     reduction: Reduction | None
     unstable_loop: str
     """As in `FinishedGrasp`."""
@@ -125,19 +126,23 @@ class ForkedProcess:
             return REFUSED
 
 
-def answer_of(grasps: Iterable[tuple[FinishedGrasp, str]]) -> Answer:
-    """Return the answer with the results of grasps, each given with its scene."""
+def answer_of(grasps: Iterable[FinishedGrasp]) -> Answer:
+    """Return the answer with the results of grasps.
+
+    Raises TypeError if one of them was not compiled, so that its state is in another layout.
+    """
     rest: list[Json] = []
-    numbers: list[float] = []
-    for grasp, scene in grasps:
-        state, begin = grasp.state, len(numbers)
+    numbers = array("d")
+    for grasp in grasps:
+        begin = len(numbers)
         if grasp.extracted is not None:
             append_numbers(numbers, grasp.extracted)
         measured = len(numbers) - begin
-        append_numbers(numbers, state)
-        lengths = measured, len(numbers) - begin - measured
-        rest.append((grasp.outcome.value, grasp.reason, model_report(state, kinds_in(scene)), *lengths))
-    return Answer(json.dumps(rest).encode(), array("d", numbers).tobytes())
+        if not isinstance(grasp.end, Stored):
+            raise TypeError("a grasp ran in the interpreter")
+        numbers.frombytes(grasp.end.numbers.tobytes())
+        rest.append((grasp.outcome.value, grasp.reason, measured, len(numbers) - begin - measured))
+    return Answer(json.dumps(rest).encode(), numbers.tobytes())
 
 
 def results(
@@ -148,30 +153,25 @@ def results(
     `form`: the extraction of the job, and `pattern` a tuple of the type that it measures. `models`: what is known of
     each grasp.
     """
-    numbers, begin, found = array("d", answer.numbers), 0, []
-    for (outcome, reason, report, measured, of_state), known in zip(
-        json.loads(answer.rest), models, strict=True
-    ):
+    numbers, begin, found = np.frombuffer(answer.numbers), 0, []
+    for (outcome, reason, measured, of_state), known in zip(json.loads(answer.rest), models, strict=True):
         state, end = begin + measured, begin + measured + of_state
         found.append(
             FinishedGrasp(
                 outcome=Outcome(outcome),
                 reason=reason,
-                end=partial(_state, known.initial, numbers[state:end]),
-                extracted=None if form is None else form.result(filled(pattern, numbers[begin:state])),
+                end=Stored(known.initial, numbers[state:end]),
+                layout=known.layout,
+                extracted=None
+                if form is None
+                else form.result(filled(pattern, numbers[begin:state].tolist())),
                 kept=None,
-                told=report,
                 reduction=known.reduction,
                 unstable_loop=known.unstable_loop,
             )
         )
         begin = end
     return found
-
-
-def _state(pattern: PlantState, numbers: Iterable[float]) -> PlantState:
-    state: PlantState = filled(pattern, numbers)
-    return state
 
 
 def _serve(answer: Callable[[int], Answer], connection: Connection, inherited: Sequence[Connection]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -30,6 +31,7 @@ from graspsense.plugin_api import (
 )
 from graspsense_sim_gripper.build import CELL_OFFSET, build, device_info, instantiate
 from graspsense_sim_gripper.compiled.compose import grasp_loop, guarded_loop
+from graspsense_sim_gripper.compiled.loop_code import CompiledLoop
 from graspsense_sim_gripper.compiled.padding import PaddedLayout, composition_of, layout_of, padded, unpadded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
@@ -40,9 +42,10 @@ from graspsense_sim_gripper.loop import (
     NOT_STARTED,
     Buffers,
     GraspParams,
+    LoopEnd,
     SimulationState,
     before_failure,
-    has_ended,
+    run_plain,
     uses_macro_steps,
 )
 from graspsense_sim_gripper.model_report import accuracy_report, model_report
@@ -74,7 +77,8 @@ more draws more noise then: drawing is a tenth of the time of a grasp."""
 
 Extracted = Any
 """What `Job.extract` returns, such as features."""
-GraspLoop = Callable[[GraspParams, SimulationState, Buffers], SimulationState]
+GraspLoop = CompiledLoop | Callable[[GraspParams, SimulationState, Buffers], SimulationState]
+"""The loop of a grasp, compiled or in the interpreter."""
 Measure = Callable[[Any, Any, Any, int], Any]
 """`compiled.extraction.measure_buffers` of a job, compiled."""
 
@@ -85,8 +89,8 @@ class FinishedGrasp:
 
     outcome: Outcome
     reason: str
-    _end: PlantState | Callable[[], PlantState]
-    """The plant at the end of the grasp, as its loop returned it, or what reads it from another process' answer."""
+    end: Callable[[], PlantState]
+    """Returns the plant at the end of the grasp, as its loop returned it."""
     extracted: Extracted
     """What `Job.extract` returned for the trace; None if there is no `Job.extract`."""
     kept: Trace | None
@@ -95,20 +99,18 @@ class FinishedGrasp:
     """The reduced model of the object; None without an object."""
     unstable_loop: str = ""
     """The text of `sampled_loop.instability` for the scene."""
-    _layout: PaddedLayout | None = None
-    """The layout of the terms in `_end`; None: they are those of the object."""
-    _told: Mapping[str, Any] | None = None
-    """The `model_report` of the grasp, if another process has made it."""
+    layout: PaddedLayout | None = None
+    """The layout of the terms in `end`; None: they are those of the object."""
 
     @property
     def state(self) -> PlantState:
         """The plant at the end of the grasp, with the true peak force."""
-        end = self._end() if callable(self._end) else self._end
-        return end if self._layout is None else unpadded(end, self._layout)
+        end = self.end()
+        return end if self.layout is None else unpadded(end, self.layout)
 
     def report(self, kinds: Sequence[str]) -> dict[str, Any]:
         """Return the `model_report` of the grasp, with what its model does not verify; `kinds`: those of its terms."""
-        report = dict(self._told) if self._told is not None else model_report(self.state, kinds)
+        report = model_report(self.state, kinds)
         if self.reduction is not None:
             report |= accuracy_report(report, self.reduction, self.unstable_loop)
         return report
@@ -119,9 +121,8 @@ class FinishedGrasp:
         return FinishedGrasp(
             outcome=self.outcome,
             reason=self.reason,
-            end=self._end,
-            layout=self._layout,
-            told=self._told,
+            end=self.end,
+            layout=self.layout,
             extracted=self.extracted,
             kept=self.kept,
             reduction=reduction,
@@ -191,7 +192,7 @@ class Scenes:
     """By the name of the scene, with the number of the instance."""
     _unstable: dict[tuple[str, bool], str] = field(factory=dict, init=False)
     """Why the sampled loop is unstable, by `scene_key`."""
-    _initial: dict[tuple[str, bool], PlantState] = field(factory=dict, init=False)
+    _initial: dict[tuple[str, bool], tuple[PlantState, PaddedLayout]] = field(factory=dict, init=False)
     """What `initial` returns, by `scene_key`."""
 
     def add(self, scene: str, *, compiled: bool = False) -> None:
@@ -226,11 +227,15 @@ class Scenes:
             known = self._problems[scene] = problem, reduction
         return instantiate(*known, seed, self.generator_of)
 
-    def initial(self, scene: str) -> PlantState:
-        """Return a state of the plant before a grasp of the scene; its numbers may be those of any seed."""
+    def initial(self, scene: str) -> tuple[PlantState, PaddedLayout]:
+        """Return a padded state of the plant before a grasp of the scene, and its layout.
+
+        Its numbers may be those of any seed.
+        """
         key = scene_key(scene)
         if key not in self._initial:
-            self._initial[key] = self.setup(scene, 0).state
+            setup = self.setup(scene, 0)
+            self._initial[key] = padded(setup).state, layout_of(setup)
         return self._initial[key]
 
     def model_of(self, scene: str, seed: int) -> tuple[Reduction | None, str]:
@@ -274,7 +279,7 @@ class Storage:
 
 
 def grasp_compiled(
-    job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage, measure: Measure | None = None
+    job: Job, setup: GraspSetup, loop: CompiledLoop, storage: Storage, measure: Measure | None = None
 ) -> FinishedGrasp:
     """Simulate a grasp with the compiled loop of its composition (see `composition_of`).
 
@@ -282,7 +287,7 @@ def grasp_compiled(
     """
     try:
         whole, layout = padded(setup), layout_of(setup)
-        return grasp_once(job, whole, loop, storage, on_arrays=True, layout=layout, measure=measure)
+        return grasp_once(job, whole, loop, storage, layout=layout, measure=measure)
     except LAW_ERRORS:
         # Compiled code does not say which term raised it.
         return grasp_plain(job, setup)
@@ -292,11 +297,11 @@ def grasp_plain(job: Job, setup: GraspSetup) -> FinishedGrasp:
     """Simulate a grasp in the interpreter."""
     composition, step = composition_of(job.config, setup, pad=False), type(job.controller).step
     try:
-        return grasp_once(job, setup, grasp_loop(composition, step), Storage(), on_arrays=False)
+        return grasp_once(job, setup, grasp_loop(composition, step), Storage())
     except LAW_ERRORS as error:
         if composition.shape is not None or not raised_in_term(error, setup.kinds):
             raise
-    return grasp_once(job, setup, guarded_loop(composition, step), Storage(), on_arrays=False)
+    return grasp_once(job, setup, guarded_loop(composition, step), Storage())
 
 
 def grasp_once(
@@ -305,26 +310,27 @@ def grasp_once(
     loop: GraspLoop,
     storage: Storage,
     *,
-    on_arrays: bool,
     layout: PaddedLayout | None = None,
     measure: Measure | None = None,
 ) -> FinishedGrasp:
-    """Grasp what `setup` describes with the loop, on arrays where it is compiled, on lists where it is not.
+    """Grasp what `setup` describes with the loop: on arrays if it is compiled, on lists if it is not.
 
     `layout`: that in which the grasp is padded; None: it is not. `measure`: as for `grasp_compiled`.
     """
-    end, buffers = _run(job, setup, loop, storage, on_arrays)
+    on_arrays = isinstance(loop, CompiledLoop)
+    (ending, state, plant), buffers = _run(job, setup, loop, storage)
     if on_arrays:
         storage.buffers = _first_images(buffers)
-    outcome, reason = ended_by_itself(end.controller)
-    if end.loop.failed == 1:
+    outcome, reason = ended_by_itself(ending.stopped, ending.outcome)
+    if ending.failed == 1:
         outcome = Outcome.ABORTED
-        reason = not_finite_in_tick(setup.kinds, setup.plant, end.plant, end.loop.effort_n, setup.dt_s)
-    elif not has_ended(end.controller):
+        effort_n = state().loop.effort_n
+        reason = not_finite_in_tick(setup.kinds, setup.plant, plant(), effort_n, setup.dt_s)
+    elif ending.ended == 0:
         outcome, reason = Outcome.ABORTED, overdue(job.run)
     if not job.traces and job.extract is None:
-        return finished(job, outcome, reason, end.plant, layout)
-    n, k = end.loop.recorded, end.sensor.images
+        return finished(job, outcome, reason, plant, layout)
+    n, k = ending.recorded, ending.images
     columns, phases = buffers.columns, buffers.phases
     if measure is not None and job.extraction is not None:
         try:
@@ -335,7 +341,7 @@ def grasp_once(
         else:
             extracted = job.extraction.result(measured)
             return FinishedGrasp(
-                outcome=outcome, reason=reason, end=end.plant, layout=layout, extracted=extracted, kept=None
+                outcome=outcome, reason=reason, end=plant, layout=layout, extracted=extracted, kept=None
             )
     table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
     images, times = np.asarray(buffers.pads.images[:k]), np.asarray(buffers.image_times[:k])
@@ -346,12 +352,12 @@ def grasp_once(
         trace = recorded_trace(
             type(job.controller).events, table.copy(), numbers.copy(), images, times, signals
         )
-        return finished(job, outcome, reason, end.plant, layout, trace)
+        return finished(job, outcome, reason, plant, layout, trace)
     # A trace that fills most of the buffers, or that only features are extracted from, is a view of them.
     # While a column of it is referenced, those buffers are kept, and the next grasps have new ones.
     references = sys.getrefcount(columns), sys.getrefcount(phases)
     trace = recorded_trace(type(job.controller).events, table, numbers, images, times, signals)
-    done = finished(job, outcome, reason, end.plant, layout, trace)
+    done = finished(job, outcome, reason, plant, layout, trace)
     del trace
     if on_arrays and (sys.getrefcount(columns), sys.getrefcount(phases)) != references:
         storage.buffers = _first_images(buffers)._replace(
@@ -364,11 +370,11 @@ def finished(
     job: Job,
     outcome: Outcome,
     reason: str,
-    end: PlantState,
+    end: Callable[[], PlantState],
     layout: PaddedLayout | None = None,
     trace: Trace | None = None,
 ) -> FinishedGrasp:
-    """Return the result of a grasp that ended in this state of the plant, whose terms are in this layout.
+    """Return the result of a grasp. `end` returns the plant at its end, whose terms are in this layout.
 
     `trace` may be None if neither traces nor `extract` are asked for.
     """
@@ -379,11 +385,10 @@ def finished(
     )
 
 
-def _run(
-    job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage, on_arrays: bool
-) -> tuple[SimulationState, Buffers]:
+def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tuple[LoopEnd, Buffers]:
     """Run the loop to the end of the grasp, with longer buffers where those of the storage do not suffice."""
-    ideal, buffers = setup.sensor.ideal == 1, storage.buffers
+    ideal, buffers, on_arrays = setup.sensor.ideal == 1, storage.buffers, isinstance(loop, CompiledLoop)
+    run = loop.run if isinstance(loop, CompiledLoop) else partial(run_plain, loop)
     if not ideal:
         noise = setup.noise()
         noise.fill(buffers.pads.noise)
@@ -411,13 +416,14 @@ def _run(
     while True:
         if setup.has_palm:
             params = params._replace(max_ticks=min(most_ticks, len(buffers.palm.noise)))
-        start, progress = progress, loop(params, progress, buffers)
-        if progress.loop.failed == 1:
-            plant = before_failure(loop, params, start, buffers, progress)
-            return progress._replace(plant=plant), buffers
-        if has_ended(progress.controller) or progress.loop.ticks >= most_ticks:
-            return progress, buffers
-        if not ideal and progress.sensor.images == len(buffers.pads.images):
+        end = run(params, progress, buffers)
+        if end.ending.failed == 1:
+            before = partial(before_failure, loop, params, progress, buffers, end.ending.ticks)
+            return end._replace(plant=before), buffers
+        if end.ending.ended == 1 or end.ending.ticks >= most_ticks:
+            return end, buffers
+        progress = end.state()
+        if not ideal and end.ending.images == len(buffers.pads.images):
             buffers = _with_more_images(buffers, noise.standard_normal((IMAGES_PER_BLOCK, 2 * CELLS)))
         else:
             buffers = _with_more_ticks(buffers, palm_noise)

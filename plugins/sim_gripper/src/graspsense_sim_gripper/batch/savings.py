@@ -12,7 +12,7 @@ from graspsense.plugin_api import NotCompilable
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, Storage, grasp_compiled, scene_key
 from graspsense_sim_gripper.batch.threads import WORTH_COMPILING
 from graspsense_sim_gripper.build import build
-from graspsense_sim_gripper.compiled.jit import compiled_loop
+from graspsense_sim_gripper.compiled.loop_code import compiled_loop
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.reduction.select import select_anew

@@ -23,7 +23,7 @@ from typing import Any, Final, Unpack
 import numpy as np
 from attrs import define, field
 
-from graspsense.plugin_api import BatchOptions, Controller, FeatureSet, NotCompilable, RunConfig, entry_point
+from graspsense.plugin_api import BatchOptions, Controller, FeatureSet, NotCompilable, RunConfig
 from graspsense_sim_gripper.batch.forked import (
     REFUSED,
     Answer,
@@ -38,7 +38,6 @@ from graspsense_sim_gripper.batch.forked import (
 )
 from graspsense_sim_gripper.batch.job import (
     FinishedGrasp,
-    GraspLoop,
     Job,
     Measure,
     Scenes,
@@ -51,7 +50,7 @@ from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.compiled.compose import Composition
 from graspsense_sim_gripper.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.compiled.generator import compiled_generator
-from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
+from graspsense_sim_gripper.compiled.loop_code import CompiledLoop, compiled_loop
 from graspsense_sim_gripper.compiled.padding import compiled_kinds, composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.loop import COLUMNS
@@ -158,8 +157,7 @@ class _Batch:
     counts: Counter[Composition] = field(factory=Counter, init=False)
     """Number of grasps of each composition."""
     is_compiled: dict[Composition, bool] = field(factory=dict, init=False)
-    loops: dict[Composition, GraspLoop] = field(factory=dict, init=False)
-    """The compiled loops that have run once, so that their machine code exists."""
+    loops: dict[Composition, CompiledLoop] = field(factory=dict, init=False)
     local: threading.local = field(factory=threading.local, init=False)
     """The storage of each thread, and its process for grasps in the interpreter."""
     processes: ExitStack = field(factory=ExitStack, init=False)
@@ -287,8 +285,7 @@ class _Batch:
         """Return, in a forked process, the results of the slice that begins at this index."""
         if self.job.extraction is not None and not isinstance(self.job.extract, MeasuredNumbers):
             self.job = self.models.job = measuring(self.job)
-        scenes = (scene for scene, _ in self._part(begin))
-        return answer_of(zip(self._slice(begin), scenes, strict=True))
+        return answer_of(self._slice(begin))
 
     def _forked_slice(self, begin: int) -> Results:
         """Return the answer of a forked process for a slice, or the results if it cannot run the slice."""
@@ -309,7 +306,7 @@ class _Batch:
         if form is not None and self.measure is not None:
             # What is measured on no ticks has the same type.
             pattern = self.measure(form.params, np.zeros((len(COLUMNS), 1)), np.zeros(1, np.int64), 0)
-        known = (InModel(models.initial(scene), *models.model_of(scene, seed)) for scene, seed in part)
+        known = (InModel(*models.initial(scene), *models.model_of(scene, seed)) for scene, seed in part)
         return results(answer, form, pattern, known)
 
     def _part(self, begin: int) -> list[tuple[str, int]]:
@@ -348,15 +345,11 @@ class _Batch:
             )
         if not self.is_compiled[composition]:
             return None
-        loop = self.loops.get(composition)
-        if loop is not None:
-            return grasp_compiled(self.job, setup, loop, self._storage(), self.measure)
         try:
-            loop = compiled_loop(composition, type(self.job.controller).step)
-            with compiling(composition):
-                grasp = grasp_compiled(self.job, setup, loop, self._storage(), self.measure)
-                self.loops[composition] = entry_point(loop)
-                return grasp
+            loop = self.loops.get(composition)
+            if loop is None:
+                loop = self.loops[composition] = compiled_loop(composition, type(self.job.controller).step)
+            return grasp_compiled(self.job, setup, loop, self._storage(), self.measure)
         except NotCompilable as error:
             self.is_compiled[composition] = False
             self._note_plain(str(error))

@@ -15,6 +15,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Sequence
+from functools import partial
 from types import TracebackType
 from typing import IO, Any, Final
 
@@ -23,8 +24,8 @@ from attrs import asdict, evolve, fields
 
 from graspsense.plugin_api import Controller, GraspEvent, Outcome, Phase, RunConfig, Trace, create, recipe_of
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, finished, grasp_plain
-from graspsense_sim_gripper.batch.nested import like
 from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.nested import like
 from graspsense_sim_gripper.reduction.cache import restored, stored
 
 _ARRAYS: Final = tuple(
@@ -111,7 +112,9 @@ class PlainProcess:
             trace = _read_trace(traces) if job.traces or job.extract is not None else None
             if trace is not None:
                 trace = evolve(trace, events=tuple(_event(*event) for event in told))
-            results.append(finished(job, Outcome(outcome), reason, like(initial, values), trace=trace))
+            results.append(
+                finished(job, Outcome(outcome), reason, partial(like, initial, values), trace=trace)
+            )
         return results
 
 

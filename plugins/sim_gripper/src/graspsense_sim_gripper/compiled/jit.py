@@ -5,14 +5,11 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import lru_cache
 from typing import Any, Final
 
 from graspsense.plugin_api import CompileOptions, Inlining, compile_function, first_call
-from graspsense_sim_gripper.compiled.compose import Composition, grasp_loop
 from graspsense_sim_gripper.dynamics.contact import _pressed, solve_contact
 from graspsense_sim_gripper.exact.propagate import cold_calls
-from graspsense_sim_gripper.problem import ControllerStep
 from graspsense_sim_gripper.stepping.advance import advance, attempt_of, move, take_step, take_steps
 from graspsense_sim_gripper.stepping.converge import refine_until_converged
 
@@ -44,7 +41,8 @@ OPTIONS: Final = CompileOptions(
     ),
     install="graspsense-sim-gripper[fast]",
 )
-_COMPILING: Final = threading.Lock()
+COMPILING: Final = threading.Lock()
+"""Held while code is compiled."""
 
 
 def compile_part(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -55,25 +53,11 @@ def compile_part(function: Callable[..., Any]) -> Callable[..., Any]:
     return compile_function(function, OPTIONS)
 
 
-@lru_cache(maxsize=64)
-def compiled_loop(composition: Composition, step: ControllerStep) -> Callable[..., Any]:
-    """Return the compiled loop of a composition for a controller with this step. Raises NotCompilable."""
-    with _COMPILING:
-        return compile_part(grasp_loop(composition, step, interpreted=False))
-
-
 @contextmanager
-def compiling(composition: Composition) -> Iterator[None]:
-    """Context for a call of a compiled loop that may be its first, which generates the machine code.
+def generating(*, slp_vectorize: bool = False) -> Iterator[None]:
+    """Context as of `first_call`, for a call of a compiled function that may be its first.
 
     Threads wait for each other here, so that the code is not generated twice. Raises NotCompilable if numba refuses.
     """
-    with generating(slp_vectorize=composition.shape is not None):
-        yield
-
-
-@contextmanager
-def generating(*, slp_vectorize: bool = False) -> Iterator[None]:
-    """Context as of `first_call`, in which threads wait for each other."""
-    with _COMPILING, first_call(slp_vectorize=slp_vectorize):
+    with COMPILING, first_call(slp_vectorize=slp_vectorize):
         yield

@@ -22,15 +22,14 @@ from graspsense.plugin_api import (
     FeatureSet,
     NotCompilable,
     TickParams,
-    entry_point,
     first_state,
     gap_and_rate,
     revolutions_at,
     seconds_at_most,
     tick_params,
 )
-from graspsense_sim_gripper.compiled.compose import Composition, composition, grasp_loop
-from graspsense_sim_gripper.compiled.jit import compiled_loop, compiling
+from graspsense_sim_gripper.compiled.compose import composition, grasp_loop
+from graspsense_sim_gripper.compiled.loop_code import compiled_loop
 from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import Motion, PlantState
@@ -145,8 +144,6 @@ class TrialGrasps:
     _records: dict[Any, GraspRecord] = field(factory=dict, init=False)
     _features: dict[Any, OwnFeatures | None] = field(factory=dict, init=False)
     """The features of the pipeline in the grasps of `_records`."""
-    _loops: dict[Composition, Callable[..., SimulationState]] = field(factory=dict, init=False)
-    """The compiled loops that have run once."""
     _starts: dict[Steps | None, _Stage] = field(factory=dict, init=False)
     """The grasp shortly before the first contact, by the steps of the approach; one for all where `only_near`."""
     work: int = field(default=0, init=False)
@@ -211,7 +208,7 @@ class TrialGrasps:
     def of(self, setup: GraspSetup) -> TrialGrasps:
         """Return trial grasps of another instance of the object, which begin near it and go on counting the work."""
         other = evolve(self, setup=setup, only_near=True)
-        other.work, other._loops = self.work, self._loops
+        other.work = self.work
         return other
 
     def _max_ticks(self) -> int:
@@ -288,7 +285,7 @@ class TrialGrasps:
                 start, written = progress, Buffers(*buffers, *recorded)._replace(palm=palm)
                 progress = loop(grasp_params, start, written)
                 if progress.loop.failed == 1:
-                    before = before_failure(loop, grasp_params, start, written, progress)
+                    before = before_failure(loop, grasp_params, start, written, progress.loop.ticks)
                     raise TermFailed(
                         not_finite_in_tick(
                             made.kinds,
@@ -337,17 +334,7 @@ class TrialGrasps:
         model = None if exact is None else exact[0]
         if not on_arrays:
             return False, grasp_loop(composed, self.controller.step), made, model
-        if composed in self._loops:
-            return True, self._loops[composed], made, model
-        machine_code = compiled_loop(composed, self.controller.step)
-
-        def loop(*args: Any) -> SimulationState:
-            with compiling(composed):
-                progress: SimulationState = machine_code(*args)
-            self._loops[composed] = entry_point(machine_code)
-            return progress
-
-        return True, loop, made, model
+        return True, compiled_loop(composed, self.controller.step), made, model
 
 
 def trial_grasps(

@@ -1,9 +1,26 @@
-"""Nested tuples from a list of their numbers, or from the nested lists that JSON makes of them."""
+"""Nested tuples from an array of their numbers, or from the nested lists that JSON makes of them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, MutableSequence
 from typing import Any
+
+import numpy as np
+from attrs import frozen
+from numpy.typing import NDArray
+
+
+@frozen(eq=False)
+class Stored:
+    """Nested tuples, of which only the numbers are kept until they are read."""
+
+    pattern: Any
+    """Tuples of the same types."""
+    numbers: NDArray[np.float64]
+
+    def __call__(self) -> Any:
+        """Return the tuples."""
+        return filled(self.pattern, self.numbers.tolist())
 
 
 def like(pattern: Any, values: Any) -> Any:
@@ -17,7 +34,7 @@ def like(pattern: Any, values: Any) -> Any:
     return type(pattern)(*parts) if hasattr(pattern, "_fields") else tuple(parts)
 
 
-def append_numbers(to: list[float], values: Any) -> None:
+def append_numbers(to: MutableSequence[float], values: Any) -> None:
     """Append the numbers in nested tuples, in order; `values` may also be a number."""
     if isinstance(values, tuple):
         for value in values:
@@ -27,6 +44,11 @@ def append_numbers(to: list[float], values: Any) -> None:
                 to.append(value)
     else:
         to.append(values)
+
+
+def count_numbers(values: Any) -> int:
+    """Return the number of numbers in nested tuples."""
+    return sum(map(count_numbers, values)) if isinstance(values, tuple) else 1
 
 
 def filled(pattern: Any, numbers: Iterable[float]) -> Any:
