@@ -30,6 +30,7 @@ from graspsense_sim_gripper.sensing import (
     sense,
 )
 from graspsense_sim_gripper.stepping.scheme import Steps
+from graspsense_sim_gripper.stepping.trend import UNKNOWN, Trend
 
 COLUMNS: Final = (
     "t_s",
@@ -74,6 +75,8 @@ class MacroControl(NamedTuple):
     """Number of ticks from which on it is tried."""
     wait: int
     """Ticks to wait after one that was not accepted; doubles each time."""
+    trend: Trend
+    """That at the end of the last one, if it was accepted."""
 
 
 def uses_macro_steps(exact: Any, steps: Steps) -> int:
@@ -164,7 +167,7 @@ class Buffers(NamedTuple):
 
 EVENT_SHIFT: Final = 8
 """Number of bits of a phase in `Buffers.phases`."""
-NOT_STARTED: Final = LoopState(0, 0, -1, 0, 0.0, 0, MacroControl(2, 0, 1))
+NOT_STARTED: Final = LoopState(0, 0, -1, 0, 0.0, 0, MacroControl(2, 0, 1, UNKNOWN))
 ROWS_AT_ONCE: Final = 128
 """The most rows that are recorded at once. The loop stops this many rows before the end of a buffer, so that none is
 cut by it."""

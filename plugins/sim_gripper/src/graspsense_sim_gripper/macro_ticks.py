@@ -32,6 +32,7 @@ from graspsense_sim_gripper.stepping.macro_step import (
     with_peak,
 )
 from graspsense_sim_gripper.stepping.scheme import PlantParams, Steps
+from graspsense_sim_gripper.stepping.trend import UNKNOWN
 
 FIRST_TICKS: Final = 2
 """Number of ticks in the first macro-step."""
@@ -55,22 +56,25 @@ def run_macro_step(
     if most < FIRST_TICKS:
         return at, now
     n, event = min(now.length, most), False
-    step = MacroStep(math.inf, 0.0, at.plant, constant_values(at.plant))
+    step = MacroStep(math.inf, 0.0, at.plant, constant_values(at.plant), UNKNOWN)
+    # In any other tick the plant has moved since the last macro-step ended.
+    trend = now.trend if at.ticks == now.from_tick + 1 else UNKNOWN
     while n >= FIRST_TICKS and not step.error <= 1.0:
-        step = macro_step(params.plant, at.plant, at.effort_n, n * params.dt_s)
+        step = macro_step(params.plant, at.plant, at.effort_n, n * params.dt_s, trend)
         if not step.error <= 1.0:
             event = event or not step.error < math.inf
             n = next_ticks(n, step.error, step.event_share)
     if not step.error <= 1.0:
         wait = min(2 * now.wait, MAX_WAIT)
-        return at, MacroControl(FIRST_TICKS, at.ticks + wait, wait)
+        return at, MacroControl(FIRST_TICKS, at.ticks + wait, wait, UNKNOWN)
     # A step that an image cut short does not shorten the next one.
     length = max(next_ticks(n, step.error, HALF), now.length if n == most else FIRST_TICKS)
     after = _ticks_within(params, at, step, n, pads, columns, phases)
     # The step ends shortly before the event.
     if event or after.effort_n != at.effort_n:
         length = FIRST_TICKS
-    return after, MacroControl(length, after.ticks, 1)
+    trend = step.trend if after.effort_n == at.effort_n else UNKNOWN
+    return after, MacroControl(length, after.ticks, 1, trend)
 
 
 def _ticks_within(

@@ -25,8 +25,6 @@ from graspsense_sim_gripper.dynamics.state import (
 from graspsense_sim_gripper.stepping.advance import completed, rests
 from graspsense_sim_gripper.stepping.coast import coast
 from graspsense_sim_gripper.stepping.control import (
-    EXPONENT,
-    MAX_FACTOR,
     MIN_FACTOR,
     SAFETY,
     SMALL_ERROR,
@@ -46,6 +44,14 @@ from graspsense_sim_gripper.stepping.scheme import (
     start_of,
 )
 from graspsense_sim_gripper.stepping.stick import stick
+from graspsense_sim_gripper.stepping.trend import (
+    UNKNOWN,
+    Trend,
+    change_to_middle,
+    errors,
+    speed_for_end,
+    trend_at_end,
+)
 
 MAX_TICKS: Final = 128
 """Largest number of ticks in a macro-step; no more than the rows that `loop.ROWS_AT_ONCE` keeps free."""
@@ -53,6 +59,8 @@ RELAXATION_ERROR: Final = 0.1
 """The error of a force that relaxes while the fingers are held, as a share of its second difference over the step."""
 GROWTH: Final = 4.0
 """Largest ratio of successive macro-steps."""
+EXPONENT: Final = -0.25
+"""The error of a macro-step with a trend is proportional to the fourth power of its length."""
 HALF: Final = 0.5
 """The share of a step after which an event is assumed that is only known to be in it."""
 
@@ -78,17 +86,22 @@ class MacroStep(NamedTuple):
     after: PlantState
     values: DenseOutput
     """The values within it."""
+    trend: Trend
+    """That at its end."""
 
 
-def macro_step(params: PlantParams, state: PlantState, effort_n: float, h: float) -> MacroStep:
-    """Return an attempted step of `h`."""
-    if state.contact.touched == 1 and h > params.steps.longest_touched_s:
-        error, share, middle, after = math.inf, HALF, state.contact, state
-    elif state.motion.speed_rev_s == 0.0:
+def macro_step(params: PlantParams, state: PlantState, effort_n: float, h: float, trend: Trend) -> MacroStep:
+    """Return an attempted step of `h`. `trend`: that of the macro-step that ends here, under the same effort."""
+    error, share, middle, after, later = math.inf, HALF, state.contact, state, UNKNOWN
+    if state.motion.speed_rev_s == 0.0 and not _too_long(params, state, h):
         error, share, middle, after = _rested(params, state, effort_n, h)
-    else:
-        error, share, middle, after = _moved(params, state, effort_n, h)
-    return MacroStep(error, share, after, dense_output(state, middle, after, h))
+    elif not _too_long(params, state, h):
+        error, share, middle, after, later = _moved(params, state, effort_n, h, trend)
+    return MacroStep(error, share, after, dense_output(state, middle, after, h), later)
+
+
+def _too_long(params: PlantParams, state: PlantState, h: float) -> bool:
+    return state.contact.touched == 1 and h > params.steps.longest_touched_s
 
 
 def _rested(
@@ -117,13 +130,13 @@ def _rested(
 
 
 def _moved(
-    params: PlantParams, state: PlantState, effort_n: float, h: float
-) -> tuple[float, float, Contact, PlantState]:
+    params: PlantParams, state: PlantState, effort_n: float, h: float, trend: Trend
+) -> tuple[float, float, Contact, PlantState, Trend]:
     """Return error and event of a step of moving fingers (see `MacroStep`), the contact half-way, and the plant after.
 
-    The scheme is of Runge-Kutta-Nystrom type with the nodes 0, 1/2 and 1 and the weights of Simpson's rule; its speeds
-    are those of Kutta's scheme of third order. The third stage is at the end of the path, so that the object has two
-    steps of `h` / 2. The estimate of the error is the difference to the midpoint rule.
+    The last value is the trend then. The scheme is of Runge-Kutta-Nystrom type with the nodes 0, 1/2 and 1 and the
+    weights of Simpson's rule; `trend` gives the middle, and the errors, more exactly. The third stage is at the end of
+    the path, so that the object has two steps of `h` / 2.
     """
     drive, model, steps = params
     link, contact, motion = drive.link, state.contact, state.motion
@@ -133,33 +146,34 @@ def _moved(
         coasting = PlantParams(drive, model, Steps(scale * steps.macro_tolerance))
         coasts, after = coast(coasting, state, effort_n, h)
         if coasts or contact.left_n + contact.right_n > 0.0:
-            return 0.0 if coasts else math.inf, HALF, contact, after
+            return 0.0 if coasts else math.inf, HALF, contact, after, UNKNOWN
     start = start_of(params, state, effort_n)
     if comes_to_rest(start):
-        return math.inf, HALF, contact, state
+        return math.inf, HALF, contact, state, UNKNOWN
     revolutions, speed, _, jacobian = motion
     direction, rate = start.direction, start.acceleration
-    gap1, jacobian1 = gap_and_rate(link, revolutions + 0.5 * h * (speed + 0.25 * h * rate))
-    speed1 = speed + 0.5 * h * rate
+    change = change_to_middle(trend, h)
+    mean = speed + 0.5 * h * (rate / 2.0 + change.linear / 6.0 + change.square / 12.0)
+    gap1, jacobian1 = gap_and_rate(link, revolutions + 0.5 * h * mean)
+    speed1 = speed + 0.5 * h * (rate + change.linear / 2.0 + change.square / 3.0)
     middle = pressed(model, contact, gap1, -speed1 * jacobian1, 0.5 * h)
     rate1 = acceleration_of(drive, jacobian1, speed1, middle, effort_n, direction)
     revolutions2 = revolutions + h * (speed + h * (rate + 2.0 * rate1) / 6.0)
     gap2, jacobian2 = gap_and_rate(link, revolutions2)
-    speed2 = speed + h * (2.0 * rate1 - rate)
+    speed2 = speed_for_end(trend, change, speed, rate, rate1, h)
     end = pressed(model, middle, gap2, -speed2 * jacobian2, 0.5 * h)
     rate2 = acceleration_of(drive, jacobian2, speed2, end, effort_n, direction)
     speed_end = speed + h * (rate + 4.0 * rate1 + rate2) / 6.0
-    speed_error = h * abs(rate - 2.0 * rate1 + rate2) / 6.0
-    position_error = h * h * abs(rate1 - rate) / 6.0
-    motion2 = Motion(revolutions2, speed_end, gap2, jacobian2)
-    error_n = force_error(start, motion2, end, position_error)
-    attempt = Attempt(motion2, end, h, speed_error * abs(jacobian), error_n)
+    motion2, rates = Motion(revolutions2, speed_end, gap2, jacobian2), (rate, rate1, rate2)
+    off = errors(trend, change, rates, h)
+    attempt = Attempt(motion2, end, h, off.speed * abs(jacobian), force_error(start, motion2, end, off.angle))
     share = _event_share(params, start, middle, attempt)
     if share > 0.0:
-        return math.inf, share, contact, state
+        return math.inf, share, contact, state, UNKNOWN
     next_s, n_steps, unresolved = state.step
     after = completed(params, state, start, attempt, StepState(next_s, n_steps + 1, unresolved))
-    return relative_error(params.steps.macro_tolerance, start, attempt), HALF, middle, after
+    error = relative_error(params.steps.macro_tolerance, start, attempt)
+    return error, HALF, middle, after, trend_at_end(rates, h)
 
 
 def _event_share(params: PlantParams, start: Start, middle: Contact, attempt: Attempt) -> float:
@@ -197,11 +211,11 @@ def _load(contact: Contact) -> float:
 def next_ticks(n: int, error: float, event_share: float) -> int:
     """Return the number of ticks of the next macro-step after one of `n` ticks with this error and event.
 
-    The same control as that of single steps (`control`), for the error of a third-order scheme.
+    The same control as that of single steps (`control`), for the error of a scheme of fourth order.
     """
     if not error < math.inf:
         return min(int(n * event_share), n - 1)
-    factor = MAX_FACTOR if error <= SMALL_ERROR else SAFETY * error**EXPONENT
+    factor = GROWTH if error <= SMALL_ERROR else SAFETY * error**EXPONENT
     return min(max(int(n * min(max(factor, MIN_FACTOR), GROWTH)), 1), MAX_TICKS)
 
 
