@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import pytest
 
-from graspsense_sim_gripper.nested import append_numbers, filled
+from graspsense_sim_gripper.nested import TupleType, append_numbers
 
 
 class Inner(NamedTuple):
@@ -31,7 +31,7 @@ def numbers_of(values):
 
 
 def test_tuples_come_back_with_their_types():
-    found = filled(PATTERN, numbers_of(VALUES))
+    found = TupleType.of(PATTERN).filled(numbers_of(VALUES))
     assert found == VALUES
     assert [type(value) for value in (found, found.halves[0], found.inner.steps, found.broken)] == [
         Outer,
@@ -42,10 +42,10 @@ def test_tuples_come_back_with_their_types():
 
 
 def test_a_number_by_itself_comes_back():
-    assert filled(1, numbers_of(7)) == 7
+    assert TupleType.of(1).filled(numbers_of(7)) == 7
 
 
-@pytest.mark.parametrize("count", [3, 6])
+@pytest.mark.parametrize("count", [3, 7])
 def test_another_number_of_numbers_is_refused(count):
-    with pytest.raises(ValueError, match="numbers than in the pattern"):
-        filled(PATTERN, [0.0] * count)
+    with pytest.raises(ValueError, match=f"{count} numbers for nested tuples of 5"):
+        TupleType.of(PATTERN).filled([0.0] * count)

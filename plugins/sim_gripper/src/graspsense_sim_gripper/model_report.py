@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.reduction.model import QUANTITIES, Reduction
 from graspsense_sim_gripper.terms.registry import find_term
+from graspsense_sim_gripper.terms.term import TermState, never_beyond
 
 
 def model_report(state: PlantState, kinds: Sequence[str]) -> dict[str, Any]:
@@ -16,8 +18,8 @@ def model_report(state: PlantState, kinds: Sequence[str]) -> dict[str, Any]:
     warnings = {
         f"{kind}: {reason}": None
         for half in (contact.left, *contact.right)
-        for i, kind in enumerate(kinds, 1)
-        if (reason := find_term(kind)[1].beyond(half.states[i]))
+        for i, kind, beyond in _checked(tuple(kinds))
+        if (reason := beyond(half.states[i]))
     }
     return {
         "simulated": True,
@@ -26,6 +28,13 @@ def model_report(state: PlantState, kinds: Sequence[str]) -> dict[str, Any]:
         "broken": any(getattr(term, "broken", 0) == 1 for term in contact.left.states),
         "beyond": "; ".join(warnings),
     }
+
+
+@lru_cache(maxsize=256)
+def _checked(kinds: tuple[str, ...]) -> list[tuple[int, str, Callable[[TermState], str]]]:
+    """Return place and kind of each term whose law may be used beyond its validity, with what says so."""
+    terms = [(i, kind, find_term(kind)[1].beyond) for i, kind in enumerate(kinds, 1)]
+    return [term for term in terms if term[2] is not never_beyond]
 
 
 def accuracy_report(report: Mapping[str, Any], reduction: Reduction, unstable_loop: str) -> dict[str, Any]:

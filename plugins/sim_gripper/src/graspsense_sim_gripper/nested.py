@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, MutableSequence
+from collections.abc import Callable, MutableSequence, Sequence
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -11,16 +12,54 @@ from numpy.typing import NDArray
 
 
 @frozen(eq=False)
+class TupleType:
+    """The types of nested tuples of numbers, from which such tuples are made of their numbers."""
+
+    count: int
+    """Number of numbers."""
+    _make: Callable[[list[float]], Any]
+
+    @classmethod
+    def of(cls, pattern: Any) -> TupleType:
+        """Return the type of these nested tuples; `pattern` may also be a number."""
+        make, count = _maker(pattern, 0)
+        return cls(count, make)
+
+    def filled(self, numbers: Sequence[float] | NDArray[np.float64]) -> Any:
+        """Return these numbers as nested tuples. Raises ValueError if there are more or fewer than in the type."""
+        if len(numbers) != self.count:
+            raise ValueError(f"{len(numbers)} numbers for nested tuples of {self.count}")
+        return self._make(numbers.tolist() if isinstance(numbers, np.ndarray) else list(numbers))
+
+
+@frozen(eq=False)
 class Stored:
     """Nested tuples, of which only the numbers are kept until they are read."""
 
-    pattern: Any
-    """Tuples of the same types."""
+    type: TupleType
     numbers: NDArray[np.float64]
 
     def __call__(self) -> Any:
         """Return the tuples."""
-        return filled(self.pattern, self.numbers.tolist())
+        return self.type.filled(self.numbers)
+
+
+def _maker(pattern: Any, begin: int) -> tuple[Callable[[list[float]], Any], int]:
+    """Return what makes a value of the type of `pattern` of the numbers from `begin` on, and where these end."""
+    kind, end = type(pattern), begin
+    if not isinstance(pattern, tuple):
+        if kind is float:
+            return itemgetter(begin), begin + 1
+        return lambda numbers: kind(numbers[begin]), begin + 1
+    makers = []
+    for part in pattern:
+        make, end = _maker(part, end)
+        makers.append(make)
+    # `tuple.__new__` makes named tuples in half of the time of their constructors.
+    new = tuple.__new__
+    if all(type(part) is float for part in pattern):
+        return lambda numbers: new(kind, numbers[begin:end]), end
+    return lambda numbers: new(kind, [make(numbers) for make in makers]), end
 
 
 def like(pattern: Any, values: Any) -> Any:
@@ -44,30 +83,3 @@ def append_numbers(to: MutableSequence[float], values: Any) -> None:
                 to.append(value)
     else:
         to.append(values)
-
-
-def count_numbers(values: Any) -> int:
-    """Return the number of numbers in nested tuples."""
-    return sum(map(count_numbers, values)) if isinstance(values, tuple) else 1
-
-
-def filled(pattern: Any, numbers: Iterable[float]) -> Any:
-    """Return numbers as nested tuples and numbers of the same types as in `pattern`.
-
-    Raises ValueError if there are more or fewer numbers than in the pattern.
-    """
-    rest = iter(numbers)
-    try:
-        values = _filled(pattern, rest)
-    except StopIteration:
-        raise ValueError("fewer numbers than in the pattern") from None
-    if next(rest, None) is not None:
-        raise ValueError("more numbers than in the pattern")
-    return values
-
-
-def _filled(pattern: Any, numbers: Iterator[float]) -> Any:
-    if not isinstance(pattern, tuple):
-        return type(pattern)(next(numbers))
-    parts = [_filled(part, numbers) for part in pattern]
-    return type(pattern)(*parts) if hasattr(pattern, "_fields") else tuple(parts)

@@ -26,8 +26,7 @@ from attrs import evolve, frozen
 from graspsense.plugin_api import CompiledExtraction, Outcome, Trace, columns_of_ticks
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job
 from graspsense_sim_gripper.compiled.padding import PaddedLayout
-from graspsense_sim_gripper.dynamics.state import PlantState
-from graspsense_sim_gripper.nested import Stored, append_numbers, filled
+from graspsense_sim_gripper.nested import Stored, TupleType, append_numbers
 from graspsense_sim_gripper.reduction.model import Reduction
 
 Json = Any
@@ -50,10 +49,10 @@ REFUSED: Final = Answer(b"", b"")
 class InModel(NamedTuple):
     """What the process that asks knows of a grasp of an answer."""
 
-    initial: PlantState
-    """The plant before it begins, padded; its numbers may be others."""
+    plant_type: TupleType
+    """That of its state, padded."""
     layout: PaddedLayout
-    """That of `initial`."""
+    """That of the padded state."""
     reduction: Reduction | None
     unstable_loop: str
     """As in `FinishedGrasp`."""
@@ -146,25 +145,29 @@ def answer_of(grasps: Iterable[FinishedGrasp]) -> Answer:
 
 
 def results(
-    answer: Answer, form: CompiledExtraction | None, pattern: Any, models: Iterable[InModel]
+    answer: Answer,
+    form: CompiledExtraction | None,
+    measured_type: TupleType | None,
+    models: Iterable[InModel],
 ) -> list[FinishedGrasp]:
     """Return the results in an answer.
 
-    `form`: the extraction of the job, and `pattern` a tuple of the type that it measures. `models`: what is known of
-    each grasp.
+    `form`: the extraction of the job, and `measured_type` that of what it measures. `models`: what is known of each
+    grasp.
     """
     numbers, begin, found = np.frombuffer(answer.numbers), 0, []
     for (outcome, reason, measured, of_state), known in zip(json.loads(answer.rest), models, strict=True):
         state, end = begin + measured, begin + measured + of_state
+        extracted = None
+        if form is not None and measured_type is not None:
+            extracted = form.result(measured_type.filled(numbers[begin:state]))
         found.append(
             FinishedGrasp(
                 outcome=Outcome(outcome),
                 reason=reason,
-                end=Stored(known.initial, numbers[state:end]),
+                end=Stored(known.plant_type, numbers[state:end]),
                 layout=known.layout,
-                extracted=None
-                if form is None
-                else form.result(filled(pattern, numbers[begin:state].tolist())),
+                extracted=extracted,
                 kept=None,
                 reduction=known.reduction,
                 unstable_loop=known.unstable_loop,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, Final
 
 import numpy as np
@@ -49,6 +49,7 @@ from graspsense_sim_gripper.loop import (
     uses_macro_steps,
 )
 from graspsense_sim_gripper.model_report import accuracy_report, model_report
+from graspsense_sim_gripper.nested import TupleType
 from graspsense_sim_gripper.objects.library import split_number
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers, sample_trace
@@ -71,9 +72,9 @@ from graspsense_sim_gripper.terms.term import LAW_ERRORS
 TICKS: Final = 8200
 """Ticks that the buffers hold at first; a grasp that needs more continues with longer ones. It is not a power of two,
 because all columns would then share one set of the processor's cache and evict each other."""
-IMAGES: Final = 136
-"""Cell images that the buffers hold at first, which suffice for nine of ten grasps of the catalogue. A grasp that needs
-more draws more noise then: drawing is a tenth of the time of a grasp."""
+IMAGES: Final = 160
+"""Cell images that the buffers hold at first, which suffice for 19 of 20 grasps of the catalogue. A grasp that needs
+more draws more noise then, which takes longer than the noise that the others do not need."""
 
 Extracted = Any
 """What `Job.extract` returns, such as features."""
@@ -192,8 +193,8 @@ class Scenes:
     """By the name of the scene, with the number of the instance."""
     _unstable: dict[tuple[str, bool], str] = field(factory=dict, init=False)
     """Why the sampled loop is unstable, by `scene_key`."""
-    _initial: dict[tuple[str, bool], tuple[PlantState, PaddedLayout]] = field(factory=dict, init=False)
-    """What `initial` returns, by `scene_key`."""
+    _plant_types: dict[tuple[str, bool], tuple[TupleType, PaddedLayout]] = field(factory=dict, init=False)
+    """What `plant_type` returns, by `scene_key`."""
 
     def add(self, scene: str, *, compiled: bool = False) -> None:
         """Select the model of a scene. `compiled`: run the trial grasps compiled, not in the interpreter.
@@ -227,16 +228,13 @@ class Scenes:
             known = self._problems[scene] = problem, reduction
         return instantiate(*known, seed, self.generator_of)
 
-    def initial(self, scene: str) -> tuple[PlantState, PaddedLayout]:
-        """Return a padded state of the plant before a grasp of the scene, and its layout.
-
-        Its numbers may be those of any seed.
-        """
+    def plant_type(self, scene: str) -> tuple[TupleType, PaddedLayout]:
+        """Return the type of the padded state of the plant in a compiled grasp of the scene, and its layout."""
         key = scene_key(scene)
-        if key not in self._initial:
+        if key not in self._plant_types:
             setup = self.setup(scene, 0)
-            self._initial[key] = padded(setup).state, layout_of(setup)
-        return self._initial[key]
+            self._plant_types[key] = TupleType.of(padded(setup).state), layout_of(setup)
+        return self._plant_types[key]
 
     def model_of(self, scene: str, seed: int) -> tuple[Reduction | None, str]:
         """Return the reduced model of a scene, and the text of `sampled_loop.instability` for it."""
@@ -249,6 +247,7 @@ class Scenes:
         return reduction, self._unstable[key]
 
 
+@lru_cache(maxsize=4096)
 def scene_key(scene: str) -> tuple[str, bool]:
     """Return the key of a scene's model: the name without the number of an instance, and whether there is a number."""
     if scene == "none":

@@ -54,6 +54,7 @@ from graspsense_sim_gripper.compiled.loop_code import CompiledLoop, compiled_loo
 from graspsense_sim_gripper.compiled.padding import compiled_kinds, composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.loop import COLUMNS
+from graspsense_sim_gripper.nested import TupleType
 from graspsense_sim_gripper.objects.library import kinds_in
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.problem import GraspSetup
@@ -153,6 +154,8 @@ class _Batch:
     """Remarks on how the grasps ran, as keys, so that each is given once."""
     measure: Measure | None = field(default=None, init=False)
     """The compiled form of `Job.extraction`."""
+    measured: TupleType | None = field(default=None, init=False)
+    """The type of what `measure` returns."""
     models: Scenes = field(init=False)
     counts: Counter[Composition] = field(factory=Counter, init=False)
     """Number of grasps of each composition."""
@@ -302,12 +305,13 @@ class _Batch:
         if not isinstance(answer, Answer):
             done = zip(answer, part, strict=True)
             return [grasp.in_model(*models.model_of(*one)) for grasp, one in done]
-        form, pattern = self.job.extraction, None
-        if form is not None and self.measure is not None:
+        form = self.job.extraction
+        if form is not None and self.measure is not None and self.measured is None:
             # What is measured on no ticks has the same type.
-            pattern = self.measure(form.params, np.zeros((len(COLUMNS), 1)), np.zeros(1, np.int64), 0)
-        known = (InModel(*models.initial(scene), *models.model_of(scene, seed)) for scene, seed in part)
-        return results(answer, form, pattern, known)
+            no_ticks = np.zeros((len(COLUMNS), 1)), np.zeros(1, np.int64), 0
+            self.measured = TupleType.of(self.measure(form.params, *no_ticks))
+        known = (InModel(*models.plant_type(scene), *models.model_of(scene, seed)) for scene, seed in part)
+        return results(answer, form, self.measured, known)
 
     def _part(self, begin: int) -> list[tuple[str, int]]:
         """Return the scene and the seed of each grasp of the slice that begins at this index."""

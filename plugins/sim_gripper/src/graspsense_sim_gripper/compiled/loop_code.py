@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from graspsense.plugin_api import NotCompilable, bind, entry_point
 from graspsense_sim_gripper.compiled.compose import Composition, grasp_loop
 from graspsense_sim_gripper.compiled.jit import COMPILING, OPTIONS, compile_part, generating
 from graspsense_sim_gripper.loop import Buffers, Ending, GraspParams, LoopEnd, SimulationState, ending
-from graspsense_sim_gripper.nested import Stored, count_numbers
+from graspsense_sim_gripper.nested import Stored, TupleType
 from graspsense_sim_gripper.problem import ControllerStep
 
 
@@ -38,6 +38,15 @@ def stored_grasp(params: GraspParams, progress: SimulationState, buffers: Buffer
     return ending(state)
 
 
+class _Types(NamedTuple):
+    """The types of the state of a grasp."""
+
+    state: TupleType
+    plant: TupleType
+    before_plant: int
+    """Number of numbers of the state before those of the plant."""
+
+
 class CompiledLoop:
     """The compiled loop of a composition for a controller."""
 
@@ -45,20 +54,20 @@ class CompiledLoop:
         """Take the function that `compile_function` returned; its first call makes machine code."""
         self._composition, self._compiled = composition, compiled
         self._machine_code: Callable[..., Ending] | None = None
-        self._counts = 0, 0, 0
-        """Of a state: the numbers before those of the plant, those up to their end, and all."""
+        self._types: _Types | None = None
 
     def run(self, params: GraspParams, progress: SimulationState, buffers: Buffers) -> LoopEnd:
         """Run the grasp from a state to its end, as `loop.grasp` does. Raises NotCompilable if numba refuses."""
-        before, plant, total = self._counts if self._machine_code is not None else _counts(progress)
-        numbers = np.empty(total)
+        types = self._types or _types(progress)
+        numbers = np.empty(types.state.count)
         if self._machine_code is not None:
             end = self._machine_code(params, progress, buffers, numbers)
         else:
             with generating(slp_vectorize=self._composition.shape is not None):
                 end = self._compiled(params, progress, buffers, numbers)
-            self._counts, self._machine_code = (before, plant, total), entry_point(self._compiled)
-        return LoopEnd(end, Stored(progress, numbers), Stored(progress.plant, numbers[before:plant]))
+            self._types, self._machine_code = types, entry_point(self._compiled)
+        plant = numbers[types.before_plant : types.before_plant + types.plant.count]
+        return LoopEnd(end, Stored(types.state, numbers), Stored(types.plant, plant))
 
     def __call__(self, params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
         """Return the state at the end of what `run` runs."""
@@ -66,9 +75,8 @@ class CompiledLoop:
         return state
 
 
-def _counts(state: SimulationState) -> tuple[int, int, int]:
-    before, plant = count_numbers(state.loop), count_numbers(state.plant)
-    return before, before + plant, count_numbers(state)
+def _types(state: SimulationState) -> _Types:
+    return _Types(TupleType.of(state), TupleType.of(state.plant), TupleType.of(state.loop).count)
 
 
 @lru_cache(maxsize=64)
