@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, MutableSequence, Sequence
+from itertools import groupby
 from operator import itemgetter
 from typing import Any
 
@@ -17,19 +18,27 @@ class TupleType:
 
     count: int
     """Number of numbers."""
-    _make: Callable[[list[float]], Any]
+    _others: tuple[tuple[int, type], ...]
+    """The place and the type of each number that is no float."""
+    _make: Callable[[list[Any]], Any]
 
     @classmethod
     def of(cls, pattern: Any) -> TupleType:
         """Return the type of these nested tuples; `pattern` may also be a number."""
-        make, count = _maker(pattern, 0)
-        return cls(count, make)
+        leaves: list[Any] = []
+        append_numbers(leaves, pattern)
+        others = tuple((i, type(leaf)) for i, leaf in enumerate(leaves) if type(leaf) is not float)
+        make = _maker(pattern, 0) if isinstance(pattern, tuple) else itemgetter(0)
+        return cls(len(leaves), others, make)
 
     def filled(self, numbers: Sequence[float] | NDArray[np.float64]) -> Any:
         """Return these numbers as nested tuples. Raises ValueError if there are more or fewer than in the type."""
         if len(numbers) != self.count:
             raise ValueError(f"{len(numbers)} numbers for nested tuples of {self.count}")
-        return self._make(numbers.tolist() if isinstance(numbers, np.ndarray) else list(numbers))
+        leaves = numbers.tolist() if isinstance(numbers, np.ndarray) else list(numbers)
+        for i, kind in self._others:
+            leaves[i] = kind(leaves[i])
+        return self._make(leaves)
 
 
 @frozen(eq=False)
@@ -44,22 +53,32 @@ class Stored:
         return self.type.filled(self.numbers)
 
 
-def _maker(pattern: Any, begin: int) -> tuple[Callable[[list[float]], Any], int]:
-    """Return what makes a value of the type of `pattern` of the numbers from `begin` on, and where these end."""
-    kind, end = type(pattern), begin
-    if not isinstance(pattern, tuple):
-        if kind is float:
-            return itemgetter(begin), begin + 1
-        return lambda numbers: kind(numbers[begin]), begin + 1
-    makers = []
-    for part in pattern:
-        make, end = _maker(part, end)
-        makers.append(make)
+def _maker(pattern: tuple[Any, ...], begin: int) -> Callable[[list[Any]], Any]:
+    """Return what makes a tuple of the type of `pattern` of the numbers from `begin` on, in a list of numbers."""
     # `tuple.__new__` makes named tuples in half of the time of their constructors.
-    new = tuple.__new__
-    if all(type(part) is float for part in pattern):
-        return lambda numbers: new(kind, numbers[begin:end]), end
-    return lambda numbers: new(kind, [make(numbers) for make in makers]), end
+    new, kind, makers = tuple.__new__, type(pattern), []
+    at = begin
+    for is_tuple, parts in groupby(pattern, lambda part: isinstance(part, tuple)):
+        for part in parts if is_tuple else [tuple(parts)]:
+            end = at + count_numbers(part)
+            makers.append((at, end, _maker(part, at) if is_tuple else None))
+            at = end
+    if at == begin:
+        # A tuple without numbers is always the same.
+        return lambda numbers: pattern
+    if all(make is None for _, _, make in makers):
+        return lambda numbers: new(kind, numbers[begin:at])
+
+    def made(numbers: list[Any]) -> Any:
+        fields: list[Any] = []
+        for first, last, make in makers:
+            if make is None:
+                fields += numbers[first:last]
+            else:
+                fields.append(make(numbers))
+        return new(kind, fields)
+
+    return made
 
 
 def like(pattern: Any, values: Any) -> Any:
@@ -83,3 +102,8 @@ def append_numbers(to: MutableSequence[float], values: Any) -> None:
                 to.append(value)
     else:
         to.append(values)
+
+
+def count_numbers(values: Any) -> int:
+    """Return the number of numbers in nested tuples."""
+    return sum(map(count_numbers, values)) if isinstance(values, tuple) else 1
