@@ -36,6 +36,9 @@ from graspsense_sim_gripper.stepping.trend import UNKNOWN
 
 FIRST_TICKS: Final = 2
 """Number of ticks in the first macro-step."""
+SHORTEST_ERROR: Final = 8.0
+"""Largest error, relative to the tolerance, of a macro-step of `FIRST_TICKS`. Steps of a tick each, which would take its
+place, are of lower order and less exact (docs/numerics.md, "Steps over several ticks")."""
 MAX_WAIT: Final = 16
 """Most ticks to wait after a macro-step that was not accepted."""
 
@@ -59,12 +62,14 @@ def run_macro_step(
     step = MacroStep(math.inf, 0.0, at.plant, constant_values(at.plant), UNKNOWN)
     # In any other tick the plant has moved since the last macro-step ended.
     trend = now.trend if at.ticks == now.from_tick + 1 else UNKNOWN
-    while n >= FIRST_TICKS and not step.error <= 1.0:
+    accepted = False
+    while n >= FIRST_TICKS and not accepted:
         step = macro_step(params.plant, at.plant, at.effort_n, n * params.dt_s, trend)
-        if not step.error <= 1.0:
+        accepted = step.error <= (SHORTEST_ERROR if n == FIRST_TICKS else 1.0)
+        if not accepted:
             event = event or not step.error < math.inf
-            n = next_ticks(n, step.error, step.event_share)
-    if not step.error <= 1.0:
+            n = _fewer_ticks(n, step)
+    if not accepted:
         wait = min(2 * now.wait, MAX_WAIT)
         return at, MacroControl(FIRST_TICKS, at.ticks + wait, wait, UNKNOWN)
     # A step that an image cut short does not shorten the next one.
@@ -75,6 +80,12 @@ def run_macro_step(
         length = FIRST_TICKS
     trend = step.trend if after.effort_n == at.effort_n else UNKNOWN
     return after, MacroControl(length, after.ticks, 1, trend)
+
+
+def _fewer_ticks(n: int, step: MacroStep) -> int:
+    """Return the number of ticks with which a step of `n` that was not accepted is repeated; less than 2: not at all."""
+    fewer = next_ticks(n, step.error, step.event_share)
+    return max(fewer, FIRST_TICKS) if step.error < math.inf and n > FIRST_TICKS else fewer
 
 
 def _ticks_within(
