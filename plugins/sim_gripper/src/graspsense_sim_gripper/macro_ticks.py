@@ -37,7 +37,7 @@ from graspsense_sim_gripper.stepping.trend import UNKNOWN
 FIRST_TICKS: Final = 2
 """Number of ticks in the first macro-step."""
 SHORTEST_ERROR: Final = 8.0
-"""Largest error, relative to the tolerance, of a macro-step of `FIRST_TICKS`. Steps of a tick each, which would take its
+"""Largest error, relative to the tolerance, of a macro-step of `FIRST_TICKS`. Two steps of a tick, which would take its
 place, are of lower order and less exact (docs/numerics.md, "Steps over several ticks")."""
 MAX_WAIT: Final = 16
 """Most ticks to wait after a macro-step that was not accepted."""
@@ -83,7 +83,7 @@ def run_macro_step(
 
 
 def _fewer_ticks(n: int, step: MacroStep) -> int:
-    """Return the number of ticks with which a step of `n` that was not accepted is repeated; less than 2: not at all."""
+    """Return the number of ticks with which a step of `n` that was not accepted is repeated; below 2: not at all."""
     fewer = next_ticks(n, step.error, step.event_share)
     return max(fewer, FIRST_TICKS) if step.error < math.inf and n > FIRST_TICKS else fewer
 
