@@ -169,6 +169,12 @@ def _no_macro_steps(
     return at, now
 
 
+def _no_exact_ticks(
+    params: GraspParams, at: LoopProgress, pads: Pads, columns: Table, phases: Any
+) -> LoopProgress:
+    return at
+
+
 def _every_tick(
     params: GraspParams, at: LoopProgress, frame: Frame, columns: Table, phases: Any
 ) -> LoopProgress:
@@ -187,6 +193,8 @@ move: Callable[[PlantModel, PlantState, float, float], PlantState] = move_unboun
 control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = control_unbound
 run_macro_step: Callable[..., tuple[LoopProgress, MacroControl]] = _no_macro_steps
 """`macro_ticks.run_macro_step` where a step may last several ticks."""
+run_exact_ticks: Callable[[GraspParams, LoopProgress, Pads, Table, Any], LoopProgress] = _no_exact_ticks
+"""`exact_ticks.exact_ticks` where exact discretisation advances the plant."""
 run_approach_ticks: Callable[[GraspParams, LoopProgress, Frame, Table, Any], LoopProgress] = _every_tick
 """`approach.approach_ticks`, in the interpreter `free_ticks.approach_or_free_ticks`, where ticks are run at once."""
 
@@ -239,6 +247,15 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
             ticks, recorded, effort, plant, sensor, state = at
             if state.done == 1 or state.guard.stopped == 1:
                 break
+        if phase >= APPROACH and same_phase:
+            at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
+            at = run_exact_ticks(params, at, pads, columns, buffers.phases)
+            ticks, recorded, effort, plant, sensor, state = at
+            if state.phase != phase:
+                phase, tare_from = state.phase, count
+            if state.done == 1 or state.guard.stopped == 1:
+                break
+            before = ticks
         if ticks == before:
             # Keeping the plant before the tick as well would cost compiled code a sixth of its time.
             plant = move(params.plant, plant, effort, dt_s)

@@ -25,7 +25,8 @@ from graspsense_sim_gripper.dynamics.contact import (
 )
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, Past, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
-from graspsense_sim_gripper.exact.propagate import bind_move
+from graspsense_sim_gripper.exact.propagate import bind_move, exact_parts
+from graspsense_sim_gripper.exact_ticks import exact_ticks
 from graspsense_sim_gripper.free_ticks import approach_or_free_ticks, free_ticks
 from graspsense_sim_gripper.loop import GraspParams, LoopProgress, SimulationState, grasp
 from graspsense_sim_gripper.macro_ticks import run_macro_step
@@ -408,6 +409,9 @@ def _loop_of(
                 if force
                 else bind_reachable(approach_ticks, law)
             )
+    if composition.shape is not None and not composition.has_palm:
+        own = {"control": control, **exact_parts(composition.kinds, composition.shape)}
+        parts["run_exact_ticks"] = bind_reachable(exact_ticks, own)
     if composition.has_palm:
         parts |= {"further_signals": palm_signals, "keep_signals": keep_samples}
     loop = bind_reachable(grasp, parts)
