@@ -437,28 +437,31 @@ def _event_possible(params: ExactPlant, index: int, peak_n: float, dt: float) ->
     """Return whether, inside a tick, a guard may be negative or the force above `peak_n`, although not at its end.
 
     The outputs inside the tick differ from Y0 by no more than the bounds (see `bounds`). The direct bound is evaluated
-    first, and the modal one only if the direct one does not exclude an event.
+    first, and the modal one only if the direct one does not exclude an event. The peak needs neither if the rates of
+    the force at both ends agree with its mean rate: it does not oscillate in between then.
     """
     tables, ws = params.tables, params.workspace
+    force0, force1 = ws[Y0 + FORCE], ws[X1 + N_STATES + FORCE]
+    rise = force1 - force0
+    uneven = max(abs(ws[Y0 + FORCE_RATE] * dt - rise), abs(ws[X1 + N_STATES + FORCE_RATE] * dt - rise))
+    exceeded = (1.0 + PEAK_TOL) * max(peak_n, force1)
+    peak_excluded = max(force0, force1) + uneven <= exceeded
     bound_directly(tables.direct_bound, index * OUTPUT_ROWS * N_STATES, ws)
-    exceeded = (1.0 + PEAK_TOL) * max(peak_n, ws[X1 + N_STATES + FORCE])
-    possible = not ws[Y0 + FORCE] + ws[BOUND + FORCE] <= exceeded
-    for k in range(N_GUARDS):
-        if not ws[BOUND + FIRST_GUARD + k] <= ws[Y0 + FIRST_GUARD + k]:
-            possible = True
-    if not possible:
+    if _is_excluded(ws, peak_excluded, exceeded):
         return False
     project_change(tables.modal_projection, index * PROJECTION_ROWS * N_STATES, ws)
     bound_by_modes(tables.modal_bound, 2 * index * OUTPUT_ROWS * N_STATES, ws)
+    return not _is_excluded(ws, peak_excluded, exceeded)
+
+
+def _is_excluded(ws: Table, peak_excluded: bool, exceeded_n: float) -> bool:
+    """Return whether the bounds exclude that a guard is negative, and that the force is above `exceeded_n`."""
+    excluded = peak_excluded or ws[Y0 + FORCE] + ws[BOUND + FORCE] <= exceeded_n
     for k in range(N_GUARDS):
+        # False for NaN too.
         if not ws[BOUND + FIRST_GUARD + k] <= ws[Y0 + FIRST_GUARD + k]:
-            return True
-    if ws[Y0 + FORCE] + ws[BOUND + FORCE] <= exceeded:
-        return False
-    # If the rates at both ends agree with the mean rate, the force does not oscillate in between.
-    rise = ws[X1 + N_STATES + FORCE] - ws[Y0 + FORCE]
-    uneven = max(abs(ws[Y0 + FORCE_RATE] * dt - rise), abs(ws[X1 + N_STATES + FORCE_RATE] * dt - rise))
-    return not max(ws[Y0 + FORCE], ws[X1 + N_STATES + FORCE]) + uneven <= exceeded
+            excluded = False
+    return excluded
 
 
 def locate_events(params: ExactPlant, mode: Mode, touched: int, peak_n: float, dt: float) -> TickResult:
