@@ -1,4 +1,8 @@
-"""The ticks of an exactly discretised plant in one mode, run at once: in each the sensors, the controller and the plant."""
+"""Ticks of an exactly discretised plant, run at once while it stays in one mode and the controller in one phase.
+
+In each of them the sensors are read, the controller is called and a row is recorded, as tick by tick, but the state of
+the plant remains in the workspace of `exact.run`. The results are the same to the bit.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ from typing import Any
 
 from graspsense.plugin_api import Command, Pads, Reading, TickParams, TickState
 from graspsense_sim_gripper.dynamics.state import PlantReadings
-from graspsense_sim_gripper.exact.run import NO_RUN, begin_run, end_run, run_tick
+from graspsense_sim_gripper.exact.run import begin_run, end_run, run_tick
 from graspsense_sim_gripper.loop import (
     EVENT_SHIFT,
     NOT_NEGATIVE,
@@ -26,30 +30,30 @@ control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] =
 def exact_ticks(
     params: GraspParams, at: LoopProgress, pads: Pads, columns: Table, phases: Any
 ) -> LoopProgress:
-    """Run ticks until an event may be within the next one, an image is due, or the phase changes; return the grasp then.
+    """Run ticks up to one in which the mode may end or an image is due, or in which the phase or the grasp has ended.
 
     `at` and the result are in a tick, after the controller and before the plant moves. `pads` is the last cell image.
     """
     dt_s, exact = params.dt_s, params.plant
     ticks, recorded, effort, plant, sensor, state = at
-    image_s, phase, begun = next_image_s(params.sensor, sensor), state.phase, ticks
-    most = min(params.max_ticks, ticks + len(columns[0]) - ROWS_AT_ONCE - recorded)
-    run = begin_run(exact, plant, effort)
-    # TODO
-    while run.index != NO_RUN and ticks < most and ticks * dt_s < image_s:
-        quiet, run = run_tick(exact, run, effort, dt_s)
-        if not quiet:
+    first, phase, image_s = ticks, state.phase, next_image_s(params.sensor, sensor)
+    until = min(params.max_ticks, ticks + len(columns[0]) - ROWS_AT_ONCE - recorded)
+    going, run = begin_run(exact, plant, effort)
+    while going and ticks < until and ticks * dt_s < image_s:
+        going, run = run_tick(exact, run, effort, dt_s)
+        if not going:
             break
+        t_s = ticks * dt_s
         measured = PlantReadings(run.motion, run.force_n, run.force_n)
-        frame, sensor = read_frame(params.sensor, sensor, measured, ticks * dt_s, dt_s, effort)
+        frame, sensor = read_frame(params.sensor, sensor, measured, t_s, dt_s, effort)
         command, state = control(params.controller, state, Reading(frame, pads, ()))
         effort = command.value
         row = recorded & NOT_NEGATIVE
         record(columns, row, frame, effort)
         phases[row] = state.phase | state.events << EVENT_SHIFT
         recorded, ticks = recorded + 1, ticks + 1
-        if state.phase != phase or state.done == 1 or state.guard.stopped == 1:
-            break
-    if ticks == begun:
+        going = state.phase == phase and state.done == 0 and state.guard.stopped == 0
+    if ticks == first:
         return at
-    return LoopProgress(ticks, recorded, effort, end_run(exact, plant, run, ticks - begun), sensor, state)
+    plant = end_run(exact, plant, run, ticks - first)
+    return LoopProgress(ticks, recorded, effort, plant, sensor, state)

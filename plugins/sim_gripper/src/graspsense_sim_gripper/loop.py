@@ -240,14 +240,7 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
         ticks += 1
         if state.done == 1 or state.guard.stopped == 1:
             break
-        before, constant = ticks, effort == last_effort and same_phase and phase >= APPROACH
-        if params.macro_steps == 1 and constant and ticks >= macro.from_tick:
-            at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
-            at, macro = run_macro_step(params, at, macro, pads, columns, buffers.phases)
-            ticks, recorded, effort, plant, sensor, state = at
-            if state.done == 1 or state.guard.stopped == 1:
-                break
-        if phase >= APPROACH and same_phase:
+        if same_phase and phase >= APPROACH:
             at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
             at = run_exact_ticks(params, at, pads, columns, buffers.phases)
             ticks, recorded, effort, plant, sensor, state = at
@@ -255,7 +248,13 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
                 phase, tare_from = state.phase, count
             if state.done == 1 or state.guard.stopped == 1:
                 break
-            before = ticks
+        before, constant = ticks, effort == last_effort and same_phase and phase >= APPROACH
+        if params.macro_steps == 1 and constant and ticks >= macro.from_tick:
+            at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
+            at, macro = run_macro_step(params, at, macro, pads, columns, buffers.phases)
+            ticks, recorded, effort, plant, sensor, state = at
+            if state.done == 1 or state.guard.stopped == 1:
+                break
         if ticks == before:
             # Keeping the plant before the tick as well would cost compiled code a sixth of its time.
             plant = move(params.plant, plant, effort, dt_s)

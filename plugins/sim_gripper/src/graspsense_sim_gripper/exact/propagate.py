@@ -360,10 +360,9 @@ def store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_o
     pad_m, branch_n = before.pad_m, before.branch_n
     if PAD_STATES == 1:
         pad_m, branch_n = ws[X1 + 3], ws[X1 + 4]
+    compression = ws[X1] if touched == 1 else 0.0
     if SEPARABLE == 1:
         compression = ws[X1 + 2]
-    else:
-        compression = ws[X1] if touched == 1 else 0.0
     states, _ = unpack(model.terms, before.states, ws, X1 + TERM_STATES)
     left = ContactState(
         compression,
