@@ -50,7 +50,9 @@ class TraceMemory:
                 self._pages.popleft()
             self._pages.append(page)
             self._left = list(page)
-        return self._left.pop()
+        columns, phases = self._left.pop()
+        # A tuple of its own, so that whoever holds it references the arrays.
+        return columns, phases
 
 
 def _is_free(page: tuple[TraceArrays, ...]) -> bool:
