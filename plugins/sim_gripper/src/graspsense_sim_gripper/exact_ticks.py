@@ -18,6 +18,7 @@ from graspsense_sim_gripper.loop import (
     ROWS_AT_ONCE,
     GraspParams,
     LoopProgress,
+    MacroControl,
     Table,
     control_unbound,
     record,
@@ -28,11 +29,12 @@ control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] =
 
 
 def exact_ticks(
-    params: GraspParams, at: LoopProgress, pads: Pads, columns: Table, phases: Any
-) -> LoopProgress:
+    params: GraspParams, at: LoopProgress, now: MacroControl, pads: Pads, columns: Table, phases: Any
+) -> tuple[LoopProgress, MacroControl]:
     """Run ticks up to one in which the mode may end or an image is due, or in which the phase or the grasp has ended.
 
     `at` and the result are in a tick, after the controller and before the plant moves. `pads` is the last cell image.
+    `now` is returned as it is.
     """
     dt_s, exact = params.dt_s, params.plant
     ticks, recorded, effort, plant, sensor, state = at
@@ -54,6 +56,6 @@ def exact_ticks(
         recorded, ticks = recorded + 1, ticks + 1
         going = state.phase == phase and state.done == 0 and state.guard.stopped == 0
     if ticks == first:
-        return at
+        return at, now
     plant = end_run(exact, plant, run, ticks - first)
-    return LoopProgress(ticks, recorded, effort, plant, sensor, state)
+    return LoopProgress(ticks, recorded, effort, plant, sensor, state), now

@@ -403,7 +403,7 @@ def _loop_of(
     parts: dict[str, Any] = {"move": move, "control": control}
     if _takes_steps(composition):
         own = {"move": move, "control": control, **step_parts(composition)}
-        parts["run_macro_step"] = bind_reachable(run_macro_step, own)
+        parts["run_ticks"] = bind_reachable(run_macro_step, own)
         if law := free_parts(step):
             glides = {"can_glide": can_glide, "glide": glide}
             parts["run_approach_ticks"] = (
@@ -413,7 +413,7 @@ def _loop_of(
             )
     if composition.shape is not None and not composition.has_palm:
         own = {"control": control, **exact_parts(composition.kinds, composition.shape)}
-        parts["run_exact_ticks"] = bind_reachable(exact_ticks, own, INTERPRETED if force else None)
+        parts["run_ticks"] = bind_reachable(exact_ticks, own, INTERPRETED if force else None)
     if composition.has_palm:
         parts |= {"further_signals": palm_signals, "keep_signals": keep_samples}
     loop = bind_reachable(grasp, parts)
