@@ -8,7 +8,14 @@ from typing import Any
 from graspsense.plugin_api import CALLED, TARING, Frame, after_free, free_from, free_tick
 from graspsense_sim_gripper.approach import approach_ticks
 from graspsense_sim_gripper.dynamics.state import Contact, Motion, PlantState
-from graspsense_sim_gripper.loop import NOT_NEGATIVE, GraspParams, LoopProgress, PlantModel, Table
+from graspsense_sim_gripper.loop import (
+    MACRO_STEPS,
+    NOT_NEGATIVE,
+    GraspParams,
+    LoopProgress,
+    PlantModel,
+    Table,
+)
 from graspsense_sim_gripper.sensing import moved_sensor, next_image_s, sense_motion
 from graspsense_sim_gripper.stepping.coast import glided
 
@@ -89,6 +96,6 @@ def approach_or_free_ticks(
     params: GraspParams, at: LoopProgress, frame: Frame, columns: Table, phases: Any
 ) -> LoopProgress:
     """Run what compiled code does: `approach_ticks` where steps may last several ticks, otherwise `free_ticks`."""
-    if params.macro_steps == 1:
+    if params.macro_steps == MACRO_STEPS:
         return approach_ticks(params, at, frame, columns, phases)
     return free_ticks(params, at, frame, columns, phases)

@@ -51,6 +51,9 @@ Table = Any
 """Rows of numbers: an array in compiled code, a list of lists in the interpreter."""
 
 
+MACRO_STEPS, EXACT_TICKS = 1, 2
+
+
 class GraspParams(NamedTuple):
     """The constants of a grasp."""
 
@@ -62,8 +65,8 @@ class GraspParams(NamedTuple):
     palm: Any = ()
     """`PalmParams`; () without an accelerometer."""
     macro_steps: int = 0
-    """1: steps of the plant may last several ticks (`macro_ticks`), and the ticks of an approach are run at once
-    (`approach`)."""
+    """MACRO_STEPS: steps of the plant may last several ticks (`macro_ticks`), and the ticks of an approach are run at
+    once (`approach`). EXACT_TICKS: ticks of an exactly discretised plant are (`exact_ticks`)."""
 
 
 class MacroControl(NamedTuple):
@@ -81,7 +84,9 @@ class MacroControl(NamedTuple):
 
 def uses_macro_steps(exact: Any, steps: Steps) -> int:
     """Return `GraspParams.macro_steps` for a plant with these steps; `exact`: its exact discretisation, or None."""
-    return 1 if exact is None and steps.macro_tolerance > 0.0 else 0
+    if exact is not None:
+        return EXACT_TICKS
+    return MACRO_STEPS if steps.macro_tolerance > 0.0 else 0
 
 
 class LoopState(NamedTuple):
@@ -191,7 +196,7 @@ def _no_signals(
     return (), state
 
 
-def _no_macro_steps(
+def _no_ticks(
     params: GraspParams, at: LoopProgress, now: MacroControl, pads: Pads, columns: Table, phases: Any
 ) -> tuple[LoopProgress, MacroControl]:
     return at, now
@@ -213,8 +218,9 @@ keep_signals: Callable[[Any, Any, int], None] = _keep_nothing
 """What records them: `palm.keep_samples` of a gripper with an accelerometer."""
 move: Callable[[PlantModel, PlantState, float, float], PlantState] = move_unbound
 control: Callable[[TickParams, TickState, Reading], tuple[Command, TickState]] = control_unbound
-run_macro_step: Callable[..., tuple[LoopProgress, MacroControl]] = _no_macro_steps
-"""`macro_ticks.run_macro_step` where a step may last several ticks."""
+run_ticks: Callable[..., tuple[LoopProgress, MacroControl]] = _no_ticks
+"""`macro_ticks.run_macro_step` where a step may last several ticks, after which the plant has moved in all of them;
+`exact_ticks.exact_ticks` where exact discretisation advances the plant, which has not moved in the last of them yet."""
 run_approach_ticks: Callable[[GraspParams, LoopProgress, Frame, Table, Any], LoopProgress] = _every_tick
 """`approach.approach_ticks`, in the interpreter `free_ticks.approach_or_free_ticks`, where ticks are run at once."""
 
@@ -260,14 +266,14 @@ def grasp(params: GraspParams, progress: SimulationState, buffers: Buffers) -> S
         ticks += 1
         if state.done == 1 or state.guard.stopped == 1:
             break
-        before, constant = ticks, effort == last_effort and same_phase and phase >= APPROACH
-        if params.macro_steps == 1 and constant and ticks >= macro.from_tick:
+        before, suits = ticks, effort == last_effort or params.macro_steps == EXACT_TICKS
+        if params.macro_steps > 0 and suits and same_phase and phase >= APPROACH and ticks >= macro.from_tick:
             at = LoopProgress(ticks, recorded, effort, plant, sensor, state)
-            at, macro = run_macro_step(params, at, macro, pads, columns, buffers.phases)
+            at, macro = run_ticks(params, at, macro, pads, columns, buffers.phases)
             ticks, recorded, effort, plant, sensor, state = at
             if state.done == 1 or state.guard.stopped == 1:
                 break
-        if ticks == before:
+        if ticks == before or params.macro_steps == EXACT_TICKS:
             # Keeping the plant before the tick as well would cost compiled code a sixth of its time.
             plant = move(params.plant, plant, effort, dt_s)
         if not is_finite(plant):

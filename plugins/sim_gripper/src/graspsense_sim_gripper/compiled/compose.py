@@ -25,7 +25,9 @@ from graspsense_sim_gripper.dynamics.contact import (
 )
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, Past, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
-from graspsense_sim_gripper.exact.propagate import bind_move
+from graspsense_sim_gripper.exact.propagate import Mode, bind_move, exact_parts
+from graspsense_sim_gripper.exact.run import Run
+from graspsense_sim_gripper.exact_ticks import exact_ticks
 from graspsense_sim_gripper.free_ticks import approach_or_free_ticks, free_ticks
 from graspsense_sim_gripper.loop import GraspParams, LoopProgress, SimulationState, grasp
 from graspsense_sim_gripper.macro_ticks import run_macro_step
@@ -57,6 +59,7 @@ INTERPRETED: Final[Constructors] = {
     for kind in (
         *(PlantState, Motion, Contact, ContactState, Past, StepState, SensorState, Frame),
         *(Start, Attempt, SpeedSearch, Stage, PadLoad, BalanceSearch),
+        *(Mode, Run),
     )
 }
 """The named tuples that a tick creates, each with a constructor that takes the interpreter half the time."""
@@ -400,7 +403,7 @@ def _loop_of(
     parts: dict[str, Any] = {"move": move, "control": control}
     if _takes_steps(composition):
         own = {"move": move, "control": control, **step_parts(composition)}
-        parts["run_macro_step"] = bind_reachable(run_macro_step, own)
+        parts["run_ticks"] = bind_reachable(run_macro_step, own)
         if law := free_parts(step):
             glides = {"can_glide": can_glide, "glide": glide}
             parts["run_approach_ticks"] = (
@@ -408,6 +411,9 @@ def _loop_of(
                 if force
                 else bind_reachable(approach_ticks, law)
             )
+    if composition.shape is not None and not composition.has_palm:
+        own = {"control": control, **exact_parts(composition.kinds, composition.shape)}
+        parts["run_ticks"] = bind_reachable(exact_ticks, own, INTERPRETED if force else None)
     if composition.has_palm:
         parts |= {"further_signals": palm_signals, "keep_signals": keep_samples}
     loop = bind_reachable(grasp, parts)

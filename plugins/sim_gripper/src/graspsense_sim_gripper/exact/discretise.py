@@ -18,31 +18,43 @@ from graspsense_sim_gripper.terms.lumped import linear as lumped_form
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import LinearForm, OwnContact, TermParams
 
+Forms = list[tuple[str, LinearForm | OwnContact | None]]
+"""The kind and the linear form of each term; None as the form: not linear."""
+
 
 def why_not_exact(config: SimConfig, setup: GraspSetup) -> str:
     """Return the reason why exact discretisation does not apply to a grasp, or an empty string if it applies.
 
+    Raises TypeError if the linear form of a term has another number of states than its law.
+    """
+    return _why_not_exact_or_tables(config, setup, on_arrays=True)[0]
+
+
+def _why_not_exact_or_tables(
+    config: SimConfig, setup: GraspSetup, *, on_arrays: bool
+) -> tuple[str, tuple[Shape, Tables] | None]:
+    """Return the reason of `why_not_exact`, and the shape and the tables if there is none.
+
     This is the only place that decides between time steps and the matrix exponential. Time steps are prescribed by the
-    settings, by a level of reduction that divides each tick, and by the fidelity `reference`. Raises TypeError if the
-    linear form of a term has another number of states than its law.
+    settings, by a level of reduction that divides each tick, and by the fidelity `reference`.
     """
     drive, model, steps = setup.plant.drive, setup.plant.object, setup.plant.steps
     if config.has_forced_steps or steps.longest_s < math.inf or steps.settle > 0.0:
-        return "the scheme or the length of its steps is prescribed"
+        return "the scheme or the length of its steps is prescribed", None
     if drive.link.finger_m != 0.0:
-        return "the ratio of the linkage varies with the gap"
+        return "the ratio of the linkage varies with the gap", None
     if drive.friction.breakaway_n != drive.friction.coulomb_n:
-        return "friction is greater at rest than while sliding"
+        return "friction is greater at rest than while sliding", None
     if model.held == 1 and setup.state.contact.offset_m != 0.0:
-        return "the object is held off the centre line, so that each half would have modes of its own"
+        return "the object is held off the centre line, so that each half would have modes of its own", None
     if model.pads.hardening_m < math.inf and model.pads.stiffness_n_m < math.inf:
-        return "the pads are not linear"
-    nonlinear = [kind for kind, form in _forms(setup) if form is None]
+        return "the pads are not linear", None
+    forms = _forms(setup)
+    nonlinear = [kind for kind, form in forms if form is None]
     if nonlinear:
-        return f"terms are not linear: {', '.join(nonlinear)}"
-    if _tables(setup, on_arrays=True) is None:
-        return "the forces leave the motion of a mode undetermined"
-    return ""
+        return f"terms are not linear: {', '.join(nonlinear)}", None
+    found = _tables(setup, forms, on_arrays=on_arrays)
+    return ("" if found is not None else "the forces leave the motion of a mode undetermined"), found
 
 
 def discretise(
@@ -53,18 +65,17 @@ def discretise(
     `on_arrays`: store the matrices in arrays, for compiled code; otherwise in lists, which the interpreter indexes
     faster. Raises TypeError as `why_not_exact` does.
     """
-    if why_not_exact(config, setup):
+    _, found = _why_not_exact_or_tables(config, setup, on_arrays=on_arrays)
+    if found is None:
         return None
-    found = _tables(setup, on_arrays=on_arrays)
-    assert found is not None
     shape, tables = found
     size = workspace_size(shape)
     workspace: Any = np.zeros(size) if on_arrays else [0.0] * size
     return ExactPlant(setup.plant, tables, workspace), shape
 
 
-def _tables(setup: GraspSetup, *, on_arrays: bool) -> tuple[Shape, Tables] | None:
-    """Return the matrices of a grasp whose terms are all linear; None as `tables_of`."""
+def _tables(setup: GraspSetup, forms: Forms, *, on_arrays: bool) -> tuple[Shape, Tables] | None:
+    """Return the matrices of a grasp whose terms have these linear forms; None as `tables_of`."""
     drive, model = setup.plant.drive, setup.plant.object
     scene = LinearScene(
         drive.inertia / setup.state.motion.jacobian_m_rev**2,
@@ -73,18 +84,18 @@ def _tables(setup: GraspSetup, *, on_arrays: bool) -> tuple[Shape, Tables] | Non
         drive.friction.load_friction_coefficient,
         drive.lag_s,
         model.pads,
-        tuple(form for _, form in _forms(setup) if form is not None),
+        tuple(form for _, form in forms if form is not None),
     )
     return tables_of(scene, setup.dt_s) if on_arrays else listed_tables_of(scene, setup.dt_s)
 
 
-def _forms(setup: GraspSetup) -> list[tuple[str, LinearForm | OwnContact | None]]:
+def _forms(setup: GraspSetup) -> Forms:
     """Return the kind and the linear form of each term that the model keeps; None as the form: not linear.
 
     The lumped spring and damper comes first, with an empty kind.
     """
     lumped, *terms = setup.plant.object.terms
-    forms: list[tuple[str, LinearForm | OwnContact | None]] = []
+    forms: Forms = []
     if lumped.active == 1:
         forms.append(("", lumped_form(lumped.params)))
     forms += [

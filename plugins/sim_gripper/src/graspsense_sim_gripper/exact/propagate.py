@@ -106,6 +106,14 @@ def bind_move(
 
     `step_move` advances the plant by time steps in ticks to which exact discretisation does not apply.
     """
+    bound_move: Callable[[Any, PlantState, float, float], PlantState] = bind_reachable(
+        move, {**exact_parts(kinds, shape), "step_move": step_move}
+    )
+    return bound_move
+
+
+def exact_parts(kinds: Sequence[str], shape: Shape) -> dict[str, Any]:
+    """Return what the functions of this module read for an object with terms of these kinds and modes of this shape."""
     constants = _constants(shape)
     n, n_outputs = shape.n_states, padded(FIRST_GUARD + shape.n_guards)
     x0, x1, y0, bound, dx = (constants[name] for name in VECTORS)
@@ -120,9 +128,7 @@ def bind_move(
     pack, unpack = term_state_functions(kinds)
     # Only the products read DX.
     parts: dict[str, Any] = {name: place for name, place in constants.items() if name != "DX"}
-    parts |= {**products, "pack": pack, "unpack": unpack, "step_move": step_move}
-    bound_move: Callable[[Any, PlantState, float, float], PlantState] = bind_reachable(move, parts)
-    return bound_move
+    return parts | {**products, "pack": pack, "unpack": unpack}
 
 
 def cold_calls(function: Callable[..., Any]) -> tuple[str, ...]:
@@ -241,14 +247,11 @@ def propagate(params: ExactPlant, state: PlantState, effort_n: float, dt: float)
     """
     contact, drive = state.contact, params.plant.drive
     at_open_end = state.motion.revolutions >= drive.open_rev and effort_n <= 0.0
-    if (
-        (at_open_end and (LAGS == 1 or state.motion.speed_rev_s != 0.0 or contact.left.force_n > 0.0))
-        or contact.offset_m != 0.0
-        or contact.left_n != contact.right_n
-        or contact.pending_s > 0.0
+    if not is_centred(contact) or (
+        at_open_end and (LAGS == 1 or state.motion.speed_rev_s != 0.0 or contact.left.force_n > 0.0)
     ):
         return False, state
-    mode = _load(params, state, 0.0 if at_open_end else effort_n)
+    mode = load(params, state, 0.0 if at_open_end else effort_n)
     if no_event(params, mode, state.peak_n, dt):
         peak_n = max(state.peak_n, params.workspace[X1 + N_STATES + FORCE])
         result = TickResult(mode.compressed, contact.touched, peak_n, 0)
@@ -257,35 +260,45 @@ def propagate(params: ExactPlant, state: PlantState, effort_n: float, dt: float)
     return _store(params, state, result, at_open_end)
 
 
-def _load(params: ExactPlant, state: PlantState, effort_n: float) -> Mode:
+def is_centred(contact: Contact) -> bool:
+    """Return whether the object is on the centre line, both pads carry the same force, and no recovery is pending."""
+    return contact.offset_m == 0.0 and contact.left_n == contact.right_n and not contact.pending_s > 0.0
+
+
+def load(params: ExactPlant, state: PlantState, effort_n: float) -> Mode:
     """Write the state to X0, and return the mode. Its closed contacts of terms are a guess that the guards correct."""
-    drive, model, ws = params.plant.drive, params.plant.object, params.workspace
-    left = state.contact.left
-    closure = model.width_m - state.motion.gap_m
-    ws[X0] = closure
-    ws[X0 + 1] = -state.motion.speed_rev_s * state.motion.jacobian_m_rev
-    compressed = 1
+    model, ws, left = params.plant.object, params.workspace, state.contact.left
     if SEPARABLE == 1:
-        compression, pad = left.compression_m, 0.0
-        if PAD_STATES == 1:
-            pad = left.pad_m
-            ws[X0 + 3], ws[X0 + 4] = pad, left.branch_n
-        if left.force_n <= 0.0 and closure - compression - pad < -GAP_TOL_M:
-            compressed = 0
-        elif model.pads.stiffness_n_m == math.inf:
-            compression = closure
-        ws[X0 + 2] = compression
+        ws[X0 + 2] = left.compression_m
+    if PAD_STATES == 1:
+        ws[X0 + 3], ws[X0 + 4] = left.pad_m, left.branch_n
     pack(model.terms, left.states, ws, X0 + TERM_STATES)
     ws[X0 + N_STATES] = effort_n
     if LAGS == 1:
         ws[X0 + N_STATES - 1] = state.effort_n
+    if N_MOTIONS == 3:
+        ws[X0 + N_STATES + 1] = params.plant.drive.friction.coulomb_n
+    return load_motion(params, state.motion, left.force_n)
+
+
+def load_motion(params: ExactPlant, moved: Motion, force_n: float) -> Mode:
+    """Write the motion to X0, where the other states are, and return the mode, given the force on a pad."""
+    model, ws = params.plant.object, params.workspace
+    closure = model.width_m - moved.gap_m
+    ws[X0] = closure
+    ws[X0 + 1] = -moved.speed_rev_s * moved.jacobian_m_rev
+    compressed = 1
+    if SEPARABLE == 1:
+        pad = ws[X0 + 3] if PAD_STATES == 1 else 0.0
+        if force_n <= 0.0 and closure - ws[X0 + 2] - pad < -GAP_TOL_M:
+            compressed = 0
+        elif model.pads.stiffness_n_m == math.inf:
+            ws[X0 + 2] = closure
     motion = STUCK
     at_rest = ws[X0 + 1] == 0.0
-    if N_MOTIONS == 3:
-        ws[X0 + N_STATES + 1] = drive.friction.coulomb_n
-        if not at_rest:
-            motion = CLOSING if ws[X0 + 1] > 0.0 else OPENING
-    contacts = (1 << N_CONTACTS) - 1 if left.force_n > 0.0 else 0
+    if N_MOTIONS == 3 and not at_rest:
+        motion = CLOSING if ws[X0 + 1] > 0.0 else OPENING
+    contacts = (1 << N_CONTACTS) - 1 if force_n > 0.0 else 0
     return Mode(compressed, motion, contacts, at_rest)
 
 
@@ -293,20 +306,26 @@ def _store(
     params: ExactPlant, state: PlantState, result: TickResult, at_open_end: bool
 ) -> tuple[bool, PlantState]:
     """Return whether the fingers are within their travel, and the plant with the state in X1."""
+    within, motion = moved(params, state.motion, at_open_end)
+    if not within:
+        return False, state
+    contact = store_contact(params, state.contact, result, at_open_end)
+    unresolved = state.step.unresolved + (1 if result.n_events >= MAX_EVENTS else 0)
+    step = StepState(state.step.next_s, state.step.n_steps + 1, unresolved)
+    effort_n = params.workspace[X1 + N_STATES - 1] if LAGS == 1 else state.effort_n
+    return True, PlantState(motion, contact, step, effort_n, result.peak_n)
+
+
+def moved(params: ExactPlant, motion: Motion, at_open_end: bool) -> tuple[bool, Motion]:
+    """Return whether the fingers are within their travel at X1, and their motion there; `motion`: that before."""
     drive, ws = params.plant.drive, params.workspace
-    revolutions, _, gap, jacobian = state.motion
+    revolutions, _, gap, jacobian = motion
     closed_by = ws[X1] - (params.plant.object.width_m - gap)
     # The next tick depends on this, and a product is available sooner than a quotient.
     rev_per_m = 1.0 / jacobian
     revolutions1 = revolutions - closed_by * rev_per_m
-    if not (drive.closed_rev < revolutions1 < drive.open_rev or (at_open_end and closed_by == 0.0)):
-        return False, state
-    motion = Motion(revolutions1, -ws[X1 + 1] * rev_per_m, gap - closed_by, jacobian)
-    contact = _store_contact(params, state.contact, result, at_open_end)
-    unresolved = state.step.unresolved + (1 if result.n_events >= MAX_EVENTS else 0)
-    step = StepState(state.step.next_s, state.step.n_steps + 1, unresolved)
-    effort_n = ws[X1 + N_STATES - 1] if LAGS == 1 else state.effort_n
-    return True, PlantState(motion, contact, step, effort_n, result.peak_n)
+    within = drive.closed_rev < revolutions1 < drive.open_rev or (at_open_end and closed_by == 0.0)
+    return within, Motion(revolutions1, -ws[X1 + 1] * rev_per_m, gap - closed_by, jacobian)
 
 
 def _both_same(right: Halves, left: ContactState) -> Halves:
@@ -315,26 +334,35 @@ def _both_same(right: Halves, left: ContactState) -> Halves:
     return (left,)
 
 
-def _store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_open_end: bool) -> Contact:
+def pad_force_n(ws: Table, compressed: int) -> float:
+    """Return the force on a pad at X1 (N)."""
+    # A mode that is entered at the very end of the tick has not acted yet.
+    return max(ws[X1 + N_STATES + FORCE], 0.0) if compressed == 1 else 0.0
+
+
+def touched_after(params: ExactPlant, compressed: int, touched: int, at_open_end: bool) -> int:
+    """Return `Contact.touched` at X1, given that before."""
+    ws = params.workspace
+    if SEPARABLE == 0:
+        return 1 if ws[X1] >= 0.0 else touched
+    if compressed == 1:
+        return 1
+    pad_m = ws[X1 + 3] if PAD_STATES == 1 else 0.0
+    in_shape = ws[X1] < 0.0 and abs(ws[X1 + 2]) + abs(pad_m) <= RECOVERED_M
+    return 0 if in_shape and (not at_open_end or params.plant.object.overshoots == 0) else touched
+
+
+def store_contact(params: ExactPlant, contact: Contact, result: TickResult, at_open_end: bool) -> Contact:
     """Return the contact with the state of the object and the forces on the pads in X1."""
     model, ws, before = params.plant.object, params.workspace, contact.left
-    # A mode that is entered at the very end of the tick has not acted yet.
-    force = max(ws[X1 + N_STATES + FORCE], 0.0) if result.compressed == 1 else 0.0
-    touched, closure = result.touched, ws[X1]
+    force = pad_force_n(ws, result.compressed)
+    touched = touched_after(params, result.compressed, result.touched, at_open_end)
     pad_m, branch_n = before.pad_m, before.branch_n
     if PAD_STATES == 1:
         pad_m, branch_n = ws[X1 + 3], ws[X1 + 4]
+    compression = ws[X1] if touched == 1 else 0.0
     if SEPARABLE == 1:
         compression = ws[X1 + 2]
-        in_shape = closure < 0.0 and abs(compression) + abs(pad_m) <= RECOVERED_M
-        if result.compressed == 1:
-            touched = 1
-        elif in_shape and (not at_open_end or model.overshoots == 0):
-            touched = 0
-    else:
-        if closure >= 0.0:
-            touched = 1
-        compression = closure if touched == 1 else 0.0
     states, _ = unpack(model.terms, before.states, ws, X1 + TERM_STATES)
     left = ContactState(
         compression,
@@ -359,6 +387,12 @@ def no_event(params: ExactPlant, mode: Mode, peak_n: float, dt: float) -> bool:
     This is the frequent case. The result is also False if the force may exceed `peak_n` inside the tick but not at its
     ends.
     """
+    index = index_with_contacts(params, mode)
+    return keeps_mode(params, index, mode.at_rest, peak_n, dt)
+
+
+def index_with_contacts(params: ExactPlant, mode: Mode) -> int:
+    """Return the index of the mode with the contacts of terms that are closed in X0, and write its outputs to Y0."""
     tables, ws = params.tables, params.workspace
     tol, index = tables.guard_tol, _mode_index(mode)
     for _ in range(2):
@@ -370,9 +404,15 @@ def no_event(params: ExactPlant, mode: Mode, peak_n: float, dt: float) -> bool:
         if wrong == 0:
             break
         index ^= wrong
-    if N_MOTIONS == 3 and mode.at_rest:
+    return index
+
+
+def keeps_mode(params: ExactPlant, index: int, at_rest: bool, peak_n: float, dt: float) -> bool:
+    """Do what `no_event` does, in the mode with this index, whose outputs are in Y0."""
+    tables, ws = params.tables, params.workspace
+    if N_MOTIONS == 3 and at_rest:
         for k in range(N_GUARDS - 2, N_GUARDS):
-            if ws[Y0 + FIRST_GUARD + k] < -tol[((index * N_GUARDS) & INDEX_MASK) + k]:
+            if ws[Y0 + FIRST_GUARD + k] < -tables.guard_tol[((index * N_GUARDS) & INDEX_MASK) + k]:
                 return False
     map_step(tables.maps, index * (MAX_BISECTIONS + 1) * MAP_ROWS * N_COLUMNS, ws)
     if _guard_violated(tables, index, ws):
@@ -396,28 +436,31 @@ def _event_possible(params: ExactPlant, index: int, peak_n: float, dt: float) ->
     """Return whether, inside a tick, a guard may be negative or the force above `peak_n`, although not at its end.
 
     The outputs inside the tick differ from Y0 by no more than the bounds (see `bounds`). The direct bound is evaluated
-    first, and the modal one only if the direct one does not exclude an event.
+    first, and the modal one only if the direct one does not exclude an event. The peak needs neither if the rates of
+    the force at both ends agree with its mean rate: it does not oscillate in between then.
     """
     tables, ws = params.tables, params.workspace
+    force0, force1 = ws[Y0 + FORCE], ws[X1 + N_STATES + FORCE]
+    rise = force1 - force0
+    uneven = max(abs(ws[Y0 + FORCE_RATE] * dt - rise), abs(ws[X1 + N_STATES + FORCE_RATE] * dt - rise))
+    exceeded = (1.0 + PEAK_TOL) * max(peak_n, force1)
+    peak_excluded = max(force0, force1) + uneven <= exceeded
     bound_directly(tables.direct_bound, index * OUTPUT_ROWS * N_STATES, ws)
-    exceeded = (1.0 + PEAK_TOL) * max(peak_n, ws[X1 + N_STATES + FORCE])
-    possible = not ws[Y0 + FORCE] + ws[BOUND + FORCE] <= exceeded
-    for k in range(N_GUARDS):
-        if not ws[BOUND + FIRST_GUARD + k] <= ws[Y0 + FIRST_GUARD + k]:
-            possible = True
-    if not possible:
+    if _is_excluded(ws, peak_excluded, exceeded):
         return False
     project_change(tables.modal_projection, index * PROJECTION_ROWS * N_STATES, ws)
     bound_by_modes(tables.modal_bound, 2 * index * OUTPUT_ROWS * N_STATES, ws)
+    return not _is_excluded(ws, peak_excluded, exceeded)
+
+
+def _is_excluded(ws: Table, peak_excluded: bool, exceeded_n: float) -> bool:
+    """Return whether the bounds exclude that a guard is negative, and that the force is above `exceeded_n`."""
+    excluded = peak_excluded or ws[Y0 + FORCE] + ws[BOUND + FORCE] <= exceeded_n
     for k in range(N_GUARDS):
+        # False for NaN too.
         if not ws[BOUND + FIRST_GUARD + k] <= ws[Y0 + FIRST_GUARD + k]:
-            return True
-    if ws[Y0 + FORCE] + ws[BOUND + FORCE] <= exceeded:
-        return False
-    # If the rates at both ends agree with the mean rate, the force does not oscillate in between.
-    rise = ws[X1 + N_STATES + FORCE] - ws[Y0 + FORCE]
-    uneven = max(abs(ws[Y0 + FORCE_RATE] * dt - rise), abs(ws[X1 + N_STATES + FORCE_RATE] * dt - rise))
-    return not max(ws[Y0 + FORCE], ws[X1 + N_STATES + FORCE]) + uneven <= exceeded
+            excluded = False
+    return excluded
 
 
 def locate_events(params: ExactPlant, mode: Mode, touched: int, peak_n: float, dt: float) -> TickResult:
