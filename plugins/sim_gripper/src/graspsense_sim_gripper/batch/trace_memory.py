@@ -1,7 +1,8 @@
 """Memory for traces that are kept, in huge pages.
 
 The memory of a kept trace is new to the process, and the system clears each page at its first use. That takes several
-times as long as writing the trace, and a third of it where a page has 2 MiB instead of 4 KiB.
+times as long as writing the trace, and a third of it where a page has 2 MiB instead of 4 KiB. (A virtual machine that
+first has to get the memory from its host gains nothing.)
 """
 
 from __future__ import annotations
