@@ -29,7 +29,6 @@ from graspsense.plugin_api import (
     seconds_at_most,
     tick_params,
 )
-from graspsense_sim_gripper.batch.trace_memory import TICKS, TraceMemory
 from graspsense_sim_gripper.build import CELL_OFFSET, build, device_info, instantiate
 from graspsense_sim_gripper.compiled.compose import grasp_loop, guarded_loop
 from graspsense_sim_gripper.compiled.loop_code import CompiledLoop
@@ -70,6 +69,9 @@ from graspsense_sim_gripper.sensing import PadBuffers, with_listed_cells
 from graspsense_sim_gripper.term_failure import not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
+TICKS: Final = 8200
+"""Ticks that the buffers hold at first; a grasp that needs more continues with longer ones. It is not a power of two,
+because all columns would then share one set of the processor's cache and evict each other."""
 IMAGES: Final = 160
 """Cell images that the buffers hold at first, which suffice for 19 of 20 grasps of the catalogue. A grasp that needs
 more draws more noise then, which takes longer than the noise that the others do not need."""
@@ -255,7 +257,6 @@ def scene_key(scene: str) -> tuple[str, bool]:
 
 
 def _new_buffers() -> Buffers:
-    """Return buffers for `TICKS` ticks; a grasp that needs more continues with longer ones."""
     return Buffers(
         pads=PadBuffers(
             left_zero=np.zeros(CELLS),
@@ -274,8 +275,6 @@ class Storage:
     """The buffers of a thread. Its grasps use them one after the other."""
 
     buffers: Buffers = field(factory=_new_buffers)
-    memory: TraceMemory = field(factory=TraceMemory)
-    """That of the next buffers, where a trace keeps the present ones."""
 
 
 def grasp_compiled(
@@ -360,9 +359,9 @@ def grasp_once(
     done = finished(job, outcome, reason, plant, layout, trace)
     del trace
     if on_arrays and (sys.getrefcount(columns), sys.getrefcount(phases)) != references:
-        longer = len(phases) > TICKS
-        arrays = (np.empty_like(columns), np.empty_like(phases)) if longer else storage.memory.arrays()
-        storage.buffers = _first_images(buffers)._replace(columns=arrays[0], phases=arrays[1])
+        storage.buffers = _first_images(buffers)._replace(
+            columns=np.empty_like(columns), phases=np.empty_like(phases)
+        )
     return done
 
 
