@@ -105,7 +105,7 @@ def run(arguments: list[str]) -> None:
     for owner, name, part in (
         (job.Scenes, "add", "choosing reduced models"),
         (threads, "compiled_measure", "loading compiled features"),
-        (threads, "compiled_loop", "loading the compiled loop"),
+        (loop_code, "_compiled", "loading the compiled loop"),
         (SimBackend, "run_many", "grasping"),
         (C45, "fit", "fitting trees"),
         (C45, "probabilities", "predicting"),

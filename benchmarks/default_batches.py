@@ -22,7 +22,7 @@ from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import RunConfig, create
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, Storage, grasp_compiled, grasp_plain
 from graspsense_sim_gripper.build import build
-from graspsense_sim_gripper.compiled.loop_code import compiled_loop
+from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.problem import GraspController, GraspSetup
@@ -50,14 +50,14 @@ class Batch:
     job: Job
     setups: list[GraspSetup]
     compiled: bool
+    loops: CompiledLoops
 
     def grasp(self, i: int, storage: Storage) -> FinishedGrasp:
         """Return grasp `i`."""
         setup = self.setups[i]
         if not self.compiled:
             return grasp_plain(self.job, setup)
-        loop = compiled_loop(composition_of(self.job.config, setup), type(self.job.controller).step)
-        return grasp_compiled(self.job, setup, loop, storage)
+        return grasp_compiled(self.job, setup, self.loops.of(composition_of(self.job.config, setup)), storage)
 
 
 def batch_of(
@@ -76,7 +76,12 @@ def batch_of(
     scenes = Scenes(job)
     for name in objects:
         scenes.add(name, compiled=compiled)
-    return Batch(job, [scenes.setup(name, seed) for name in objects for seed in range(instances)], compiled)
+    return Batch(
+        job,
+        [scenes.setup(name, seed) for name in objects for seed in range(instances)],
+        compiled,
+        CompiledLoops(type(job.controller).step),
+    )
 
 
 def selection_s(objects: tuple[str, ...], settings: dict[str, Any], repeats: int, *, compiled: bool) -> float:

@@ -25,7 +25,7 @@ from graspsense_sim_gripper.batch.job import Scenes, Storage, grasp_compiled
 from graspsense_sim_gripper.batch.threads import SLICE, job_of
 from graspsense_sim_gripper.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.compiled.generator import compiled_generator
-from graspsense_sim_gripper.compiled.loop_code import CompiledLoop, compiled_loop
+from graspsense_sim_gripper.compiled.loop_code import CompiledLoop, CompiledLoops
 from graspsense_sim_gripper.compiled.padding import composition_of, padded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue
@@ -67,7 +67,7 @@ def parts(config: SimConfig, repeats: int) -> dict[str, float]:
         scenes.add(name, compiled=True)
     setups = [scenes.setup(names[k % len(names)], k) for k in range(GRASPS)]
     composition, storage = composition_of(config, setups[0]), Storage()
-    loop, measure = compiled_loop(composition, type(law).step), compiled_measure(job.extraction)
+    loop, measure = CompiledLoops(type(law).step).of(composition), compiled_measure(job.extraction)
     grasp_compiled(job, setups[0], loop, storage, measure)
     timed_loop = TimedLoop(loop)
 

@@ -24,7 +24,7 @@ from simulation_scene import KC, LIGHT, TICK, TICKS, X0, B, C, K, Law, M, Run
 
 from graspsense.plugin_api import RunConfig
 from graspsense_sim_gripper.batch.job import Job, Scenes, Storage, grasp_compiled
-from graspsense_sim_gripper.compiled.loop_code import compiled_loop
+from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
 
@@ -67,7 +67,7 @@ def _our_engine(config: SimConfig, setting: str) -> Engine:
     scenes.add(config.object, compiled=True)
     setup = scenes.setup(config.object, 0)
     composition = composition_of(config, setup)
-    loop = compiled_loop(composition, Law.step)
+    loop = CompiledLoops(Law.step).of(composition)
     storage = Storage()
     grasp_compiled(job, setup, loop, storage)
 

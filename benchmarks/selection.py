@@ -35,7 +35,7 @@ from graspsense.plugin_api import HOLD, ConfigError, RunConfig, create
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Storage, grasp_once
 from graspsense_sim_gripper.build import instantiate, problem_of
 from graspsense_sim_gripper.compiled.compose import Composition
-from graspsense_sim_gripper.compiled.loop_code import compiled_loop
+from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.compiled.padding import composition_of, padded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.spec import ObjectSpec
@@ -227,7 +227,7 @@ class Bench:
         composition = composition_of(config, setup, pad=False)
         if composition not in self.compiled:
             began = time.process_time()
-            loop = compiled_loop(composition, step)
+            loop = CompiledLoops(step).of(composition)
             controller = create("controller", "hybrid")
             short = RunConfig(grasp_timeout_s=0.01)
             job = Job(config=config, controller=controller, run=short, extract=None, traces=True)

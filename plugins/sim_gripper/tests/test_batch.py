@@ -4,6 +4,7 @@ import io
 import math
 import sys
 import tracemalloc
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -13,7 +14,19 @@ from graspsense.core.errors import UnknownName
 from graspsense.core.plugins import IsolatedPlugins
 from graspsense.core.run_config import RunConfig
 from graspsense.core.runner import run_grasp
-from graspsense.plugin_api import EFFORT, Command, ControllerEntry, Outcome, Trace, create, hookimpl
+from graspsense.plugin_api import (
+    APPROACH,
+    EFFORT,
+    RUNNING,
+    STEADY,
+    Command,
+    Controller,
+    ControllerEntry,
+    Outcome,
+    Trace,
+    create,
+    hookimpl,
+)
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import job as batch_job
 from graspsense_sim_gripper.batch import threads, worker
@@ -295,7 +308,7 @@ def test_what_fails_in_another_process_is_said():
 def test_without_numba_the_plain_loop_runs_and_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "numba", None)
     # What this process has compiled before it would use without numba as well.
-    loop_code.compiled_loop.cache_clear()
+    loop_code._compiled.cache_clear()
     monkeypatch.setattr(threads, "WORTH_COMPILING", 2)
     run = RunConfig(grasp_timeout_s=0.01, opening_timeout_s=0.1)
     with pytest.warns(UserWarning, match=r"plain Python on one core.*numba is not installed"):
@@ -396,3 +409,50 @@ def test_a_dropped_term_is_not_compiled_and_changes_no_bit(tmp_path, spread, mon
     )
     assert fast.state == plain.state
     assert np.array_equal(fast.trace.force_left_n, plain.trace.force_left_n)
+
+
+class PressState(NamedTuple):
+    phase: int
+    outcome: int
+    begun_s: float
+
+
+class PressParams(NamedTuple):
+    effort_n: float
+
+
+def press(params, state, reading):
+    """Close with a constant effort for half a second."""
+    t_s = reading.frame.t_s
+    begun_s = t_s if state.begun_s < 0.0 else state.begun_s
+    outcome = STEADY if t_s - begun_s > 0.5 else RUNNING
+    return Command(EFFORT, 1.0 * params.effort_n, math.inf, math.inf), PressState(APPROACH, outcome, begun_s)
+
+
+class Pressing(Controller[None]):
+    step = staticmethod(press)
+
+    def __init__(self, effort_n):
+        super().__init__(None)
+        self.effort_n = effort_n
+
+    def params(self):
+        return PressParams(self.effort_n)
+
+    def init(self):
+        return PressState(APPROACH, RUNNING, -1.0)
+
+
+@pytest.mark.slow
+def test_after_a_batch_with_a_whole_number_another_one_may_have_a_fraction():
+    """Compiled code takes a number that was an integer at first for an integer."""
+    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+    config = SimConfig(sensor="ideal", fidelity="fixed", scheme="explicit")
+    for effort_n in (4, 4.75):
+        fast, plain = (
+            run_many(config, Pressing(effort_n), ["toy"], [1], compiled=compiled)[0]
+            for compiled in (True, False)
+        )
+        assert plain.trace.command.max() == effort_n
+        np.testing.assert_array_equal(fast.trace.command, plain.trace.command)
+        assert fast.state == plain.state

@@ -12,7 +12,7 @@ from graspsense.plugin_api import NotCompilable
 from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, Storage, grasp_compiled, scene_key
 from graspsense_sim_gripper.batch.threads import WORTH_COMPILING
 from graspsense_sim_gripper.build import build
-from graspsense_sim_gripper.compiled.loop_code import compiled_loop
+from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.reduction.select import select_anew
@@ -35,20 +35,20 @@ class TimedBatch:
 
     job: Job
     setups: list[GraspSetup]
+    loops: CompiledLoops
 
     @classmethod
     def of(cls, job: Job, scenes: Sequence[str], seeds: Sequence[int]) -> TimedBatch:
         """Return the grasps of each scene with its seed. Raises ConfigError if a model cannot be selected."""
-        known = Scenes(job)
+        known, loops = Scenes(job), CompiledLoops(type(job.controller).step)
         for scene in {scene_key(one): one for one in scenes}.values():
             known.add(scene, compiled=True)
-        return cls(job, [known.setup(*grasp) for grasp in zip(scenes, seeds, strict=True)])
+        return cls(job, [known.setup(*grasp) for grasp in zip(scenes, seeds, strict=True)], loops)
 
     def grasp(self, i: int, storage: Storage) -> FinishedGrasp:
         """Return grasp `i`. Raises NotCompilable."""
         setup = self.setups[i]
-        loop = compiled_loop(composition_of(self.job.config, setup), type(self.job.controller).step)
-        return grasp_compiled(self.job, setup, loop, storage)
+        return grasp_compiled(self.job, setup, self.loops.of(composition_of(self.job.config, setup)), storage)
 
     def seconds(self, storage: Storage) -> float:
         """Return the processor time (s) of a grasp, the mean of all. Raises NotCompilable."""

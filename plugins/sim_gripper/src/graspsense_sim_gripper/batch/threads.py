@@ -50,7 +50,7 @@ from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.compiled.compose import Composition
 from graspsense_sim_gripper.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.compiled.generator import compiled_generator
-from graspsense_sim_gripper.compiled.loop_code import CompiledLoop, compiled_loop
+from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.compiled.padding import compiled_kinds, composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.loop import COLUMNS
@@ -160,7 +160,7 @@ class _Batch:
     counts: Counter[Composition] = field(factory=Counter, init=False)
     """Number of grasps of each composition."""
     is_compiled: dict[Composition, bool] = field(factory=dict, init=False)
-    loops: dict[Composition, CompiledLoop] = field(factory=dict, init=False)
+    loops: CompiledLoops = field(init=False)
     local: threading.local = field(factory=threading.local, init=False)
     """The storage of each thread, and its process for grasps in the interpreter."""
     processes: ExitStack = field(factory=ExitStack, init=False)
@@ -168,6 +168,10 @@ class _Batch:
     """The forked processes that no thread uses at present."""
     slice_size: int = field(default=SLICE, init=False)
     """Number of grasps that a worker takes at once."""
+
+    @loops.default
+    def _loops(self) -> CompiledLoops:
+        return CompiledLoops(type(self.job.controller).step)
 
     @models.default
     def _models(self) -> Scenes:
@@ -350,10 +354,7 @@ class _Batch:
         if not self.is_compiled[composition]:
             return None
         try:
-            loop = self.loops.get(composition)
-            if loop is None:
-                loop = self.loops[composition] = compiled_loop(composition, type(self.job.controller).step)
-            return grasp_compiled(self.job, setup, loop, self._storage(), self.measure)
+            return grasp_compiled(self.job, setup, self.loops.of(composition), self._storage(), self.measure)
         except NotCompilable as error:
             self.is_compiled[composition] = False
             self._note_plain(str(error))

@@ -20,11 +20,11 @@ from graspsense_sim_gripper.problem import ControllerStep
 
 
 def _grasp_unbound(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
-    raise TypeError("no loop is bound: use compiled_loop")
+    raise TypeError("no loop is bound: use CompiledLoops")
 
 
 def _store_unbound(array: Any, values: Any) -> None:
-    raise TypeError("only compiled code stores numbers: use compiled_loop")
+    raise TypeError("only compiled code stores numbers: use CompiledLoops")
 
 
 grasp: Callable[[GraspParams, SimulationState, Buffers], SimulationState] = _grasp_unbound
@@ -48,7 +48,7 @@ class _Types(NamedTuple):
 
 
 class CompiledLoop:
-    """The compiled loop of a composition for a controller."""
+    """The compiled loop of a composition for a controller. Its first grasp decides which numbers are integers."""
 
     def __init__(self, composition: Composition, compiled: Callable[..., Ending]) -> None:
         """Take the function that `compile_function` returned; its first call makes machine code."""
@@ -75,17 +75,35 @@ class CompiledLoop:
         return state
 
 
+class CompiledLoops:
+    """The compiled loops of a batch.
+
+    Another batch, whose controller may be set to a whole number where this one is not, takes loops of its own.
+    """
+
+    def __init__(self, step: ControllerStep) -> None:
+        """Take the step of the controller."""
+        self._step = step
+        self._loops: dict[Composition, CompiledLoop] = {}
+
+    def of(self, composition: Composition) -> CompiledLoop:
+        """Return the loop of a composition. Raises NotCompilable."""
+        if composition not in self._loops:
+            self._loops[composition] = CompiledLoop(composition, _compiled(composition, self._step))
+        return self._loops[composition]
+
+
 def _types(state: SimulationState) -> _Types:
     return _Types(TupleType.of(state), TupleType.of(state.plant), TupleType.of(state.loop).count)
 
 
 @lru_cache(maxsize=64)
-def compiled_loop(composition: Composition, step: ControllerStep) -> CompiledLoop:
-    """Return the compiled loop of a composition for a controller with this step. Raises NotCompilable."""
+def _compiled(composition: Composition, step: ControllerStep) -> Callable[..., Ending]:
+    """Return `stored_grasp` of a composition for a controller with this step, compiled. Raises NotCompilable."""
     try:
         from graspsense_sim_gripper.compiled.nested_numbers import store_numbers
     except ImportError as error:
         raise NotCompilable(f'numba is not installed: pip install "{OPTIONS.install}"') from error
     parts = {"grasp": grasp_loop(composition, step, interpreted=False), "store_numbers": store_numbers}
     with COMPILING:
-        return CompiledLoop(composition, compile_part(bind(stored_grasp, **parts)))
+        return compile_part(bind(stored_grasp, **parts))

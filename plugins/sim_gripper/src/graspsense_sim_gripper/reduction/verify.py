@@ -29,7 +29,7 @@ from graspsense.plugin_api import (
     tick_params,
 )
 from graspsense_sim_gripper.compiled.compose import composition, grasp_loop
-from graspsense_sim_gripper.compiled.loop_code import compiled_loop
+from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import Motion, PlantState
@@ -146,10 +146,15 @@ class TrialGrasps:
     """The features of the pipeline in the grasps of `_records`."""
     _starts: dict[Steps | None, _Stage] = field(factory=dict, init=False)
     """The grasp shortly before the first contact, by the steps of the approach; one for all where `only_near`."""
+    _loops: CompiledLoops = field(init=False)
     work: int = field(default=0, init=False)
     """Ticks and steps of all trial grasps so far."""
     _reported_s: float = field(factory=time.monotonic, init=False)
     """When progress was reported last."""
+
+    @_loops.default
+    def _new_loops(self) -> CompiledLoops:
+        return CompiledLoops(self.controller.step)
 
     def record(self, reduction: Reduction, force_n: float = 0.0, travel: float = 0.0) -> GraspRecord:
         """Return the grasp in this model; the controller reads values with these errors (see `Sensitivity`)."""
@@ -208,7 +213,7 @@ class TrialGrasps:
     def of(self, setup: GraspSetup) -> TrialGrasps:
         """Return trial grasps of another instance of the object, which begin near it and go on counting the work."""
         other = evolve(self, setup=setup, only_near=True)
-        other.work = self.work
+        other.work, other._loops = self.work, self._loops
         return other
 
     def _max_ticks(self) -> int:
@@ -334,7 +339,7 @@ class TrialGrasps:
         model = None if exact is None else exact[0]
         if not on_arrays:
             return False, grasp_loop(composed, self.controller.step), made, model
-        return True, compiled_loop(composed, self.controller.step), made, model
+        return True, self._loops.of(composed), made, model
 
 
 def trial_grasps(
