@@ -17,7 +17,7 @@ class Trend(NamedTuple):
 UNKNOWN: Final = Trend(0, 0.0, 0.0)
 
 
-class Change(NamedTuple):
+class TrendChange(NamedTuple):
     """The change of the acceleration (rev/s2) up to the middle of a step, as its trend says."""
 
     linear: float
@@ -33,13 +33,15 @@ class StepErrors(NamedTuple):
     angle: float
 
 
-def change_to_middle(trend: Trend, h: float) -> Change:
+def change_to_middle(trend: Trend, h: float) -> TrendChange:
     """Return the change in the first half of a step of `h`; none if the trend is not known."""
     _, first, second = trend
-    return Change(0.5 * h * first, 0.125 * h * h * second)
+    return TrendChange(0.5 * h * first, 0.125 * h * h * second)
 
 
-def speed_for_end(trend: Trend, change: Change, speed: float, rate: float, middle: float, h: float) -> float:
+def speed_for_end(
+    trend: Trend, change: TrendChange, speed: float, rate: float, middle: float, h: float
+) -> float:
     """Return the speed at which the forces at the end of the step are evaluated.
 
     `rate`, `middle`: the accelerations at its beginning and half-way. With a trend it is the integral of the parabola
@@ -50,7 +52,7 @@ def speed_for_end(trend: Trend, change: Change, speed: float, rate: float, middl
     return speed + h * (4.0 * middle - rate - change.linear) / 3.0
 
 
-def errors(trend: Trend, change: Change, rates: tuple[float, float, float], h: float) -> StepErrors:
+def errors(trend: Trend, change: TrendChange, rates: tuple[float, float, float], h: float) -> StepErrors:
     """Return the errors of a step with these accelerations at its beginning, half-way and at its end.
 
     They are the differences of its quadratures to those of the accelerations that the trend predicts, which are
