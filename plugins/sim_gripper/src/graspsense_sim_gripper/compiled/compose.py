@@ -26,7 +26,7 @@ from graspsense_sim_gripper.dynamics.contact import (
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, Past, PlantState, StepState
 from graspsense_sim_gripper.exact.modes import Shape
 from graspsense_sim_gripper.exact.propagate import Mode, bind_move, exact_parts
-from graspsense_sim_gripper.exact.run import Run
+from graspsense_sim_gripper.exact.run import ExactRun
 from graspsense_sim_gripper.exact_ticks import exact_ticks
 from graspsense_sim_gripper.free_ticks import approach_or_free_ticks, free_ticks
 from graspsense_sim_gripper.loop import GraspParams, LoopProgress, SimulationState, grasp
@@ -59,7 +59,7 @@ INTERPRETED: Final[Constructors] = {
     for kind in (
         *(PlantState, Motion, Contact, ContactState, Past, StepState, SensorState, Frame),
         *(Start, Attempt, SpeedSearch, Stage, PadLoad, BalanceSearch),
-        *(Mode, Run),
+        *(Mode, ExactRun),
     )
 }
 """The named tuples that a tick creates, each with a constructor that takes the interpreter half the time."""

@@ -40,7 +40,7 @@ from graspsense_sim_gripper.exact.propagate import (
 OTHER_MODE: Final = -1
 
 
-class Run(NamedTuple):
+class ExactRun(NamedTuple):
     """The state of a run between two ticks, in addition to the state vector X0."""
 
     mode_index: int
@@ -58,16 +58,16 @@ class Run(NamedTuple):
     """The largest force on a pad in the grasp so far."""
 
 
-def begin_run(params: ExactPlant, plant: PlantState, effort_n: float) -> tuple[bool, Run]:
+def begin_run(params: ExactPlant, plant: PlantState, effort_n: float) -> tuple[bool, ExactRun]:
     """Write the state of the plant to X0; return whether exact discretisation applies to it, and the run from there."""
     contact, motion = plant.contact, plant.motion
     mode = load(params, plant, effort_n)
     index = index_with_contacts(params, mode)
     applies = is_centred(contact) and motion.revolutions < params.plant.drive.open_rev
-    return applies, Run(index, mode, motion, contact.left.force_n, 0.0, contact.touched, plant.peak_n)
+    return applies, ExactRun(index, mode, motion, contact.left.force_n, 0.0, contact.touched, plant.peak_n)
 
 
-def run_tick(params: ExactPlant, run: Run, effort_n: float, dt: float) -> tuple[bool, Run]:
+def run_tick(params: ExactPlant, run: ExactRun, effort_n: float, dt: float) -> tuple[bool, ExactRun]:
     """Return whether the plant stays in its mode over a tick under this effort (N), and the run after the tick.
 
     If it does not, the run is unchanged, and so are the states in X0.
@@ -95,10 +95,10 @@ def run_tick(params: ExactPlant, run: Run, effort_n: float, dt: float) -> tuple[
     after = load_motion(params, motion, force)
     if after.compressed != mode.compressed or after.motion != mode.motion:
         index = OTHER_MODE
-    return True, Run(index, mode, motion, force, closure, touched, peak)
+    return True, ExactRun(index, mode, motion, force, closure, touched, peak)
 
 
-def end_run(params: ExactPlant, plant: PlantState, run: Run, n_ticks: int) -> PlantState:
+def end_run(params: ExactPlant, plant: PlantState, run: ExactRun, n_ticks: int) -> PlantState:
     """Return the plant after a run of this many ticks, at least one, given that before it."""
     ws = params.workspace
     # A tick that was not accepted has overwritten X1.
