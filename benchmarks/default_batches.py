@@ -20,7 +20,8 @@ from selection import record_of
 
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import RunConfig, create
-from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, Storage, grasp_compiled, grasp_plain
+from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Storage, grasp_compiled, grasp_plain
+from graspsense_sim_gripper.batch.scenes import Scenes
 from graspsense_sim_gripper.build import build
 from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.compiled.padding import composition_of

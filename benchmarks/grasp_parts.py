@@ -21,7 +21,8 @@ from typing import Any, Final
 from timed_loop import TimedLoop
 
 from graspsense.plugin_api import create
-from graspsense_sim_gripper.batch.job import Scenes, Storage, grasp_compiled
+from graspsense_sim_gripper.batch.job import Storage, grasp_compiled
+from graspsense_sim_gripper.batch.scenes import Scenes
 from graspsense_sim_gripper.batch.threads import SLICE, job_of
 from graspsense_sim_gripper.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.compiled.generator import compiled_generator

@@ -30,7 +30,8 @@ from graspsense.plugin_api import (
 from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.batch import job as batch_job
 from graspsense_sim_gripper.batch import threads, worker
-from graspsense_sim_gripper.batch.job import Job, Scenes, grasp_plain
+from graspsense_sim_gripper.batch.job import Job, grasp_plain
+from graspsense_sim_gripper.batch.scenes import Scenes
 from graspsense_sim_gripper.batch.threads import SLICE, WORTH_A_PROCESS, run_many
 from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.compiled import loop_code

@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import evolve, fields
+from numpy.typing import NDArray
 
 from graspsense.plugin_api import (
     EFFORT,
@@ -32,7 +33,7 @@ from graspsense_sim_gripper.fingertip import CELLS
 from graspsense_sim_gripper.objects.instance import PAD_CELLS, Instance, cell_weights, central_cells, sample
 from graspsense_sim_gripper.objects.library import find, split_number
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
-from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.objects.spec import PATCHES, ObjectSpec
 from graspsense_sim_gripper.palm import AT_REST, palm_params
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.random_numbers import Generator, GeneratorOf, NumpyGenerator
@@ -126,7 +127,7 @@ def _examples(config: SimConfig, spec: ObjectSpec | None) -> tuple[GraspSetup, .
         rng = NumpyGenerator(seed)
         instance = sample(spec, rng)
         with suppress(ConfigError):
-            _check_fit(config, instance)
+            check_fit(config, spec, instance.width_m, instance.offset_m)
             setups.append(_setup(config, instance, seed, rng))
     return tuple(setups)
 
@@ -147,7 +148,7 @@ def instantiate(
     instance = None
     if problem.spec is not None:
         instance = sample(problem.spec, rng if config.spread else None, problem.number)
-        _check_fit(config, instance)
+        check_fit(config, problem.spec, instance.width_m, instance.offset_m)
     return _setup(config, instance, seed, rng, reduction)
 
 
@@ -191,16 +192,16 @@ def _setup(
     )
 
 
-def _check_fit(config: SimConfig, instance: Instance) -> None:
-    """Raise ConfigError if an object of a scene file does not fit between the open fingers, or has no width."""
-    where = instance.spec.file
-    needed_m = instance.width_m + 2.0 * abs(instance.offset_m)
-    if where and instance.width_m <= 0.0:
-        raise ConfigError(f"{where}: width_m: this instance is {instance.width_m:g} m wide (width_spread_m)")
+def check_fit(config: SimConfig, spec: ObjectSpec, width_m: float, offset_m: float) -> None:
+    """Raise ConfigError if an instance of a scene file does not fit between the open fingers, or has no width."""
+    where = spec.file
+    needed_m = width_m + 2.0 * abs(offset_m)
+    if where and width_m <= 0.0:
+        raise ConfigError(f"{where}: width_m: this instance is {width_m:g} m wide (width_spread_m)")
     if where and needed_m >= config.open_gap_m:
-        what = "width_m" if instance.width_m >= config.open_gap_m else "offset_m"
+        what = "width_m" if width_m >= config.open_gap_m else "offset_m"
         raise ConfigError(
-            f"{where}: {what}: {instance.width_m:g} m wide and {instance.offset_m:g} m off the centre, it needs "
+            f"{where}: {what}: {width_m:g} m wide and {offset_m:g} m off the centre, it needs "
             f"{needed_m:g} m, and the fingers open to {config.open_gap_m:g} m (gripper.open_gap_m)"
         )
 
@@ -214,9 +215,9 @@ def _plant(config: SimConfig, instance: Instance | None, rng: Generator) -> tupl
     drive = gripper.drive
     if config.spread:
         # `_replace` would take several times as long.
-        link, inertia, (coulomb_n, _, *rest), closed_rev, open_rev, lag_s = drive
-        coulomb_n = max(coulomb_n + config.coulomb_spread_n * float(rng.standard_normal(1)[0]), 0.0)
-        friction = Friction(coulomb_n, max(float(config.breakaway_n), coulomb_n), *rest)
+        link, inertia, (_, _, *rest), closed_rev, open_rev, lag_s = drive
+        drawn = drawn_friction(friction_spread(config), float(rng.standard_normal(1)[0]))
+        friction = Friction(*drawn, *rest)
         drive = Drive(link, inertia, friction, closed_rev, open_rev, lag_s)
     if instance is None:
         # A negative width: the fingers close without touching anything.
@@ -234,6 +235,25 @@ def _plant(config: SimConfig, instance: Instance | None, rng: Generator) -> tupl
     right = (at_rest,) if model.held == 1 else ()
     state = PlantState(gripper.motion, Contact(0.0, 0.0, offset, 0, at_rest, right))
     return PlantParams(drive, model, gripper.steps), state
+
+
+class FrictionSpread(NamedTuple):
+    """How the Coulomb friction of the drive differs between trials (N)."""
+
+    coulomb_n: float
+    coulomb_spread_n: float
+    breakaway_n: float
+
+
+def friction_spread(config: SimConfig) -> FrictionSpread:
+    """Return how friction differs between the trials of these settings."""
+    return FrictionSpread(float(config.coulomb_n), float(config.coulomb_spread_n), float(config.breakaway_n))
+
+
+def drawn_friction(spread: FrictionSpread, draw: float) -> tuple[float, float]:
+    """Return the Coulomb and the breakaway friction (N) of a trial with this standard normal draw."""
+    coulomb_n = max(spread.coulomb_n + spread.coulomb_spread_n * draw, 0.0)
+    return coulomb_n, max(spread.breakaway_n, coulomb_n)
 
 
 @lru_cache(maxsize=256)
@@ -307,13 +327,13 @@ def _sensor(config: SimConfig, instance: Instance | None, rng: Generator) -> Sen
     if config.sensor == "ideal":
         clock = ImageClock(0.0, period, 0.0)
         return SensorParams(1, _linkage(config), clock, 1.0, 0.0, IDEAL_CELLS, IDEAL_CELLS)
-    mean, spread = CELL_OFFSET
-    offsets = mean + spread * rng.standard_normal((2, CELLS))
-    weights = cell_weights(instance.spec.patch, instance.patch_row) if instance else EVEN_WEIGHTS
-    if config.pad_cells < PAD_CELLS:
-        present = central_cells(config.pad_cells)
-        weights = tuple([weight if cell in present else 0.0 for cell, weight in enumerate(weights)])
+    offsets = cell_offset(rng.standard_normal((2, CELLS)))
+    weights = list(EVEN_WEIGHTS)
+    if instance is not None:
+        cell_weights(PATCHES.index(instance.spec.patch), instance.patch_row, weights)
     shares = np.array(weights)
+    if config.pad_cells < PAD_CELLS:
+        shares *= present_cells(config.pad_cells)
     return SensorParams(
         ideal=0,
         link=_linkage(config),
@@ -323,3 +343,15 @@ def _sensor(config: SimConfig, instance: Instance | None, rng: Generator) -> Sen
         left=PadCells(shares, offsets[0]),
         right=PadCells(shares, offsets[1]),
     )
+
+
+def cell_offset(draw: Any) -> Any:
+    """Return the counts of an unloaded cell with this standard normal draw, or of several with an array of them."""
+    return CELL_OFFSET[0] + CELL_OFFSET[1] * draw
+
+
+@lru_cache(maxsize=16)
+def present_cells(count: int) -> NDArray[np.float64]:
+    """Return 1 for each of the `count` cells of the gripping face that are nearest to its middle, otherwise 0."""
+    present = central_cells(count)
+    return np.array([float(cell in present) for cell in range(PAD_CELLS)])

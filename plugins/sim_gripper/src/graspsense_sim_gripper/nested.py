@@ -1,4 +1,4 @@
-"""Nested tuples from an array of their numbers, or from the nested lists that JSON makes of them."""
+"""Nested tuples and the numbers in them: from an array of these, or from the nested lists that JSON makes of them."""
 
 from __future__ import annotations
 
@@ -39,6 +39,13 @@ class TupleType:
         for i, kind in self._others:
             leaves[i] = kind(leaves[i])
         return self._make(leaves)
+
+
+@frozen(eq=False)
+class Pattern:
+    """Nested tuples of numbers and arrays that stand for their types only."""
+
+    values: Any
 
 
 @frozen(eq=False)
@@ -92,18 +99,45 @@ def like(pattern: Any, values: Any) -> Any:
     return type(pattern)(*parts) if hasattr(pattern, "_fields") else tuple(parts)
 
 
+def with_places(pattern: Any, begin: int = 0) -> Any:
+    """Return nested tuples like `pattern`, in which each number is its place among all numbers, counted from `begin`.
+
+    Arrays are no numbers, and are kept.
+    """
+    if isinstance(pattern, np.ndarray):
+        return pattern
+    if not isinstance(pattern, tuple):
+        return begin
+    parts = []
+    for part in pattern:
+        parts.append(with_places(part, begin))
+        begin += count_numbers(part)
+    return tuple.__new__(type(pattern), parts)
+
+
+def append_arrays(to: list[NDArray[Any]], values: Any) -> None:
+    """Append the arrays in nested tuples, in order."""
+    if isinstance(values, tuple):
+        for value in values:
+            append_arrays(to, value)
+    elif isinstance(values, np.ndarray):
+        to.append(values)
+
+
 def append_numbers(to: MutableSequence[float], values: Any) -> None:
-    """Append the numbers in nested tuples, in order; `values` may also be a number."""
+    """Append the numbers in nested tuples, in order, without arrays; `values` may also be a number."""
     if isinstance(values, tuple):
         for value in values:
             if isinstance(value, tuple):
                 append_numbers(to, value)
-            else:
+            elif not isinstance(value, np.ndarray):
                 to.append(value)
     else:
         to.append(values)
 
 
 def count_numbers(values: Any) -> int:
-    """Return the number of numbers in nested tuples."""
-    return sum(map(count_numbers, values)) if isinstance(values, tuple) else 1
+    """Return the number of numbers in nested tuples, without arrays."""
+    if isinstance(values, tuple):
+        return sum(map(count_numbers, values))
+    return 0 if isinstance(values, np.ndarray) else 1

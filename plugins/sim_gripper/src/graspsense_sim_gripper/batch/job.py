@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache, partial
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
-from attrs import define, evolve, field, frozen
-from numpy.typing import NDArray
+from attrs import define, field, frozen
 
 from graspsense.plugin_api import (
     CompiledExtraction,
@@ -29,7 +29,7 @@ from graspsense.plugin_api import (
     seconds_at_most,
     tick_params,
 )
-from graspsense_sim_gripper.build import CELL_OFFSET, build, device_info, instantiate
+from graspsense_sim_gripper.build import CELL_OFFSET, device_info
 from graspsense_sim_gripper.compiled.compose import grasp_loop, guarded_loop
 from graspsense_sim_gripper.compiled.loop_code import CompiledLoop
 from graspsense_sim_gripper.compiled.padding import PaddedLayout, composition_of, layout_of, padded, unpadded
@@ -41,6 +41,7 @@ from graspsense_sim_gripper.loop import (
     COLUMNS,
     NOT_STARTED,
     Buffers,
+    Ending,
     GraspParams,
     LoopEnd,
     SimulationState,
@@ -49,8 +50,6 @@ from graspsense_sim_gripper.loop import (
     uses_macro_steps,
 )
 from graspsense_sim_gripper.model_report import accuracy_report, model_report
-from graspsense_sim_gripper.nested import TupleType
-from graspsense_sim_gripper.objects.library import split_number
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers, sample_trace
 from graspsense_sim_gripper.problem import (
@@ -58,13 +57,10 @@ from graspsense_sim_gripper.problem import (
     GraspController,
     GraspSetup,
     PalmNoise,
-    Problem,
 )
-from graspsense_sim_gripper.random_numbers import GeneratorOf, NumpyGenerator
+from graspsense_sim_gripper.random_numbers import Generator
 from graspsense_sim_gripper.recorded_trace import recorded_trace
 from graspsense_sim_gripper.reduction.model import Reduction
-from graspsense_sim_gripper.reduction.select import select
-from graspsense_sim_gripper.sampled_loop import instability
 from graspsense_sim_gripper.sensing import PadBuffers, with_listed_cells
 from graspsense_sim_gripper.term_failure import not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
@@ -178,84 +174,6 @@ class Job:
         return GraspController(self.controller, self.run, self.features)
 
 
-@define
-class Scenes:
-    """The scenes of a job, each with its reduced model. All seeds of a scene share the model."""
-
-    job: Job
-    selected: Mapping[tuple[str, bool], Reduction | None] = field(factory=dict)
-    """Models that were selected elsewhere, by `scene_key`."""
-    generator_of: GeneratorOf = NumpyGenerator
-    """Draws what a seed gives."""
-    _scenes: dict[tuple[str, bool], tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
-    """By `scene_key`."""
-    _problems: dict[str, tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
-    """By the name of the scene, with the number of the instance."""
-    _unstable: dict[tuple[str, bool], str] = field(factory=dict, init=False)
-    """Why the sampled loop is unstable, by `scene_key`."""
-    _plant_types: dict[tuple[str, bool], tuple[TupleType, PaddedLayout]] = field(factory=dict, init=False)
-    """What `plant_type` returns, by `scene_key`."""
-
-    def add(self, scene: str, *, compiled: bool = False) -> None:
-        """Select the model of a scene. `compiled`: run the trial grasps compiled, not in the interpreter.
-
-        Raises UnknownName and ConfigError as `build` and `select` do.
-        """
-        job, key = self.job, scene_key(scene)
-        reduction = self.selected.get(key)
-        problem = build(job.config, scene, job.scaled)
-        if problem.spec is not None and reduction is None:
-            reduction = select(problem, job.grasp_controller, compiled=compiled)
-        self._scenes[key] = problem, reduction
-
-    def models(self) -> dict[tuple[str, bool], Reduction | None]:
-        """Return the models of the scenes that were added, by `scene_key`."""
-        return {key: reduction for key, (_, reduction) in self._scenes.items()}
-
-    def setup(self, scene: str, seed: int) -> GraspSetup:
-        """Return the grasp of a scene with this seed. The model is selected if the scene was not added before.
-
-        Raises as `add` and `instantiate` do.
-        """
-        known = self._problems.get(scene)
-        if known is None:
-            key = scene_key(scene)
-            if key not in self._scenes:
-                self.add(scene)
-            problem, reduction = self._scenes[key]
-            if key[1]:
-                problem = evolve(problem, number=split_number(scene)[1])
-            known = self._problems[scene] = problem, reduction
-        return instantiate(*known, seed, self.generator_of)
-
-    def plant_type(self, scene: str) -> tuple[TupleType, PaddedLayout]:
-        """Return the type of the padded state of the plant in a compiled grasp of the scene, and its layout."""
-        key = scene_key(scene)
-        if key not in self._plant_types:
-            setup = self.setup(scene, 0)
-            self._plant_types[key] = TupleType.of(padded(setup).state), layout_of(setup)
-        return self._plant_types[key]
-
-    def model_of(self, scene: str, seed: int) -> tuple[Reduction | None, str]:
-        """Return the reduced model of a scene, and the text of `sampled_loop.instability` for it."""
-        key = scene_key(scene)
-        _, reduction = self._scenes[key]
-        if reduction is None:
-            return None, ""
-        if key not in self._unstable:
-            self._unstable[key] = instability(self.setup(scene, seed), self.job.grasp_controller, reduction)
-        return reduction, self._unstable[key]
-
-
-@lru_cache(maxsize=4096)
-def scene_key(scene: str) -> tuple[str, bool]:
-    """Return the key of a scene's model: the name without the number of an instance, and whether there is a number."""
-    if scene == "none":
-        return scene, False
-    name, number = split_number(scene)
-    return name, number is not None
-
-
 def _new_buffers() -> Buffers:
     return Buffers(
         pads=PadBuffers(
@@ -319,7 +237,7 @@ def grasp_once(
     on_arrays = isinstance(loop, CompiledLoop)
     (ending, state, plant), buffers = _run(job, setup, loop, storage)
     if on_arrays:
-        storage.buffers = _first_images(buffers)
+        storage.buffers = first_images(buffers)
     outcome, reason = ended_by_itself(ending.stopped, ending.outcome)
     if ending.failed == 1:
         outcome = Outcome.ABORTED
@@ -329,19 +247,15 @@ def grasp_once(
         outcome, reason = Outcome.ABORTED, overdue(job.run)
     if not job.traces and job.extract is None:
         return finished(job, outcome, reason, plant, layout)
-    n, k = ending.recorded, ending.images
-    columns, phases = buffers.columns, buffers.phases
-    if measure is not None and job.extraction is not None:
-        try:
-            measured = measure(job.extraction.params, columns, phases, n)
-        except Exception:
-            # Compiled code does not say where an exception comes from. `extract` does, if it raises one too.
-            pass
-        else:
-            extracted = job.extraction.result(measured)
+    if measure is not None:
+        # Compiled code does not say where an exception comes from. `extract` does, if it raises one too.
+        with suppress(Exception):
+            extracted = measured(job, measure, buffers, ending)
             return FinishedGrasp(
                 outcome=outcome, reason=reason, end=plant, layout=layout, extracted=extracted, kept=None
             )
+    n, k = ending.recorded, ending.images
+    columns, phases = buffers.columns, buffers.phases
     table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
     images, times = np.asarray(buffers.pads.images[:k]), np.asarray(buffers.image_times[:k])
     signals: dict[str, SampleTrace] = {}
@@ -359,10 +273,17 @@ def grasp_once(
     done = finished(job, outcome, reason, plant, layout, trace)
     del trace
     if on_arrays and (sys.getrefcount(columns), sys.getrefcount(phases)) != references:
-        storage.buffers = _first_images(buffers)._replace(
+        storage.buffers = first_images(buffers)._replace(
             columns=np.empty_like(columns), phases=np.empty_like(phases)
         )
     return done
+
+
+def measured(job: Job, measure: Measure, buffers: Buffers, ending: Ending) -> Extracted:
+    """Return what the compiled form of `Job.extraction` gives for a grasp. Raises what it raises."""
+    form = job.extraction
+    assert form is not None
+    return form.result(measure(form.params, buffers.columns, buffers.phases, ending.recorded))
 
 
 def finished(
@@ -388,11 +309,8 @@ def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tupl
     """Run the loop to the end of the grasp, with longer buffers where those of the storage do not suffice."""
     ideal, buffers, on_arrays = setup.sensor.ideal == 1, storage.buffers, isinstance(loop, CompiledLoop)
     run = loop.run if isinstance(loop, CompiledLoop) else partial(run_plain, loop)
-    if not ideal:
-        noise = setup.noise()
-        noise.fill(buffers.pads.noise)
-    buffers.pads.images[-1] = math.nan
-    buffers.pads.left_zero[:] = buffers.pads.right_zero[:] = CELL_OFFSET[0]
+    noise = None if ideal else setup.noise()
+    begin_images(buffers, noise)
     palm_noise = None
     if setup.has_palm:
         palm_noise, ticks = setup.palm_noise(), len(buffers.phases)
@@ -400,18 +318,8 @@ def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tupl
     if not on_arrays:
         # The interpreter indexes lists faster than arrays.
         buffers = _as_lists(buffers)
-    exact = discretise(job.config, setup, on_arrays=on_arrays)
-    most_ticks = math.ceil(seconds_at_most(job.run) / setup.dt_s)
-    params = GraspParams(
-        plant=setup.plant if exact is None else exact[0],
-        sensor=setup.sensor if on_arrays else with_listed_cells(setup.sensor),
-        controller=job.params,
-        dt_s=setup.dt_s,
-        max_ticks=most_ticks,
-        palm=setup.palm,
-        macro_steps=uses_macro_steps(exact, setup.plant.steps),
-    )
-    progress = SimulationState(NOT_STARTED, setup.state, setup.sensor_state, job.initial, setup.palm_state)
+    params, progress = started(job, setup, on_arrays=on_arrays)
+    most_ticks = params.max_ticks
     while True:
         if setup.has_palm:
             params = params._replace(max_ticks=min(most_ticks, len(buffers.palm.noise)))
@@ -422,12 +330,29 @@ def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tupl
         if end.ending.ended == 1 or end.ending.ticks >= most_ticks:
             return end, buffers
         progress = end.state()
-        if not ideal and end.ending.images == len(buffers.pads.images):
-            buffers = _with_more_images(buffers, noise.standard_normal((IMAGES_PER_BLOCK, 2 * CELLS)))
+        if noise is not None and end.ending.images == len(buffers.pads.images):
+            buffers = with_more_images(buffers, noise)
         else:
             buffers = _with_more_ticks(buffers, palm_noise)
         if not on_arrays:
             buffers = _as_lists(buffers)
+
+
+def started(job: Job, setup: GraspSetup, *, on_arrays: bool) -> tuple[GraspParams, SimulationState]:
+    """Return the parameters of the loop for a grasp, and the state in which it begins."""
+    exact = discretise(job.config, setup, on_arrays=on_arrays)
+    params = GraspParams(
+        plant=setup.plant if exact is None else exact[0],
+        sensor=setup.sensor if on_arrays else with_listed_cells(setup.sensor),
+        controller=job.params,
+        dt_s=setup.dt_s,
+        max_ticks=math.ceil(seconds_at_most(job.run) / setup.dt_s),
+        palm=setup.palm,
+        macro_steps=uses_macro_steps(exact, setup.plant.steps),
+    )
+    return params, SimulationState(
+        NOT_STARTED, setup.state, setup.sensor_state, job.initial, setup.palm_state
+    )
 
 
 def _as_lists(buffers: Buffers) -> Buffers:
@@ -436,8 +361,17 @@ def _as_lists(buffers: Buffers) -> Buffers:
     return Buffers(pads, *(np.asarray(array).tolist() for array in buffers[1:-1]))._replace(palm=palm)
 
 
-def _with_more_images(buffers: Buffers, noise: NDArray[np.float64]) -> Buffers:
-    """Return buffers for as many more images as `noise` has rows; they begin with the same values."""
+def begin_images(buffers: Buffers, noise: Generator | None) -> None:
+    """Prepare buffers for a grasp, of whose cells `noise` draws the noise; None: the sensors are ideal."""
+    if noise is not None:
+        noise.fill(buffers.pads.noise)
+    buffers.pads.images[-1] = math.nan
+    buffers.pads.left_zero[:] = buffers.pads.right_zero[:] = CELL_OFFSET[0]
+
+
+def with_more_images(buffers: Buffers, generator: Generator) -> Buffers:
+    """Return buffers for more images, of which `generator` draws the noise; they begin with the same values."""
+    noise = generator.standard_normal((IMAGES_PER_BLOCK, 2 * CELLS))
     left_zero, right_zero, drawn, images = (np.asarray(array) for array in buffers.pads)
     images = np.concatenate([images, np.zeros((len(noise), 2, CELLS))])
     images[-1] = math.nan
@@ -463,7 +397,7 @@ def _with_more_ticks(buffers: Buffers, palm_noise: PalmNoise | None) -> Buffers:
     )
 
 
-def _first_images(buffers: Buffers) -> Buffers:
+def first_images(buffers: Buffers) -> Buffers:
     """Return the buffers with the images that every grasp begins with, so that none draws noise which it needs not."""
     pads = buffers.pads
     if len(pads.images) == IMAGES:

@@ -9,7 +9,8 @@ from typing import Any, Final
 from attrs import evolve, frozen
 
 from graspsense.plugin_api import NotCompilable
-from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, Storage, grasp_compiled, scene_key
+from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Storage, grasp_compiled
+from graspsense_sim_gripper.batch.scenes import Scenes, scene_key
 from graspsense_sim_gripper.batch.threads import WORTH_COMPILING
 from graspsense_sim_gripper.build import build
 from graspsense_sim_gripper.compiled.loop_code import CompiledLoops

@@ -24,6 +24,7 @@ import numpy as np
 from attrs import define, field
 
 from graspsense.plugin_api import BatchOptions, Controller, FeatureSet, NotCompilable, RunConfig
+from graspsense_sim_gripper.batch.drawn import DrawnGrasps, can_be_drawn
 from graspsense_sim_gripper.batch.forked import (
     REFUSED,
     Answer,
@@ -40,14 +41,14 @@ from graspsense_sim_gripper.batch.job import (
     FinishedGrasp,
     Job,
     Measure,
-    Scenes,
     Storage,
     grasp_compiled,
     grasp_plain,
-    scene_key,
 )
+from graspsense_sim_gripper.batch.scenes import Scenes, scene_key
 from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.compiled.compose import Composition
+from graspsense_sim_gripper.compiled.drawing import Drawing, compiled_drawing
 from graspsense_sim_gripper.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.compiled.generator import compiled_generator
 from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
@@ -154,6 +155,8 @@ class _Batch:
     """Remarks on how the grasps ran, as keys, so that each is given once."""
     measure: Measure | None = field(default=None, init=False)
     """The compiled form of `Job.extraction`."""
+    drawing: Drawing | None = field(default=None, init=False)
+    """Draws grasps in compiled code; None if grasps need a trace."""
     measured: TupleType | None = field(default=None, init=False)
     """The type of what `measure` returns."""
     models: Scenes = field(init=False)
@@ -243,10 +246,13 @@ class _Batch:
         if find_spec("numba") is None:
             return
         self.models.generator_of = compiled_generator()
+        if not self.job.traces and (self.job.extract is None or self.job.extraction is not None):
+            self.drawing = compiled_drawing()
         if self.job.extraction is not None:
             try:
                 self.measure = compiled_measure(self.job.extraction)
             except NotCompilable as error:
+                self.drawing = None
                 self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
 
     def _worth_forking(self, workers: int, progress: Callable[[int, int], None] | None) -> bool:
@@ -330,10 +336,8 @@ class _Batch:
         part = self._part(begin)
         done: dict[int, FinishedGrasp] = {}
         plain: list[int] = []
-        # All at first: between the loops of two grasps, the processor's caches hold little of the code for this.
-        setups = [self.models.setup(*grasp) for grasp in part]
-        for i, setup in enumerate(setups):
-            grasp = self._compiled(setup)
+        for i, (scene, seed) in enumerate(part):
+            grasp = self._drawn(scene, seed) or self._compiled(self.models.setup(scene, seed))
             if grasp is None:
                 plain.append(i)
             else:
@@ -342,6 +346,23 @@ class _Batch:
             grasps = self._plain([part[i] for i in plain])
             done.update(zip(plain, grasps, strict=True))
         return [done[i] for i in range(len(part))]
+
+    def _drawn(self, scene: str, seed: int) -> FinishedGrasp | None:
+        """Return the result of a grasp that compiled code draws; None if it has to be simulated from its setup."""
+        if self.drawing is None or not can_be_drawn(seed):
+            return None
+        instances = self.models.drawn(scene)
+        if instances is None or not self.is_compiled[instances.scene.composition]:
+            return None
+        if not hasattr(self.local, "drawn_grasps"):
+            self.local.drawn_grasps = DrawnGrasps(self.job, self.drawing, self.measure, self._storage())
+        drawn_grasps: DrawnGrasps = self.local.drawn_grasps
+        try:
+            loop = self.loops.of(instances.scene.composition)
+            return drawn_grasps.grasp(instances, seed, loop)
+        except NotCompilable as error:
+            self._note_not_compilable(instances.scene.composition, error)
+            return None
 
     def _compiled(self, setup: GraspSetup) -> FinishedGrasp | None:
         """Return the result of a compiled grasp; None if it has to run in the interpreter."""
@@ -356,13 +377,13 @@ class _Batch:
         try:
             return grasp_compiled(self.job, setup, self.loops.of(composition), self._storage(), self.measure)
         except NotCompilable as error:
-            self.is_compiled[composition] = False
-            self._note_plain(str(error))
+            self._note_not_compilable(composition, error)
             return None
 
-    def _note_plain(self, reason: str) -> None:
+    def _note_not_compilable(self, composition: Composition, error: NotCompilable) -> None:
+        self.is_compiled[composition] = False
         how = f"on {self.workers} cores" if self._worth_processes() else "on one core"
-        self.notes[f"these grasps run in plain Python {how}, about a hundred times slower: {reason}"] = None
+        self.notes[f"these grasps run in plain Python {how}, about a hundred times slower: {error}"] = None
 
     def _worth_processes(self) -> bool:
         """Return whether separate processes save time for the grasps in the interpreter."""

@@ -23,7 +23,8 @@ import numpy as np
 from attrs import asdict, evolve, fields
 
 from graspsense.plugin_api import Controller, GraspEvent, Outcome, Phase, RunConfig, Trace, create, recipe_of
-from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Scenes, finished, grasp_plain
+from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, finished, grasp_plain
+from graspsense_sim_gripper.batch.scenes import Scenes
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.nested import like
 from graspsense_sim_gripper.reduction.cache import restored, stored

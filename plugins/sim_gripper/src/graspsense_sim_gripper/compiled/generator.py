@@ -193,27 +193,35 @@ class CompiledGenerator:
 
     def copy(self) -> CompiledGenerator:
         """Return another generator that continues with the same numbers."""
-        other = CompiledGenerator.__new__(CompiledGenerator)
-        other._draws, other._state = self._draws, self._state.copy()
-        return other
+        return CompiledGenerator.in_state(self._state.copy(), self._draws)
+
+    @classmethod
+    def in_state(cls, state: Words, draws: Draws) -> CompiledGenerator:
+        """Return the generator in this state, which it goes on to change."""
+        generator = cls.__new__(cls)
+        generator._draws, generator._state = draws, state
+        return generator
+
+
+def compiled_generator() -> GeneratorOf:
+    """Return `CompiledGenerator`; `NumpyGenerator` if the installed numpy draws other numbers. Raises NotCompilable."""
+    draws = draws_like_numpy()
+    return NumpyGenerator if draws is None else lambda seed: CompiledGenerator(seed, draws)
 
 
 @cache
-def compiled_generator() -> GeneratorOf:
-    """Return `CompiledGenerator`; `NumpyGenerator` if the installed numpy draws other numbers. Raises NotCompilable."""
+def draws_like_numpy() -> Draws | None:
+    """Return the functions of a generator, compiled; None if the installed numpy draws others. Raises NotCompilable."""
     draws = _draws()
     mine, numpy = CompiledGenerator(1, draws), NumpyGenerator(1)
-    if (
-        mine.random() != numpy.random()
-        or (mine.standard_normal(COMPARED) != numpy.standard_normal(COMPARED)).any()
-    ):
-        return NumpyGenerator
-    return lambda seed: CompiledGenerator(seed, draws)
+    same = mine.random() == numpy.random()
+    same = same and bool((mine.standard_normal(COMPARED) == numpy.standard_normal(COMPARED)).all())
+    return draws if same else None
 
 
 def _draws() -> Draws:
     tables, words = ziggurat_of_numpy(), np.zeros(4, WORD)
-    seed, uniform, normals = (_compiled(draw) for draw in (seed_state, draw_uniform, draw_normals))
+    seed, uniform, normals = (compiled_draw(draw) for draw in (seed_state, draw_uniform, draw_normals))
     with generating():
         seed(WORD(1), words, np.zeros(4, WORD))
         uniform(words)
@@ -221,7 +229,8 @@ def _draws() -> Draws:
     return Draws(entry_point(seed), entry_point(uniform), entry_point(normals), tables, words)
 
 
-def _compiled(draw: Callable[..., Any]) -> Callable[..., Any]:
+def compiled_draw(draw: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that calls those of this generator, compiled. Raises NotCompilable."""
     try:
         from graspsense_sim_gripper.compiled.wide_product import high_product
     except ImportError as error:

@@ -1,26 +1,42 @@
-"""The compiled loop of a grasp. The state at its end is an array of numbers; named tuples are made of it when read.
+"""The compiled loop of a grasp. It begins with an array of numbers, and its end is one.
 
 The interpreter takes a tenth of the time of a grasp for the named tuples of a state, and a batch reads few of them.
 """
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from graspsense.plugin_api import NotCompilable, bind, entry_point
 from graspsense_sim_gripper.compiled.compose import Composition, grasp_loop
 from graspsense_sim_gripper.compiled.jit import COMPILING, OPTIONS, compile_part, generating
 from graspsense_sim_gripper.loop import Buffers, Ending, GraspParams, LoopEnd, SimulationState, ending
-from graspsense_sim_gripper.nested import Stored, TupleType
+from graspsense_sim_gripper.nested import (
+    Pattern,
+    Stored,
+    TupleType,
+    append_arrays,
+    append_numbers,
+    count_numbers,
+)
 from graspsense_sim_gripper.problem import ControllerStep
+
+Numbers = NDArray[np.float64]
+Arrays = tuple[NDArray[Any], ...]
 
 
 def _grasp_unbound(params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
     raise TypeError("no loop is bound: use CompiledLoops")
+
+
+def _tuples_unbound(pattern: Pattern, numbers: Any, arrays: Any) -> Any:
+    raise TypeError("only compiled code makes tuples of numbers: use CompiledLoops")
 
 
 def _store_unbound(array: Any, values: Any) -> None:
@@ -28,23 +44,60 @@ def _store_unbound(array: Any, values: Any) -> None:
 
 
 grasp: Callable[[GraspParams, SimulationState, Buffers], SimulationState] = _grasp_unbound
+tuples_of: Callable[[Pattern, Any, Any], Any] = _tuples_unbound
 store_numbers: Callable[[Any, Any], None] = _store_unbound
 
 
-def stored_grasp(params: GraspParams, progress: SimulationState, buffers: Buffers, numbers: Any) -> Ending:
-    """Run `grasp`, write the numbers of the state at its end to `numbers`, and return those that all callers read."""
+def stored_grasp(pattern: Pattern, start: Any, arrays: Any, buffers: Buffers, end: Any) -> Ending:
+    """Run `grasp` from the numbers and arrays of its parameters and its state, which have the types of `pattern`.
+
+    Write the numbers of the state at its end to `end`, and return those that all callers read.
+    """
+    params, progress = tuples_of(pattern, start, arrays)
     state = grasp(params, progress, buffers)
-    store_numbers(numbers, state)
+    store_numbers(end, state)
     return ending(state)
 
 
-class _Types(NamedTuple):
-    """The types of the state of a grasp."""
+class LoopStart(NamedTuple):
+    """The parameters of a grasp and a state of it, in the form that a compiled loop takes."""
 
+    types: LoopTypes
+    numbers: Numbers
+    """Those of the parameters, then those of the state."""
+    arrays: Arrays
+
+    def after(self, end: LoopEnd) -> LoopStart:
+        """Return the same grasp in the state in which a compiled loop ended."""
+        state = end.state
+        assert isinstance(state, Stored)
+        of_params = self.numbers[: len(self.numbers) - len(state.numbers)]
+        return LoopStart(self.types, np.concatenate([of_params, state.numbers]), self.arrays)
+
+
+class LoopTypes(NamedTuple):
+    """The types of the parameters and the states of the grasps of a compiled loop."""
+
+    pattern: Pattern
+    """Parameters and state."""
     state: TupleType
     plant: TupleType
     before_plant: int
     """Number of numbers of the state before those of the plant."""
+
+    @classmethod
+    def of(cls, params: GraspParams, state: SimulationState) -> LoopTypes:
+        """Return the types of these parameters and of this state."""
+        pattern = Pattern((params, state))
+        return cls(pattern, TupleType.of(state), TupleType.of(state.plant), count_numbers(state.loop))
+
+
+def loop_start(params: GraspParams, state: SimulationState, types: LoopTypes | None = None) -> LoopStart:
+    """Return a state of a grasp in the form that a compiled loop takes; `types`: its types, if they are known."""
+    numbers, arrays = array("d"), list[NDArray[Any]]()
+    append_numbers(numbers, (params, state))
+    append_arrays(arrays, params)
+    return LoopStart(types or LoopTypes.of(params, state), np.frombuffer(numbers), tuple(arrays))
 
 
 class CompiledLoop:
@@ -54,20 +107,24 @@ class CompiledLoop:
         """Take the function that `compile_function` returned; its first call makes machine code."""
         self._composition, self._compiled = composition, compiled
         self._machine_code: Callable[..., Ending] | None = None
-        self._types: _Types | None = None
+        self._types: LoopTypes | None = None
 
     def run(self, params: GraspParams, progress: SimulationState, buffers: Buffers) -> LoopEnd:
         """Run the grasp from a state to its end, as `loop.grasp` does. Raises NotCompilable if numba refuses."""
-        types = self._types or _types(progress)
-        numbers = np.empty(types.state.count)
+        return self.run_from(loop_start(params, progress, self._types), buffers)
+
+    def run_from(self, start: LoopStart, buffers: Buffers) -> LoopEnd:
+        """Run the grasp from its start to its end. Raises NotCompilable if numba refuses."""
+        types, state = start.types, np.empty(start.types.state.count)
+        arguments = types.pattern, start.numbers, start.arrays, buffers, state
         if self._machine_code is not None:
-            end = self._machine_code(params, progress, buffers, numbers)
+            end = self._machine_code(*arguments)
         else:
             with generating(slp_vectorize=self._composition.shape is not None):
-                end = self._compiled(params, progress, buffers, numbers)
+                end = self._compiled(*arguments)
             self._types, self._machine_code = types, entry_point(self._compiled)
-        plant = numbers[types.before_plant : types.before_plant + types.plant.count]
-        return LoopEnd(end, Stored(types.state, numbers), Stored(types.plant, plant))
+        plant = state[types.before_plant : types.before_plant + types.plant.count]
+        return LoopEnd(end, Stored(types.state, state), Stored(types.plant, plant))
 
     def __call__(self, params: GraspParams, progress: SimulationState, buffers: Buffers) -> SimulationState:
         """Return the state at the end of what `run` runs."""
@@ -93,17 +150,13 @@ class CompiledLoops:
         return self._loops[composition]
 
 
-def _types(state: SimulationState) -> _Types:
-    return _Types(TupleType.of(state), TupleType.of(state.plant), TupleType.of(state.loop).count)
-
-
 @lru_cache(maxsize=64)
 def _compiled(composition: Composition, step: ControllerStep) -> Callable[..., Ending]:
     """Return `stored_grasp` of a composition for a controller with this step, compiled. Raises NotCompilable."""
     try:
-        from graspsense_sim_gripper.compiled.nested_numbers import store_numbers
+        from graspsense_sim_gripper.compiled.nested_numbers import store_numbers, tuples_of
     except ImportError as error:
         raise NotCompilable(f'numba is not installed: pip install "{OPTIONS.install}"') from error
-    parts = {"grasp": grasp_loop(composition, step, interpreted=False), "store_numbers": store_numbers}
+    loop = grasp_loop(composition, step, interpreted=False)
     with COMPILING:
-        return compile_part(bind(stored_grasp, **parts))
+        return compile_part(bind(stored_grasp, grasp=loop, tuples_of=tuples_of, store_numbers=store_numbers))

@@ -55,14 +55,27 @@ class ParsedTerm(NamedTuple):
     spread: TermSpread
 
 
-class NominalParam(NamedTuple):
-    """The nominal value of a parameter of a term, and how it varies between instances."""
+class NominalParams(NamedTuple):
+    """The parameters of all terms of an object, one term after the other, and how each varies between instances."""
 
-    value: float
-    is_stiffness: bool
-    """Whether it varies with the stiffness of the object."""
-    spread: float
+    value: Any
+    """The nominal values: numbers in a tuple, or in an array for compiled code. So are the others."""
+    is_stiffness: Any
+    """1: it varies with the stiffness of the object."""
+    spread: Any
     """The standard deviation of the logarithm of its own variation; 0: it has none."""
+
+
+class InstanceSpread(NamedTuple):
+    """How the instances of an object differ, besides the parameters of its terms; fields as in `ObjectSpec`."""
+
+    stiffness: float
+    width_m: float
+    width_spread_m: float
+    offset_m: float
+    offset_spread_m: float
+    share: float
+    share_spread: float
 
 
 @frozen(kw_only=True)
@@ -104,16 +117,28 @@ class ObjectSpec:
         return tuple(kind for kind, _ in self.terms)
 
     @cached_property
-    def nominal_params(self) -> tuple[NominalParam, ...]:
-        """The nominal parameters of all terms, one term after the other."""
-        nominal = []
+    def nominal_params(self) -> NominalParams:
+        """The nominal parameters of all terms."""
+        value: list[float] = []
+        is_stiffness: list[int] = []
+        own: list[float] = []
         spreads = self.spreads or ({},) * len(self.terms)
         for (kind, values), spread in zip(self.terms, spreads, strict=True):
             term = find_term(kind)[1]
-            for name, value in term.params(**values)._asdict().items():
+            for name, number in term.params(**values)._asdict().items():
                 # A default may be written as an integer, and compiled code distinguishes the types.
-                nominal.append(NominalParam(float(value), name in term.stiffnesses, spread.get(name, 0.0)))
-        return tuple(nominal)
+                value.append(float(number))
+                is_stiffness.append(int(name in term.stiffnesses))
+                own.append(spread.get(name, 0.0))
+        return NominalParams(tuple(value), tuple(is_stiffness), tuple(own))
+
+    @cached_property
+    def spread(self) -> InstanceSpread:
+        """How its instances differ."""
+        return InstanceSpread(
+            *(float(self.stiffness_spread), float(self.width_m), float(self.width_spread_m)),
+            *(float(self.offset_m), float(self.offset_spread_m), float(self.share), float(self.share_spread)),
+        )
 
     @cached_property
     def params_of_terms(self) -> tuple[tuple[type[TermParams], int, int], ...]:
@@ -128,7 +153,7 @@ class ObjectSpec:
     @cached_property
     def n_own_spreads(self) -> int:
         """The number of parameters with a spread of their own."""
-        return sum(param.spread > 0.0 for param in self.nominal_params)
+        return sum(spread > 0.0 for spread in self.nominal_params.spread)
 
     @cached_property
     def dents(self) -> tuple[tuple[int, Callable[[TermParams], float]], ...]:

@@ -1,0 +1,115 @@
+"""The scenes of a batch, each with its reduced model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+
+from attrs import define, evolve, field
+
+from graspsense_sim_gripper.batch.drawn import DrawnInstances, DrawnScene, drawn_scene
+from graspsense_sim_gripper.batch.job import Job, started
+from graspsense_sim_gripper.build import build, instantiate
+from graspsense_sim_gripper.compiled.padding import PaddedLayout, layout_of, padded
+from graspsense_sim_gripper.nested import TupleType
+from graspsense_sim_gripper.objects.library import split_number
+from graspsense_sim_gripper.problem import GraspSetup, Problem
+from graspsense_sim_gripper.random_numbers import GeneratorOf, NumpyGenerator
+from graspsense_sim_gripper.reduction.model import Reduction
+from graspsense_sim_gripper.reduction.select import select
+from graspsense_sim_gripper.sampled_loop import instability
+
+
+@define
+class Scenes:
+    """The scenes of a job, each with its reduced model. All seeds of a scene share the model."""
+
+    job: Job
+    selected: Mapping[tuple[str, bool], Reduction | None] = field(factory=dict)
+    """Models that were selected elsewhere, by `scene_key`."""
+    generator_of: GeneratorOf = NumpyGenerator
+    """Draws what a seed gives."""
+    _scenes: dict[tuple[str, bool], tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
+    """By `scene_key`."""
+    _problems: dict[str, tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
+    """By the name of the scene, with the number of the instance."""
+    _unstable: dict[tuple[str, bool], str] = field(factory=dict, init=False)
+    """Why the sampled loop is unstable, by `scene_key`."""
+    _plant_types: dict[tuple[str, bool], tuple[TupleType, PaddedLayout]] = field(factory=dict, init=False)
+    """What `plant_type` returns, by `scene_key`."""
+    _drawn_scenes: dict[tuple[str, bool], DrawnScene | None] = field(factory=dict, init=False)
+    """By `scene_key`."""
+    _drawn: dict[str, DrawnInstances | None] = field(factory=dict, init=False)
+    """What `drawn` returns, by the name of the scene, with the number of the instance."""
+
+    def add(self, scene: str, *, compiled: bool = False) -> None:
+        """Select the model of a scene. `compiled`: run the trial grasps compiled, not in the interpreter.
+
+        Raises UnknownName and ConfigError as `build` and `select` do.
+        """
+        job, key = self.job, scene_key(scene)
+        reduction = self.selected.get(key)
+        problem = build(job.config, scene, job.scaled)
+        if problem.spec is not None and reduction is None:
+            reduction = select(problem, job.grasp_controller, compiled=compiled)
+        self._scenes[key] = problem, reduction
+
+    def models(self) -> dict[tuple[str, bool], Reduction | None]:
+        """Return the models of the scenes that were added, by `scene_key`."""
+        return {key: reduction for key, (_, reduction) in self._scenes.items()}
+
+    def setup(self, scene: str, seed: int) -> GraspSetup:
+        """Return the grasp of a scene with this seed. The model is selected if the scene was not added before.
+
+        Raises as `add` and `instantiate` do.
+        """
+        known = self._problems.get(scene)
+        if known is None:
+            key = scene_key(scene)
+            if key not in self._scenes:
+                self.add(scene)
+            problem, reduction = self._scenes[key]
+            if key[1]:
+                problem = evolve(problem, number=split_number(scene)[1])
+            known = self._problems[scene] = problem, reduction
+        return instantiate(*known, seed, self.generator_of)
+
+    def drawn(self, scene: str) -> DrawnInstances | None:
+        """Return what the compiled grasps of a scene are drawn from; None if each of them needs a `GraspSetup`."""
+        if scene not in self._drawn:
+            key = scene_key(scene)
+            if key not in self._drawn_scenes:
+                setup = self.setup(scene, 0)
+                params, state = started(self.job, padded(setup), on_arrays=True)
+                self._drawn_scenes[key] = drawn_scene(*self._scenes[key], setup, params, state)
+            of_key = self._drawn_scenes[key]
+            number = split_number(scene)[1] if key[1] else None
+            self._drawn[scene] = None if of_key is None else DrawnInstances(of_key, number)
+        return self._drawn[scene]
+
+    def plant_type(self, scene: str) -> tuple[TupleType, PaddedLayout]:
+        """Return the type of the padded state of the plant in a compiled grasp of the scene, and its layout."""
+        key = scene_key(scene)
+        if key not in self._plant_types:
+            setup = self.setup(scene, 0)
+            self._plant_types[key] = TupleType.of(padded(setup).state), layout_of(setup)
+        return self._plant_types[key]
+
+    def model_of(self, scene: str, seed: int) -> tuple[Reduction | None, str]:
+        """Return the reduced model of a scene, and the text of `sampled_loop.instability` for it."""
+        key = scene_key(scene)
+        _, reduction = self._scenes[key]
+        if reduction is None:
+            return None, ""
+        if key not in self._unstable:
+            self._unstable[key] = instability(self.setup(scene, seed), self.job.grasp_controller, reduction)
+        return reduction, self._unstable[key]
+
+
+@lru_cache(maxsize=4096)
+def scene_key(scene: str) -> tuple[str, bool]:
+    """Return the key of a scene's model: the name without the number of an instance, and whether there is a number."""
+    if scene == "none":
+        return scene, False
+    name, number = split_number(scene)
+    return name, number is not None
