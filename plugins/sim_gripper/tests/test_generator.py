@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from graspsense_sim_gripper.compiled import generator
-from graspsense_sim_gripper.compiled.generator import CompiledGenerator, compiled_generator
+from graspsense_sim_gripper.compiled import drawing, generator
+from graspsense_sim_gripper.compiled.drawing import compiled_drawing
+from graspsense_sim_gripper.compiled.generator import CompiledGenerator, compiled_generator, draws_like_numpy
 from graspsense_sim_gripper.random_numbers import NumpyGenerator
 
 pytest.importorskip("numba", reason="the compiled generator needs the extra `fast`")
@@ -61,6 +62,9 @@ def test_numpy_draws_where_its_numbers_are_others(monkeypatch):
     """Another version of numpy may draw by other tables."""
     tables = generator.ziggurat_of_numpy()
     others = tables._replace(factors=tables.factors * (1.0 + 1e-15))
-    monkeypatch.setattr(generator, "ziggurat_of_numpy", lambda: others)
-    assert compiled_generator.__wrapped__() is NumpyGenerator
     assert isinstance(compiled_generator()(1), CompiledGenerator)
+    monkeypatch.setattr(generator, "ziggurat_of_numpy", lambda: others)
+    monkeypatch.setattr(generator, "draws_like_numpy", draws_like_numpy.__wrapped__)
+    assert compiled_generator() is NumpyGenerator
+    monkeypatch.setattr(drawing, "draws_like_numpy", draws_like_numpy.__wrapped__)
+    assert compiled_drawing.__wrapped__() is None

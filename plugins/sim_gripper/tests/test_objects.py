@@ -13,7 +13,7 @@ from graspsense_sim_gripper.backend import SimBackend
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.instance import cell_weights, sample
 from graspsense_sim_gripper.objects.library import catalogue, find, parse_entry
-from graspsense_sim_gripper.objects.spec import ObjectSpec
+from graspsense_sim_gripper.objects.spec import PATCHES, ObjectSpec
 from graspsense_sim_gripper.terms import NoState, Term
 from graspsense_sim_gripper.terms.registry import TERMS
 
@@ -102,10 +102,10 @@ def test_instances_spread_as_the_catalogue_says():
     assert all(0.0 < i.share <= 1.0 for i in many)
 
 
-@pytest.mark.parametrize("patch", ["line", "face", "point"])
+@pytest.mark.parametrize("patch", PATCHES)
 def test_the_weights_of_the_cells_share_out_the_whole_force(patch):
-    weights = cell_weights(patch, 0.4)
-    assert len(weights) == 15
+    weights = [math.nan] * 15
+    cell_weights(PATCHES.index(patch), 0.4, weights)
     assert math.fsum(weights) == pytest.approx(1.0)
     rows = [sum(weights[3 * r : 3 * r + 3]) for r in range(5)]
     if patch == "face":

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from graspsense_sim_gripper.compiled.padding import PaddedLayout
 from graspsense_sim_gripper.dynamics.state import PlantState
+from graspsense_sim_gripper.nested import TupleType, first_place, with_places
 from graspsense_sim_gripper.reduction.model import QUANTITIES, Reduction
 from graspsense_sim_gripper.terms.registry import find_term
 from graspsense_sim_gripper.terms.term import TermState, never_beyond
@@ -15,19 +20,86 @@ from graspsense_sim_gripper.terms.term import TermState, never_beyond
 def model_report(state: PlantState, kinds: Sequence[str]) -> dict[str, Any]:
     """Return the report of a grasp that ended in this state, of an object with terms of these kinds."""
     contact = state.contact
-    warnings = {
-        f"{kind}: {reason}": None
+    beyond = (
+        (kind, check(half.states[i]))
         for half in (contact.left, *contact.right)
-        for i, kind, beyond in _checked(tuple(kinds))
-        if (reason := beyond(half.states[i]))
-    }
+        for i, kind, check in _checked(tuple(kinds))
+    )
+    return _report(
+        state.peak_n,
+        state.step.unresolved + contact.unbalanced,
+        any(getattr(term, "broken", 0) == 1 for term in contact.left.states),
+        beyond,
+    )
+
+
+def _report(
+    peak_n: float, unresolved: float, broken: bool, beyond: Iterable[tuple[str, str]]
+) -> dict[str, Any]:
+    """Return a report; `beyond` gives the kind of a term and why its law was used beyond its validity, or ''."""
     return {
         "simulated": True,
-        "true_peak_force_n": state.peak_n,
-        "resolved": state.step.unresolved + state.contact.unbalanced == 0,
-        "broken": any(getattr(term, "broken", 0) == 1 for term in contact.left.states),
-        "beyond": "; ".join(warnings),
+        "true_peak_force_n": peak_n,
+        "resolved": unresolved == 0,
+        "broken": broken,
+        "beyond": "; ".join(dict.fromkeys(f"{kind}: {reason}" for kind, reason in beyond if reason)),
     }
+
+
+class _CheckedTerm(NamedTuple):
+    """A term whose law may be used beyond its validity, in an array of the numbers of a state."""
+
+    kind: str
+    check: Callable[[TermState], str]
+    type: TupleType
+    """That of its state."""
+    begin: int
+    """Where the numbers of its state begin."""
+
+
+class StoredReport(NamedTuple):
+    """Makes `model_report` of the numbers of a state, without the named tuples of the state."""
+
+    peak: int
+    """Place of the peak force among the numbers; below likewise."""
+    unresolved: int
+    unbalanced: int
+    broken: tuple[int, ...]
+    checked: tuple[_CheckedTerm, ...]
+
+    def of(self, numbers: NDArray[np.float64]) -> dict[str, Any]:
+        """Return the report of a grasp that ended in the state of these numbers."""
+        beyond = (
+            (kind, check(state.filled(numbers[begin : begin + state.count])))
+            for kind, check, state, begin in self.checked
+        )
+        return _report(
+            float(numbers[self.peak]),
+            float(numbers[self.unresolved] + numbers[self.unbalanced]),
+            any(numbers[place] == 1.0 for place in self.broken),
+            beyond,
+        )
+
+
+@lru_cache(maxsize=256)
+def stored_report(plant: TupleType, layout: PaddedLayout, kinds: tuple[str, ...]) -> StoredReport:
+    """Return what makes the reports of states of the plant of this type, padded in this layout.
+
+    `kinds`: those of the object's own terms. Terms that are not in the layout stay at rest, and are not looked at.
+    """
+    padded = plant.filled([0.0] * plant.count)
+    at = with_places(padded)
+    states = zip(
+        (padded.contact.left, *padded.contact.right), (at.contact.left, *at.contact.right), strict=True
+    )
+    checked = tuple(
+        _CheckedTerm(kind, check, TupleType.of(half.states[place]), first_place(places.states[place]))
+        for half, places in states
+        for i, kind, check in _checked(kinds)
+        if (place := layout.places[i][0]) >= 0
+    )
+    broken = tuple(state.broken for state in at.contact.left.states if hasattr(state, "broken"))
+    return StoredReport(at.peak_n, at.step.unresolved, at.contact.unbalanced, broken, checked)
 
 
 @lru_cache(maxsize=256)

@@ -115,6 +115,15 @@ def with_places(pattern: Any, begin: int = 0) -> Any:
     return tuple.__new__(type(pattern), parts)
 
 
+def first_place(places: Any) -> int:
+    """Return the first of nested places; 0 if there is none."""
+    while isinstance(places, tuple):
+        if not places:
+            return 0
+        places = places[0]
+    return int(places)
+
+
 def append_arrays(to: list[NDArray[Any]], values: Any) -> None:
     """Append the arrays in nested tuples, in order."""
     if isinstance(values, tuple):

@@ -49,7 +49,8 @@ from graspsense_sim_gripper.loop import (
     run_plain,
     uses_macro_steps,
 )
-from graspsense_sim_gripper.model_report import accuracy_report, model_report
+from graspsense_sim_gripper.model_report import accuracy_report, model_report, stored_report
+from graspsense_sim_gripper.nested import Stored
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers, sample_trace
 from graspsense_sim_gripper.problem import (
@@ -107,7 +108,10 @@ class FinishedGrasp:
 
     def report(self, kinds: Sequence[str]) -> dict[str, Any]:
         """Return the `model_report` of the grasp, with what its model does not verify; `kinds`: those of its terms."""
-        report = model_report(self.state, kinds)
+        if isinstance(self.end, Stored) and self.layout is not None:
+            report = stored_report(self.end.type, self.layout, tuple(kinds)).of(self.end.numbers)
+        else:
+            report = model_report(self.state, kinds)
         if self.reduction is not None:
             report |= accuracy_report(report, self.reduction, self.unstable_loop)
         return report
@@ -363,8 +367,9 @@ def _as_lists(buffers: Buffers) -> Buffers:
 
 def begin_images(buffers: Buffers, noise: Generator | None) -> None:
     """Prepare buffers for a grasp, of whose cells `noise` draws the noise; None: the sensors are ideal."""
-    if noise is not None:
-        noise.fill(buffers.pads.noise)
+    if noise is None:
+        return
+    noise.fill(buffers.pads.noise)
     buffers.pads.images[-1] = math.nan
     buffers.pads.left_zero[:] = buffers.pads.right_zero[:] = CELL_OFFSET[0]
 

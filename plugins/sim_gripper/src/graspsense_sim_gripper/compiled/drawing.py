@@ -138,7 +138,8 @@ def _write_instance(scene: SceneNumbers, places: Places, draws: Any, params: Any
         numbers[places.params[i]] = params[i]
     placement = placed(scene.spread, draws)
     numbers[places.width_m], numbers[places.offset_m] = placement.width_m, placement.offset_m
-    numbers[places.share] = placement.share
+    if scene.has_cells == 1:
+        numbers[places.share] = placement.share
     return placement.patch_row
 
 

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import Final, NamedTuple
 
+from attrs import frozen
+
 from graspsense_sim_gripper.compiled.compose import Composition, composition
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.contact import ObjectModel
@@ -37,7 +39,8 @@ TermStates = tuple[TermState, ...]
 NOTHING: Final = Filler(Switchable(0, None), None)
 
 
-class PaddedLayout(NamedTuple):
+@frozen(eq=False)
+class PaddedLayout:
     """The terms of a composition, and the positions of an object's own terms in it.
 
     In `sources` and `places`, though not in `kinds`, the lumped spring and damper is at position 0.

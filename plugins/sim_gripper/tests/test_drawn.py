@@ -1,0 +1,154 @@
+"""Grasps that compiled code draws are, to the bit, those that `build.instantiate` gives."""
+
+import re
+from functools import cache
+
+import pytest
+from attrs import evolve
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from graspsense.core.errors import ConfigError
+from graspsense.core.run_config import RunConfig
+from graspsense.plugin_api import create
+from graspsense_sim_gripper.batch.drawn import can_be_drawn
+from graspsense_sim_gripper.batch.job import Job, started
+from graspsense_sim_gripper.batch.scenes import Scenes, scene_key
+from graspsense_sim_gripper.build import build
+from graspsense_sim_gripper.compiled.loop_code import loop_start
+from graspsense_sim_gripper.compiled.padding import padded
+from graspsense_sim_gripper.config import SimConfig
+from graspsense_sim_gripper.objects.library import catalogue
+from graspsense_sim_gripper.reduction.model import DROPPED, KEPT
+from graspsense_sim_gripper.reduction.propose import grip_of, propose
+
+pytest.importorskip("numba", reason="grasps are drawn in compiled code with the extra `fast`")
+from graspsense_sim_gripper.compiled.drawing import compiled_drawing
+
+HELD = """
+width_m = 0.04
+width_spread_m = 0.002
+stiffness_spread = 0.3
+offset_m = 0.001
+offset_spread_m = 0.001
+share = 0.9
+share_spread = 0.1
+patch = "point"
+held = true
+
+[[terms]]
+type = "elastic"
+k1_n_m = 900.0
+k3_n_m3 = 1e6
+spread = { k3_n_m3 = 0.5 }
+
+[[terms]]
+type = "maxwell"
+k_n_m = 300.0
+tau_s = 0.2
+spread = { k_n_m = 0.2, tau_s = 0.4 }
+"""
+WIDE = """
+width_m = 0.084
+width_spread_m = 0.004
+
+[[terms]]
+type = "elastic"
+k1_n_m = 900.0
+k3_n_m3 = 0.0
+"""
+NAMES = [*sorted(catalogue()), "odwalla:full_open#3", "odwalla_worn:empty_open#7", HELD, f"{HELD}#4", WIDE]
+CONFIGS = {
+    "pads": SimConfig(),
+    "ideal": SimConfig(sensor="ideal"),
+    "no spread": SimConfig(spread=False),
+    "few cells": SimConfig(pad_cells=5, pad_period_s=0.0161, transmission="pr2_paper"),
+    "dropped": SimConfig(sensor="ideal", accuracy=0.5),
+}
+SEEDS = st.one_of(st.integers(0, 500), st.integers(0, 2**64 - 1))
+
+
+def scenes_of(config, last=KEPT):
+    """Return the scenes with models that no trial grasp verifies, which treat the last term like this."""
+    job = Job(
+        config=config,
+        controller=create("controller", "hybrid"),
+        run=RunConfig(),
+        extract=None,
+        traces=False,
+    )
+    models = {}
+    for name in NAMES:
+        problem = build(config, name)
+        proposed = propose(problem, grip_of(problem))
+        *terms, pads = proposed.treatment
+        models[scene_key(name)] = evolve(
+            proposed, treatment=(*[one if one == DROPPED else KEPT for one in terms[:-1]], last, pads)
+        )
+    return Scenes(job, models)
+
+
+@cache
+def scenes_with(name):
+    return scenes_of(CONFIGS[name], DROPPED if name == "dropped" else KEPT)
+
+
+@pytest.mark.parametrize("config", CONFIGS)
+@given(st.sampled_from([name for name in NAMES if name != WIDE]), st.lists(SEEDS, min_size=1, max_size=3))
+@settings(max_examples=40)
+def test_a_drawn_grasp_is_that_of_the_seed(config, name, seeds):
+    scenes, drawing = scenes_with(config), compiled_drawing()
+    scene, number = scenes.drawn(name)
+    buffers = scene.buffers()
+    for seed in seeds:
+        setup = padded(scenes.setup(name, seed))
+        expected = loop_start(*started(scenes.job, setup, on_arrays=True))
+        start = scene.drawn(drawing, seed, number, buffers)
+
+        assert start.numbers.tobytes() == expected.numbers.tobytes()
+        for one, other in zip(start.arrays, expected.arrays, strict=True):
+            assert one.tobytes() == other.tobytes()
+        if scene.has_cells:
+            images = (5, 44)
+            mine, numpy = drawing.noise(buffers), setup.noise()
+            assert mine.standard_normal(images).tobytes() == numpy.standard_normal(images).tobytes()
+
+
+def test_an_instance_that_does_not_fit_is_refused_as_it_is_by_itself():
+    scenes, drawing = scenes_with("ideal"), compiled_drawing()
+    scene, number = scenes.drawn(WIDE)
+    messages = []
+    for seed in range(40):
+        try:
+            scenes.setup(WIDE, seed)
+        except ConfigError as error:
+            messages.append(str(error))
+            with pytest.raises(ConfigError, match=re.escape(messages[-1])):
+                scene.drawn(drawing, seed, number, scene.buffers())
+        else:
+            scene.drawn(drawing, seed, number, scene.buffers())
+    assert 0 < len(messages) < 40
+
+
+@pytest.mark.parametrize(
+    ("config", "name"),
+    [
+        (SimConfig(transmission="straight"), "toy"),
+        (SimConfig(acceleration=True), "toy"),
+        (SimConfig(), "none"),
+    ],
+)
+def test_grasps_that_need_more_than_their_numbers_are_not_drawn(config, name):
+    """A straight drive may be discretised exactly, and an accelerometer draws noise of its own."""
+    assert scenes_of(config).drawn(name) is None
+
+
+def test_a_limit_of_a_term_depends_on_the_instance_and_is_not_drawn():
+    assert scenes_of(SimConfig(), last="damper").drawn("toy") is None
+
+
+def test_only_seeds_that_compiled_code_hashes_are_drawn():
+    assert can_be_drawn(0)
+    assert can_be_drawn(2**64 - 1)
+    assert not can_be_drawn(2**64)
+    assert not can_be_drawn(-1)
