@@ -124,7 +124,7 @@ def run(arguments: list[str]) -> None:
 
 
 def processor_s() -> float:
-    """Return the processor time of this process and of the forked ones that have ended."""
+    """Return the processor time of this process and of those it started that have ended."""
     return sum(os.times()[:4])
 
 

@@ -2,6 +2,9 @@
 
 import io
 import math
+import os
+import signal
+import subprocess
 import sys
 import tracemalloc
 from typing import NamedTuple
@@ -20,6 +23,7 @@ from graspsense.plugin_api import (
     RUNNING,
     STEADY,
     Command,
+    CompiledExtraction,
     Controller,
     ControllerEntry,
     Outcome,
@@ -37,12 +41,32 @@ from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.compiled import loop_code
 from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.objects.library import catalogue, shipped_scenes
+from graspsense_sim_gripper.model_report import model_report
+from graspsense_sim_gripper.objects.library import catalogue, kinds_in, shipped_scenes
 from graspsense_sim_gripper.reduction import levels
 
 HYBRID = create("controller", "hybrid")
 FEATURES = create("feature-set", "chitta")
 SCENES = ["block", "can:empty_open", "toy", "none"]
+
+
+class Found(NamedTuple):
+    largest_n: float
+    ticks: float
+
+
+def largest(params, ticks):
+    most = 0.0
+    for force in ticks.force_left_n:
+        most = max(most, force)
+    return Found(most, float(len(ticks.t_s)))
+
+
+class Largest:
+    """Extracts two numbers of a trace in a form that can be compiled."""
+
+    def compiled_extraction(self):
+        return CompiledExtraction(largest, (), lambda found: (type(found).__name__, *found))
 
 
 def bits(trace):
@@ -113,6 +137,104 @@ def test_features_without_traces_are_those_of_the_traces():
             assert one.extracted.reasons == other.extracted.reasons
             assert (one.outcome, one.reason, one.state) == (other.outcome, other.reason, other.state)
     assert len(built) == 24
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sensor", ["pads", "ideal"])
+def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monkeypatch):
+    """Of each object, of one that breaks, of one beyond its law, and with more images than the buffers hold first."""
+    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+    monkeypatch.setattr(batch_job, "IMAGES", 48)
+    names = [*sorted(catalogue()), "odwalla:full_open#3", BREAKS, "none"]
+    config, options = (
+        SimConfig(sensor=sensor),
+        {"traces": False, "compiled": True, "extract": FEATURES.extract},
+    )
+
+    def told(workers):
+        done = run_many(config, HYBRID, names, range(len(names)), workers=workers, **options)
+        return [
+            (one.outcome, one.reason, repr(one.extracted), repr(one.state), one.report(kinds_in(name)))
+            for one, name in zip(done, names, strict=True)
+        ]
+
+    drawn = told(1)
+    assert told(3) == drawn
+    monkeypatch.setattr(threads, "can_be_drawn", lambda seed: False)
+    assert told(1) == drawn
+    assert any(report["broken"] for *_, report in drawn)
+
+
+@pytest.mark.slow
+def test_a_report_is_that_of_the_state():
+    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+    names = [*sorted(catalogue()), "none"]
+    for grasp, name in zip(
+        run_many(SimConfig(), HYBRID, names, range(len(names)), traces=False, compiled=True),
+        names,
+        strict=True,
+    ):
+        of_state = model_report(grasp.state, kinds_in(name))
+        assert {key: grasp.report(kinds_in(name))[key] for key in of_state} == of_state
+
+
+BREAKS = """
+width_m = 0.04
+width_spread_m = 0.002
+stiffness_spread = 0.1
+
+[[terms]]
+type = "rigid"
+hertz_n_m15 = 2e6
+crush_force_n = 4.0
+broken_n_m = 3000.0
+"""
+INTERRUPTED = """
+from graspsense.plugin_api import create
+from graspsense_sim_gripper.batch.threads import grasps, job_of
+from graspsense_sim_gripper.config import SimConfig
+
+def told(done, of):
+    if done > 0:
+        print("running", flush=True)
+
+law, features = create("controller", "hybrid"), create("feature-set", "chitta")
+options = {"extract": features.extract, "workers": 2, "progress": told}
+job = job_of(SimConfig(), law, options, features=features)
+scenes = ["block"] * 10**6
+try:
+    for _ in grasps(job, scenes, range(len(scenes)), True, options):
+        pass
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+
+
+@pytest.mark.slow
+def test_a_batch_ends_when_it_is_interrupted():
+    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+    with subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as running:
+        assert running.stdout.readline() == "running\n"
+        os.killpg(running.pid, signal.SIGINT)
+        said, errors = running.communicate()
+    assert (said.splitlines()[-1], errors) == ("interrupted", "")
+
+
+@pytest.mark.slow
+def test_a_named_tuple_that_is_measured_comes_back_as_one():
+    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+    done = run_many(
+        SimConfig(), HYBRID, ["block"] * 3, range(3), traces=False, compiled=True, extract=Largest()
+    )
+    traced = run_many(SimConfig(), HYBRID, ["block"] * 3, range(3), compiled=True)
+    for one, other in zip(done, traced, strict=True):
+        assert one.extracted == ("Found", max(other.trace.force_left_n), float(len(other.trace.t_s)))
 
 
 def test_features_that_cannot_be_compiled_are_extracted_from_traces():

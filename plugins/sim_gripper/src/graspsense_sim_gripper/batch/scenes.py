@@ -10,8 +10,7 @@ from attrs import define, evolve, field
 from graspsense_sim_gripper.batch.drawn import DrawnInstances, DrawnScene, drawn_scene
 from graspsense_sim_gripper.batch.job import Job, started
 from graspsense_sim_gripper.build import build, instantiate
-from graspsense_sim_gripper.compiled.padding import PaddedLayout, layout_of, padded
-from graspsense_sim_gripper.nested import TupleType
+from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.objects.library import split_number
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.random_numbers import GeneratorOf, NumpyGenerator
@@ -35,8 +34,6 @@ class Scenes:
     """By the name of the scene, with the number of the instance."""
     _unstable: dict[tuple[str, bool], str] = field(factory=dict, init=False)
     """Why the sampled loop is unstable, by `scene_key`."""
-    _plant_types: dict[tuple[str, bool], tuple[TupleType, PaddedLayout]] = field(factory=dict, init=False)
-    """What `plant_type` returns, by `scene_key`."""
     _drawn_scenes: dict[tuple[str, bool], DrawnScene | None] = field(factory=dict, init=False)
     """By `scene_key`."""
     _drawn: dict[str, DrawnInstances | None] = field(factory=dict, init=False)
@@ -86,14 +83,6 @@ class Scenes:
             number = split_number(scene)[1] if key[1] else None
             self._drawn[scene] = None if of_key is None else DrawnInstances(of_key, number)
         return self._drawn[scene]
-
-    def plant_type(self, scene: str) -> tuple[TupleType, PaddedLayout]:
-        """Return the type of the padded state of the plant in a compiled grasp of the scene, and its layout."""
-        key = scene_key(scene)
-        if key not in self._plant_types:
-            setup = self.setup(scene, 0)
-            self._plant_types[key] = TupleType.of(padded(setup).state), layout_of(setup)
-        return self._plant_types[key]
 
     def model_of(self, scene: str, seed: int) -> tuple[Reduction | None, str]:
         """Return the reduced model of a scene, and the text of `sampled_loop.instability` for it."""

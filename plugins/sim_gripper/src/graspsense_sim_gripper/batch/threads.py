@@ -1,9 +1,8 @@
 """Simulating many grasps on all cores: compiled if numba is installed, otherwise in the interpreter.
 
-Threads process slices of the batch in turn. A compiled loop runs in its thread without the interpreter lock; where
-forking is safe and the results can be sent, a large batch of compiled grasps runs in one forked process per thread
-(`forked`). Grasps in the interpreter run in one new process per thread (`worker`). The result of a grasp depends on its
-scene and seed only; the number of workers changes the run time only.
+Threads process slices of the batch in turn. A compiled loop runs in its thread without the interpreter lock. Grasps in
+the interpreter run in one new process per thread (`worker`). The result of a grasp depends on its scene and seed only;
+the number of workers changes the run time only.
 """
 
 from __future__ import annotations
@@ -15,28 +14,14 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from importlib.util import find_spec
-from queue import SimpleQueue
 from typing import Any, Final, Unpack
 
-import numpy as np
 from attrs import define, field
 
 from graspsense.plugin_api import BatchOptions, Controller, FeatureSet, NotCompilable, RunConfig
 from graspsense_sim_gripper.batch.drawn import DrawnGrasps, can_be_drawn
-from graspsense_sim_gripper.batch.forked import (
-    REFUSED,
-    Answer,
-    ForkedProcess,
-    InModel,
-    MeasuredNumbers,
-    answer_of,
-    can_be_sent,
-    can_fork,
-    measuring,
-    results,
-)
 from graspsense_sim_gripper.batch.job import (
     FinishedGrasp,
     Job,
@@ -54,8 +39,6 @@ from graspsense_sim_gripper.compiled.generator import compiled_generator
 from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.compiled.padding import compiled_kinds, composition_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.loop import COLUMNS
-from graspsense_sim_gripper.nested import TupleType
 from graspsense_sim_gripper.objects.library import kinds_in
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.problem import GraspSetup
@@ -64,19 +47,12 @@ WORTH_COMPILING: Final = 50
 """Number of grasps of one composition from which compiling saves more time than it takes."""
 WORTH_A_PROCESS: Final = 16
 """Number of grasps per worker in the interpreter from which a process, which starts in half a second, saves time."""
-WORTH_FORKING: Final = 500
-"""Number of compiled grasps from which forked processes save time on two cores; they start and end in 20 ms."""
 SLICE: Final = 16
 """Number of grasps that a worker takes at once."""
-FORKED_SLICE: Final = 64
-"""Largest number that a forked process takes at once. They take 20 ms, so an interruption still takes effect soon."""
 MAX_AHEAD: Final = 8
 """Number of slices per worker that may be ahead of the earliest unfinished slice."""
 PROGRESS_S: Final = 0.2
 """Time between two calls of the progress callback."""
-
-Results = list[FinishedGrasp] | Answer
-"""The results of a slice, or the answer of a forked process with them."""
 
 
 def run_many(
@@ -157,8 +133,6 @@ class _Batch:
     """The compiled form of `Job.extraction`."""
     drawing: Drawing | None = field(default=None, init=False)
     """Draws grasps in compiled code; None if grasps need a trace."""
-    measured: TupleType | None = field(default=None, init=False)
-    """The type of what `measure` returns."""
     models: Scenes = field(init=False)
     counts: Counter[Composition] = field(factory=Counter, init=False)
     """Number of grasps of each composition."""
@@ -167,10 +141,6 @@ class _Batch:
     local: threading.local = field(factory=threading.local, init=False)
     """The storage of each thread, and its process for grasps in the interpreter."""
     processes: ExitStack = field(factory=ExitStack, init=False)
-    forked: SimpleQueue[ForkedProcess] = field(factory=SimpleQueue, init=False)
-    """The forked processes that no thread uses at present."""
-    slice_size: int = field(default=SLICE, init=False)
-    """Number of grasps that a worker takes at once."""
 
     @loops.default
     def _loops(self) -> CompiledLoops:
@@ -188,22 +158,18 @@ class _Batch:
         total = len(self.scenes)
         self._plan()
         workers = max(1, min(self.workers, math.ceil(total / SLICE)))
-        running: dict[Future[Results], int] = {}
-        ready: dict[int, Results] = {}
+        running: dict[Future[list[FinishedGrasp]], int] = {}
+        ready: dict[int, list[FinishedGrasp]] = {}
         asked = given = finished = 0
         with self.processes, ThreadPoolExecutor(max_workers=workers) as pool:
-            # A thread starts with the first slice that is submitted, and processes are forked before.
-            if self._worth_forking(workers, progress):
-                self._fork(workers)
-            run = self._slice if self.forked.empty() else self._forked_slice
-            slices = range(0, total, self.slice_size)
+            slices = range(0, total, SLICE)
             try:
                 while True:
                     # Two slices per worker, one in reserve: few results wait, and an interruption takes effect soon.
                     while len(running) < 2 * workers and asked < min(
                         len(slices), given + MAX_AHEAD * workers
                     ):
-                        running[pool.submit(run, slices[asked])] = asked
+                        running[pool.submit(self._slice, slices[asked])] = asked
                         asked += 1
                     if progress is not None:
                         progress(finished, total)
@@ -214,7 +180,7 @@ class _Batch:
                         ready[k] = future.result()
                         finished += len(self._part(slices[k]))
                     while given in ready:
-                        yield from self._read(ready.pop(given), self._part(slices[given]))
+                        yield from self._with_models(ready.pop(given), slices[given])
                         given += 1
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
@@ -255,77 +221,14 @@ class _Batch:
                 self.drawing = None
                 self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
 
-    def _worth_forking(self, workers: int, progress: Callable[[int, int], None] | None) -> bool:
-        """Return whether forked processes run the grasps; all code is compiled then."""
-        worth = workers > 1 and len(self.scenes) >= WORTH_FORKING and all(self.is_compiled.values())
-        may_be_sent = can_be_sent(self.job) and (self.job.extract is None or self.measure is not None)
-        if not (worth and may_be_sent and can_fork()):
-            return False
-        # In a thread, so that `progress` is called while code is compiled. It has ended before a process is forked.
-        with ThreadPoolExecutor(max_workers=1) as pool:
-            compiling = pool.submit(self._one_of_each)
-            while not wait([compiling], PROGRESS_S).done:
-                if progress is not None:
-                    progress(0, len(self.scenes))
-        return compiling.result()
-
-    def _one_of_each(self) -> bool:
-        """Run a grasp of each composition, which compiles its loop. Return whether all of them could be compiled."""
-        missing = set(self.is_compiled)
-        for scene, seed in zip(self.scenes, self.seeds, strict=True):
-            if not missing:
-                break
-            setup = self.models.setup(scene, seed)
-            composition = composition_of(self.job.config, setup)
-            if composition in missing and self._compiled(setup) is None:
-                return False
-            missing.discard(composition)
-        return True
-
-    def _fork(self, workers: int) -> None:
-        """Fork as many processes, or fewer if the system allows no more; without any, threads run the grasps."""
-        processes: list[ForkedProcess] = []
-        # Several for each, so that none waits long for the last of the others.
-        self.slice_size = min(max(len(self.scenes) // (4 * workers), SLICE), FORKED_SLICE)
-        # OSError: no memory, or the limit of processes.
-        with suppress(OSError):
-            for _ in range(workers):
-                process = self.processes.enter_context(ForkedProcess(self._answer, tuple(processes)))
-                processes.append(process)
-                self.forked.put(process)
-
-    def _answer(self, begin: int) -> Answer:
-        """Return, in a forked process, the results of the slice that begins at this index."""
-        if self.job.extraction is not None and not isinstance(self.job.extract, MeasuredNumbers):
-            self.job = self.models.job = measuring(self.job)
-        return answer_of(self._slice(begin))
-
-    def _forked_slice(self, begin: int) -> Results:
-        """Return the answer of a forked process for a slice, or the results if it cannot run the slice."""
-        process = self.forked.get()
-        try:
-            answer = process.answer(begin)
-        finally:
-            self.forked.put(process)
-        return self._slice(begin) if answer == REFUSED else answer
-
-    def _read(self, answer: Results, part: Sequence[tuple[str, int]]) -> list[FinishedGrasp]:
-        """Return the results of these scenes and seeds, each with its model."""
-        models = self.models
-        if not isinstance(answer, Answer):
-            done = zip(answer, part, strict=True)
-            return [grasp.in_model(*models.model_of(*one)) for grasp, one in done]
-        form = self.job.extraction
-        if form is not None and self.measure is not None and self.measured is None:
-            # What is measured on no ticks has the same type.
-            no_ticks = np.zeros((len(COLUMNS), 1)), np.zeros(1, np.int64), 0
-            self.measured = TupleType.of(self.measure(form.params, *no_ticks))
-        known = (InModel(*models.plant_type(scene), *models.model_of(scene, seed)) for scene, seed in part)
-        return results(answer, form, self.measured, known)
+    def _with_models(self, done: list[FinishedGrasp], begin: int) -> list[FinishedGrasp]:
+        """Return the results of the slice that begins at this index, each with its model."""
+        part = zip(done, self._part(begin), strict=True)
+        return [grasp.in_model(*self.models.model_of(*one)) for grasp, one in part]
 
     def _part(self, begin: int) -> list[tuple[str, int]]:
         """Return the scene and the seed of each grasp of the slice that begins at this index."""
-        part = slice(begin, begin + self.slice_size)
+        part = slice(begin, begin + SLICE)
         return list(zip(self.scenes[part], self.seeds[part], strict=True))
 
     def _worth(self, n: int) -> bool:
