@@ -13,12 +13,13 @@ from attrs import field, frozen
 
 from graspsense.plugin_api import ended_by_itself
 from graspsense_sim_gripper.batch.job import (
+    EndedGrasp,
     FinishedGrasp,
     Job,
     Measure,
     Storage,
     begin_images,
-    measured,
+    result_of,
     with_more_images,
 )
 from graspsense_sim_gripper.build import check_fit, friction_spread, present_cells
@@ -42,13 +43,22 @@ from graspsense_sim_gripper.compiled.loop_code import (
 )
 from graspsense_sim_gripper.compiled.padding import PaddedLayout, composition_of, layout_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.loop import Buffers, Ending, GraspParams, SimulationState
+from graspsense_sim_gripper.exact.propagate import ExactPlant
+from graspsense_sim_gripper.loop import Buffers, Ending, GraspParams, PlantModel, SimulationState
 from graspsense_sim_gripper.nested import with_places
 from graspsense_sim_gripper.objects.instance import N_COMMON_DRAWS, deepest_dent, draws_of_number
 from graspsense_sim_gripper.objects.spec import PATCHES, NominalParams, ObjectSpec
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
+
+
+class DrawMemory(NamedTuple):
+    """Memory that drawing and simulating a grasp overwrite."""
+
+    buffers: DrawBuffers
+    arrays: Arrays
+    """Those of a grasp, some of which are written to."""
 
 
 @frozen(eq=False)
@@ -63,7 +73,9 @@ class DrawnScene:
     numbers: Numbers
     """Those of the parameters and of the first state of a grasp; which a seed decides is arbitrary."""
     arrays: Arrays
-    """The arrays of a grasp with ideal sensors."""
+    """Its arrays; which a seed decides are arbitrary."""
+    workspace: int | None
+    """The place in `arrays` of the workspace of exact discretisation; None without."""
     scene: SceneNumbers
     places: Places
 
@@ -72,25 +84,30 @@ class DrawnScene:
         """Whether the sensors are pads."""
         return self.scene.has_cells == 1
 
-    def drawn(self, drawing: Drawing, seed: int, number: int | None, buffers: DrawBuffers) -> LoopStart:
+    def memory(self) -> DrawMemory:
+        """Return memory for drawing and simulating its grasps one after the other, in one thread."""
+        buffers = draw_buffers(N_COMMON_DRAWS + self.scene.n_own + 1, len(self.places.params))
+        arrays, cells = [*self.arrays], buffers.cells
+        if self.workspace is not None:
+            arrays[self.workspace] = arrays[self.workspace].copy()
+        if self.has_cells:
+            # The cells of the sensor are the last arrays.
+            arrays[-4:] = [cells.weights, cells.left, cells.weights, cells.right]
+        return DrawMemory(buffers, tuple(arrays))
+
+    def drawn(self, drawing: Drawing, seed: int, number: int | None, memory: DrawMemory) -> LoopStart:
         """Return the grasp with this seed, from 0 to LARGEST_SEED; `number`: that of a particular instance.
 
-        Its cells are those of `buffers`, until the next grasp is drawn to them. Raises ConfigError as `check_fit` does.
+        Its arrays are those of `memory`, until the next grasp is drawn to it. Raises ConfigError as `check_fit` does.
         """
-        numbers, spec, places = self.numbers.copy(), self.spec, self.places
+        numbers, spec, places, (buffers, arrays) = self.numbers.copy(), self.spec, self.places, memory
         of_number = NO_NUMBER if number is None else np.array(draws_of_number(spec, number))
         drawing(self.scene, places, seed, of_number, buffers, numbers)
         if spec.dents and self.scene.varies == 1:
             numbers[places.width_m] -= deepest_dent(spec, buffers.params.tolist())
         if spec.file:
             check_fit(self.config, spec, float(numbers[places.width_m]), float(numbers[places.offset_m]))
-        cells = buffers.cells
-        pads = cells.weights, cells.left, cells.weights, cells.right
-        return LoopStart(self.types, numbers, pads if self.has_cells else self.arrays)
-
-    def buffers(self) -> DrawBuffers:
-        """Return the memory for drawing its grasps."""
-        return draw_buffers(N_COMMON_DRAWS + self.scene.n_own + 1, len(self.places.params))
+        return LoopStart(self.types, numbers, arrays)
 
 
 class DrawnInstances(NamedTuple):
@@ -108,10 +125,9 @@ class DrawnGrasps:
     job: Job
     drawing: Drawing
     measure: Measure | None
-    """The compiled form of `Job.extraction`; None: nothing is extracted."""
+    """The compiled form of `Job.extraction`."""
     storage: Storage
-    _buffers: dict[int, DrawBuffers] = field(factory=dict, init=False)
-    """Memory for drawing, by the identity of the scene."""
+    _memory: dict[DrawnScene, DrawMemory] = field(factory=dict, init=False)
 
     def grasp(self, instances: DrawnInstances, seed: int, loop: CompiledLoop) -> FinishedGrasp | None:
         """Simulate a grasp; None if a term fails or it takes long, so that it has to be simulated from its setup.
@@ -119,11 +135,11 @@ class DrawnGrasps:
         Raises ConfigError as `DrawnScene.drawn` does.
         """
         scene, number = instances
-        if id(scene) not in self._buffers:
-            self._buffers[id(scene)] = scene.buffers()
-        drawn = self._buffers[id(scene)]
-        start = scene.drawn(self.drawing, seed, number, drawn)
-        noise = self.drawing.noise(drawn) if scene.has_cells else None
+        if scene not in self._memory:
+            self._memory[scene] = scene.memory()
+        memory = self._memory[scene]
+        start = scene.drawn(self.drawing, seed, number, memory)
+        noise = self.drawing.noise(memory.buffers) if scene.has_cells else None
         buffers = self.storage.buffers
         begin_images(buffers, noise)
         try:
@@ -135,17 +151,9 @@ class DrawnGrasps:
             return None
         if end.ending.failed == 1 or end.ending.ended == 0:
             return None
-        extracted = None
-        if self.measure is not None:
-            try:
-                extracted = measured(self.job, self.measure, buffers, end.ending)
-            except Exception:
-                # Compiled code does not say where an exception comes from. `Job.extract` does.
-                return None
         outcome, reason = ended_by_itself(end.ending.stopped, end.ending.outcome)
-        return FinishedGrasp(
-            outcome=outcome, reason=reason, end=end.plant, layout=scene.layout, extracted=extracted, kept=None
-        )
+        done = EndedGrasp(outcome, reason, end.plant, scene.layout, end.ending)
+        return result_of(self.job, done, buffers, self.storage, self.measure)
 
 
 def _needs_images(ending: Ending, buffers: Buffers) -> bool:
@@ -170,8 +178,10 @@ def drawn_scene(
     `example`: one of them; `params` and `state`: its parameters and its first state, padded.
     """
     spec, plant, sensor = problem.spec, example.plant, example.sensor
-    # With a straight linkage the draws decide how a grasp is discretised; limits of terms depend on the instance.
-    if spec is None or reduction is None or example.has_palm or plant.drive.link.finger_m == 0.0:
+    if spec is None or reduction is None or example.has_palm:
+        return None
+    # With a straight linkage the draws may decide how a grasp is discretised; limits of terms depend on the instance.
+    if plant.drive.link.finger_m == 0.0 and problem.config.spread:
         return None
     if not set(reduction.treatment[:-1]) <= {KEPT, DROPPED}:
         return None
@@ -193,16 +203,31 @@ def drawn_scene(
         patch=PATCHES.index(spec.patch),
         present=present_cells(config.pad_cells),
     )
-    composition = composition_of(config, example)
     return DrawnScene(
-        config, spec, composition, layout, start.types, start.numbers, start.arrays, scene, places
+        config=config,
+        spec=spec,
+        composition=composition_of(config, example),
+        layout=layout,
+        types=start.types,
+        numbers=start.numbers,
+        arrays=start.arrays,
+        workspace=_workspace(params.plant, start.arrays),
+        scene=scene,
+        places=places,
     )
+
+
+def _workspace(plant: PlantModel, arrays: Arrays) -> int | None:
+    if not isinstance(plant, ExactPlant):
+        return None
+    return next(i for i, array in enumerate(arrays) if array is plant.workspace)
 
 
 def _places(at: Any, layout: PaddedLayout) -> Places:
     """Return where the numbers are that a seed decides; `at`: parameters and state with the place of each number."""
     params, state = at
-    friction, model = params.plant.drive.friction, params.plant.object
+    plant: Any = params.plant.plant if isinstance(params.plant, ExactPlant) else params.plant
+    friction, model = plant.drive.friction, plant.object
     of_params = [place for position, _ in layout.places[1:] for place in model.terms[position].params]
     return Places(
         coulomb_n=friction.coulomb_n,

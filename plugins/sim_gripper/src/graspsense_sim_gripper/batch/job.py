@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import define, field, frozen
@@ -238,10 +238,7 @@ def grasp_once(
 
     `layout`: that in which the grasp is padded; None: it is not. `measure`: as for `grasp_compiled`.
     """
-    on_arrays = isinstance(loop, CompiledLoop)
     (ending, state, plant), buffers = _run(job, setup, loop, storage)
-    if on_arrays:
-        storage.buffers = first_images(buffers)
     outcome, reason = ended_by_itself(ending.stopped, ending.outcome)
     if ending.failed == 1:
         outcome = Outcome.ABORTED
@@ -249,64 +246,68 @@ def grasp_once(
         reason = not_finite_in_tick(setup.kinds, setup.plant, plant(), effort_n, setup.dt_s)
     elif ending.ended == 0:
         outcome, reason = Outcome.ABORTED, overdue(job.run)
+    done = EndedGrasp(outcome, reason, plant, layout, ending)
+    return result_of(job, done, buffers, storage, measure)
+
+
+class EndedGrasp(NamedTuple):
+    """A grasp that has ended, of which nothing was extracted yet."""
+
+    outcome: Outcome
+    reason: str
+    plant: Callable[[], PlantState]
+    layout: PaddedLayout | None
+    """As in `FinishedGrasp`."""
+    ending: Ending
+
+    def finished(self, extracted: Extracted, kept: Trace | None) -> FinishedGrasp:
+        """Return its result, with what was extracted, and the trace if it is kept."""
+        return FinishedGrasp(
+            outcome=self.outcome,
+            reason=self.reason,
+            end=self.plant,
+            layout=self.layout,
+            extracted=extracted,
+            kept=kept,
+        )
+
+
+def result_of(
+    job: Job, done: EndedGrasp, buffers: Buffers, storage: Storage, measure: Measure | None
+) -> FinishedGrasp:
+    """Return the result of a grasp that has been recorded in these buffers; `measure`: as for `grasp_compiled`."""
+    on_arrays = isinstance(buffers.columns, np.ndarray)
+    if on_arrays:
+        storage.buffers = first_images(buffers)
     if not job.traces and job.extract is None:
-        return finished(job, outcome, reason, plant, layout)
-    if measure is not None:
+        return done.finished(None, None)
+    n, k, form = done.ending.recorded, done.ending.images, job.extraction
+    columns, phases = buffers.columns, buffers.phases
+    if measure is not None and form is not None:
         # Compiled code does not say where an exception comes from. `extract` does, if it raises one too.
         with suppress(Exception):
-            extracted = measured(job, measure, buffers, ending)
-            return FinishedGrasp(
-                outcome=outcome, reason=reason, end=plant, layout=layout, extracted=extracted, kept=None
-            )
-    n, k = ending.recorded, ending.images
-    columns, phases = buffers.columns, buffers.phases
+            return done.finished(form.result(measure(form.params, columns, phases, n)), None)
     table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
     images, times = np.asarray(buffers.pads.images[:k]), np.asarray(buffers.image_times[:k])
     signals: dict[str, SampleTrace] = {}
-    if setup.has_palm:
+    if buffers.palm:
         signals["acceleration"] = sample_trace(table[0], np.asarray(buffers.palm.samples)[:, :n])
+    events = type(job.controller).events
     if job.traces and 2 * n < len(columns[0]):
-        trace = recorded_trace(
-            type(job.controller).events, table.copy(), numbers.copy(), images, times, signals
-        )
-        return finished(job, outcome, reason, plant, layout, trace)
+        trace = recorded_trace(events, table.copy(), numbers.copy(), images, times, signals)
+        return done.finished(None if job.extract is None else job.extract(trace), trace)
     # A trace that fills most of the buffers, or that only features are extracted from, is a view of them.
     # While a column of it is referenced, those buffers are kept, and the next grasps have new ones.
     references = sys.getrefcount(columns), sys.getrefcount(phases)
-    trace = recorded_trace(type(job.controller).events, table, numbers, images, times, signals)
-    done = finished(job, outcome, reason, plant, layout, trace)
-    del trace
+    trace = recorded_trace(events, table, numbers, images, times, signals)
+    extracted = None if job.extract is None else job.extract(trace)
+    result = done.finished(extracted, trace if job.traces else None)
+    del trace, extracted
     if on_arrays and (sys.getrefcount(columns), sys.getrefcount(phases)) != references:
         storage.buffers = first_images(buffers)._replace(
             columns=np.empty_like(columns), phases=np.empty_like(phases)
         )
-    return done
-
-
-def measured(job: Job, measure: Measure, buffers: Buffers, ending: Ending) -> Extracted:
-    """Return what the compiled form of `Job.extraction` gives for a grasp. Raises what it raises."""
-    form = job.extraction
-    assert form is not None
-    return form.result(measure(form.params, buffers.columns, buffers.phases, ending.recorded))
-
-
-def finished(
-    job: Job,
-    outcome: Outcome,
-    reason: str,
-    end: Callable[[], PlantState],
-    layout: PaddedLayout | None = None,
-    trace: Trace | None = None,
-) -> FinishedGrasp:
-    """Return the result of a grasp. `end` returns the plant at its end, whose terms are in this layout.
-
-    `trace` may be None if neither traces nor `extract` are asked for.
-    """
-    extracted = None if job.extract is None or trace is None else job.extract(trace)
-    kept = trace if job.traces else None
-    return FinishedGrasp(
-        outcome=outcome, reason=reason, end=end, layout=layout, extracted=extracted, kept=kept
-    )
+    return result
 
 
 def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tuple[LoopEnd, Buffers]:

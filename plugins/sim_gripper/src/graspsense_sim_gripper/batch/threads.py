@@ -132,7 +132,7 @@ class _Batch:
     measure: Measure | None = field(default=None, init=False)
     """The compiled form of `Job.extraction`."""
     drawing: Drawing | None = field(default=None, init=False)
-    """Draws grasps in compiled code; None if grasps need a trace."""
+    """Draws grasps in compiled code; None if nothing is compiled, or if numpy draws other numbers."""
     models: Scenes = field(init=False)
     counts: Counter[Composition] = field(factory=Counter, init=False)
     """Number of grasps of each composition."""
@@ -212,13 +212,11 @@ class _Batch:
         if find_spec("numba") is None:
             return
         self.models.generator_of = compiled_generator()
-        if not self.job.traces and (self.job.extract is None or self.job.extraction is not None):
-            self.drawing = compiled_drawing()
+        self.drawing = compiled_drawing()
         if self.job.extraction is not None:
             try:
                 self.measure = compiled_measure(self.job.extraction)
             except NotCompilable as error:
-                self.drawing = None
                 self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
 
     def _with_models(self, done: list[FinishedGrasp], begin: int) -> list[FinishedGrasp]:

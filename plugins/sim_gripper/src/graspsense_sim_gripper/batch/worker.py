@@ -23,7 +23,7 @@ import numpy as np
 from attrs import asdict, evolve, fields
 
 from graspsense.plugin_api import Controller, GraspEvent, Outcome, Phase, RunConfig, Trace, create, recipe_of
-from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, finished, grasp_plain
+from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, grasp_plain
 from graspsense_sim_gripper.batch.scenes import Scenes
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.nested import like
@@ -114,7 +114,13 @@ class PlainProcess:
             if trace is not None:
                 trace = evolve(trace, events=tuple(_event(*event) for event in told))
             results.append(
-                finished(job, Outcome(outcome), reason, partial(like, initial, values), trace=trace)
+                FinishedGrasp(
+                    outcome=Outcome(outcome),
+                    reason=reason,
+                    end=partial(like, initial, values),
+                    extracted=None if job.extract is None or trace is None else job.extract(trace),
+                    kept=trace if job.traces else None,
+                )
             )
         return results
 
