@@ -20,13 +20,13 @@ from selection import record_of
 
 from graspsense.experiments.versions import where_measured
 from graspsense.plugin_api import RunConfig, create
-from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Storage, grasp_compiled, grasp_plain
+from graspsense_sim_gripper.batch.compiled_grasps import CompiledGrasps
+from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, grasp_plain
 from graspsense_sim_gripper.batch.scenes import Scenes
 from graspsense_sim_gripper.build import build
 from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
-from graspsense_sim_gripper.compiled.padding import composition_of
 from graspsense_sim_gripper.config import SimConfig
-from graspsense_sim_gripper.problem import GraspController, GraspSetup
+from graspsense_sim_gripper.problem import GraspController
 from graspsense_sim_gripper.reduction.error import deviation
 from graspsense_sim_gripper.reduction.select import select_anew
 
@@ -49,16 +49,19 @@ class Batch:
     """The grasps of a variant, ready to run."""
 
     job: Job
-    setups: list[GraspSetup]
-    compiled: bool
-    loops: CompiledLoops
+    grasps: list[tuple[str, int]]
+    """The scene and the seed of each."""
+    compiled: CompiledGrasps | None
+    """None: in the interpreter."""
+    scenes: Scenes
 
-    def grasp(self, i: int, storage: Storage) -> FinishedGrasp:
+    def grasp(self, i: int) -> FinishedGrasp:
         """Return grasp `i`."""
-        setup = self.setups[i]
-        if not self.compiled:
-            return grasp_plain(self.job, setup)
-        return grasp_compiled(self.job, setup, self.loops.of(composition_of(self.job.config, setup)), storage)
+        if self.compiled is None:
+            return grasp_plain(self.job, self.scenes.setup(*self.grasps[i]))
+        done = self.compiled.grasp(*self.grasps[i])
+        assert done is not None
+        return done
 
 
 def batch_of(
@@ -74,15 +77,11 @@ def batch_of(
         traces=ideal,
         features=create("feature-set", "chitta"),
     )
-    scenes = Scenes(job)
+    scenes, loops = Scenes(job), CompiledLoops(type(job.controller).step)
     for name in objects:
         scenes.add(name, compiled=compiled)
-    return Batch(
-        job,
-        [scenes.setup(name, seed) for name in objects for seed in range(instances)],
-        compiled,
-        CompiledLoops(type(job.controller).step),
-    )
+    grasps = [(name, seed) for name in objects for seed in range(instances)]
+    return Batch(job, grasps, CompiledGrasps(scenes, loops) if compiled else None, scenes)
 
 
 def selection_s(objects: tuple[str, ...], settings: dict[str, Any], repeats: int, *, compiled: bool) -> float:
@@ -99,7 +98,7 @@ def selection_s(objects: tuple[str, ...], settings: dict[str, Any], repeats: int
 
 def measure(objects: tuple[str, ...], instances: int, repeats: int, *, compiled: bool) -> list[str]:
     """Return the figures in Markdown."""
-    storage, dt_s = Storage(), 1.0 / SimConfig().rate_hz
+    dt_s = 1.0 / SimConfig().rate_hz
     how = {"compiled": compiled}
     timed = {name: batch_of(objects, instances, one, ideal=False, **how) for name, one in VARIANTS.items()}
     spent: dict[str, list[float]] = {name: [] for name in VARIANTS}
@@ -108,11 +107,11 @@ def measure(objects: tuple[str, ...], instances: int, repeats: int, *, compiled:
         for name, batch in timed.items():
             began = time.thread_time()
             for i in range(count):
-                batch.grasp(i, storage)
+                batch.grasp(i)
             if k > 0:
                 spent[name].append((time.thread_time() - began) / count)
     reference = batch_of(objects, instances, REFERENCE, ideal=True, **how)
-    expected = [record_of(reference.grasp(i, storage), dt_s) for i in range(count)]
+    expected = [record_of(reference.grasp(i), dt_s) for i in range(count)]
     lines = [
         f"{count} grasps ({', '.join(objects)}); {where_measured()}.",
         "",
@@ -125,7 +124,7 @@ def measure(objects: tuple[str, ...], instances: int, repeats: int, *, compiled:
     }
     for name, settings in VARIANTS.items():
         ideal = batch_of(objects, instances, settings, ideal=True, **how)
-        errors = [deviation(record_of(ideal.grasp(i, storage), dt_s), expected[i])[0] for i in range(count)]
+        errors = [deviation(record_of(ideal.grasp(i), dt_s), expected[i])[0] for i in range(count)]
         ms = [1e3 * one for one in spent[name]]
         beyond = sum(error > ideal.job.config.accuracy for error in errors)
         lines.append(

@@ -18,20 +18,19 @@ from collections.abc import Callable
 from datetime import date
 from typing import Any, Final
 
-from timed_loop import TimedLoop
+from timed_loop import TimedLoops
 
 from graspsense.plugin_api import create
-from graspsense_sim_gripper.batch.job import Storage, grasp_compiled
+from graspsense_sim_gripper.batch.compiled_grasps import CompiledGrasps
 from graspsense_sim_gripper.batch.scenes import Scenes
 from graspsense_sim_gripper.batch.threads import SLICE, job_of
+from graspsense_sim_gripper.compiled.drawing import compiled_drawing
 from graspsense_sim_gripper.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.compiled.generator import compiled_generator
-from graspsense_sim_gripper.compiled.loop_code import CompiledLoop, CompiledLoops
-from graspsense_sim_gripper.compiled.padding import composition_of, padded
+from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import catalogue
-from graspsense_sim_gripper.problem import GraspSetup
-from graspsense_sim_gripper.random_numbers import NumpyGenerator
+from graspsense_sim_gripper.random_numbers import Generator, NumpyGenerator
 
 GRASPS: Final = 220
 
@@ -63,47 +62,47 @@ def parts(config: SimConfig, repeats: int) -> dict[str, float]:
     """Return the microseconds of a grasp and of its parts."""
     law, features = create("controller", "hybrid"), create("feature-set", "chitta")
     job = job_of(config, law, {"extract": features.extract}, features=features)
-    names, scenes = sorted(catalogue()), Scenes(job, generator_of=compiled_generator())
+    names, scenes = sorted(catalogue()), Scenes(job)
     for name in names:
         scenes.add(name, compiled=True)
-    setups = [scenes.setup(names[k % len(names)], k) for k in range(GRASPS)]
-    composition, storage = composition_of(config, setups[0]), Storage()
-    loop, measure = CompiledLoops(type(law).step).of(composition), compiled_measure(job.extraction)
-    grasp_compiled(job, setups[0], loop, storage, measure)
-    timed_loop = TimedLoop(loop)
+    drawing, loops = compiled_drawing(), CompiledLoops(type(law).step)
+    timed_loops = TimedLoops(loops)
+    measure = compiled_measure(job.extraction)
+    grasps, timed_grasps = (CompiledGrasps(scenes, one, measure) for one in (loops, timed_loops))
+    part = [(names[k % len(names)], k) for k in range(GRASPS)]
 
-    def sampled(begin: int) -> list[GraspSetup]:
-        return [scenes.setup(names[k % len(names)], k) for k in range(begin, min(begin + SLICE, GRASPS))]
-
-    def whole(begin: int, loop: CompiledLoop = loop) -> None:
-        for setup in sampled(begin):
-            composition_of(config, setup)
-            grasp_compiled(job, setup, loop, storage, measure)
-
-    def of_each(part: Callable[[Any], Any]) -> Callable[[int], None]:
-        def of_slice(begin: int) -> None:
-            for setup in setups[begin : begin + SLICE]:
-                part(setup)
-
-        return of_slice
+    def whole(begin: int, grasps: CompiledGrasps = grasps) -> None:
+        for scene, seed in part[begin : begin + SLICE]:
+            grasps.grasp(scene, seed)
 
     def loop_only(begin: int) -> float:
-        timed_loop.spent_s = 0.0
-        whole(begin, timed_loop)
-        return timed_loop.spent_s
+        timed_loops.spent_s = 0.0
+        whole(begin, timed_grasps)
+        return timed_loops.spent_s
+
+    memory = {name: scenes.drawn(name).scene.memory() for name in names}
+
+    def drawn(begin: int) -> None:
+        for name, seed in part[begin : begin + SLICE]:
+            scenes.drawn(name).scene.drawn(drawing, seed, None, memory[name])
+
+    table = grasps.storage.buffers.pads.noise
+
+    def noise_of(generator: Generator) -> Callable[[int], None]:
+        def of_slice(begin: int) -> None:
+            for _ in part[begin : begin + SLICE]:
+                generator.fill(table)
+
+        return of_slice
 
     ways: dict[str, Callable[[int], Any]] = {
         "whole grasp": whole,
         "loop, within it": loop_only,
-        "sampling, by itself": sampled,
-        "filling the layout, by itself": of_each(padded),
+        "drawing, by itself": drawn,
     }
     if config.sensor == "pads":
-        table = storage.buffers.pads.noise
-        ways["noise of the first images, by itself"] = of_each(lambda setup: setup.noise().fill(table))
-        ways["the same by numpy's own generator"] = of_each(
-            lambda setup: NumpyGenerator(setup.seed).fill(table)
-        )
+        ways["noise of the first images, by itself"] = noise_of(compiled_generator()(0))
+        ways["the same by numpy's own generator"] = noise_of(NumpyGenerator(0))
     return {name: 1e6 * least / GRASPS for name, least in leasts(ways, repeats).items()}
 
 

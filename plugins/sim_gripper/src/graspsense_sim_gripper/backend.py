@@ -34,14 +34,14 @@ from graspsense.plugin_api import (
     tare,
 )
 from graspsense_sim_gripper.binding import bind_reachable
-from graspsense_sim_gripper.build import CELL_OFFSET, EFFORT_LIMIT_N, build, device_info, instantiate
+from graspsense_sim_gripper.build import EFFORT_LIMIT_N, build, device_info, instantiate
 from graspsense_sim_gripper.compiled.compose import INTERPRETED, composed_move, composition, free_motion
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantReadings, PlantState, is_finite, right_of
 from graspsense_sim_gripper.exact.discretise import discretise
 from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.explain import explain
-from graspsense_sim_gripper.fingertip import CELLS, FIRST_PAD_CELL, fingertips
+from graspsense_sim_gripper.fingertip import CELL_OFFSET, CELLS, FIRST_PAD_CELL, fingertips
 from graspsense_sim_gripper.loop import COLUMNS, GraspParams, LoopProgress
 from graspsense_sim_gripper.model_report import accuracy_report, model_report
 from graspsense_sim_gripper.objects.library import kinds_in, object_kinds

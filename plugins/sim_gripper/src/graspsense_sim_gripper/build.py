@@ -12,7 +12,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import evolve, fields
-from numpy.typing import NDArray
 
 from graspsense.plugin_api import (
     EFFORT,
@@ -27,10 +26,10 @@ from graspsense_sim_gripper.compiled.compose import all_active, uncompressed
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.drive_models import LINKAGES, STRAIGHT
 from graspsense_sim_gripper.dynamics.contact import ObjectModel, PadCompliance
-from graspsense_sim_gripper.dynamics.drive import Drive, Friction
+from graspsense_sim_gripper.dynamics.drive import Drive, Friction, FrictionSpread, drawn_friction
 from graspsense_sim_gripper.dynamics.state import Contact, ContactState, Motion, PlantState
-from graspsense_sim_gripper.fingertip import CELLS
-from graspsense_sim_gripper.objects.instance import PAD_CELLS, Instance, cell_weights, central_cells, sample
+from graspsense_sim_gripper.fingertip import CELL_OFFSET, CELLS, cell_offset
+from graspsense_sim_gripper.objects.instance import PAD_CELLS, Instance, cell_weights, present_cells, sample
 from graspsense_sim_gripper.objects.library import find, split_number
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.objects.spec import PATCHES, ObjectSpec
@@ -51,8 +50,6 @@ OPENING_N: Final = -20.0
 """The effort that opens the fingers. The recordings of the paper's authors show 17 and 20 N between squeezes."""
 TARE_IMAGES: Final = 6
 """Number of cell images in a tare."""
-CELL_OFFSET: Final = (3300.0, 250.0)
-"""Mean and standard deviation of the counts of an unloaded cell; 2900 to 3800 counts are reported."""
 EVEN_WEIGHTS: Final = (1.0 / PAD_CELLS,) * PAD_CELLS
 """The share of each cell of the gripping face in the force, if there is no object."""
 IDEAL_CELLS: Final = PadCells(np.array(EVEN_WEIGHTS), np.full(CELLS, CELL_OFFSET[0]))
@@ -237,23 +234,9 @@ def _plant(config: SimConfig, instance: Instance | None, rng: Generator) -> tupl
     return PlantParams(drive, model, gripper.steps), state
 
 
-class FrictionSpread(NamedTuple):
-    """How the Coulomb friction of the drive differs between trials (N)."""
-
-    coulomb_n: float
-    coulomb_spread_n: float
-    breakaway_n: float
-
-
 def friction_spread(config: SimConfig) -> FrictionSpread:
     """Return how friction differs between the trials of these settings."""
     return FrictionSpread(float(config.coulomb_n), float(config.coulomb_spread_n), float(config.breakaway_n))
-
-
-def drawn_friction(spread: FrictionSpread, draw: float) -> tuple[float, float]:
-    """Return the Coulomb and the breakaway friction (N) of a trial with this standard normal draw."""
-    coulomb_n = max(spread.coulomb_n + spread.coulomb_spread_n * draw, 0.0)
-    return coulomb_n, max(spread.breakaway_n, coulomb_n)
 
 
 @lru_cache(maxsize=256)
@@ -343,15 +326,3 @@ def _sensor(config: SimConfig, instance: Instance | None, rng: Generator) -> Sen
         left=PadCells(shares, offsets[0]),
         right=PadCells(shares, offsets[1]),
     )
-
-
-def cell_offset(draw: Any) -> Any:
-    """Return the counts of an unloaded cell with this standard normal draw, or of several with an array of them."""
-    return CELL_OFFSET[0] + CELL_OFFSET[1] * draw
-
-
-@lru_cache(maxsize=16)
-def present_cells(count: int) -> NDArray[np.float64]:
-    """Return 1 for each of the `count` cells of the gripping face that are nearest to its middle, otherwise 0."""
-    present = central_cells(count)
-    return np.array([float(cell in present) for cell in range(PAD_CELLS)])

@@ -6,7 +6,7 @@ The face has five rows of three cells, the row at the tip first.
 from __future__ import annotations
 
 from math import nan
-from typing import Final
+from typing import Any, Final
 
 from graspsense.plugin_api import TactileArray
 from graspsense_sim_gripper.objects.instance import COLUMN_MM, PAD_CELLS, ROW_MM
@@ -15,6 +15,13 @@ FIRST_PAD_CELL: Final = 7
 """The first cell on the gripping face."""
 CELLS: Final = FIRST_PAD_CELL + PAD_CELLS
 """Number of cells of a fingertip."""
+CELL_OFFSET: Final = (3300.0, 250.0)
+"""Mean and standard deviation of the counts of an unloaded cell; 2900 to 3800 counts are reported."""
+
+
+def cell_offset(draw: Any) -> Any:
+    """Return the counts of an unloaded cell with this standard normal draw, or of several with an array of them."""
+    return CELL_OFFSET[0] + CELL_OFFSET[1] * draw
 
 
 def fingertips(rate_hz: float) -> TactileArray:

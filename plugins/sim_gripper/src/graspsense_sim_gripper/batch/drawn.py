@@ -9,20 +9,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from attrs import field, frozen
+from attrs import frozen
 
-from graspsense.plugin_api import ended_by_itself
-from graspsense_sim_gripper.batch.job import (
-    EndedGrasp,
-    FinishedGrasp,
-    Job,
-    Measure,
-    Storage,
-    begin_images,
-    result_of,
-    with_more_images,
-)
-from graspsense_sim_gripper.build import check_fit, friction_spread, present_cells
+from graspsense_sim_gripper.build import check_fit, friction_spread
 from graspsense_sim_gripper.compiled.compose import Composition
 from graspsense_sim_gripper.compiled.drawing import (
     NO_NUMBER,
@@ -35,7 +24,6 @@ from graspsense_sim_gripper.compiled.drawing import (
 from graspsense_sim_gripper.compiled.generator import LARGEST_SEED
 from graspsense_sim_gripper.compiled.loop_code import (
     Arrays,
-    CompiledLoop,
     LoopStart,
     LoopTypes,
     Numbers,
@@ -44,13 +32,17 @@ from graspsense_sim_gripper.compiled.loop_code import (
 from graspsense_sim_gripper.compiled.padding import PaddedLayout, composition_of, layout_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.exact.propagate import ExactPlant
-from graspsense_sim_gripper.loop import Buffers, Ending, GraspParams, PlantModel, SimulationState
+from graspsense_sim_gripper.loop import GraspParams, PlantModel, SimulationState
 from graspsense_sim_gripper.nested import with_places
-from graspsense_sim_gripper.objects.instance import N_COMMON_DRAWS, deepest_dent, draws_of_number
+from graspsense_sim_gripper.objects.instance import (
+    N_COMMON_DRAWS,
+    deepest_dent,
+    draws_of_number,
+    present_cells,
+)
 from graspsense_sim_gripper.objects.spec import PATCHES, NominalParams, ObjectSpec
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction
-from graspsense_sim_gripper.terms.term import LAW_ERRORS
 
 
 class DrawMemory(NamedTuple):
@@ -116,49 +108,6 @@ class DrawnInstances(NamedTuple):
     scene: DrawnScene
     number: int | None
     """That of the instance."""
-
-
-@frozen(eq=False)
-class DrawnGrasps:
-    """Simulates grasps that compiled code draws, in one thread."""
-
-    job: Job
-    drawing: Drawing
-    measure: Measure | None
-    """The compiled form of `Job.extraction`."""
-    storage: Storage
-    _memory: dict[DrawnScene, DrawMemory] = field(factory=dict, init=False)
-
-    def grasp(self, instances: DrawnInstances, seed: int, loop: CompiledLoop) -> FinishedGrasp | None:
-        """Simulate a grasp; None if a term fails or it takes long, so that it has to be simulated from its setup.
-
-        Raises ConfigError as `DrawnScene.drawn` does.
-        """
-        scene, number = instances
-        if scene not in self._memory:
-            self._memory[scene] = scene.memory()
-        memory = self._memory[scene]
-        start = scene.drawn(self.drawing, seed, number, memory)
-        noise = self.drawing.noise(memory.buffers) if scene.has_cells else None
-        buffers = self.storage.buffers
-        begin_images(buffers, noise)
-        try:
-            end = loop.run_from(start, buffers)
-            while noise is not None and _needs_images(end.ending, buffers):
-                buffers, start = with_more_images(buffers, noise), start.after(end)
-                end = loop.run_from(start, buffers)
-        except LAW_ERRORS:
-            return None
-        if end.ending.failed == 1 or end.ending.ended == 0:
-            return None
-        outcome, reason = ended_by_itself(end.ending.stopped, end.ending.outcome)
-        done = EndedGrasp(outcome, reason, end.plant, scene.layout, end.ending)
-        return result_of(self.job, done, buffers, self.storage, self.measure)
-
-
-def _needs_images(ending: Ending, buffers: Buffers) -> bool:
-    """Return whether a grasp has not ended, but has filled the buffers of images."""
-    return ending.ended == 0 and ending.failed == 0 and ending.images == len(buffers.pads.images)
 
 
 def can_be_drawn(seed: int) -> bool:

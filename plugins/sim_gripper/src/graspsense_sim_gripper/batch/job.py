@@ -29,14 +29,14 @@ from graspsense.plugin_api import (
     seconds_at_most,
     tick_params,
 )
-from graspsense_sim_gripper.build import CELL_OFFSET, device_info
+from graspsense_sim_gripper.build import device_info
 from graspsense_sim_gripper.compiled.compose import grasp_loop, guarded_loop
 from graspsense_sim_gripper.compiled.loop_code import CompiledLoop
 from graspsense_sim_gripper.compiled.padding import PaddedLayout, composition_of, layout_of, padded, unpadded
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.dynamics.state import PlantState
 from graspsense_sim_gripper.exact.discretise import discretise
-from graspsense_sim_gripper.fingertip import CELLS
+from graspsense_sim_gripper.fingertip import CELL_OFFSET, CELLS
 from graspsense_sim_gripper.loop import (
     COLUMNS,
     NOT_STARTED,

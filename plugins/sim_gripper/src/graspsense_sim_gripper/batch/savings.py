@@ -9,13 +9,12 @@ from typing import Any, Final
 from attrs import evolve, frozen
 
 from graspsense.plugin_api import NotCompilable
-from graspsense_sim_gripper.batch.job import FinishedGrasp, Job, Storage, grasp_compiled
+from graspsense_sim_gripper.batch.compiled_grasps import CompiledGrasps
+from graspsense_sim_gripper.batch.job import Job
 from graspsense_sim_gripper.batch.scenes import Scenes, scene_key
 from graspsense_sim_gripper.batch.threads import WORTH_COMPILING
 from graspsense_sim_gripper.build import build
 from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
-from graspsense_sim_gripper.compiled.padding import composition_of
-from graspsense_sim_gripper.problem import GraspSetup
 from graspsense_sim_gripper.reduction.select import select_anew
 
 WAYS: Final[Mapping[str, Mapping[str, Any]]] = {
@@ -34,9 +33,9 @@ LEAST_SAVED: Final = 0.02
 class TimedBatch:
     """The grasps of a job, ready to run one by one in compiled code."""
 
-    job: Job
-    setups: list[GraspSetup]
-    loops: CompiledLoops
+    scenes: Sequence[str]
+    seeds: Sequence[int]
+    grasps: CompiledGrasps
 
     @classmethod
     def of(cls, job: Job, scenes: Sequence[str], seeds: Sequence[int]) -> TimedBatch:
@@ -44,19 +43,14 @@ class TimedBatch:
         known, loops = Scenes(job), CompiledLoops(type(job.controller).step)
         for scene in {scene_key(one): one for one in scenes}.values():
             known.add(scene, compiled=True)
-        return cls(job, [known.setup(*grasp) for grasp in zip(scenes, seeds, strict=True)], loops)
+        return cls(scenes, seeds, CompiledGrasps(known, loops))
 
-    def grasp(self, i: int, storage: Storage) -> FinishedGrasp:
-        """Return grasp `i`. Raises NotCompilable."""
-        setup = self.setups[i]
-        return grasp_compiled(self.job, setup, self.loops.of(composition_of(self.job.config, setup)), storage)
-
-    def seconds(self, storage: Storage) -> float:
+    def seconds(self) -> float:
         """Return the processor time (s) of a grasp, the mean of all. Raises NotCompilable."""
         began = time.thread_time()
-        for i in range(len(self.setups)):
-            self.grasp(i, storage)
-        return (time.thread_time() - began) / len(self.setups)
+        for scene, seed in zip(self.scenes, self.seeds, strict=True):
+            self.grasps.grasp(scene, seed)
+        return (time.thread_time() - began) / len(self.scenes)
 
 
 def savings(job: Job, scenes: Sequence[str], seeds: Sequence[int]) -> str:
@@ -74,7 +68,7 @@ def savings(job: Job, scenes: Sequence[str], seeds: Sequence[int]) -> str:
     first = {scene_key(scene): k for k, scene in reversed(list(enumerate(scenes)))}
     which = sorted(first.values())[:MOST_OBJECTS]
     scenes, seeds = [scenes[k] for k in which], [seeds[k] for k in which]
-    storage, least = Storage(), dict.fromkeys(WAYS, float("inf"))
+    least = dict.fromkeys(WAYS, float("inf"))
     try:
         batches = {
             way: TimedBatch.of(evolve(job, config=evolve(config, **settings)), scenes, seeds)
@@ -82,7 +76,7 @@ def savings(job: Job, scenes: Sequence[str], seeds: Sequence[int]) -> str:
         }
         for _ in range(ROUNDS):
             for way, batch in batches.items():
-                least[way] = min(least[way], batch.seconds(storage))
+                least[way] = min(least[way], batch.seconds())
     except NotCompilable:
         return ""
     names = [scene for scene in scenes if scene != "none"]

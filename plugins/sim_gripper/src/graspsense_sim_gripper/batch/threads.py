@@ -21,19 +21,16 @@ from typing import Any, Final, Unpack
 from attrs import define, field
 
 from graspsense.plugin_api import BatchOptions, Controller, FeatureSet, NotCompilable, RunConfig
-from graspsense_sim_gripper.batch.drawn import DrawnGrasps, can_be_drawn
+from graspsense_sim_gripper.batch.compiled_grasps import CompiledGrasps
 from graspsense_sim_gripper.batch.job import (
     FinishedGrasp,
     Job,
     Measure,
-    Storage,
-    grasp_compiled,
     grasp_plain,
 )
 from graspsense_sim_gripper.batch.scenes import Scenes, scene_key
 from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.compiled.compose import Composition
-from graspsense_sim_gripper.compiled.drawing import Drawing, compiled_drawing
 from graspsense_sim_gripper.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.compiled.generator import compiled_generator
 from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
@@ -41,7 +38,6 @@ from graspsense_sim_gripper.compiled.padding import compiled_kinds, composition_
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.objects.library import kinds_in
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
-from graspsense_sim_gripper.problem import GraspSetup
 
 WORTH_COMPILING: Final = 50
 """Number of grasps of one composition from which compiling saves more time than it takes."""
@@ -131,15 +127,13 @@ class _Batch:
     """Remarks on how the grasps ran, as keys, so that each is given once."""
     measure: Measure | None = field(default=None, init=False)
     """The compiled form of `Job.extraction`."""
-    drawing: Drawing | None = field(default=None, init=False)
-    """Draws grasps in compiled code; None if nothing is compiled, or if numpy draws other numbers."""
     models: Scenes = field(init=False)
     counts: Counter[Composition] = field(factory=Counter, init=False)
     """Number of grasps of each composition."""
     is_compiled: dict[Composition, bool] = field(factory=dict, init=False)
     loops: CompiledLoops = field(init=False)
     local: threading.local = field(factory=threading.local, init=False)
-    """The storage of each thread, and its process for grasps in the interpreter."""
+    """The compiled grasps of each thread, and its process for those in the interpreter."""
     processes: ExitStack = field(factory=ExitStack, init=False)
 
     @loops.default
@@ -212,7 +206,6 @@ class _Batch:
         if find_spec("numba") is None:
             return
         self.models.generator_of = compiled_generator()
-        self.drawing = compiled_drawing()
         if self.job.extraction is not None:
             try:
                 self.measure = compiled_measure(self.job.extraction)
@@ -237,8 +230,8 @@ class _Batch:
         part = self._part(begin)
         done: dict[int, FinishedGrasp] = {}
         plain: list[int] = []
-        for i, (scene, seed) in enumerate(part):
-            grasp = self._drawn(scene, seed) or self._compiled(self.models.setup(scene, seed))
+        for i, one in enumerate(part):
+            grasp = self._compiled(*one)
             if grasp is None:
                 plain.append(i)
             else:
@@ -248,38 +241,26 @@ class _Batch:
             done.update(zip(plain, grasps, strict=True))
         return [done[i] for i in range(len(part))]
 
-    def _drawn(self, scene: str, seed: int) -> FinishedGrasp | None:
-        """Return the result of a grasp that compiled code draws; None if it has to be simulated from its setup."""
-        if self.drawing is None or not can_be_drawn(seed):
+    def _compiled(self, scene: str, seed: int) -> FinishedGrasp | None:
+        """Return the result of a compiled grasp; None if it has to run in the interpreter."""
+        if not any(self.is_compiled.values()):
             return None
-        instances = self.models.drawn(scene)
-        if instances is None or not self.is_compiled[instances.scene.composition]:
-            return None
-        if not hasattr(self.local, "drawn_grasps"):
-            self.local.drawn_grasps = DrawnGrasps(self.job, self.drawing, self.measure, self._storage())
-        drawn_grasps: DrawnGrasps = self.local.drawn_grasps
         try:
-            loop = self.loops.of(instances.scene.composition)
-            return drawn_grasps.grasp(instances, seed, loop)
+            if not hasattr(self.local, "grasps"):
+                self.local.grasps = CompiledGrasps(self.models, self.loops, self.measure, self._is_compiled)
+            grasps: CompiledGrasps = self.local.grasps
+            return grasps.grasp(scene, seed)
         except NotCompilable as error:
-            self._note_not_compilable(instances.scene.composition, error)
+            self._note_not_compilable(composition_of(self.job.config, self.models.setup(scene, seed)), error)
             return None
 
-    def _compiled(self, setup: GraspSetup) -> FinishedGrasp | None:
-        """Return the result of a compiled grasp; None if it has to run in the interpreter."""
-        composition = composition_of(self.job.config, setup)
+    def _is_compiled(self, composition: Composition) -> bool:
         if composition not in self.is_compiled:
             # The friction that is drawn may make one trial of a scene piecewise linear, and the next not.
             self.is_compiled[composition] = any(
                 compiled for other, compiled in self.is_compiled.items() if other.kinds == composition.kinds
             )
-        if not self.is_compiled[composition]:
-            return None
-        try:
-            return grasp_compiled(self.job, setup, self.loops.of(composition), self._storage(), self.measure)
-        except NotCompilable as error:
-            self._note_not_compilable(composition, error)
-            return None
+        return self.is_compiled[composition]
 
     def _note_not_compilable(self, composition: Composition, error: NotCompilable) -> None:
         self.is_compiled[composition] = False
@@ -302,8 +283,3 @@ class _Batch:
                 local.without_process = True
                 self.notes[f"plain grasps run on one core: {error}"] = None
         return [grasp_plain(self.job, self.models.setup(*grasp)) for grasp in grasps]
-
-    def _storage(self) -> Storage:
-        if not hasattr(self.local, "storage"):
-            self.local.storage = Storage()
-        return self.local.storage  # type: ignore[no-any-return]

@@ -1,6 +1,6 @@
 """Drawing what a seed decides of a grasp in compiled code: the instance, its placement, friction and the cells.
 
-The rules are those of `objects.instance` and `build`, and the result is the same to the bit. A scene gives the numbers
+The rules are those of `objects.instance`, `dynamics.drive` and `fingertip`, and the result is the same to the bit. A scene gives the numbers
 of one of its grasps, and where those are that a seed decides; these are overwritten.
 """
 
@@ -15,7 +15,6 @@ from attrs import frozen
 from numpy.typing import NDArray
 
 from graspsense.plugin_api import entry_point
-from graspsense_sim_gripper.build import FrictionSpread, cell_offset, drawn_friction
 from graspsense_sim_gripper.compiled.generator import (
     WORD,
     CompiledGenerator,
@@ -29,7 +28,8 @@ from graspsense_sim_gripper.compiled.generator import (
 )
 from graspsense_sim_gripper.compiled.jit import generating
 from graspsense_sim_gripper.compiled.ziggurat import Ziggurat
-from graspsense_sim_gripper.fingertip import CELLS
+from graspsense_sim_gripper.dynamics.drive import FrictionSpread, drawn_friction
+from graspsense_sim_gripper.fingertip import CELLS, cell_offset
 from graspsense_sim_gripper.objects.instance import (
     N_COMMON_DRAWS,
     PAD_CELLS,

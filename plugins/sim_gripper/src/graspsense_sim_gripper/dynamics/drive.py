@@ -40,6 +40,21 @@ class Friction(NamedTuple):
     """Viscous damping."""
 
 
+class FrictionSpread(NamedTuple):
+    """How friction differs between trials (N)."""
+
+    coulomb_n: float
+    coulomb_spread_n: float
+    """Standard deviation of the Coulomb friction."""
+    breakaway_n: float
+
+
+def drawn_friction(spread: FrictionSpread, draw: float) -> tuple[float, float]:
+    """Return the Coulomb and the breakaway friction (N) of a trial with this standard normal draw."""
+    coulomb_n = max(spread.coulomb_n + spread.coulomb_spread_n * draw, 0.0)
+    return coulomb_n, max(spread.breakaway_n, coulomb_n)
+
+
 class Drive(NamedTuple):
     """Linkage, inertia, friction and ends of travel."""
 

@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense_sim_gripper.objects.spec import (
     PATCHES,
@@ -172,10 +173,11 @@ def cell_weights(patch: int, row: float, weights: Any) -> None:
 
 
 @cache
-def central_cells(count: int) -> frozenset[int]:
-    """Return the indices of the `count` cells of the gripping face that are nearest to its middle."""
-    return frozenset(
-        sorted(range(PAD_CELLS), key=lambda i: math.hypot(ROW_MM * (i // 3 - 2), COLUMN_MM * (i % 3 - 1)))[
-            :count
-        ]
+def present_cells(count: int) -> NDArray[np.float64]:
+    """Return 1 for each of the `count` cells of the gripping face that are nearest to its middle, otherwise 0."""
+    nearest = sorted(
+        range(PAD_CELLS), key=lambda i: math.hypot(ROW_MM * (i // 3 - 2), COLUMN_MM * (i % 3 - 1))
     )
+    present = np.zeros(PAD_CELLS)
+    present[nearest[:count]] = 1.0
+    return present
