@@ -1,7 +1,7 @@
 """Drawing what a seed decides of a grasp in compiled code: the instance, its placement, friction and the cells.
 
-The rules are those of `objects.instance`, `dynamics.drive` and `fingertip`, and the result is the same to the bit. A scene gives the numbers
-of one of its grasps, and where those are that a seed decides; these are overwritten.
+The rules are those of `objects.instance`, `dynamics.drive` and `fingertip`, and the result is the same to the bit. A
+scene gives the numbers of one of its grasps, and where those are that a seed decides; these are overwritten.
 """
 
 from __future__ import annotations
