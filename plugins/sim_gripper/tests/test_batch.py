@@ -32,8 +32,8 @@ from graspsense.plugin_api import (
     hookimpl,
 )
 from graspsense_sim_gripper.backend import SimBackend
+from graspsense_sim_gripper.batch import compiled_grasps, threads, worker
 from graspsense_sim_gripper.batch import job as batch_job
-from graspsense_sim_gripper.batch import threads, worker
 from graspsense_sim_gripper.batch.job import Job, grasp_plain
 from graspsense_sim_gripper.batch.scenes import Scenes
 from graspsense_sim_gripper.batch.threads import SLICE, WORTH_A_PROCESS, run_many
@@ -160,7 +160,7 @@ def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monke
 
     drawn = told(1)
     assert told(3) == drawn
-    monkeypatch.setattr(threads, "can_be_drawn", lambda seed: False)
+    monkeypatch.setattr(compiled_grasps, "can_be_drawn", lambda seed: False)
     assert told(1) == drawn
     assert any(report["broken"] for *_, report in drawn)
 

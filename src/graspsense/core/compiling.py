@@ -83,6 +83,8 @@ class CompileOptions:
     """Which calls are inlined; by default the compiler decides."""
     replacements: Replacements = NO_REPLACEMENTS
     """Python functions, each with the function that is compiled in its place."""
+    releases_lock: bool = True
+    """Whether other threads may run Python code meanwhile. False is faster for a function of a few microseconds."""
     install: str = "numba"
     """The requirement that brings numba, named to a user who does not have it."""
 
@@ -101,7 +103,7 @@ def compile_function(
 
     The machine code is made at the first call with arguments of each type, or loaded from disk; see `first_call`. It is
     kept in the user's cache folder, or in NUMBA_CACHE_DIR where that is set. The compiled function runs without the
-    interpreter's lock.
+    interpreter's lock, unless the options say otherwise.
 
     Raises NotCompilable for closures, for recursion (which numba's cache cannot hold), for anything that is not a
     function written in Python, and where numba cannot be imported.
@@ -261,7 +263,11 @@ class _Compilation:
         return digest.hexdigest()[:16]
 
     def _flags(self, function: types.FunctionType) -> dict[str, Any]:
-        flags = {"nogil": True, "no_cfunc_wrapper": True, "error_model": self.options.error_model}
+        flags: dict[str, Any] = {
+            "nogil": self.options.releases_lock,
+            "no_cfunc_wrapper": True,
+            "error_model": self.options.error_model,
+        }
         counts = self.options.counts_references and function.__code__ not in self.options.uncounted
         return flags if counts else {**flags, "_nrt": False}
 

@@ -85,12 +85,12 @@ class CompiledGrasps:
             self._memory[scene] = scene.memory()
         memory, buffers = self._memory[scene], self.storage.buffers
         start = scene.drawn(drawing, seed, number, memory)
-        noise = drawing.noise(memory.buffers) if scene.has_cells else None
-        begin_images(buffers, noise)
+        begin_images(buffers)
         try:
-            end = loop.run_from(start, buffers)
-            while noise is not None and _needs_images(end.ending, buffers):
-                buffers, start = with_more_images(buffers, noise), start.after(end)
+            end = loop.run_from(start, buffers, drawing.noise_of(scene.scene, memory.buffers))
+            while scene.has_cells and _needs_images(end.ending, buffers):
+                buffers = with_more_images(buffers, drawing.noise(memory.buffers))
+                start = start.after(end)
                 end = loop.run_from(start, buffers)
         except LAW_ERRORS:
             return None

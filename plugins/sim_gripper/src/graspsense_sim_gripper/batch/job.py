@@ -315,7 +315,9 @@ def _run(job: Job, setup: GraspSetup, loop: GraspLoop, storage: Storage) -> tupl
     ideal, buffers, on_arrays = setup.sensor.ideal == 1, storage.buffers, isinstance(loop, CompiledLoop)
     run = loop.run if isinstance(loop, CompiledLoop) else partial(run_plain, loop)
     noise = None if ideal else setup.noise()
-    begin_images(buffers, noise)
+    if noise is not None:
+        noise.fill(buffers.pads.noise)
+    begin_images(buffers)
     palm_noise = None
     if setup.has_palm:
         palm_noise, ticks = setup.palm_noise(), len(buffers.phases)
@@ -366,11 +368,8 @@ def _as_lists(buffers: Buffers) -> Buffers:
     return Buffers(pads, *(np.asarray(array).tolist() for array in buffers[1:-1]))._replace(palm=palm)
 
 
-def begin_images(buffers: Buffers, noise: Generator | None) -> None:
-    """Prepare buffers for a grasp, of whose cells `noise` draws the noise; None: the sensors are ideal."""
-    if noise is None:
-        return
-    noise.fill(buffers.pads.noise)
+def begin_images(buffers: Buffers) -> None:
+    """Prepare buffers for the cell images of another grasp."""
     buffers.pads.images[-1] = math.nan
     buffers.pads.left_zero[:] = buffers.pads.right_zero[:] = CELL_OFFSET[0]
 

@@ -14,7 +14,7 @@ import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import entry_point
+from graspsense.plugin_api import CompileOptions, entry_point
 from graspsense_sim_gripper.compiled.generator import (
     WORD,
     CompiledGenerator,
@@ -27,6 +27,7 @@ from graspsense_sim_gripper.compiled.generator import (
     seed_state,
 )
 from graspsense_sim_gripper.compiled.jit import generating
+from graspsense_sim_gripper.compiled.loop_code import Noise
 from graspsense_sim_gripper.compiled.ziggurat import Ziggurat
 from graspsense_sim_gripper.dynamics.drive import FrictionSpread, drawn_friction
 from graspsense_sim_gripper.fingertip import CELLS, cell_offset
@@ -168,6 +169,10 @@ class Drawing:
         """Return the generator of the noise of the cells in the grasp that was drawn last to these buffers."""
         return CompiledGenerator.in_state(buffers.words, self.draws)
 
+    def noise_of(self, scene: SceneNumbers, buffers: DrawBuffers) -> Noise:
+        """Return the same noise in the form that a compiled loop takes; nothing is drawn with ideal sensors."""
+        return Noise(scene.has_cells, buffers.words, self.draws.tables)
+
 
 @cache
 def compiled_drawing() -> Drawing | None:
@@ -180,7 +185,8 @@ def compiled_drawing() -> Drawing | None:
         *(0, 0, NominalParams(none, no_places, none), InstanceSpread(*(0.0,) * 7), 0),
         *(FrictionSpread(0.0, 0.0, 0.0), 0, np.zeros(PAD_CELLS)),
     )
-    compiled = compiled_draw(draw_grasp)
+    # It takes less time than getting the lock of the interpreter back from another thread.
+    compiled = compiled_draw(draw_grasp, CompileOptions(releases_lock=False))
     with generating():
         compiled(
             scene, Places(0, 0, 0, 0, 0, 0, no_places), draws.tables, WORD(0), none, draw_buffers(6, 0), none

@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from graspsense.plugin_api import NotCompilable, compile_function, entry_point
+from graspsense.plugin_api import CompileOptions, NotCompilable, compile_function, entry_point
 from graspsense_sim_gripper.binding import bind_reachable
 from graspsense_sim_gripper.compiled.jit import generating
 from graspsense_sim_gripper.compiled.ziggurat import TAIL, Ziggurat, ziggurat_of_numpy
@@ -229,10 +229,15 @@ def _draws() -> Draws:
     return Draws(entry_point(seed), entry_point(uniform), entry_point(normals), tables, words)
 
 
-def compiled_draw(draw: Callable[..., Any]) -> Callable[..., Any]:
+def compiled_draw(draw: Callable[..., Any], options: CompileOptions | None = None) -> Callable[..., Any]:
     """Return a function that calls those of this generator, compiled. Raises NotCompilable."""
+    return compile_function(with_wide_product(draw), options)
+
+
+def with_wide_product(draw: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that calls those of this generator, with the product that these need. Raises NotCompilable."""
     try:
         from graspsense_sim_gripper.compiled.wide_product import high_product
     except ImportError as error:
         raise NotCompilable(str(error)) from error
-    return compile_function(bind_reachable(draw, {"high_product": high_product}))
+    return bind_reachable(draw, {"high_product": high_product})

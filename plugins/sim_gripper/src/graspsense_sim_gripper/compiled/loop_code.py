@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from graspsense.plugin_api import NotCompilable, bind, entry_point
 from graspsense_sim_gripper.compiled.compose import Composition, grasp_loop
+from graspsense_sim_gripper.compiled.generator import WORD, Words, draw_normals, with_wide_product
 from graspsense_sim_gripper.compiled.jit import COMPILING, OPTIONS, compile_part, generating
+from graspsense_sim_gripper.compiled.ziggurat import Ziggurat
 from graspsense_sim_gripper.loop import Buffers, Ending, GraspParams, LoopEnd, SimulationState, ending
 from graspsense_sim_gripper.nested import (
     Pattern,
@@ -48,11 +50,33 @@ tuples_of: Callable[[Pattern, Any, Any], Any] = _tuples_unbound
 store_numbers: Callable[[Any, Any], None] = _store_unbound
 
 
-def stored_grasp(pattern: Pattern, start: Any, arrays: Any, buffers: Buffers, end: Any) -> Ending:
+class Noise(NamedTuple):
+    """The noise of the cells of a grasp."""
+
+    is_drawn: int
+    """1: it is drawn to the buffers before the grasp; 0: it is in them, or there is none."""
+    words: Words
+    tables: Ziggurat
+    """The state of its generator, which changes, and its tables."""
+
+
+@cache
+def no_noise() -> Noise:
+    """Return that nothing is drawn."""
+    tables = Ziggurat(np.zeros(512), np.zeros(256, WORD), np.zeros(256))
+    return Noise(0, np.zeros(4, WORD), tables)
+
+
+def stored_grasp(
+    pattern: Pattern, start: Any, arrays: Any, buffers: Buffers, noise: Noise, end: Any
+) -> Ending:
     """Run `grasp` from the numbers and arrays of its parameters and its state, which have the types of `pattern`.
 
     Write the numbers of the state at its end to `end`, and return those that all callers read.
     """
+    if noise.is_drawn == 1:
+        for image in range(len(buffers.pads.noise)):
+            draw_normals(noise.words, noise.tables, buffers.pads.noise[image])
     params, progress = tuples_of(pattern, start, arrays)
     state = grasp(params, progress, buffers)
     store_numbers(end, state)
@@ -113,10 +137,13 @@ class CompiledLoop:
         """Run the grasp from a state to its end, as `loop.grasp` does. Raises NotCompilable if numba refuses."""
         return self.run_from(loop_start(params, progress, self._types), buffers)
 
-    def run_from(self, start: LoopStart, buffers: Buffers) -> LoopEnd:
-        """Run the grasp from its start to its end. Raises NotCompilable if numba refuses."""
+    def run_from(self, start: LoopStart, buffers: Buffers, noise: Noise | None = None) -> LoopEnd:
+        """Run the grasp from its start to its end; `noise` None: it is in the buffers.
+
+        Raises NotCompilable if numba refuses.
+        """
         types, state = start.types, np.empty(start.types.state.count)
-        arguments = types.pattern, start.numbers, start.arrays, buffers, state
+        arguments = types.pattern, start.numbers, start.arrays, buffers, noise or no_noise(), state
         if self._machine_code is not None:
             end = self._machine_code(*arguments)
         else:
@@ -157,6 +184,11 @@ def _compiled(composition: Composition, step: ControllerStep) -> Callable[..., E
         from graspsense_sim_gripper.compiled.nested_numbers import store_numbers, tuples_of
     except ImportError as error:
         raise NotCompilable(f'numba is not installed: pip install "{OPTIONS.install}"') from error
-    loop = grasp_loop(composition, step, interpreted=False)
+    parts = {
+        "grasp": grasp_loop(composition, step, interpreted=False),
+        "tuples_of": tuples_of,
+        "store_numbers": store_numbers,
+        "draw_normals": with_wide_product(draw_normals),
+    }
     with COMPILING:
-        return compile_part(bind(stored_grasp, grasp=loop, tuples_of=tuples_of, store_numbers=store_numbers))
+        return compile_part(bind(stored_grasp, **parts))
