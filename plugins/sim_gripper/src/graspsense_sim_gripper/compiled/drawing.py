@@ -27,7 +27,7 @@ from graspsense_sim_gripper.compiled.generator import (
     seed_state,
 )
 from graspsense_sim_gripper.compiled.jit import generating
-from graspsense_sim_gripper.compiled.loop_code import Noise
+from graspsense_sim_gripper.compiled.loop_code import CellNoise
 from graspsense_sim_gripper.compiled.ziggurat import Ziggurat
 from graspsense_sim_gripper.dynamics.drive import FrictionSpread, drawn_friction
 from graspsense_sim_gripper.fingertip import CELLS, cell_offset
@@ -169,9 +169,9 @@ class Drawing:
         """Return the generator of the noise of the cells in the grasp that was drawn last to these buffers."""
         return CompiledGenerator.in_state(buffers.words, self.draws)
 
-    def noise_of(self, scene: SceneNumbers, buffers: DrawBuffers) -> Noise:
+    def noise_of(self, scene: SceneNumbers, buffers: DrawBuffers) -> CellNoise:
         """Return the same noise in the form that a compiled loop takes; nothing is drawn with ideal sensors."""
-        return Noise(scene.has_cells, buffers.words, self.draws.tables)
+        return CellNoise(scene.has_cells, buffers.words, self.draws.tables)
 
 
 @cache

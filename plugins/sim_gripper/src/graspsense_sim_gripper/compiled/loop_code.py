@@ -50,7 +50,7 @@ tuples_of: Callable[[Pattern, Any, Any], Any] = _tuples_unbound
 store_numbers: Callable[[Any, Any], None] = _store_unbound
 
 
-class Noise(NamedTuple):
+class CellNoise(NamedTuple):
     """The noise of the cells of a grasp."""
 
     is_drawn: int
@@ -61,14 +61,14 @@ class Noise(NamedTuple):
 
 
 @cache
-def no_noise() -> Noise:
+def no_noise() -> CellNoise:
     """Return that nothing is drawn."""
     tables = Ziggurat(np.zeros(512), np.zeros(256, WORD), np.zeros(256))
-    return Noise(0, np.zeros(4, WORD), tables)
+    return CellNoise(0, np.zeros(4, WORD), tables)
 
 
 def stored_grasp(
-    pattern: Pattern, start: Any, arrays: Any, buffers: Buffers, noise: Noise, end: Any
+    pattern: Pattern, start: Any, arrays: Any, buffers: Buffers, noise: CellNoise, end: Any
 ) -> Ending:
     """Run `grasp` from the numbers and arrays of its parameters and its state, which have the types of `pattern`.
 
@@ -137,7 +137,7 @@ class CompiledLoop:
         """Run the grasp from a state to its end, as `loop.grasp` does. Raises NotCompilable if numba refuses."""
         return self.run_from(loop_start(params, progress, self._types), buffers)
 
-    def run_from(self, start: LoopStart, buffers: Buffers, noise: Noise | None = None) -> LoopEnd:
+    def run_from(self, start: LoopStart, buffers: Buffers, noise: CellNoise | None = None) -> LoopEnd:
         """Run the grasp from its start to its end; `noise` None: it is in the buffers.
 
         Raises NotCompilable if numba refuses.
