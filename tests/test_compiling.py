@@ -303,6 +303,38 @@ def test_an_edited_helper_or_constant_of_another_module_is_noticed(tmp_path):
     assert run(main, tmp_path, **cache) == ["21.0 0"]
 
 
+@pytest.mark.usefixtures("_numba")
+def test_code_of_a_version_with_other_types_is_made_anew(tmp_path):
+    """The code of the function stays the same, but the type of its argument has another name."""
+    (tmp_path / "law.py").write_text("def law(params):\n    return params.stiffness * 2.0\n")
+    run = """
+import shapes
+from law import law
+from graspsense.plugin_api import compile_function
+compiled = compile_function(law)
+print(compiled(shapes.{name}(3.0)), sum(compiled.stats.cache_hits.values()))
+"""
+    told = []
+    for name in ("Spring", "Spring", "Shell", "Shell"):
+        lines = ["from typing import NamedTuple", f"class {name}(NamedTuple):", "    stiffness: float"]
+        (tmp_path / "shapes.py").write_text("\n".join(lines))
+        environment = {
+            **os.environ,
+            "NUMBA_CACHE_DIR": str(tmp_path / "kept"),
+            "PYTHONDONTWRITEBYTECODE": "1",
+        }
+        done = subprocess.run(
+            [sys.executable, "-c", run.format(name=name)],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        told.append(done.stdout.split())
+    assert told == [["6.0", "0"], ["6.0", "1"], ["6.0", "0"], ["6.0", "1"]]
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("_numba")
 def test_compiled_code_is_kept_in_the_users_cache_and_nowhere_else(tmp_path):

@@ -218,12 +218,12 @@ class _Compilation:
             # Only the outermost function is kept on disk, since the others are inside it, and only it needs the
             # wrapper for calls from the interpreter, which takes longer to compile than most functions.
             with _cache_folder(self.numba, function) as is_kept:
-                _COMPILED[key] = self.numba.njit(
-                    named,
-                    cache=is_kept,
-                    pipeline_class=_linked_code().OutermostCompiler,
-                    **self._flags(function),
+                compiled: Any = self.numba.njit(
+                    named, pipeline_class=_linked_code().OutermostCompiler, **self._flags(function)
                 )
+                if is_kept:
+                    compiled._cache = _linked_code().KeptCode(named)
+                _COMPILED[key] = compiled
         return _COMPILED[key]
 
     def _inner(self, function: types.FunctionType, n_places: int) -> Callable[..., Any]:

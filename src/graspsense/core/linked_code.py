@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from numba import _dynfunc  # type: ignore[attr-defined]
+from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import register_pass
@@ -97,3 +98,16 @@ class OutermostCompiler(Compiler):
         """Return the passes of numba, with `OutermostLowering` in place of its own lowering."""
         (passes,) = super().define_pipelines()  # type: ignore[no-untyped-call]
         return _with_lowering(passes, OutermostLowering)
+
+
+class KeptCode(FunctionCache):
+    """The machine code of a function on disk. Code that cannot be loaded any more is made anew."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the code for arguments of these types, or None."""
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except Exception:
+            # Another version of a plugin kept it, for arguments of a type that is gone: pickle raises many exceptions.
+            self.flush()  # type: ignore[no-untyped-call]
+            return None

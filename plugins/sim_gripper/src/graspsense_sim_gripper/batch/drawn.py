@@ -115,16 +115,25 @@ def can_be_drawn(seed: int) -> bool:
     return 0 <= seed <= LARGEST_SEED
 
 
+class StartLayout(NamedTuple):
+    """What the grasps of a composition have in common at their beginning."""
+
+    types: LoopTypes
+    at: Any
+    """Parameters and state, in which each number is its place among all numbers."""
+
+
 def drawn_scene(
     problem: Problem,
     reduction: Reduction | None,
     example: GraspSetup,
-    params: GraspParams,
-    state: SimulationState,
+    begun: tuple[GraspParams, SimulationState],
+    layouts: dict[Composition, StartLayout],
 ) -> DrawnScene | None:
     """Return what the grasps of a scene are drawn from; None if each of them needs a `GraspSetup`.
 
-    `example`: one of them; `params` and `state`: its parameters and its first state, padded.
+    `example`: one of them; `begun`: its parameters and its first state, padded. `layouts`: those that are known, to
+    which that of this scene is added.
     """
     spec, plant, sensor = problem.spec, example.plant, example.sensor
     if spec is None or reduction is None or example.has_palm:
@@ -135,8 +144,11 @@ def drawn_scene(
     if not set(reduction.treatment[:-1]) <= {KEPT, DROPPED}:
         return None
     layout, config = layout_of(example), problem.config
-    at = with_places((params, state))
-    start, places = loop_start(params, state), _places(at, layout)
+    composition = composition_of(config, example)
+    if composition not in layouts:
+        layouts[composition] = StartLayout(LoopTypes.of(*begun), with_places(begun))
+    known = layouts[composition]
+    start, places = loop_start(*begun, known.types), _places(known.at, layout)
     if sensor.ideal == 0:
         start.numbers[places.image_phase_s] = sensor.clock.period_s
     nominal = spec.nominal_params
@@ -155,12 +167,12 @@ def drawn_scene(
     return DrawnScene(
         config=config,
         spec=spec,
-        composition=composition_of(config, example),
+        composition=composition,
         layout=layout,
         types=start.types,
         numbers=start.numbers,
         arrays=start.arrays,
-        workspace=_workspace(params.plant, start.arrays),
+        workspace=_workspace(begun[0].plant, start.arrays),
         scene=scene,
         places=places,
     )

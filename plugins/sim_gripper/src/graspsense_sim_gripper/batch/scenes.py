@@ -7,9 +7,10 @@ from functools import lru_cache
 
 from attrs import define, evolve, field
 
-from graspsense_sim_gripper.batch.drawn import DrawnInstances, DrawnScene, drawn_scene
+from graspsense_sim_gripper.batch.drawn import DrawnInstances, DrawnScene, StartLayout, drawn_scene
 from graspsense_sim_gripper.batch.job import Job, started
 from graspsense_sim_gripper.build import build, instantiate
+from graspsense_sim_gripper.compiled.compose import Composition
 from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.objects.library import split_number
 from graspsense_sim_gripper.problem import GraspSetup, Problem
@@ -36,6 +37,7 @@ class Scenes:
     """Why the sampled loop is unstable, by `scene_key`."""
     _drawn_scenes: dict[tuple[str, bool], DrawnScene | None] = field(factory=dict, init=False)
     """By `scene_key`."""
+    _layouts: dict[Composition, StartLayout] = field(factory=dict, init=False)
     _drawn: dict[str, DrawnInstances | None] = field(factory=dict, init=False)
     """What `drawn` returns, by the name of the scene, with the number of the instance."""
 
@@ -77,8 +79,8 @@ class Scenes:
             key = scene_key(scene)
             if key not in self._drawn_scenes:
                 setup = self.setup(scene, 0)
-                params, state = started(self.job, padded(setup), on_arrays=True)
-                self._drawn_scenes[key] = drawn_scene(*self._scenes[key], setup, params, state)
+                begun = started(self.job, padded(setup), on_arrays=True)
+                self._drawn_scenes[key] = drawn_scene(*self._scenes[key], setup, begun, self._layouts)
             of_key = self._drawn_scenes[key]
             number = split_number(scene)[1] if key[1] else None
             self._drawn[scene] = None if of_key is None else DrawnInstances(of_key, number)

@@ -31,6 +31,7 @@ from graspsense_sim_gripper.batch.job import (
 from graspsense_sim_gripper.batch.scenes import Scenes, scene_key
 from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.compiled.compose import Composition
+from graspsense_sim_gripper.compiled.drawing import compiled_drawing
 from graspsense_sim_gripper.compiled.extraction import compiled_measure
 from graspsense_sim_gripper.compiled.generator import compiled_generator
 from graspsense_sim_gripper.compiled.loop_code import CompiledLoops
@@ -205,6 +206,8 @@ class _Batch:
         """Compile what each compiled grasp does before and after its loop."""
         if find_spec("numba") is None:
             return
+        # Here, so that the threads find the code of the drawing.
+        compiled_drawing()
         self.models.generator_of = compiled_generator()
         if self.job.extraction is not None:
             try:
