@@ -1,11 +1,12 @@
-"""Nested tuples that another process sends as the list of their numbers."""
+"""Nested tuples, and the arrays of their numbers."""
 
 from array import array
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 
-from graspsense_sim_gripper.nested import TupleType, append_numbers
+from graspsense_sim_gripper.nested import TupleType, append_numbers, count_numbers, first_place, with_places
 
 
 class Inner(NamedTuple):
@@ -49,3 +50,18 @@ def test_a_number_by_itself_comes_back():
 def test_another_number_of_numbers_is_refused(count):
     with pytest.raises(ValueError, match=f"{count} numbers for nested tuples of 5"):
         TupleType.of(PATTERN).filled([0.0] * count)
+
+
+def test_places_count_the_numbers_and_leave_out_arrays():
+    weights = np.zeros(3)
+    values = (Inner(3, 0.1), (weights, 2.0), Outer(Inner(0, 0.0), (), (), False))
+    numbers, arrays = [], []
+    append_numbers(numbers, values, arrays)
+    places = with_places(values)
+
+    assert numbers == [3, 0.1, 2.0, 0, 0.0, False]
+    assert [array is weights for array in arrays] == [True]
+    assert (places[0], places[1][1], places[2].inner, places[2].broken) == (Inner(0, 1), 2, Inner(3, 4), 5)
+    assert places[1][0] is weights
+    assert count_numbers(values) == 6
+    assert [first_place(places[2]), first_place(places[2].nothing)] == [3, 0]

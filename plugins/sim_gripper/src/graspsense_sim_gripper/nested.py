@@ -124,25 +124,18 @@ def first_place(places: Any) -> int:
     return int(places)
 
 
-def append_arrays(to: list[NDArray[Any]], values: Any) -> None:
-    """Append the arrays in nested tuples, in order."""
-    if isinstance(values, tuple):
-        for value in values:
-            append_arrays(to, value)
-    elif isinstance(values, np.ndarray):
+def append_numbers(to: MutableSequence[float], values: Any, arrays: list[NDArray[Any]] | None = None) -> None:
+    """Append the numbers in nested tuples, in order, and the arrays to `arrays`; `values` may also be a number."""
+    if not isinstance(values, tuple):
         to.append(values)
-
-
-def append_numbers(to: MutableSequence[float], values: Any) -> None:
-    """Append the numbers in nested tuples, in order, without arrays; `values` may also be a number."""
-    if isinstance(values, tuple):
-        for value in values:
-            if isinstance(value, tuple):
-                append_numbers(to, value)
-            elif not isinstance(value, np.ndarray):
-                to.append(value)
-    else:
-        to.append(values)
+        return
+    for value in values:
+        if isinstance(value, tuple):
+            append_numbers(to, value, arrays)
+        elif arrays is not None and isinstance(value, np.ndarray):
+            arrays.append(value)
+        else:
+            to.append(value)
 
 
 def count_numbers(values: Any) -> int:

@@ -23,7 +23,6 @@ from graspsense_sim_gripper.nested import (
     Pattern,
     Stored,
     TupleType,
-    append_arrays,
     append_numbers,
     count_numbers,
 )
@@ -119,8 +118,7 @@ class LoopTypes(NamedTuple):
 def loop_start(params: GraspParams, state: SimulationState, types: LoopTypes | None = None) -> LoopStart:
     """Return a state of a grasp in the form that a compiled loop takes; `types`: its types, if they are known."""
     numbers, arrays = array("d"), list[NDArray[Any]]()
-    append_numbers(numbers, (params, state))
-    append_arrays(arrays, params)
+    append_numbers(numbers, (params, state), arrays)
     return LoopStart(types or LoopTypes.of(params, state), np.frombuffer(numbers), tuple(arrays))
 
 
