@@ -33,6 +33,18 @@ class Gear(IntEnum):
     LOW = 1
 
 
+def helper_of_half():
+    return None
+
+
+def half(x):
+    return x
+
+
+def _calls_half(x):
+    return half(x)
+
+
 def _twice(x):
     return 2.0 * x
 
@@ -109,6 +121,29 @@ def test_a_fingerprint_changes_with_what_an_array_an_enumeration_or_a_module_hol
 
 def test_a_fingerprint_covers_the_function_that_is_compiled_in_place_of_another():
     assert fingerprint(_scaled, {_twice: _thrice}) == fingerprint(bind(_scaled, helper=_thrice))
+
+
+def _half_type():
+    return None
+
+
+def _other_half_type():
+    return 1
+
+
+@pytest.mark.usefixtures("_numba")
+def test_a_fingerprint_covers_the_functions_that_generate_the_code_of_an_intrinsic():
+    from numba.extending import intrinsic
+
+    def declared(helper):
+        def half(context, x):
+            return helper_of_half(), None
+
+        return intrinsic(bind(half, helper_of_half=helper))
+
+    prints = [fingerprint(bind(_calls_half, half=declared(one))) for one in (_half_type, _other_half_type)]
+    assert prints[0] != prints[1]
+    assert prints[0] == fingerprint(bind(_calls_half, half=declared(_half_type)))
 
 
 def test_closures_recursion_and_builtins_are_refused_by_name():

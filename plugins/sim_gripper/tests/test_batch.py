@@ -44,6 +44,8 @@ from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.model_report import model_report
 from graspsense_sim_gripper.objects.library import catalogue, kinds_in, shipped_scenes
 from graspsense_sim_gripper.reduction import levels
+from graspsense_sim_gripper.terms.registry import TERMS
+from graspsense_sim_gripper.terms.term import Term
 
 HYBRID = create("controller", "hybrid")
 FEATURES = create("feature-set", "chitta")
@@ -235,6 +237,105 @@ def test_a_named_tuple_that_is_measured_comes_back_as_one():
     traced = run_many(SimConfig(), HYBRID, ["block"] * 3, range(3), compiled=True)
     for one, other in zip(done, traced, strict=True):
         assert one.extracted == ("Found", max(other.trace.force_left_n), float(len(other.trace.t_s)))
+
+
+class Failing(NamedTuple):
+    """A term that gives no number once it is pressed."""
+
+    k_n_m: float
+
+
+def no_number(params, state, d0, d1, h, v1):
+    return params.k_n_m * d1 * (1.0 if d1 < 0.001 else math.nan), state
+
+
+FAILS = """
+width_m = 0.05
+
+[[terms]]
+type = "failing"
+k_n_m = 2000.0
+"""
+
+
+def test_the_state_before_a_failure_is_computed_once_before_its_buffers_are_used_again(monkeypatch):
+    monkeypatch.setitem(TERMS, "failing", Term(name="failing", summary="", params=Failing, law=no_number))
+    config = SimConfig(sensor="ideal", fidelity="full")
+    (grasp,) = run_many(config, HYBRID, [FAILS], [0], compiled=False, traces=False)
+    assert grasp.outcome == Outcome.ABORTED
+    assert grasp.end() is grasp.end()
+
+
+class Raising:
+    """Extracts the number of events, in a form that raises where there are no ticks, or always, and in `result`."""
+
+    def __init__(self, where):
+        self.where = where
+
+    def __call__(self, trace):
+        return len(trace.events)
+
+    def compiled_extraction(self):
+        measure = {"no ticks": mean_n, "measure": raising}.get(self.where, largest)
+        return CompiledExtraction(
+            measure, (), raising_result if self.where == "result" else lambda found: found
+        )
+
+
+def mean_n(params, ticks):
+    total = 0.0
+    for force in ticks.force_left_n:
+        total += force
+    return total / len(ticks.t_s)
+
+
+def raising(params, ticks):
+    if len(ticks.t_s) > 1:
+        raise ValueError("no such ticks")
+    return 0.0
+
+
+def raising_result(found):
+    raise RuntimeError("not these numbers")
+
+
+@pytest.mark.slow
+def test_a_compiled_form_that_raises_is_not_hidden_and_hides_no_events():
+    pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
+
+    def extracted(where):
+        options = {"traces": False, "compiled": True, "extract": Raising(where)}
+        return run_many(SimConfig(), HYBRID, ["block"], [0], **options)[0].extracted
+
+    (traced,) = run_many(SimConfig(), HYBRID, ["block"], [0], compiled=True)
+    assert extracted("no ticks") == pytest.approx(traced.trace.force_left_n.mean())
+    assert extracted("measure") == len(traced.trace.events) > 0
+    with pytest.raises(RuntimeError, match="not these numbers"):
+        extracted("result")
+
+
+def test_where_numba_cannot_be_imported_grasps_run_in_the_interpreter(tmp_path):
+    (tmp_path / "numba").mkdir()
+    (tmp_path / "numba" / "__init__.py").write_text("raise ImportError('Numba needs another numpy')")
+    script = """
+import warnings
+from graspsense.plugin_api import create
+from graspsense_sim_gripper.batch.threads import run_many
+from graspsense_sim_gripper.config import SimConfig
+with warnings.catch_warnings(record=True) as told:
+    warnings.simplefilter("always")
+    run_many(SimConfig(fidelity="full"), create("controller", "hybrid"), ["toy"], [0], compiled=True, traces=False)
+print([str(one.message).partition(":")[0] for one in told])
+"""
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "these grasps run in plain Python" in done.stdout
+
+
+def test_a_seed_is_a_whole_number():
+    with pytest.raises(TypeError, match="float"):
+        run_many(SimConfig(), HYBRID, ["block"], [2.7], traces=False)
 
 
 def test_features_that_cannot_be_compiled_are_extracted_from_traces():

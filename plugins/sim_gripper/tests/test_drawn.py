@@ -57,7 +57,30 @@ type = "elastic"
 k1_n_m = 900.0
 k3_n_m3 = 0.0
 """
-NAMES = [*sorted(catalogue()), "odwalla:full_open#3", "odwalla_worn:empty_open#7", HELD, f"{HELD}#4", WIDE]
+DROPS = """
+width_m = 0.05
+stiffness_spread = 0.2
+
+[[terms]]
+type = "elastic"
+k1_n_m = 900.0
+k3_n_m3 = 0.0
+
+[[terms]]
+type = "slosh"
+mass_kg = 1e-3
+frequency_hz = 1e7
+damping_ratio = 0.1
+"""
+NAMES = [
+    DROPS,
+    *sorted(catalogue()),
+    "odwalla:full_open#3",
+    "odwalla_worn:empty_open#7",
+    HELD,
+    f"{HELD}#4",
+    WIDE,
+]
 CONFIGS = {
     "pads": SimConfig(),
     "ideal": SimConfig(sensor="ideal"),
@@ -130,6 +153,21 @@ def test_an_instance_that_does_not_fit_is_refused_as_it_is_by_itself():
         else:
             scene.drawn(drawing, seed, number, scene.memory())
     assert 0 < len(messages) < 40
+
+
+def test_a_scene_is_drawn_of_which_one_grasp_does_not_fit():
+    scenes = scenes_of(CONFIGS["ideal"])
+    numbered = [f"{WIDE}#{k}" for k in range(40)]
+
+    def fits(name, seed):
+        try:
+            scenes.setup(name, seed)
+        except ConfigError:
+            return False
+        return True
+
+    name = next(name for name in numbered if not fits(name, 0) and not fits(name, 1))
+    assert scenes_of(CONFIGS["ideal"]).drawn(name).scene.spec.file == scenes.drawn(WIDE).scene.spec.file
 
 
 @pytest.mark.parametrize(

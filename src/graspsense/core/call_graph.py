@@ -138,6 +138,25 @@ def _description(
             yield from _module_description(value, code)
         else:
             yield _value_description(value)
+            yield from _generator_description(value)
+
+
+def _generator_description(value: Any) -> Iterator[str]:
+    """Describe the functions of an intrinsic of numba, and those of its module, which generate its code."""
+    defined = getattr(value, "_defn", None)
+    if not isinstance(defined, types.FunctionType):
+        return
+    waiting, seen = [defined], {id(defined)}
+    while waiting:
+        function = waiting.pop()
+        for each in _with_nested(function.__code__):
+            yield from _code_description(each)
+        for name, called in _globals_read(function):
+            yield name
+            own = isinstance(called, types.FunctionType) and called.__module__ == defined.__module__
+            if own and id(called) not in seen:
+                seen.add(id(called))
+                waiting.append(called)
 
 
 def _code_description(code: types.CodeType) -> Iterator[str]:

@@ -141,12 +141,24 @@ def instantiate(
 
     Raises ConfigError for an object of a scene file that the open fingers would cut into.
     """
-    config, rng = problem.config, generator_of(seed)
-    instance = None
-    if problem.spec is not None:
-        instance = sample(problem.spec, rng if config.spread else None, problem.number)
-        check_fit(config, problem.spec, instance.width_m, instance.offset_m)
-    return _setup(config, instance, seed, rng, reduction)
+    rng = generator_of(seed)
+    instance = _instance(problem, rng)
+    if instance is not None:
+        check_fit(problem.config, instance.spec, instance.width_m, instance.offset_m)
+    return _setup(problem.config, instance, seed, rng, reduction)
+
+
+def example_of(problem: Problem, reduction: Reduction | None) -> GraspSetup:
+    """Return any grasp of a scene, for what all of them have in common; it may not fit between the fingers."""
+    rng = NumpyGenerator(0)
+    return _setup(problem.config, _instance(problem, rng), 0, rng, reduction)
+
+
+def _instance(problem: Problem, rng: Generator) -> Instance | None:
+    """Return the instance that `rng` draws; None if there is no object."""
+    if problem.spec is None:
+        return None
+    return sample(problem.spec, rng if problem.config.spread else None, problem.number)
 
 
 def unverified_setup(config: SimConfig, scene: str | ObjectSpec | None, seed: int) -> GraspSetup:

@@ -79,7 +79,10 @@ class CompiledGrasps:
     def _drawn(
         self, drawing: Drawing, instances: DrawnInstances, seed: int, loop: CompiledLoop
     ) -> FinishedGrasp | None:
-        """Simulate a grasp; None if a term fails or it takes long, so that it has to be simulated from its setup."""
+        """Simulate a grasp; None if it has to be simulated from its setup.
+
+        That is so if a term fails in it, or if it does not end within the ticks that the buffers hold.
+        """
         scene, number = instances
         if scene not in self._memory:
             self._memory[scene] = scene.memory()

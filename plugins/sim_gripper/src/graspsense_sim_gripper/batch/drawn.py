@@ -1,7 +1,7 @@
 """The grasps of a scene that compiled code draws, without a `GraspSetup` for each.
 
 A grasp is an array of numbers, in which those that its seed decides are overwritten. The results are the same to the
-bit as by `build.instantiate`.
+bit as by `build.instantiate` (`test_a_drawn_grasp_is_that_of_the_seed`).
 """
 
 from __future__ import annotations
@@ -10,11 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from attrs import frozen
+from numpy.typing import NDArray
 
 from graspsense_sim_gripper.build import check_fit, friction_spread
 from graspsense_sim_gripper.compiled.compose import Composition
 from graspsense_sim_gripper.compiled.drawing import (
     NO_NUMBER,
+    NO_PLACE,
     DrawBuffers,
     Drawing,
     Places,
@@ -32,8 +34,8 @@ from graspsense_sim_gripper.compiled.loop_code import (
 from graspsense_sim_gripper.compiled.padding import PaddedLayout, composition_of, layout_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.exact.propagate import ExactPlant
-from graspsense_sim_gripper.loop import GraspParams, PlantModel, SimulationState
-from graspsense_sim_gripper.nested import with_places
+from graspsense_sim_gripper.loop import GraspParams, SimulationState
+from graspsense_sim_gripper.nested import append_numbers, with_places
 from graspsense_sim_gripper.objects.instance import (
     N_COMMON_DRAWS,
     deepest_dent,
@@ -43,6 +45,7 @@ from graspsense_sim_gripper.objects.instance import (
 from graspsense_sim_gripper.objects.spec import PATCHES, NominalParams, ObjectSpec
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.reduction.model import DROPPED, KEPT, Reduction
+from graspsense_sim_gripper.sensing import PadCells
 
 
 class DrawMemory(NamedTuple):
@@ -53,6 +56,36 @@ class DrawMemory(NamedTuple):
     """Those of a grasp, some of which are written to."""
 
 
+class StartLayout(NamedTuple):
+    """What the grasps of a composition have in common at their beginning."""
+
+    types: LoopTypes
+    at: Any
+    """Parameters and state, in which each number is its place among all numbers."""
+    cells: tuple[int, ...]
+    """The places of the weights and offsets of the left and of the right cells among all arrays."""
+    workspace: int | None
+    """The place of the workspace of exact discretisation among them; None without."""
+
+    @classmethod
+    def of(cls, params: GraspParams, state: SimulationState) -> StartLayout:
+        """Return that of a grasp with these parameters and this first state."""
+        # Other arrays in their stead are told apart, while both fingertips may share theirs.
+        left, right = (PadCells(np.zeros(0), np.zeros(0)) for _ in range(2))
+        arrays: list[NDArray[Any]] = []
+        append_numbers([], params._replace(sensor=params.sensor._replace(left=left, right=right)), arrays)
+
+        def place(wanted: Any) -> int:
+            return next(i for i, array in enumerate(arrays) if array is wanted)
+
+        return cls(
+            LoopTypes.of(params, state),
+            with_places((params, state)),
+            tuple(place(array) for array in (*left, *right)),
+            place(params.plant.workspace) if isinstance(params.plant, ExactPlant) else None,
+        )
+
+
 @frozen(eq=False)
 class DrawnScene:
     """What the grasps of a scene are drawn from."""
@@ -61,13 +94,11 @@ class DrawnScene:
     spec: ObjectSpec
     composition: Composition
     layout: PaddedLayout
-    types: LoopTypes
+    start: StartLayout
     numbers: Numbers
     """Those of the parameters and of the first state of a grasp; which a seed decides is arbitrary."""
     arrays: Arrays
     """Its arrays; which a seed decides are arbitrary."""
-    workspace: int | None
-    """The place in `arrays` of the workspace of exact discretisation; None without."""
     scene: SceneNumbers
     places: Places
 
@@ -79,12 +110,12 @@ class DrawnScene:
     def memory(self) -> DrawMemory:
         """Return memory for drawing and simulating its grasps one after the other, in one thread."""
         buffers = draw_buffers(N_COMMON_DRAWS + self.scene.n_own + 1, len(self.places.params))
-        arrays, cells = [*self.arrays], buffers.cells
-        if self.workspace is not None:
-            arrays[self.workspace] = arrays[self.workspace].copy()
+        arrays, workspace, (weights, left, right) = [*self.arrays], self.start.workspace, buffers.cells
+        if workspace is not None:
+            arrays[workspace] = arrays[workspace].copy()
         if self.has_cells:
-            # The cells of the sensor are the last arrays.
-            arrays[-4:] = [cells.weights, cells.left, cells.weights, cells.right]
+            for place, array in zip(self.start.cells, (weights, left, weights, right), strict=True):
+                arrays[place] = array
         return DrawMemory(buffers, tuple(arrays))
 
     def drawn(self, drawing: Drawing, seed: int, number: int | None, memory: DrawMemory) -> LoopStart:
@@ -99,7 +130,7 @@ class DrawnScene:
             numbers[places.width_m] -= deepest_dent(spec, buffers.params.tolist())
         if spec.file:
             check_fit(self.config, spec, float(numbers[places.width_m]), float(numbers[places.offset_m]))
-        return LoopStart(self.types, numbers, arrays)
+        return LoopStart(self.start.types, numbers, arrays)
 
 
 class DrawnInstances(NamedTuple):
@@ -113,14 +144,6 @@ class DrawnInstances(NamedTuple):
 def can_be_drawn(seed: int) -> bool:
     """Return whether compiled code draws grasps with this seed."""
     return 0 <= seed <= LARGEST_SEED
-
-
-class StartLayout(NamedTuple):
-    """What the grasps of a composition have in common at their beginning."""
-
-    types: LoopTypes
-    at: Any
-    """Parameters and state, in which each number is its place among all numbers."""
 
 
 def drawn_scene(
@@ -146,9 +169,9 @@ def drawn_scene(
     layout, config = layout_of(example), problem.config
     composition = composition_of(config, example)
     if composition not in layouts:
-        layouts[composition] = StartLayout(LoopTypes.of(*begun), with_places(begun))
+        layouts[composition] = StartLayout.of(*begun)
     known = layouts[composition]
-    start, places = loop_start(*begun, known.types), _places(known.at, layout)
+    start, places = loop_start(*begun, known.types), _places(known.at, layout, spec)
     if sensor.ideal == 0:
         start.numbers[places.image_phase_s] = sensor.clock.period_s
     nominal = spec.nominal_params
@@ -169,27 +192,23 @@ def drawn_scene(
         spec=spec,
         composition=composition,
         layout=layout,
-        types=start.types,
+        start=known,
         numbers=start.numbers,
         arrays=start.arrays,
-        workspace=_workspace(begun[0].plant, start.arrays),
         scene=scene,
         places=places,
     )
 
 
-def _workspace(plant: PlantModel, arrays: Arrays) -> int | None:
-    if not isinstance(plant, ExactPlant):
-        return None
-    return next(i for i, array in enumerate(arrays) if array is plant.workspace)
-
-
-def _places(at: Any, layout: PaddedLayout) -> Places:
+def _places(at: Any, layout: PaddedLayout, spec: ObjectSpec) -> Places:
     """Return where the numbers are that a seed decides; `at`: parameters and state with the place of each number."""
     params, state = at
     plant: Any = params.plant.plant if isinstance(params.plant, ExactPlant) else params.plant
     friction, model = plant.drive.friction, plant.object
-    of_params = [place for position, _ in layout.places[1:] for place in model.terms[position].params]
+    of_params: list[int] = []
+    for (position, _), (_, begin, end) in zip(layout.places[1:], spec.params_of_terms, strict=True):
+        # A term that the model drops may not be in the composition.
+        of_params += model.terms[position].params if position >= 0 else (NO_PLACE,) * (end - begin)
     return Places(
         coulomb_n=friction.coulomb_n,
         breakaway_n=friction.breakaway_n,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import partial
 from typing import Any, Final, NamedTuple
 
@@ -243,11 +242,18 @@ def grasp_once(
     if ending.failed == 1:
         outcome = Outcome.ABORTED
         effort_n = state().loop.effort_n
-        reason = not_finite_in_tick(setup.kinds, setup.plant, plant(), effort_n, setup.dt_s)
+        # Once and now: the loop runs again for it, in buffers that the next grasp uses.
+        before = plant()
+        plant = partial(_same, before)
+        reason = not_finite_in_tick(setup.kinds, setup.plant, before, effort_n, setup.dt_s)
     elif ending.ended == 0:
         outcome, reason = Outcome.ABORTED, overdue(job.run)
     done = EndedGrasp(outcome, reason, plant, layout, ending)
     return result_of(job, done, buffers, storage, measure)
+
+
+def _same(plant: PlantState) -> PlantState:
+    return plant
 
 
 class EndedGrasp(NamedTuple):
@@ -283,16 +289,20 @@ def result_of(
         return done.finished(None, None)
     n, k, form = done.ending.recorded, done.ending.images, job.extraction
     columns, phases = buffers.columns, buffers.phases
+    events = type(job.controller).events
     if measure is not None and form is not None:
-        # Compiled code does not say where an exception comes from. `extract` does, if it raises one too.
-        with suppress(Exception):
-            return done.finished(form.result(measure(form.params, columns, phases, n)), None)
+        try:
+            measured = measure(form.params, columns, phases, n)
+        except Exception:
+            # Compiled code does not say where an exception comes from. `extract` does, if it raises one too.
+            pass
+        else:
+            return done.finished(form.result(measured), None)
     table, numbers = np.asarray(columns)[:, :n], np.asarray(phases)[:n]
     images, times = np.asarray(buffers.pads.images[:k]), np.asarray(buffers.image_times[:k])
     signals: dict[str, SampleTrace] = {}
     if buffers.palm:
         signals["acceleration"] = sample_trace(table[0], np.asarray(buffers.palm.samples)[:, :n])
-    events = type(job.controller).events
     if job.traces and 2 * n < len(columns[0]):
         trace = recorded_trace(events, table.copy(), numbers.copy(), images, times, signals)
         return done.finished(None if job.extract is None else job.extract(trace), trace)

@@ -9,7 +9,7 @@ from attrs import define, evolve, field
 
 from graspsense_sim_gripper.batch.drawn import DrawnInstances, DrawnScene, StartLayout, drawn_scene
 from graspsense_sim_gripper.batch.job import Job, started
-from graspsense_sim_gripper.build import build, instantiate
+from graspsense_sim_gripper.build import build, example_of, instantiate
 from graspsense_sim_gripper.compiled.compose import Composition
 from graspsense_sim_gripper.compiled.padding import padded
 from graspsense_sim_gripper.objects.library import split_number
@@ -73,12 +73,19 @@ class Scenes:
             known = self._problems[scene] = problem, reduction
         return instantiate(*known, seed, self.generator_of)
 
+    def example(self, scene: str) -> GraspSetup:
+        """Return any grasp of a scene, for what all of them have in common. Raises as `add` does."""
+        key = scene_key(scene)
+        if key not in self._scenes:
+            self.add(scene)
+        return example_of(*self._scenes[key])
+
     def drawn(self, scene: str) -> DrawnInstances | None:
         """Return what the compiled grasps of a scene are drawn from; None if each of them needs a `GraspSetup`."""
         if scene not in self._drawn:
             key = scene_key(scene)
             if key not in self._drawn_scenes:
-                setup = self.setup(scene, 0)
+                setup = self.example(scene)
                 begun = started(self.job, padded(setup), on_arrays=True)
                 self._drawn_scenes[key] = drawn_scene(*self._scenes[key], setup, begun, self._layouts)
             of_key = self._drawn_scenes[key]

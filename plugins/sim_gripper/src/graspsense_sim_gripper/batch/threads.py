@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack
 from importlib.util import find_spec
+from operator import index
 from typing import Any, Final, Unpack
 
 from attrs import define, field
@@ -196,7 +197,7 @@ class _Batch:
         for key, n in counts.items():
             worth = self._worth(of_kinds[compiled_kinds(kinds_in(examples[key]))])
             self.models.add(examples[key], compiled=may_compile and worth)
-            self.counts[composition_of(self.job.config, self.models.setup(examples[key], 0))] += n
+            self.counts[composition_of(self.job.config, self.models.example(examples[key]))] += n
         for composition, n in self.counts.items():
             self.is_compiled[composition] = self._worth(n)
         if any(self.is_compiled.values()):
@@ -206,9 +207,13 @@ class _Batch:
         """Compile what each compiled grasp does before and after its loop."""
         if find_spec("numba") is None:
             return
-        # Here, so that the threads find the code of the drawing.
-        compiled_drawing()
-        self.models.generator_of = compiled_generator()
+        try:
+            # Here, so that the threads find the code of the drawing.
+            compiled_drawing()
+            self.models.generator_of = compiled_generator()
+        except NotCompilable:
+            # The loop cannot be compiled either, and says why.
+            return
         if self.job.extraction is not None:
             try:
                 self.measure = compiled_measure(self.job.extraction)
@@ -223,7 +228,7 @@ class _Batch:
     def _part(self, begin: int) -> list[tuple[str, int]]:
         """Return the scene and the seed of each grasp of the slice that begins at this index."""
         part = slice(begin, begin + SLICE)
-        return list(zip(self.scenes[part], self.seeds[part], strict=True))
+        return list(zip(self.scenes[part], map(index, self.seeds[part]), strict=True))
 
     def _worth(self, n: int) -> bool:
         return n >= WORTH_COMPILING if self.compiled is None else self.compiled

@@ -1,14 +1,15 @@
 """Drawing what a seed decides of a grasp in compiled code: the instance, its placement, friction and the cells.
 
-The rules are those of `objects.instance`, `dynamics.drive` and `fingertip`, and the result is the same to the bit. A
-scene gives the numbers of one of its grasps, and where those are that a seed decides; these are overwritten.
+The rules are those of `objects.instance`, `dynamics.drive` and `fingertip`, in the order in which `build.instantiate`
+draws: `test_a_drawn_grasp_is_that_of_the_seed` holds both equal to the bit. A scene gives the numbers of one of its
+grasps, and where those are that a seed decides; these are overwritten.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from attrs import frozen
@@ -52,7 +53,7 @@ class Places(NamedTuple):
     share: int
     image_phase_s: int
     params: NDArray[np.int64]
-    """Those of the terms, in the order of `NominalParams`."""
+    """Those of the terms, in the order of `NominalParams`; NO_PLACE for a term that the composition does not have."""
 
 
 class SceneNumbers(NamedTuple):
@@ -93,7 +94,8 @@ class DrawBuffers(NamedTuple):
     cells: CellArrays
 
 
-NO_NUMBER = np.zeros(0)
+NO_PLACE: Final = -1
+NO_NUMBER: Final = np.zeros(0)
 """The draws of an object without a number."""
 
 
@@ -136,7 +138,8 @@ def _write_instance(scene: SceneNumbers, places: Places, draws: Any, params: Any
     """Write the parameters and the placement of an instance to `numbers`; return its `Placement.patch_row`."""
     draw_params(scene.nominal, scene.spread.stiffness, draws, params)
     for i in range(len(places.params)):
-        numbers[places.params[i]] = params[i]
+        if places.params[i] != NO_PLACE:
+            numbers[places.params[i]] = params[i]
     placement = placed(scene.spread, draws)
     numbers[places.width_m], numbers[places.offset_m] = placement.width_m, placement.offset_m
     if scene.has_cells == 1:

@@ -23,9 +23,10 @@ measure: Callable[[Any, TickColumns], Any] = _measure_unbound
 
 
 def measure_buffers(params: Any, columns: Table, phases: Any, n: int) -> Any:
-    """Return what is measured on the first `n` ticks of `Buffers`. The events are removed from the phases."""
+    """Return what is measured on the first `n` ticks of `Buffers`, from whose phases the events are left out."""
+    without_events = np.empty(n, np.int64)
     for i in range(n):
-        phases[i] &= PHASE_BITS
+        without_events[i] = phases[i] & PHASE_BITS
     ticks = TickColumns(
         columns[0][:n],
         columns[1][:n],
@@ -36,7 +37,7 @@ def measure_buffers(params: Any, columns: Table, phases: Any, n: int) -> Any:
         columns[6][:n],
         columns[7][:n],
         columns[8][:n],
-        phases[:n],
+        without_events,
     )
     return measure(params, ticks)
 
@@ -52,5 +53,10 @@ def _compiled_measure(
 ) -> Callable[[Any, Any, Any, int], Any]:
     compiled = compile_function(bind(measure_buffers, measure=what))
     with generating():
-        compiled(params, np.zeros((len(COLUMNS), 1)), np.zeros(1, np.int64), 0)
+        try:
+            compiled(params, np.zeros((len(COLUMNS), 1)), np.zeros(1, np.int64), 0)
+        except Exception:
+            # It may raise where there are no ticks. Only if it has no code could it not be compiled.
+            if not getattr(compiled, "overloads", {}):
+                raise
     return entry_point(compiled)

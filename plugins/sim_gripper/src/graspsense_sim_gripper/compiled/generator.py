@@ -158,8 +158,6 @@ class Draws(NamedTuple):
     uniform: Callable[..., float]
     normals: Callable[..., None]
     tables: Ziggurat
-    pool: Words
-    """Four words that seeding overwrites."""
 
 
 class CompiledGenerator:
@@ -171,7 +169,8 @@ class CompiledGenerator:
         """Begin with this seed. Raises ValueError for a negative seed."""
         self._draws, self._state = draws, np.empty(4, WORD)
         if 0 <= seed <= LARGEST_SEED:
-            draws.seed(WORD(seed), draws.pool, self._state)
+            # Memory of its own: other threads may seed theirs meanwhile.
+            draws.seed(WORD(seed), np.empty(4, WORD), self._state)
         else:
             words = np.random.PCG64(seed).state["state"]
             halves = [words["state"] >> 64, words["state"], words["inc"] >> 64, words["inc"]]
@@ -226,7 +225,7 @@ def _draws() -> Draws:
         seed(WORD(1), words, np.zeros(4, WORD))
         uniform(words)
         normals(words, tables, np.zeros(1))
-    return Draws(entry_point(seed), entry_point(uniform), entry_point(normals), tables, words)
+    return Draws(entry_point(seed), entry_point(uniform), entry_point(normals), tables)
 
 
 def compiled_draw(draw: Callable[..., Any], options: CompileOptions | None = None) -> Callable[..., Any]:

@@ -55,8 +55,9 @@ class CellNoise(NamedTuple):
     is_drawn: int
     """1: it is drawn to the buffers before the grasp; 0: it is in them, or there is none."""
     words: Words
+    """The state of its generator, which changes."""
     tables: Ziggurat
-    """The state of its generator, which changes, and its tables."""
+    """The tables of its generator."""
 
 
 @cache
@@ -116,9 +117,15 @@ class LoopTypes(NamedTuple):
 
 
 def loop_start(params: GraspParams, state: SimulationState, types: LoopTypes | None = None) -> LoopStart:
-    """Return a state of a grasp in the form that a compiled loop takes; `types`: its types, if they are known."""
+    """Return a state of a grasp in the form that a compiled loop takes; `types`: its types, if they are known.
+
+    Raises NotCompilable if something in it is neither a number nor an array.
+    """
     numbers, arrays = array("d"), list[NDArray[Any]]()
-    append_numbers(numbers, (params, state), arrays)
+    try:
+        append_numbers(numbers, (params, state), arrays)
+    except TypeError as error:
+        raise NotCompilable(f"the parameters or the state of a grasp are not all numbers: {error}") from error
     return LoopStart(types or LoopTypes.of(params, state), np.frombuffer(numbers), tuple(arrays))
 
 
