@@ -98,12 +98,12 @@ def run(arguments: list[str]) -> None:
     from graspsense.evaluation import crossval, evaluate
     from graspsense_c45.plugin import C45
     from graspsense_sim_gripper.backend import SimBackend
-    from graspsense_sim_gripper.batch import job, threads
+    from graspsense_sim_gripper.batch import scenes, threads
     from graspsense_sim_gripper.compiled import loop_code
 
     SPENT["start: interpreter and imports"] = processor_s()
     for owner, name, part in (
-        (job.Scenes, "add", "choosing reduced models"),
+        (scenes.Scenes, "add", "choosing reduced models"),
         (threads, "compiled_measure", "loading compiled features"),
         (loop_code, "_compiled", "loading the compiled loop"),
         (SimBackend, "run_many", "grasping"),
