@@ -6,7 +6,15 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from graspsense_sim_gripper.nested import TupleType, append_numbers, count_numbers, first_place, with_places
+from graspsense_sim_gripper.nested import (
+    TupleType,
+    append_numbers,
+    appender,
+    count_numbers,
+    first_place,
+    structure,
+    with_places,
+)
 
 
 class Inner(NamedTuple):
@@ -56,7 +64,7 @@ def test_places_count_the_numbers_and_leave_out_arrays():
     weights = np.zeros(3)
     values = (Inner(3, 0.1), (weights, 2.0), Outer(Inner(0, 0.0), (), (), False))
     numbers, arrays = [], []
-    append_numbers(numbers, values, arrays)
+    appender(values)(values, numbers, arrays)
     places = with_places(values)
 
     assert numbers == [3, 0.1, 2.0, 0, 0.0, False]
@@ -65,3 +73,11 @@ def test_places_count_the_numbers_and_leave_out_arrays():
     assert places[1][0] is weights
     assert count_numbers(values) == 6
     assert [first_place(places[2]), first_place(places[2].nothing)] == [3, 0]
+
+
+def test_the_structure_tells_types_and_not_values():
+    one, other = (Outer(Inner(k, 0.1 * k), (), (), True) for k in (1, 2))
+    assert structure(one) == structure(other)
+    assert structure(one) != structure(one._replace(nothing=(1.0,)))
+    assert structure(one) != structure(one._replace(inner=Inner(1.0, 0.1)))
+    assert structure((np.zeros(2),)) == structure((np.zeros(3),)) != structure((np.zeros(3, int),))

@@ -8,7 +8,7 @@ from operator import itemgetter
 from typing import Any
 
 import numpy as np
-from attrs import frozen
+from attrs import define, frozen
 from numpy.typing import NDArray
 
 
@@ -41,11 +41,13 @@ class TupleType:
         return self._make(leaves)
 
 
-@frozen(eq=False)
+@define(eq=False)
 class Pattern:
     """Nested tuples of numbers and arrays that stand for their types only."""
 
     values: Any
+    compiled_type: Any = None
+    """Their type in compiled code, once it is known."""
 
 
 @frozen(eq=False)
@@ -88,6 +90,53 @@ def _maker(pattern: tuple[Any, ...], begin: int) -> Callable[[list[Any]], Any]:
     return made
 
 
+def structure(values: Any) -> Any:
+    """Return nested types, which are equal for nested tuples of equal types."""
+    if isinstance(values, tuple):
+        return (type(values), *map(structure, values))
+    return (values.dtype.str, values.ndim) if isinstance(values, np.ndarray) else type(values)
+
+
+Append = Callable[[Any, MutableSequence[float], list[NDArray[Any]]], None]
+"""`append(values, numbers, arrays)` appends the numbers and the arrays in nested tuples, in order."""
+
+
+def appender(pattern: tuple[Any, ...]) -> Append:
+    """Return what appends the numbers and the arrays of nested tuples of the same types as `pattern`."""
+    parts: list[tuple[int, int, Append | None]] = []
+    begin = 0
+    for kind, group in groupby(pattern, _kind):
+        for part in group if kind is not float else [tuple(group)]:
+            end = begin + (len(part) if kind is float else 1)
+            parts.append(
+                (begin, end, None if kind is float else appender(part) if kind is tuple else _append_array)
+            )
+            begin = end
+    if len(parts) == 1 and parts[0][2] is None:
+        return _append_all
+
+    def append(values: Any, numbers: MutableSequence[float], arrays: list[NDArray[Any]]) -> None:
+        for first, last, one in parts:
+            if one is None:
+                numbers.extend(values[first:last])
+            else:
+                one(values[first], numbers, arrays)
+
+    return append
+
+
+def _kind(part: Any) -> type:
+    return tuple if isinstance(part, tuple) else np.ndarray if isinstance(part, np.ndarray) else float
+
+
+def _append_all(values: Any, numbers: MutableSequence[float], arrays: list[NDArray[Any]]) -> None:
+    numbers.extend(values)
+
+
+def _append_array(values: Any, numbers: MutableSequence[float], arrays: list[NDArray[Any]]) -> None:
+    arrays.append(values)
+
+
 def like(pattern: Any, values: Any) -> Any:
     """Return nested lists of values as nested tuples of the same types as `pattern`.
 
@@ -124,16 +173,14 @@ def first_place(places: Any) -> int:
     return int(places)
 
 
-def append_numbers(to: MutableSequence[float], values: Any, arrays: list[NDArray[Any]] | None = None) -> None:
-    """Append the numbers in nested tuples, in order, and the arrays to `arrays`; `values` may also be a number."""
+def append_numbers(to: MutableSequence[float], values: Any) -> None:
+    """Append the numbers in nested tuples without arrays, in order; `values` may also be a number."""
     if not isinstance(values, tuple):
         to.append(values)
         return
     for value in values:
         if isinstance(value, tuple):
-            append_numbers(to, value, arrays)
-        elif arrays is not None and isinstance(value, np.ndarray):
-            arrays.append(value)
+            append_numbers(to, value)
         else:
             to.append(value)
 

@@ -35,7 +35,7 @@ from graspsense_sim_gripper.compiled.padding import PaddedLayout, composition_of
 from graspsense_sim_gripper.config import SimConfig
 from graspsense_sim_gripper.exact.propagate import ExactPlant
 from graspsense_sim_gripper.loop import GraspParams, SimulationState
-from graspsense_sim_gripper.nested import append_numbers, with_places
+from graspsense_sim_gripper.nested import appender, with_places
 from graspsense_sim_gripper.objects.instance import (
     N_COMMON_DRAWS,
     deepest_dent,
@@ -73,7 +73,8 @@ class StartLayout(NamedTuple):
         # Other arrays in their stead are told apart, while both fingertips may share theirs.
         left, right = (PadCells(np.zeros(0), np.zeros(0)) for _ in range(2))
         arrays: list[NDArray[Any]] = []
-        append_numbers([], params._replace(sensor=params.sensor._replace(left=left, right=right)), arrays)
+        told_apart = params._replace(sensor=params.sensor._replace(left=left, right=right))
+        appender(told_apart)(told_apart, [], arrays)
 
         def place(wanted: Any) -> int:
             return next(i for i, array in enumerate(arrays) if array is wanted)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable
 from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,13 @@ from graspsense_sim_gripper.compiled.jit import COMPILING, OPTIONS, compile_part
 from graspsense_sim_gripper.compiled.ziggurat import Ziggurat
 from graspsense_sim_gripper.loop import Buffers, Ending, GraspParams, LoopEnd, SimulationState, ending
 from graspsense_sim_gripper.nested import (
+    Append,
     Pattern,
     Stored,
     TupleType,
-    append_numbers,
+    appender,
     count_numbers,
+    structure,
 )
 from graspsense_sim_gripper.problem import ControllerStep
 
@@ -108,25 +110,46 @@ class LoopTypes(NamedTuple):
     plant: TupleType
     before_plant: int
     """Number of numbers of the state before those of the plant."""
+    append: Append
+    """Appends the numbers and the arrays of parameters and state."""
+    n_numbers: int
+    """Number of numbers of both."""
 
     @classmethod
     def of(cls, params: GraspParams, state: SimulationState) -> LoopTypes:
         """Return the types of these parameters and of this state."""
-        pattern = Pattern((params, state))
-        return cls(pattern, TupleType.of(state), TupleType.of(state.plant), count_numbers(state.loop))
+        begun = params, state
+        key = structure(begun)
+        known = _TYPES.get(key)
+        if known is None:
+            if len(_TYPES) >= MOST_TYPES:
+                _TYPES.clear()
+            types = TupleType.of(state), TupleType.of(state.plant)
+            known = cls(
+                Pattern(begun), *types, count_numbers(state.loop), appender(begun), count_numbers(begun)
+            )
+            _TYPES[key] = known
+        return known
+
+
+MOST_TYPES: Final = 64
+_TYPES: Final[dict[Any, LoopTypes]] = {}
+"""Those that are known, by the structure of parameters and state: making them takes a millisecond."""
 
 
 def loop_start(params: GraspParams, state: SimulationState, types: LoopTypes | None = None) -> LoopStart:
     """Return a state of a grasp in the form that a compiled loop takes; `types`: its types, if they are known.
 
-    Raises NotCompilable if something in it is neither a number nor an array.
+    Raises NotCompilable if something in it is neither a number nor an array, TypeError if it is not of these types.
     """
-    numbers, arrays = array("d"), list[NDArray[Any]]()
+    numbers, arrays, types = array("d"), list[NDArray[Any]](), types or LoopTypes.of(params, state)
     try:
-        append_numbers(numbers, (params, state), arrays)
+        types.append((params, state), numbers, arrays)
     except TypeError as error:
         raise NotCompilable(f"the parameters or the state of a grasp are not all numbers: {error}") from error
-    return LoopStart(types or LoopTypes.of(params, state), np.frombuffer(numbers), tuple(arrays))
+    if len(numbers) != types.n_numbers:
+        raise TypeError(f"a grasp with {len(numbers)} numbers in a loop for grasps with {types.n_numbers}")
+    return LoopStart(types, np.frombuffer(numbers), tuple(arrays))
 
 
 class CompiledLoop:

@@ -26,7 +26,10 @@ class PatternType(types.Type):
 
 @typeof_impl.register(Pattern)
 def _type_of(pattern: Pattern, context: Any) -> PatternType:
-    return PatternType(typeof_impl(pattern.values, context))
+    if pattern.compiled_type is None:
+        pattern.compiled_type = PatternType(typeof_impl(pattern.values, context))
+    known: PatternType = pattern.compiled_type
+    return known
 
 
 def _unbox(kind: Any, value: Any, context: Any) -> Any:
