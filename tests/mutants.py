@@ -278,6 +278,18 @@ class CompiledWithoutNumbers(Peak):
     compiled = CompiledFeatures(nothing_to_measure, lambda feature_set: (), peak_measured)
 
 
+def last_gap(params, ticks):
+    return (ticks.gap_m[-1] if len(ticks.gap_m) else 0.0,)
+
+
+@mutant("feature-set", "reads-no-release-unless-it-says-so", "remove `reads_release=False`")
+class ReadsTheRelease(Peak):
+    def extract(self, trace):
+        return peak_measured(self, last_gap((), trace), trace.units)
+
+    compiled = CompiledFeatures(last_gap, lambda feature_set: (), peak_measured, reads_release=False)
+
+
 # Controllers.
 
 

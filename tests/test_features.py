@@ -201,11 +201,22 @@ def test_the_compiled_form_finds_contact_and_rest_where_the_search_in_the_interp
     forces = np.where(np.arange(n) > 40, rng.normal(2.0, 1.0, (2, n)), 0.0)
     phases = np.sort(rng.integers(int(Phase.APPROACH), int(Phase.RELEASE) + 1, n))
     trace = made_trace(list(zip(gaps.tolist(), *forces.tolist(), strict=True)), phases=phases.tolist())
+    held = trace.until(float(trace.t_s[np.flatnonzero(trace.phase == Phase.RELEASE)[0]]))
     for choice in ("mean", "left", "right", "min", "sum"):
         features = ChittaFeatures(ChittaConfig(force=choice, rest_window_s=0.02))
         form = compiled_extraction(features.extract)
         columns = TickColumns(*(column.tolist() for column in columns_of_ticks(trace)))
         extracted = features.extract(trace)
-        compiled = form.result(form.measure(form.params, columns))
-        assert repr(compiled.values) == repr(extracted.values)
-        assert compiled.reasons == extracted.reasons
+        for same in (form.result(form.measure(form.params, columns)), features.extract(held)):
+            assert repr(same.values) == repr(extracted.values)
+            assert same.reasons == extracted.reasons
+
+
+def test_a_held_grasp_without_rest_or_contact_has_the_same_reasons_without_its_release():
+    phases = [Phase.SQUEEZE] * 50 + [Phase.HOLD] * 50 + [Phase.RELEASE] * 50
+    moving = [(0.06 - 1e-4 * k, 5.0, 5.0) for k in range(150)]
+    felt_late = [(0.06 - 1e-4 * k, 0.0, 5.0 if k < 100 else 0.0) for k in range(120)] + [(0.05, 5.0, 5.0)] * 30
+    for rows, why in ((moving, "not at rest within the 0.099 s"), (felt_late, "only the right pad felt")):
+        whole = missing_of(made_trace(rows, phases=phases))
+        assert whole == missing_of(made_trace(rows[:101], phases=phases[:101]))
+        assert any(why in reason for reason in whole[1].values())

@@ -41,9 +41,9 @@ def law_that_ends_at(t_end, outcome=STEADY):
     return step
 
 
-def walk(step, gap_of, ticks, opens=1, tare_images=3, hold_s=0.25, timeout_s=5.0, images_every=41):
+def walk(step, gap_of, ticks, opens=1, tare_images=3, hold_s=0.25, timeout_s=5.0, images_every=41, releases=1):
     """Run `ticks` ticks of 1 ms; return (t, phase, command value) of each and the last state."""
-    params = TickParams(Schedule(opens, OPENING, RELAXED, tare_images, hold_s, timeout_s), LIMITS, ())
+    params = TickParams(Schedule(opens, OPENING, RELAXED, tare_images, hold_s, timeout_s, releases), LIMITS, ())
     state = first_state(VelocityState(APPROACH, RUNNING, None, 0.0))
     bound, seen = bind(tick, step=step), []
     for k in range(ticks):
@@ -111,6 +111,16 @@ def test_a_steady_grasp_is_held_then_released_then_done():
 def test_any_other_ending_is_released_at_once():
     seen, _ = walk(law_that_ends_at(1.5, outcome=STEADY + 3), lambda t: 0.05, 5000)
     assert first_of(seen, Phase.RELEASE) == pytest.approx(1.5)
+
+
+def test_where_no_release_is_needed_a_held_grasp_ends_with_its_first_tick_and_any_other_is_released():
+    held, state = walk(law_that_ends_at(1.5), lambda t: 0.05, 5000, releases=0)
+    assert state.done == 1
+    assert [phase for _, phase, _ in held[-2:]] == [Phase.HOLD, Phase.RELEASE]
+    whole, _ = walk(law_that_ends_at(1.5), lambda t: 0.05, 5000)
+    assert held == whole[: len(held)]
+    failed, _ = walk(law_that_ends_at(1.5, outcome=STEADY + 3), lambda t: 0.05, 5000, releases=0)
+    assert failed == walk(law_that_ends_at(1.5, outcome=STEADY + 3), lambda t: 0.05, 5000)[0]
 
 
 def test_a_recording_has_no_opening_and_no_release():

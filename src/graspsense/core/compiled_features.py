@@ -53,6 +53,9 @@ class CompiledFeatures:
     features: Callable[[Any, Numbers, Mapping[str, str]], Features]
     """`features(feature_set, measured, units)`: the features of a grasp, given what `measure` returned and
     `Trace.units`."""
+    reads_release: bool = True
+    """False: the features of a grasp that was held are the same without the ticks after the first one of its release.
+    A batch then does not simulate the others."""
 
 
 @frozen
@@ -62,6 +65,8 @@ class CompiledExtraction:
     measure: Callable[[Any, TickColumns], Numbers]
     params: Numbers
     result: Callable[[Numbers], Any]
+    reads_release: bool = True
+    """As in `CompiledFeatures`."""
 
 
 def compiled_extraction(extract: Callable[[Trace], Any] | None) -> CompiledExtraction | None:
@@ -90,7 +95,9 @@ def both(one: CompiledExtraction, other: CompiledExtraction) -> CompiledExtracti
         return one.result(first), other.result(second)
 
     measure = bind(_measure_both, measure_one=one.measure, measure_other=other.measure)
-    return CompiledExtraction(measure, (one.params, other.params), result)
+    return CompiledExtraction(
+        measure, (one.params, other.params), result, one.reads_release or other.reads_release
+    )
 
 
 def _nothing(params: Any, ticks: TickColumns) -> Numbers:
@@ -118,4 +125,4 @@ def _of_method(extract: MethodType) -> CompiledExtraction | None:
     def result(measured: Numbers) -> Features:
         return form.features(feature_set, measured, SI_UNITS)
 
-    return CompiledExtraction(form.measure, form.params(feature_set), result)
+    return CompiledExtraction(form.measure, form.params(feature_set), result, form.reads_release)

@@ -33,7 +33,8 @@ class Schedule(NamedTuple):
     """The phases around a grasp: the commands that open and relax, the images for the tare, the time to hold.
 
     `opens` is 1 for a gripper. For a recording, which begins at the approach, it is 2 if the release is in it, and 0
-    if it is not.
+    if it is not. `releases` is 0 where a grasp that was held ends in the first tick of its release, because nothing of
+    the release is needed.
     """
 
     opens: int
@@ -42,6 +43,7 @@ class Schedule(NamedTuple):
     tare_images: int
     hold_s: float
     opening_timeout_s: float
+    releases: int = 1
 
 
 class TickParams(NamedTuple):
@@ -132,7 +134,7 @@ def tick(params: TickParams, state: TickState, reading: Reading) -> tuple[Comman
             since, still = frame.t_s, RestState(frame.t_s, frame.gap_m)
             if schedule.opens != 0:
                 phase = RELEASE
-            else:
+            if schedule.opens == 0 or (schedule.releases == 0 and law.outcome == STEADY):
                 done = 1
     elif phase == TARING:
         command = schedule.relaxed

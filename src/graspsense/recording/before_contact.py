@@ -63,7 +63,7 @@ def before_contact(trace: Trace, contact_force_n: float = CONTACT_FORCE_N) -> Fe
 
 def before_contact_compiled(contact_force_n: float) -> CompiledExtraction:
     """Return `before_contact` in a form that a simulator compiles; the means agree to rounding."""
-    return CompiledExtraction(measure, (contact_force_n,), _features)
+    return CompiledExtraction(measure, (contact_force_n,), _features, reads_release=False)
 
 
 def measure(params: tuple[float], ticks: TickColumns) -> Before:

@@ -6,9 +6,12 @@ import inspect
 import json
 from typing import Final
 
+import numpy as np
+
 from graspsense.core.compiled_features import columns_of_ticks, compiled_extraction
 from graspsense.core.errors import named
 from graspsense.core.features import Features
+from graspsense.core.signals import Phase
 from graspsense.core.trace import Trace
 from graspsense.testing import component
 from graspsense.testing.checks import CheckFailed, checks_of, demand
@@ -201,6 +204,25 @@ def compiled_features_are_those_of_extract(subject: Subject) -> None:
         )
 
 
+def reads_no_release_unless_it_says_so(subject: Subject) -> None:
+    """With `compiled.reads_release` false, the features of a held grasp are those without its release."""
+    set_ = subject.create()
+    form = compiled_extraction(set_.extract)
+    if form is None or form.reads_release:
+        return
+    for of, trace in {"a whole grasp": squeeze(), **unusual_traces()}.items():
+        released = np.flatnonzero(trace.phase == Phase.RELEASE)
+        if not len(released) or not (trace.phase == Phase.HOLD).any():
+            continue
+        whole, held = set_.extract(trace), set_.extract(trace.until(float(trace.t_s[released[0]])))
+        demand(
+            _same(whole, held),
+            f"on {of} it gives {whole.as_dict()} with the reasons {dict(whole.reasons)}, and without the release "
+            f"{held.as_dict()} with {dict(held.reasons)}: remove `reads_release=False` of `compiled`, or read no tick "
+            "of the release",
+        )
+
+
 CHECKS: Final = (
     *component.CHECKS,
     *checks_of(
@@ -216,5 +238,6 @@ CHECKS: Final = (
         views_and_copies_agree,
         survives_json,
         compiled_features_are_those_of_extract,
+        reads_no_release_unless_it_says_so,
     ),
 )

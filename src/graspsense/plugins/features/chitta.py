@@ -117,7 +117,7 @@ class Measured(NamedTuple):
     reached: float
     p_first: float
     after_contact: float
-    """Time from the contact to the end of the trace."""
+    """Time from the contact to the release, or to the end of a trace without one."""
     p_steady: float = math.nan
     delta_t: float = math.nan
     f_first: float = math.nan
@@ -141,9 +141,10 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
     n, tau_1 = len(phase), params.contact_force_n
     if n == 0:
         return Measured(NO_TICKS, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
-    first, felt_left, felt_right, too_late = n, False, False, False
+    first, felt_left, felt_right, too_late, held = n, False, False, False, False
     for i in range(n):
         closing = APPROACH <= phase[i] <= HOLD
+        held = held or phase[i] == HOLD
         if both_touch(left[i], right[i], tau_1):
             if closing and gap[i] == gap[i]:
                 first = i
@@ -154,7 +155,7 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
             felt_right = felt_right or right[i] >= tau_1
     if first == n:
         reached = NO_PAD
-        if too_late:
+        if too_late and not held:
             reached = BOTH_TOO_LATE
         elif felt_left and felt_right:
             reached = NEVER_BOTH
@@ -167,7 +168,7 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
     while end < n and phase[end] <= HOLD:
         holds = holds or phase[end] == HOLD
         end += 1
-    p_first, after_contact = gap[first], t[n - 1] - t[first]
+    p_first, after_contact = gap[first], t[end - 1] - t[first]
     still, since = RestState(t[first], gap[first]), first
     for i in range(first, end):
         if i > first:
@@ -241,7 +242,7 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
             float(config.rest_window_s),
         )
 
-    compiled = CompiledFeatures(measure, _params, _features)
+    compiled = CompiledFeatures(measure, _params, _features, reads_release=False)
 
     def _measured(self, trace: Trace) -> Measured:
         """Return what `measure` does, in less time in the interpreter."""
@@ -249,8 +250,9 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         if first is None:
             return Measured(self._no_contact(trace), math.nan, math.nan)
         p_first = float(trace.gap_m[first])
-        after_contact = float(trace.t_s[-1] - trace.t_s[first])
-        rest = self._rest(trace, first)
+        end = _released(trace, first)
+        after_contact = float(trace.t_s[end - 1] - trace.t_s[first])
+        rest = self._rest(trace, first, end)
         if rest is None:
             return Measured(CONTACT, p_first, after_contact)
         steady, shown = rest
@@ -268,14 +270,11 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         touch &= _closing(trace) & (trace.gap_m == trace.gap_m)
         return int(touch.argmax()) if touch.any() else None
 
-    def _rest(self, trace: Trace, first: int) -> tuple[int, int] | None:
-        """Return the tick at which rest begins and the one at which its window ends, or None."""
+    def _rest(self, trace: Trace, first: int, end: int) -> tuple[int, int] | None:
+        """Return the tick at which rest begins and the one at which its window ends, both before `end`, or None."""
         config = self.config
-        phase = trace.phase[first:]
-        released = phase > HOLD
-        end = first + (int(released.argmax()) if released.any() else len(phase))
         # A controller can wait for more than rest, such as a force. The rest in its hold phase is then the one meant.
-        held = phase == HOLD
+        held = trace.phase[first:end] == HOLD
         found = first_rest(
             trace.t_s[first:end],
             trace.gap_m[first:end],
@@ -292,7 +291,7 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         tau_1 = self.config.contact_force_n
         left, right = trace.force_left_n >= tau_1, trace.force_right_n >= tau_1
         closing = _closing(trace)
-        if bool((left & right & ~closing).any()):
+        if bool((left & right & ~closing).any()) and not bool((trace.phase == HOLD).any()):
             return BOTH_TOO_LATE
         felt_left, felt_right = bool((left & closing).any()), bool((right & closing).any())
         if felt_left and felt_right:
@@ -312,6 +311,12 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         if reached in (LEFT_ONLY, RIGHT_ONLY):
             return f"only the {'left' if reached == LEFT_ONLY else 'right'} pad felt {tau_1:g} N"
         return f"no pad felt {tau_1:g} N"
+
+
+def _released(trace: Trace, first: int) -> int:
+    """Return the first tick of the release after that of the contact, or the number of ticks."""
+    released = trace.phase[first:] > HOLD
+    return first + (int(released.argmax()) if released.any() else len(released))
 
 
 def _closing(trace: Trace) -> NDArray[np.bool_]:

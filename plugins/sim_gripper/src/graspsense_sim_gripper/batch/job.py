@@ -165,7 +165,10 @@ class Job:
 
     @params.default
     def _params(self) -> TickParams:
-        return tick_params(device_info(self.config), self.controller, self.run)
+        params = tick_params(device_info(self.config), self.controller, self.run)
+        if self.extraction is None or self.extraction.reads_release:
+            return params
+        return params._replace(schedule=params.schedule._replace(releases=0))
 
     @initial.default
     def _initial(self) -> TickState:
