@@ -60,6 +60,6 @@ printf 'vm: %s after %d s\n' "${kernel//$'\n'/, }" "$SECONDS"
 
 "$python" -m compileall -q "$here/../../src" "$here/../../../sim_gripper/src" "$here/../../../c45/src" \
     "$here/../../../../src" >/dev/null || true # what is not compiled is only slower
-"$python" "$here/guest.py" --kernel "$work/kernel" --share "$work/share" --timeout "${GRASPSENSE_VM_TIMEOUT:-600}" -- \
+"$python" "$here/guest.py" --kernel "$work/kernel" --share "$work/share" --timeout "${GRASPSENSE_VM_TIMEOUT:-1200}" -- \
     "$python" "$here/inside.py" || fail "failed, or did not boot (exit code $?)"
 printf 'vm: passed after %d s\n' "$SECONDS"
