@@ -215,7 +215,9 @@ def test_the_compiled_form_finds_contact_and_rest_where_the_search_in_the_interp
 def test_a_held_grasp_without_rest_or_contact_has_the_same_reasons_without_its_release():
     phases = [Phase.SQUEEZE] * 50 + [Phase.HOLD] * 50 + [Phase.RELEASE] * 50
     moving = [(0.06 - 1e-4 * k, 5.0, 5.0) for k in range(150)]
-    felt_late = [(0.06 - 1e-4 * k, 0.0, 5.0 if k < 100 else 0.0) for k in range(120)] + [(0.05, 5.0, 5.0)] * 30
+    felt_late = [(0.06 - 1e-4 * k, 0.0, 5.0 if k < 100 else 0.0) for k in range(120)] + [
+        (0.05, 5.0, 5.0)
+    ] * 30
     for rows, why in ((moving, "not at rest within the 0.099 s"), (felt_late, "only the right pad felt")):
         whole = missing_of(made_trace(rows, phases=phases))
         assert whole == missing_of(made_trace(rows[:101], phases=phases[:101]))

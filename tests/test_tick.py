@@ -41,9 +41,13 @@ def law_that_ends_at(t_end, outcome=STEADY):
     return step
 
 
-def walk(step, gap_of, ticks, opens=1, tare_images=3, hold_s=0.25, timeout_s=5.0, images_every=41, releases=1):
+def walk(
+    step, gap_of, ticks, opens=1, tare_images=3, hold_s=0.25, timeout_s=5.0, images_every=41, releases=1
+):
     """Run `ticks` ticks of 1 ms; return (t, phase, command value) of each and the last state."""
-    params = TickParams(Schedule(opens, OPENING, RELAXED, tare_images, hold_s, timeout_s, releases), LIMITS, ())
+    params = TickParams(
+        Schedule(opens, OPENING, RELAXED, tare_images, hold_s, timeout_s, releases), LIMITS, ()
+    )
     state = first_state(VelocityState(APPROACH, RUNNING, None, 0.0))
     bound, seen = bind(tick, step=step), []
     for k in range(ticks):

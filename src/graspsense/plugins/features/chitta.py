@@ -135,34 +135,40 @@ def pad_force(choice: int, left_n: float, right_n: float) -> float:
     return (left_n + right_n) * (0.5 if choice == 0 else 1.0)
 
 
+def reached_without_contact(params: ChittaParams, ticks: TickColumns) -> float:
+    """Return how far a grasp came in which both pads never touched before the release; it can be compiled."""
+    phase, left, right, tau_1 = ticks.phase, ticks.force_left_n, ticks.force_right_n, params.contact_force_n
+    if len(phase) == 0:
+        return NO_TICKS
+    felt_left, felt_right, too_late, held = False, False, False, False
+    for i in range(len(phase)):
+        if APPROACH <= phase[i] <= HOLD:
+            felt_left = felt_left or left[i] >= tau_1
+            felt_right = felt_right or right[i] >= tau_1
+            held = held or phase[i] == HOLD
+        else:
+            too_late = too_late or both_touch(left[i], right[i], tau_1)
+    if too_late and not held:
+        return BOTH_TOO_LATE
+    if felt_left and felt_right:
+        return NEVER_BOTH
+    if felt_left:
+        return LEFT_ONLY
+    return RIGHT_ONLY if felt_right else NO_PAD
+
+
 def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
     """Return what `ChittaFeatures` measures, from the columns of a grasp; it can be compiled."""
     phase, left, right, gap, t = ticks.phase, ticks.force_left_n, ticks.force_right_n, ticks.gap_m, ticks.t_s
-    n, tau_1 = len(phase), params.contact_force_n
-    if n == 0:
-        return Measured(NO_TICKS, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
-    first, felt_left, felt_right, too_late, held = n, False, False, False, False
-    for i in range(n):
-        closing = APPROACH <= phase[i] <= HOLD
-        held = held or phase[i] == HOLD
-        if both_touch(left[i], right[i], tau_1):
-            if closing and gap[i] == gap[i]:
-                first = i
-                break
-            too_late = too_late or not closing
-        if closing:
-            felt_left = felt_left or left[i] >= tau_1
-            felt_right = felt_right or right[i] >= tau_1
+    n, tau_1, first = len(phase), params.contact_force_n, 0
+    while first < n and not (
+        both_touch(left[first], right[first], tau_1)
+        and APPROACH <= phase[first] <= HOLD
+        and gap[first] == gap[first]
+    ):
+        first += 1
     if first == n:
-        reached = NO_PAD
-        if too_late and not held:
-            reached = BOTH_TOO_LATE
-        elif felt_left and felt_right:
-            reached = NEVER_BOTH
-        elif felt_left:
-            reached = LEFT_ONLY
-        elif felt_right:
-            reached = RIGHT_ONLY
+        reached = reached_without_contact(params, ticks)
         return Measured(reached, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
     end, holds = first, False
     while end < n and phase[end] <= HOLD:
