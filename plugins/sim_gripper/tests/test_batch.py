@@ -151,7 +151,6 @@ def test_features_without_traces_are_those_of_the_traces():
 def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monkeypatch):
     """Of each object, of one that breaks, of one beyond its law, and with more images than the buffers hold first."""
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
-    monkeypatch.setattr(batch_job, "IMAGES", 48)
     names = [*sorted(catalogue()), "odwalla:full_open#3", BREAKS, "none"]
     config, options = (
         SimConfig(sensor=sensor),
@@ -167,6 +166,8 @@ def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monke
 
     drawn = told(1)
     assert told(3) == drawn
+    monkeypatch.setattr(batch_job, "IMAGES", 48)
+    assert told(1) == drawn
     monkeypatch.setattr(compiled_grasps, "can_be_drawn", lambda seed: False)
     assert told(1) == drawn
     assert any(report["broken"] for *_, report in drawn)

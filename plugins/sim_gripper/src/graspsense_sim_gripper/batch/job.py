@@ -69,8 +69,7 @@ TICKS: Final = 8200
 """Ticks that the buffers hold at first; a grasp that needs more continues with longer ones. It is not a power of two,
 because all columns would then share one set of the processor's cache and evict each other."""
 IMAGES: Final = 160
-"""Cell images that the buffers hold at first, which suffice for 19 of 20 grasps of the catalogue. A grasp that needs
-more draws more noise then, which takes longer than the noise that the others do not need."""
+"""Cell images that the buffers hold at first, which suffice for nearly all grasps of the catalogue."""
 
 Extracted = Any
 """What `Job.extract` returns, such as features."""

@@ -5,6 +5,7 @@ The interpreter takes a tenth of the time of a grasp for the named tuples of a s
 
 from __future__ import annotations
 
+import math
 from array import array
 from collections.abc import Callable
 from functools import cache, lru_cache
@@ -29,6 +30,11 @@ from graspsense_sim_gripper.nested import (
     structure,
 )
 from graspsense_sim_gripper.problem import ControllerStep
+from graspsense_sim_gripper.sensing import PadBuffers
+
+FIRST_IMAGES: Final = 80
+IMAGES_AT_ONCE: Final = 16
+"""Numbers of images whose noise is drawn before a grasp, and each time that it has taken those."""
 
 Numbers = NDArray[np.float64]
 Arrays = tuple[NDArray[Any], ...]
@@ -55,7 +61,7 @@ class CellNoise(NamedTuple):
     """The noise of the cells of a grasp."""
 
     is_drawn: int
-    """1: it is drawn to the buffers before the grasp; 0: it is in them, or there is none."""
+    """1: it is drawn to the buffers where the grasp comes to it; 0: it is in them, or there is none."""
     words: Words
     """The state of its generator, which changes."""
     tables: Ziggurat
@@ -74,15 +80,29 @@ def stored_grasp(
 ) -> Ending:
     """Run `grasp` from the numbers and arrays of its parameters and its state, which have the types of `pattern`.
 
-    Write the numbers of the state at its end to `end`, and return those that all callers read.
+    Write the numbers of the state at its end to `end`, and return those that all callers read. The noise of the cells
+    is drawn where the grasp comes to it.
     """
-    if noise.is_drawn == 1:
-        for image in range(len(buffers.pads.noise)):
-            draw_normals(noise.words, noise.tables, buffers.pads.noise[image])
-    params, progress = tuples_of(pattern, start, arrays)
-    state = grasp(params, progress, buffers)
+    params, state = tuples_of(pattern, start, arrays)
+    pads, image_times, columns, phases, palm = buffers
+    left_zero, right_zero, of_images, images = pads
+    most, n = len(images), FIRST_IMAGES if noise.is_drawn == 1 else len(images)
+    drawn, going = 0, True
+    while going:
+        n = min(n, most)
+        if noise.is_drawn == 1:
+            for image in range(drawn, n):
+                draw_normals(noise.words, noise.tables, of_images[image])
+        if drawn == 0:
+            # The loop reads it as the image before the first one.
+            images[n - 1] = math.nan
+        part = PadBuffers(left_zero, right_zero, of_images, images[:n])
+        state = grasp(params, state, Buffers(part, image_times, columns, phases, palm))
+        done = ending(state)
+        going = done.ended == 0 and done.failed == 0 and done.images == n and n < most
+        drawn, n = n, n + IMAGES_AT_ONCE
     store_numbers(end, state)
-    return ending(state)
+    return done
 
 
 class LoopStart(NamedTuple):
