@@ -383,6 +383,27 @@ def test_plain_grasps_in_processes_are_those_of_this_one_to_the_bit():
     assert told[-1] == (n, n)
 
 
+@pytest.mark.slow
+def test_processes_end_held_grasps_with_their_hold_too_where_no_release_is_read():
+    scenes, seeds = mixed(2 * WORTH_A_PROCESS)
+    apart, here = (
+        run_many(
+            SimConfig(),
+            HYBRID,
+            scenes,
+            seeds,
+            compiled=False,
+            workers=workers,
+            extract=FEATURES.extract,
+            traces=False,
+        )
+        for workers in (2, 1)
+    )
+    assert [repr((one.state, one.extracted)) for one in apart] == [
+        repr((one.state, one.extracted)) for one in here
+    ]
+
+
 def test_a_batch_takes_the_run_settings_as_the_runner_does():
     # Held ten times as long as by default, which a batch once did not notice.
     run = RunConfig(seed=4, hold_s=2.5)

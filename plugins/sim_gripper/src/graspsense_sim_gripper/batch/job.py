@@ -153,6 +153,8 @@ class Job:
     """A parameter of the objects that is larger by a share."""
     extraction: CompiledExtraction | None = field(init=False)
     """The form of `extract` that can be compiled; None if there is none, or if traces are kept."""
+    ends_with_hold: bool = field()
+    """Whether a held grasp ends with its hold, because nothing that is extracted reads its release."""
     params: TickParams = field(init=False)
     """The parameters of controller and guard in every grasp."""
     initial: TickState = field(init=False)
@@ -162,10 +164,14 @@ class Job:
     def _extraction(self) -> CompiledExtraction | None:
         return None if self.traces else compiled_extraction(self.extract)
 
+    @ends_with_hold.default
+    def _ends_with_hold(self) -> bool:
+        return self.extraction is not None and not self.extraction.reads_release
+
     @params.default
     def _params(self) -> TickParams:
         params = tick_params(device_info(self.config), self.controller, self.run)
-        if self.extraction is None or self.extraction.reads_release:
+        if not self.ends_with_hold:
             return params
         return params._replace(schedule=params.schedule._replace(releases=0))
 

@@ -68,6 +68,7 @@ class PlainProcess:
                         for key, model in scenes.models().items()
                     ],
                     "traces": job.traces or job.extract is not None,
+                    "ends_with_hold": job.ends_with_hold,
                 }
             )
         except Exception as error:
@@ -190,6 +191,7 @@ def _job(greeting: dict[str, Json]) -> Job:
         run=RunConfig(**greeting["run"]),
         extract=None,
         traces=greeting["traces"],
+        ends_with_hold=greeting["ends_with_hold"],
     )
 
 
