@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from graspsense.core import compiled_code_folder as folder_module
+from graspsense.core import compiling
 from graspsense.core.compiled_code_folder import compiled_code_folder, delete_older_half
 from graspsense.plugin_api import (
     CompileOptions,
@@ -399,6 +400,42 @@ def test_what_an_earlier_process_compiled_is_known_to_be_on_disk(tmp_path):
     compiles.write_text("import sys\nsys.argv[1:] = ['hard']\nimport compose\n")
     run(compiles, tmp_path, **cache)
     assert run(asks, tmp_path, **cache) == ["[False, True, False] False"]
+
+
+@pytest.mark.usefixtures("_numba")
+def test_where_code_is_on_disk_what_a_function_calls_is_not_prepared_for_compiling(tmp_path, monkeypatch):
+    from numba.core import config
+
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(compiling, "_COMPILED", {})
+    assert compile_function(bind(_scaled, helper=_thrice))(2.0) == 12.0
+    monkeypatch.setattr(compiling, "_COMPILED", {})
+
+    def unexpected(*given):
+        raise AssertionError("it looked at the called functions")
+
+    monkeypatch.setattr(compiling, "called_functions", unexpected)
+    monkeypatch.setattr(compiling, "copies_if_inlined", unexpected)
+    loaded = compile_function(bind(_scaled, helper=_thrice))
+    assert loaded(2.0) == 12.0
+    with pytest.raises(AssertionError, match="called functions"):
+        loaded(2)
+
+
+@pytest.mark.usefixtures("_numba")
+def test_a_called_function_that_is_replaced_before_the_first_call_is_not_kept_under_the_old_name(
+    tmp_path, monkeypatch
+):
+    from numba.core import config
+
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(compiling, "_COMPILED", {})
+    law = bind(_scaled, helper=_twice)
+    compiled = compile_function(law)
+    law.__globals__["helper"] = _thrice
+    with pytest.raises(NotCompilable, match=r"_scaled.*was replaced after `compile_function`"):
+        compiled(2.0)
+    assert compile_function(law)(2.0) == 12.0
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ import types
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -115,9 +115,7 @@ def compile_function(
         raise NotCompilable(f'numba is not installed: pip install "{options.install}"') from error
     if len(_COMPILED) >= MAX_COMPILED:
         _COMPILED.clear()
-    plain = plain_function(function)
-    copies = copies_if_inlined(plain, options.replacements)
-    return _Compilation(numba, options, copies).outermost(plain)
+    return _Compilation(numba, options).outermost(plain_function(function))
 
 
 def is_on_disk(function: Callable[..., Any], options: CompileOptions | None = None) -> bool:
@@ -130,9 +128,8 @@ def is_on_disk(function: Callable[..., Any], options: CompileOptions | None = No
     folder = os.environ.get("NUMBA_CACHE_DIR") or compiled_code_folder()
     if folder is None:
         return False
-    copies = copies_if_inlined(plain, (options or CompileOptions()).replacements)
     try:
-        digest = _Compilation(None, options or CompileOptions(), copies).digest(plain)
+        digest = _Compilation(None, options or CompileOptions()).digest(plain)
     except PackageNotFoundError:
         return False
     # numba has a folder for each folder of sources, and names the index of a function after its qualified name, which
@@ -206,12 +203,13 @@ class _Compilation:
     numba: Any
     """The module; None where nothing is compiled and only the key is asked for."""
     options: CompileOptions
-    copies: Counter[types.CodeType]
-    """How often the code of each function would occur if all calls were inlined."""
+    copies: Counter[types.CodeType] = field(factory=Counter)
+    """How often the code of each function would occur if all calls were inlined, once something is compiled."""
     fingerprints: dict[int, str] = field(factory=dict)
     """Those of the functions so far, by identity."""
 
     def outermost(self, function: types.FunctionType) -> Callable[..., Any]:
+        """Return the function compiled. What it calls is looked at once there is no code on disk to load."""
         key = self._key(function, "outermost")
         if key not in _COMPILED:
             named = self._named(function, key)
@@ -222,7 +220,9 @@ class _Compilation:
                     named, pipeline_class=_linked_code().OutermostCompiler, **self._flags(function)
                 )
                 if is_kept:
-                    compiled._cache = _linked_code().KeptCode(named)
+                    compiled._cache = _linked_code().KeptCode(named, partial(self._bind_all, function, named))
+                else:
+                    self._bind_all(function, named)
                 _COMPILED[key] = compiled
         return _COMPILED[key]
 
@@ -231,6 +231,7 @@ class _Compilation:
         key = self._key(function, "inner" if n_places else "cold")
         if key not in _COMPILED:
             named = self._named(function, key)
+            self._bind_called(function, named)
             options = self._flags(function) | self._inline(function.__code__, n_places)
             _COMPILED[key] = self.numba.njit(
                 named, no_cpython_wrapper=True, pipeline_class=_linked_code().LinkedCompiler, **options
@@ -238,17 +239,33 @@ class _Compilation:
         return _COMPILED[key]
 
     def _named(self, function: types.FunctionType, key: str) -> Callable[..., Any]:
-        """Return a copy of the function that calls compiled functions, under a name that no other code has."""
+        """Return a copy of the function under a name that no other code has."""
+        named = bind(function)
+        named.__qualname__ = f"{function.__qualname__}_{key.partition(' ')[0]}"
+        return named
+
+    def _bind_called(self, function: types.FunctionType, named: Callable[..., Any]) -> None:
+        """Have the copy of a function call compiled functions."""
         n_places = times_read(function.__code__)
         inlining = self.options.inlining
         cold = inlining.cold_calls(function) if inlining else ()
-        parts = {
-            name: self._inner(called, 0 if name in cold else n_places[name])
-            for name, called in called_functions(function, self.options.replacements)
-        }
-        named = bind(function, **parts)
-        named.__qualname__ = f"{function.__qualname__}_{key.partition(' ')[0]}"
-        return named
+        for name, called in called_functions(function, self.options.replacements):
+            named.__globals__[name] = self._inner(called, 0 if name in cold else n_places[name])
+
+    def _bind_all(self, function: types.FunctionType, named: Callable[..., Any]) -> None:
+        """Have the copy of the outermost function call compiled functions.
+
+        Raises NotCompilable if one of them was replaced since: its code would be kept under the name of other code.
+        """
+        if self.copies:
+            return
+        if _Compilation(self.numba, self.options).digest(function) != self.digest(function):
+            raise NotCompilable(
+                f"{function.__module__}.{function.__qualname__}, or a function that it calls, was replaced after "
+                "`compile_function`: call that again"
+            )
+        self.copies.update(copies_if_inlined(function, self.options.replacements))
+        self._bind_called(function, named)
 
     def _key(self, function: types.FunctionType, role: str) -> str:
         return f"{self.digest(function)} {role}"

@@ -6,6 +6,7 @@ again there. For a loop that a few hundred functions make up that is half of the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from numba import _dynfunc  # type: ignore[attr-defined]
@@ -103,11 +104,19 @@ class OutermostCompiler(Compiler):
 class KeptCode(FunctionCache):
     """The machine code of a function on disk. Code that cannot be loaded any more is made anew."""
 
+    def __init__(self, function: Callable[..., Any], prepare: Callable[[], None]) -> None:
+        """Take the function, and what makes it ready to be compiled, which takes longer than loading its code."""
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        self._prepare = prepare
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the code for arguments of these types, or None."""
+        found = None
         try:
-            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:
             # Another version of a plugin kept it, for arguments of a type that is gone: pickle raises many exceptions.
             self.flush()  # type: ignore[no-untyped-call]
-            return None
+        if found is None:
+            self._prepare()
+        return found

@@ -221,7 +221,10 @@ class CompiledLoops:
     def of(self, composition: Composition) -> CompiledLoop:
         """Return the loop of a composition. Raises NotCompilable."""
         if composition not in self._loops:
-            self._loops[composition] = CompiledLoop(composition, _compiled(composition, self._step))
+            # Threads wait for each other, so that the functions of a loop are not found twice.
+            with COMPILING:
+                if composition not in self._loops:
+                    self._loops[composition] = CompiledLoop(composition, _compiled(composition, self._step))
         return self._loops[composition]
 
 
@@ -238,5 +241,4 @@ def _compiled(composition: Composition, step: ControllerStep) -> Callable[..., E
         "store_numbers": store_numbers,
         "draw_normals": with_wide_product(draw_normals),
     }
-    with COMPILING:
-        return compile_part(bind(stored_grasp, **parts))
+    return compile_part(bind(stored_grasp, **parts))
