@@ -420,6 +420,9 @@ def test_where_code_is_on_disk_what_a_function_calls_is_not_prepared_for_compili
     assert loaded(2.0) == 12.0
     with pytest.raises(AssertionError, match="called functions"):
         loaded(2)
+    # What was interrupted is done again.
+    monkeypatch.undo()
+    assert loaded(2) == 12.0
 
 
 @pytest.mark.usefixtures("_numba")

@@ -125,6 +125,9 @@ def test_where_no_release_is_needed_a_held_grasp_ends_with_its_first_tick_and_an
     assert held == whole[: len(held)]
     failed, _ = walk(law_that_ends_at(1.5, outcome=STEADY + 3), lambda t: 0.05, 5000, releases=0)
     assert failed == walk(law_that_ends_at(1.5, outcome=STEADY + 3), lambda t: 0.05, 5000)[0]
+    # Without a tick of the phase HOLD nothing was held.
+    at_once, state = walk(law_that_ends_at(1.5), lambda t: 0.05, 5000, hold_s=0.0, releases=0)
+    assert (at_once, state) == walk(law_that_ends_at(1.5), lambda t: 0.05, 5000, hold_s=0.0)
 
 
 def test_a_recording_has_no_opening_and_no_release():

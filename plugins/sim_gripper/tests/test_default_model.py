@@ -60,7 +60,9 @@ def test_nothing_there_is_unknown(pipeline):
     said = pipeline.grasp(object="none").prediction
 
     assert said.label == "unknown"
-    assert [one.words for one in said.because] == ["no feature is defined: no pad felt 0.625 N"]
+    assert [one.words for one in said.because] == [
+        "no feature is defined: no pad felt 0.625 N while the fingers closed"
+    ]
 
 
 def test_its_sets_are_calibrated_for_each_label():

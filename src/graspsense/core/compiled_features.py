@@ -54,8 +54,8 @@ class CompiledFeatures:
     """`features(feature_set, measured, units)`: the features of a grasp, given what `measure` returned and
     `Trace.units`."""
     reads_release: bool = True
-    """False: the features of a grasp that was held are the same without the ticks after the first one of its release.
-    A batch then does not simulate the others."""
+    """False: the features of a grasp with a tick of the phase HOLD are the same without the ticks after the first one
+    of its release. A batch then does not simulate those."""
 
 
 @frozen

@@ -257,15 +257,14 @@ class _Compilation:
 
         Raises NotCompilable if one of them was replaced since: its code would be kept under the name of other code.
         """
-        if self.copies:
-            return
-        if _Compilation(self.numba, self.options).digest(function) != self.digest(function):
+        now = _Compilation(self.numba, self.options)
+        if now.digest(function) != self.digest(function):
             raise NotCompilable(
                 f"{function.__module__}.{function.__qualname__}, or a function that it calls, was replaced after "
                 "`compile_function`: call that again"
             )
-        self.copies.update(copies_if_inlined(function, self.options.replacements))
-        self._bind_called(function, named)
+        now.copies.update(copies_if_inlined(function, self.options.replacements))
+        now._bind_called(function, named)
 
     def _key(self, function: types.FunctionType, role: str) -> str:
         return f"{self.digest(function)} {role}"

@@ -107,7 +107,7 @@ class KeptCode(FunctionCache):
     def __init__(self, function: Callable[..., Any], prepare: Callable[[], None]) -> None:
         """Take the function, and what makes it ready to be compiled, which takes longer than loading its code."""
         super().__init__(function)  # type: ignore[no-untyped-call]
-        self._prepare = prepare
+        self._prepare, self._is_prepared = prepare, False
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the code for arguments of these types, or None."""
@@ -117,6 +117,7 @@ class KeptCode(FunctionCache):
         except Exception:
             # Another version of a plugin kept it, for arguments of a type that is gone: pickle raises many exceptions.
             self.flush()  # type: ignore[no-untyped-call]
-        if found is None:
+        if found is None and not self._is_prepared:
             self._prepare()
+            self._is_prepared = True
         return found

@@ -33,8 +33,8 @@ class Schedule(NamedTuple):
     """The phases around a grasp: the commands that open and relax, the images for the tare, the time to hold.
 
     `opens` is 1 for a gripper. For a recording, which begins at the approach, it is 2 if the release is in it, and 0
-    if it is not. `releases` is 0 where a grasp that was held ends in the first tick of its release, because nothing of
-    the release is needed.
+    if it is not. `releases` is 0 where a grasp that was held (that had a tick of the phase HOLD) ends in the first
+    tick of its release, because nothing of the release is needed.
     """
 
     opens: int
@@ -134,7 +134,7 @@ def tick(params: TickParams, state: TickState, reading: Reading) -> tuple[Comman
             since, still = frame.t_s, RestState(frame.t_s, frame.gap_m)
             if schedule.opens != 0:
                 phase = RELEASE
-            if schedule.opens == 0 or (schedule.releases == 0 and law.outcome == STEADY):
+            if schedule.opens == 0 or (schedule.releases == 0 and state.phase == HOLD):
                 done = 1
     elif phase == TARING:
         command = schedule.relaxed

@@ -313,10 +313,11 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
         if reached == BOTH_TOO_LATE:
             return f"the pads felt {tau_1:g} N at the same time only when the grasp had ended"
         if reached == NEVER_BOTH:
-            return f"the pads never felt {tau_1:g} N at the same time"
+            return f"the pads never felt {tau_1:g} N at the same time while the fingers closed"
         if reached in (LEFT_ONLY, RIGHT_ONLY):
-            return f"only the {'left' if reached == LEFT_ONLY else 'right'} pad felt {tau_1:g} N"
-        return f"no pad felt {tau_1:g} N"
+            which = "left" if reached == LEFT_ONLY else "right"
+            return f"only the {which} pad felt {tau_1:g} N while the fingers closed"
+        return f"no pad felt {tau_1:g} N while the fingers closed"
 
 
 def _released(trace: Trace, first: int) -> int:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from attrs import evolve, frozen
 
-from graspsense.plugin_api import NotCompilable
+from graspsense.plugin_api import NotCompilable, compiled_extraction
 from graspsense_sim_gripper.batch.compiled_grasps import CompiledGrasps
 from graspsense_sim_gripper.batch.job import Job
 from graspsense_sim_gripper.batch.scenes import Scenes, scene_key
@@ -65,6 +65,9 @@ def savings(job: Job, scenes: Sequence[str], seeds: Sequence[int]) -> str:
         return ""
     if len(scenes) < WORTH_COMPILING:
         return ""
+    form = None if job.features is None else compiled_extraction(job.features.extract)
+    # Features are not extracted here, but the grasps end where those of the batch do.
+    job = evolve(job, ends_with_hold=form is not None and not form.reads_release)
     first = {scene_key(scene): k for k, scene in reversed(list(enumerate(scenes)))}
     which = sorted(first.values())[:MOST_OBJECTS]
     scenes, seeds = [scenes[k] for k in which], [seeds[k] for k in which]

@@ -34,7 +34,7 @@ from graspsense_sim_gripper.sensing import PadBuffers
 
 FIRST_IMAGES: Final = 80
 IMAGES_AT_ONCE: Final = 16
-"""Numbers of images whose noise is drawn before a grasp, and each time that it has taken those."""
+"""Number of images whose noise is drawn before a grasp, and for how many more each time that these are used up."""
 
 Numbers = NDArray[np.float64]
 Arrays = tuple[NDArray[Any], ...]
@@ -93,7 +93,7 @@ def stored_grasp(
         if noise.is_drawn == 1:
             for image in range(drawn, n):
                 draw_normals(noise.words, noise.tables, of_images[image])
-        if drawn == 0:
+        if state.sensor.images == 0:
             # The loop reads it as the image before the first one.
             images[n - 1] = math.nan
         part = PadBuffers(left_zero, right_zero, of_images, images[:n])
