@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from math import nan
+from math import inf, nan
 from typing import Literal
 
 import parts
@@ -151,6 +151,10 @@ def test_the_result_has_the_declared_names_and_units():
         Summit(PeakConfig()).result({"summits": 1.0})
     with pytest.raises(ValueError, match="feature 'width' is NaN without a reason"):
         Summit(PeakConfig()).result({"summit": 1.0, "width": nan})
+    for value in (inf, -inf):
+        with pytest.raises(ValueError, match=f"feature 'summit' is {-value}: give NaN with a reason"):
+            Summit(PeakConfig()).result({"summit": -value, "width": value})
+    assert Summit(PeakConfig()).result({"summit": 1.7e308, "width": 1.7e308}).values == (1.7e308, 1.7e308)
     undefined = Summit(PeakConfig()).undefined("the trace is empty")
     assert dict(undefined.reasons) == {"summit": "the trace is empty", "width": "the trace is empty"}
 

@@ -135,11 +135,11 @@ def test_features_without_traces_are_those_of_the_traces():
             run_many(SimConfig(), HYBRID, scenes, seeds, compiled=True, extract=how, traces=False, **options)
             for how in (FEATURES.extract, from_traces)
         )
-        for scene, one, other in zip(scenes, compiled, traced, strict=True):
+        for one, other in zip(compiled, traced, strict=True):
             assert repr(one.extracted.values) == repr(other.extracted.values)
             assert one.extracted.reasons == other.extracted.reasons
             assert (one.outcome, one.reason) == (other.outcome, other.reason)
-            assert one.report(kinds_in(scene)) == other.report(kinds_in(scene))
+            assert one.report() == other.report()
             # These features do not read the release, which is then not simulated where the object was held.
             held = one.outcome == Outcome.STEADY and options is not settings[2]
             assert (one.state != other.state) == held
@@ -161,7 +161,7 @@ def test_grasps_that_compiled_code_draws_are_those_of_their_setups(sensor, monke
     def told(workers):
         done = run_many(config, HYBRID, names, range(len(names)), workers=workers, **options)
         return [
-            (one.outcome, one.reason, repr(one.extracted), repr(one.state), one.report(kinds_in(name)))
+            (one.outcome, one.reason, repr(one.extracted), repr(one.state), one.report())
             for one, name in zip(done, names, strict=True)
         ]
 
@@ -185,7 +185,7 @@ def test_a_report_is_that_of_the_state():
         strict=True,
     ):
         of_state = model_report(grasp.state, kinds_in(name))
-        assert {key: grasp.report(kinds_in(name))[key] for key in of_state} == of_state
+        assert {key: grasp.report()[key] for key in of_state} == of_state
 
 
 BREAKS = """

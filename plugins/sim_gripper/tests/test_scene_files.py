@@ -67,6 +67,15 @@ def test_the_text_of_a_scene_is_grasped_like_its_file(scene):
     assert split_number(f"{text}# a comment\n") == (f"{text}# a comment\n", None)
 
 
+def test_the_report_of_a_grasp_is_of_the_scene_as_it_was_then(scene, tmp_path):
+    config = SimConfig(fidelity="fixed", scheme="explicit")
+    grasp, again = run_many(config, HYBRID, [scene(BOTTLE)] * 2, [5, 5], traces=False)
+    before = grasp.report()
+    (tmp_path / "bottle.toml").unlink()
+    assert again.report() == before
+    assert before["true_peak_force_n"] > 1.0
+
+
 def test_a_text_that_is_not_a_scene_is_refused():
     with pytest.raises(ConfigError, match="scene in memory: widht_m: no such key"):
         find("widht_m = 0.05\n")

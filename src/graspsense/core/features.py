@@ -34,6 +34,9 @@ class Features:
                 f"{len(self.names)} names, {len(self.values)} values and {len(self.units)} units: "
                 "give one of each a feature"
             )
+        # A batch makes thousands of these: a finite sum has only finite values.
+        if math.isfinite(sum(self.values)):
+            return
         for name, value in zip(self.names, self.values, strict=True):
             if math.isinf(value):
                 raise ValueError(

@@ -348,7 +348,7 @@ class SimBackend(BatchBackend[SimConfig]):
                 reason=grasp.reason,
                 extracted=grasp.extracted,
                 trace=grasp.kept,
-                report=grasp.report(kinds_in(scene)),
+                report=grasp.report(),
             )
-            for grasp, scene in zip(done, scenes, strict=True)
+            for grasp in done
         ]

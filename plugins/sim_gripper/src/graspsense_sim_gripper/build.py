@@ -97,13 +97,13 @@ def build(config: SimConfig, scene: str, scaled: ScaledParameter | None = None) 
 
 def problem_of(config: SimConfig, spec: ObjectSpec | None, number: int | None = None) -> Problem:
     """Return the problem of an object, or of its instance with this number; `spec` None: no object."""
-    model_config = evolve(config, **_NOT_OF_THE_MODEL)
+    model_config = _model_config(config, config.spread)
     nominal = None
     if spec is not None:
-        nominal = _setup(evolve(model_config, spread=False), sample(spec, None), 0, NumpyGenerator(0))
+        nominal = _setup(_model_config(config, False), sample(spec, None), 0, NumpyGenerator(0))
         if number is not None:
             # A numbered instance differs from the nominal object, like the instances that a seed draws.
-            model_config = evolve(model_config, spread=True)
+            model_config = _model_config(config, True)
     return Problem(
         config=config,
         spec=spec,
@@ -113,6 +113,12 @@ def problem_of(config: SimConfig, spec: ObjectSpec | None, number: int | None = 
         nominal=nominal,
         examples=partial(_examples, model_config, spec),
     )
+
+
+@lru_cache(maxsize=64)
+def _model_config(config: SimConfig, spread: bool) -> SimConfig:
+    """Return the settings that a reduced model depends on, with this `spread`; the objects of a batch share them."""
+    return evolve(config, **_NOT_OF_THE_MODEL, spread=spread)
 
 
 def _examples(config: SimConfig, spec: ObjectSpec | None) -> tuple[GraspSetup, ...]:

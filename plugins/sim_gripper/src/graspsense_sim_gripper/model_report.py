@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,25 +60,19 @@ class _CheckedTerm(NamedTuple):
 class StoredReport(NamedTuple):
     """Makes `model_report` of the numbers of a state, without the named tuples of the state."""
 
-    peak: int
-    """Place of the peak force among the numbers; below likewise."""
-    unresolved: int
-    unbalanced: int
-    broken: tuple[int, ...]
+    places: NDArray[np.int64]
+    """Where the peak force is among the numbers, the unresolved steps, the unbalanced ones, and what says that a term
+    is broken."""
     checked: tuple[_CheckedTerm, ...]
 
     def of(self, numbers: NDArray[np.float64]) -> dict[str, Any]:
         """Return the report of a grasp that ended in the state of these numbers."""
-        beyond = (
+        peak_n, unresolved, unbalanced, *broken = numbers[self.places].tolist()
+        beyond = [
             (kind, check(state.filled(numbers[begin : begin + state.count])))
             for kind, check, state, begin in self.checked
-        )
-        return _report(
-            float(numbers[self.peak]),
-            float(numbers[self.unresolved] + numbers[self.unbalanced]),
-            any(numbers[place] == 1.0 for place in self.broken),
-            beyond,
-        )
+        ]
+        return _report(peak_n, unresolved + unbalanced, 1.0 in broken, beyond)
 
 
 @lru_cache(maxsize=256)
@@ -99,7 +93,8 @@ def stored_report(plant: TupleType, layout: PaddedLayout, kinds: tuple[str, ...]
         if (place := layout.places[i][0]) >= 0
     )
     broken = tuple(state.broken for state in at.contact.left.states if hasattr(state, "broken"))
-    return StoredReport(at.peak_n, at.step.unresolved, at.contact.unbalanced, broken, checked)
+    places = at.peak_n, at.step.unresolved, at.contact.unbalanced, *broken
+    return StoredReport(np.array(places, np.int64), checked)
 
 
 @lru_cache(maxsize=256)
@@ -109,10 +104,24 @@ def _checked(kinds: tuple[str, ...]) -> list[tuple[int, str, Callable[[TermState
     return [term for term in terms if term[2] is not never_beyond]
 
 
+class GraspModel(NamedTuple):
+    """The model of an object in which a grasp was simulated, as far as its report needs it."""
+
+    kinds: tuple[str, ...]
+    """Those of the object's own terms."""
+    reduction: Reduction | None
+    """The reduced model; None without an object."""
+    unstable_loop: str
+    """The text of `sampled_loop.instability` for the scene."""
+
+
+NO_MODEL: Final = GraspModel((), None, "")
+
+
 def accuracy_report(report: Mapping[str, Any], reduction: Reduction, unstable_loop: str) -> dict[str, Any]:
     """Return which quantities are not verified in a grasp with this report and reduced model, and the unstable loop.
 
-    `unstable_loop` is the text of `sampled_loop.instability`.
+    `unstable_loop` is as in `GraspModel`.
     """
     valid = reduction.valid_for(report["true_peak_force_n"]) and report["resolved"]
     doubtful = not valid or report["beyond"] != "" or unstable_loop != ""

@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from attrs import frozen
@@ -191,6 +192,12 @@ def measure(params: ChittaParams, ticks: TickColumns) -> Measured:
     return Measured(CONTACT, p_first, after_contact, math.nan, math.nan, math.nan, math.nan)
 
 
+@lru_cache(maxsize=16)
+def _units(t: str, gap: str, force: str) -> tuple[str, ...]:
+    """Return the units of `NAMES`, given those of the trace."""
+    return gap, gap, force, t, f"{gap}/{t}", f"{force}/{t}"
+
+
 class ChittaFeatures(FeatureSet[ChittaConfig]):
     """Extracts the six features of Table I."""
 
@@ -216,8 +223,8 @@ class ChittaFeatures(FeatureSet[ChittaConfig]):
     def _features(self, measured: Any, units_of: Mapping[str, str]) -> Features:
         """Return the features that follow from what was measured; `units_of` are those of the trace."""
         reached, p_first, after_contact, p_steady, delta_t, f_first, f_steady = measured
-        t, gap, force = units_of["t"], units_of["gap"], units_of["force_left"]
-        units = (gap, gap, force, t, f"{gap}/{t}", f"{force}/{t}")
+        t = units_of["t"]
+        units = _units(t, units_of["gap"], units_of["force_left"])
         if reached < CONTACT:
             reasons = missing(NAMES, self._why_no_contact(reached))
             return Features(names=NAMES, values=(math.nan,) * 6, units=units, reasons=reasons)

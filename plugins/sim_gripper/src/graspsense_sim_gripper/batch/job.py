@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Any, Final, NamedTuple
 
@@ -48,7 +48,13 @@ from graspsense_sim_gripper.loop import (
     run_plain,
     uses_macro_steps,
 )
-from graspsense_sim_gripper.model_report import accuracy_report, model_report, stored_report
+from graspsense_sim_gripper.model_report import (
+    NO_MODEL,
+    GraspModel,
+    accuracy_report,
+    model_report,
+    stored_report,
+)
 from graspsense_sim_gripper.nested import Stored
 from graspsense_sim_gripper.objects.scaled import ScaledParameter
 from graspsense_sim_gripper.palm import NUMBERS, PalmBuffers, sample_trace
@@ -60,7 +66,6 @@ from graspsense_sim_gripper.problem import (
 )
 from graspsense_sim_gripper.random_numbers import Generator
 from graspsense_sim_gripper.recorded_trace import recorded_trace
-from graspsense_sim_gripper.reduction.model import Reduction
 from graspsense_sim_gripper.sensing import PadBuffers, with_listed_cells
 from graspsense_sim_gripper.term_failure import not_finite_in_tick, raised_in_term
 from graspsense_sim_gripper.terms.term import LAW_ERRORS
@@ -91,10 +96,8 @@ class FinishedGrasp:
     """What `Job.extract` returned for the trace; None if there is no `Job.extract`."""
     kept: Trace | None
     """The trace; None if traces are not kept."""
-    reduction: Reduction | None = None
-    """The reduced model of the object; None without an object."""
-    unstable_loop: str = ""
-    """The text of `sampled_loop.instability` for the scene."""
+    model: GraspModel = NO_MODEL
+    """The model in which it was simulated."""
     layout: PaddedLayout | None = None
     """The layout of the terms in `end`; None: they are those of the object."""
 
@@ -104,18 +107,19 @@ class FinishedGrasp:
         end = self.end()
         return end if self.layout is None else unpadded(end, self.layout)
 
-    def report(self, kinds: Sequence[str]) -> dict[str, Any]:
-        """Return the `model_report` of the grasp, with what its model does not verify; `kinds`: those of its terms."""
+    def report(self) -> dict[str, Any]:
+        """Return the `model_report` of the grasp, with what its model does not verify."""
+        kinds, reduction, unstable_loop = self.model
         if isinstance(self.end, Stored) and self.layout is not None:
-            report = stored_report(self.end.type, self.layout, tuple(kinds)).of(self.end.numbers)
+            report = stored_report(self.end.type, self.layout, kinds).of(self.end.numbers)
         else:
             report = model_report(self.state, kinds)
-        if self.reduction is not None:
-            report |= accuracy_report(report, self.reduction, self.unstable_loop)
+        if reduction is not None:
+            report |= accuracy_report(report, reduction, unstable_loop)
         return report
 
-    def in_model(self, reduction: Reduction | None, unstable_loop: str) -> FinishedGrasp:
-        """Return the same result with the reduced model, and the text of `sampled_loop.instability` for it."""
+    def in_model(self, model: GraspModel) -> FinishedGrasp:
+        """Return the same result, simulated in this model."""
         # `evolve` would take three times as long.
         return FinishedGrasp(
             outcome=self.outcome,
@@ -124,8 +128,7 @@ class FinishedGrasp:
             layout=self.layout,
             extracted=self.extracted,
             kept=self.kept,
-            reduction=reduction,
-            unstable_loop=unstable_loop,
+            model=model,
         )
 
     @property

@@ -12,6 +12,7 @@ from graspsense_sim_gripper.batch.job import Job, started
 from graspsense_sim_gripper.build import build, example_of, instantiate
 from graspsense_sim_gripper.compiled.compose import Composition
 from graspsense_sim_gripper.compiled.padding import padded
+from graspsense_sim_gripper.model_report import GraspModel
 from graspsense_sim_gripper.objects.library import split_number
 from graspsense_sim_gripper.problem import GraspSetup, Problem
 from graspsense_sim_gripper.random_numbers import GeneratorOf, NumpyGenerator
@@ -33,8 +34,10 @@ class Scenes:
     """By `scene_key`."""
     _problems: dict[str, tuple[Problem, Reduction | None]] = field(factory=dict, init=False)
     """By the name of the scene, with the number of the instance."""
-    _unstable: dict[tuple[str, bool], str] = field(factory=dict, init=False)
-    """Why the sampled loop is unstable, by `scene_key`."""
+    _examples: dict[tuple[str, bool], GraspSetup] = field(factory=dict, init=False)
+    """What `example` returns, by `scene_key`."""
+    _models: dict[tuple[str, bool], GraspModel] = field(factory=dict, init=False)
+    """By `scene_key`."""
     _drawn_scenes: dict[tuple[str, bool], DrawnScene | None] = field(factory=dict, init=False)
     """By `scene_key`."""
     _layouts: dict[Composition, StartLayout] = field(factory=dict, init=False)
@@ -76,9 +79,11 @@ class Scenes:
     def example(self, scene: str) -> GraspSetup:
         """Return any grasp of a scene, for what all of them have in common. Raises as `add` does."""
         key = scene_key(scene)
-        if key not in self._scenes:
-            self.add(scene)
-        return example_of(*self._scenes[key])
+        if key not in self._examples:
+            if key not in self._scenes:
+                self.add(scene)
+            self._examples[key] = example_of(*self._scenes[key])
+        return self._examples[key]
 
     def drawn(self, scene: str) -> DrawnInstances | None:
         """Return what the compiled grasps of a scene are drawn from; None if each of them needs a `GraspSetup`."""
@@ -93,15 +98,17 @@ class Scenes:
             self._drawn[scene] = None if of_key is None else DrawnInstances(of_key, number)
         return self._drawn[scene]
 
-    def model_of(self, scene: str, seed: int) -> tuple[Reduction | None, str]:
-        """Return the reduced model of a scene, and the text of `sampled_loop.instability` for it."""
+    def model_of(self, scene: str, seed: int) -> GraspModel:
+        """Return the model of a scene; `seed`: that of one of its grasps."""
         key = scene_key(scene)
-        _, reduction = self._scenes[key]
-        if reduction is None:
-            return None, ""
-        if key not in self._unstable:
-            self._unstable[key] = instability(self.setup(scene, seed), self.job.grasp_controller, reduction)
-        return reduction, self._unstable[key]
+        known = self._models.get(key)
+        if known is None:
+            problem, reduction = self._scenes[key]
+            kinds, unstable = () if problem.spec is None else problem.spec.kinds, ""
+            if reduction is not None:
+                unstable = instability(self.setup(scene, seed), self.job.grasp_controller, reduction)
+            known = self._models[key] = GraspModel(kinds, reduction, unstable)
+        return known
 
 
 @lru_cache(maxsize=4096)

@@ -45,7 +45,7 @@ WORTH_COMPILING: Final = 50
 """Number of grasps of one composition from which compiling saves more time than it takes."""
 WORTH_A_PROCESS: Final = 16
 """Number of grasps per worker in the interpreter from which a process, which starts in half a second, saves time."""
-SLICE: Final = 16
+SLICE: Final = 32
 """Number of grasps that a worker takes at once."""
 MAX_AHEAD: Final = 8
 """Number of slices per worker that may be ahead of the earliest unfinished slice."""
@@ -223,7 +223,7 @@ class _Batch:
     def _with_models(self, done: list[FinishedGrasp], begin: int) -> list[FinishedGrasp]:
         """Return the results of the slice that begins at this index, each with its model."""
         part = zip(done, self._part(begin), strict=True)
-        return [grasp.in_model(*self.models.model_of(*one)) for grasp, one in part]
+        return [grasp.in_model(self.models.model_of(*one)) for grasp, one in part]
 
     def _part(self, begin: int) -> list[tuple[str, int]]:
         """Return the scene and the seed of each grasp of the slice that begins at this index."""

@@ -200,7 +200,7 @@ def _delete_old_files(folder: Path) -> None:
 
 def stored(model: Reduction) -> dict[str, Json]:
     """Return a model as values that JSON can represent."""
-    values = asdict(model, recurse=True)
+    values = asdict(model, recurse=True, filter=lambda attribute, _: attribute.init)
     tuples = {
         "point": model.point._asdict(),
         "steps": model.steps._asdict(),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from attrs import asdict, evolve, frozen
+from attrs import asdict, evolve, field, frozen
 
 from graspsense_sim_gripper.reduction.levels import Level
 from graspsense_sim_gripper.stepping.scheme import Steps
@@ -74,6 +74,21 @@ class Reduction:
     """The tolerances with which it was proposed."""
     verification: Verification | None = None
     """The result of the trial grasps; None if there was none."""
+    not_verified: tuple[str, ...] = field(init=False)
+    """Those of `QUANTITIES`, or the features of the pipeline, whose accuracy no trial grasp has verified.
+
+    There are none for a reference. A term that was dropped as too fast is missing in the trial grasps too. The peak
+    force of a contact that bounces within a tick is right without such a term.
+    """
+
+    @not_verified.default
+    def _not_verified(self) -> tuple[str, ...]:
+        too_fast = any(math.isinf(one.error) for one in self.decisions)
+        if self.verification is not None and not too_fast:
+            return self.verification.features
+        if self.steps.settle > 0.0:
+            return ()
+        return QUANTITIES[1:] if math.isinf(self.contact.error) and not too_fast else QUANTITIES
 
     @property
     def max_force_n(self) -> float:
@@ -86,20 +101,6 @@ class Reduction:
         A reduction without error keeps every term. It is valid for every force if the error of its steps is controlled.
         """
         return peak_n <= self.max_force_n or (self.error == 0.0 and self.level.plain == 0)
-
-    @property
-    def not_verified(self) -> tuple[str, ...]:
-        """Those of `QUANTITIES`, or the features of the pipeline, whose accuracy no trial grasp has verified.
-
-        There are none for a reference. A term that was dropped as too fast is missing in the trial grasps too. The peak
-        force of a contact that bounces within a tick is right without such a term.
-        """
-        too_fast = any(math.isinf(one.error) for one in self.decisions)
-        if self.verification is not None and not too_fast:
-            return self.verification.features
-        if self.steps.settle > 0.0:
-            return ()
-        return QUANTITIES[1:] if math.isinf(self.contact.error) and not too_fast else QUANTITIES
 
     def with_exact_discretisation(self) -> Reduction:
         """Return the same reduction for a scene that is discretised exactly, without time steps."""
