@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from attrs import evolve, fields
+from hypothesis import given
+from hypothesis import strategies as st
 
 from graspsense.core.errors import UnknownName
 from graspsense.core.plugins import IsolatedPlugins
@@ -36,7 +38,7 @@ from graspsense_sim_gripper.batch import compiled_grasps, threads, worker
 from graspsense_sim_gripper.batch import job as batch_job
 from graspsense_sim_gripper.batch.job import Job, grasp_plain
 from graspsense_sim_gripper.batch.scenes import Scenes
-from graspsense_sim_gripper.batch.threads import SLICE, WORTH_A_PROCESS, run_many
+from graspsense_sim_gripper.batch.threads import SLICE, WORTH_A_PROCESS, run_many, slices_of
 from graspsense_sim_gripper.batch.worker import NotHandedOver, PlainProcess
 from graspsense_sim_gripper.compiled import loop_code
 from graspsense_sim_gripper.compiled.padding import composition_of
@@ -80,6 +82,14 @@ def bits(trace):
 
 def mixed(n):
     return [SCENES[k % len(SCENES)] for k in range(n)], range(100, 100 + n)
+
+
+@given(total=st.integers(0, 3000), workers=st.integers(1, 64))
+def test_slices_hold_every_grasp_once_in_order_and_leave_no_worker_idle(total, workers):
+    slices = slices_of(total, workers)
+    assert [k for one in slices for k in one] == list(range(total))
+    assert all(1 <= len(one) <= SLICE for one in slices)
+    assert len(slices) >= min(2 * workers, total / 2)
 
 
 @pytest.mark.slow

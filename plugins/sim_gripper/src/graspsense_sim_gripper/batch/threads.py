@@ -45,8 +45,13 @@ WORTH_COMPILING: Final = 50
 """Number of grasps of one composition from which compiling saves more time than it takes."""
 WORTH_A_PROCESS: Final = 16
 """Number of grasps per worker in the interpreter from which a process, which starts in half a second, saves time."""
+WORTH_A_WORKER: Final = 16
+"""Number of grasps from which another worker is started."""
 SLICE: Final = 32
-"""Number of grasps that a worker takes at once."""
+"""Most grasps that a worker takes at once."""
+SLICES_PER_WORKER: Final = 4
+"""Number of slices of a worker in a batch too small for slices of `SLICE` grasps. With fewer, some workers would wait
+for the last ones."""
 MAX_AHEAD: Final = 8
 """Number of slices per worker that may be ahead of the earliest unfinished slice."""
 PROGRESS_S: Final = 0.2
@@ -153,12 +158,12 @@ class _Batch:
         """
         total = len(self.scenes)
         self._plan()
-        workers = max(1, min(self.workers, math.ceil(total / SLICE)))
+        workers = max(1, min(self.workers, math.ceil(total / WORTH_A_WORKER)))
         running: dict[Future[list[FinishedGrasp]], int] = {}
         ready: dict[int, list[FinishedGrasp]] = {}
         asked = given = finished = 0
         with self.processes, ThreadPoolExecutor(max_workers=workers) as pool:
-            slices = range(0, total, SLICE)
+            slices = slices_of(total, workers)
             try:
                 while True:
                     # Two slices per worker, one in reserve: few results wait, and an interruption takes effect soon.
@@ -174,7 +179,7 @@ class _Batch:
                     for future in wait(running, PROGRESS_S, FIRST_COMPLETED).done:
                         k = running.pop(future)
                         ready[k] = future.result()
-                        finished += len(self._part(slices[k]))
+                        finished += len(slices[k])
                     while given in ready:
                         yield from self._with_models(ready.pop(given), slices[given])
                         given += 1
@@ -220,22 +225,22 @@ class _Batch:
             except NotCompilable as error:
                 self.notes[f"features are extracted from traces, which takes longer: {error}"] = None
 
-    def _with_models(self, done: list[FinishedGrasp], begin: int) -> list[FinishedGrasp]:
-        """Return the results of the slice that begins at this index, each with its model."""
-        part = zip(done, self._part(begin), strict=True)
+    def _with_models(self, done: list[FinishedGrasp], which: range) -> list[FinishedGrasp]:
+        """Return the results of the grasps with these indices, each with its model."""
+        part = zip(done, self._part(which), strict=True)
         return [grasp.in_model(self.models.model_of(*one)) for grasp, one in part]
 
-    def _part(self, begin: int) -> list[tuple[str, int]]:
-        """Return the scene and the seed of each grasp of the slice that begins at this index."""
-        part = slice(begin, begin + SLICE)
+    def _part(self, which: range) -> list[tuple[str, int]]:
+        """Return the scene and the seed of the grasps with these indices."""
+        part = slice(which.start, which.stop)
         return list(zip(self.scenes[part], map(index, self.seeds[part]), strict=True))
 
     def _worth(self, n: int) -> bool:
         return n >= WORTH_COMPILING if self.compiled is None else self.compiled
 
-    def _slice(self, begin: int) -> list[FinishedGrasp]:
-        """Run the grasps of the slice that begins at this index."""
-        part = self._part(begin)
+    def _slice(self, which: range) -> list[FinishedGrasp]:
+        """Run the grasps with these indices."""
+        part = self._part(which)
         done: dict[int, FinishedGrasp] = {}
         plain: list[int] = []
         for i, one in enumerate(part):
@@ -291,3 +296,9 @@ class _Batch:
                 local.without_process = True
                 self.notes[f"plain grasps run on one core: {error}"] = None
         return [grasp_plain(self.job, self.models.setup(*grasp)) for grasp in grasps]
+
+
+def slices_of(total: int, workers: int) -> list[range]:
+    """Return the indices of the grasps that a worker takes at once, slice by slice."""
+    length = max(1, min(SLICE, math.ceil(total / (SLICES_PER_WORKER * workers))))
+    return [range(begin, min(begin + length, total)) for begin in range(0, total, length)]
