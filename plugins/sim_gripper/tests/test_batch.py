@@ -356,6 +356,7 @@ def test_a_seed_is_a_whole_number():
         run_many(SimConfig(), HYBRID, ["block"], [2.7], traces=False)
 
 
+@pytest.mark.slow
 def test_features_that_cannot_be_compiled_are_extracted_from_traces():
     pytest.importorskip("numba", reason="the compiled loop needs the extra `fast`")
 

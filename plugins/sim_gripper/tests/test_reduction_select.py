@@ -417,10 +417,11 @@ def test_trial_grasps_end_at_a_limit_of_work_and_the_full_model_runs(monkeypatch
             ["peak", "trace", "features"],
         ),
         # The finest trial grasps miss it too, and agree.
-        (
+        pytest.param(
             'k1_n_m = 3200.0\n[[terms]]\ntype = "slosh"\nmass_kg = 0.05\nfrequency_hz = 1480.0',
             {"rate_hz": 465.0},
             ["peak", "trace", "features"],
+            marks=pytest.mark.slow,
         ),
     ],
     ids=[
