@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import threading
 from collections.abc import Callable, Iterator
@@ -75,6 +76,23 @@ def powered(monkeypatch: pytest.MonkeyPatch) -> Powered:
             thread.join()
 
     return on
+
+
+def test_no_garbage_is_collected_within_a_measurement(
+    doctor: Doctor, machine: Any, board: Any, powered: Powered, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measure, collects = diagnosis.watch_link, []
+
+    def watch_link(measured: link.Link, seconds: float) -> watching.Watched:
+        collects.append(gc.isenabled())
+        return measure(measured, seconds)
+
+    monkeypatch.setattr(diagnosis, "watch_link", watch_link)
+    machine.plug("/dev/hidraw3", board())
+    with powered(machine):
+        doctor()
+    assert collects == [False], "its pause would be told as a late report of the device"
+    assert gc.isenabled()
 
 
 def test_no_gripper_is_a_problem_only_where_one_was_asked_for(doctor: Doctor, machine: Any) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gc
 import json
 import os
 import socket
@@ -349,10 +350,19 @@ def test_the_command_does_what_it_is_told_until_it_is_told_to_quit(
     read, write = os.pipe()
     os.write(write, b"unplug\nstate\nunplugg\nplug\nhelp\nquit\n")  # at once, as a script writes them
     os.close(write)
+    told, kept = EmulatedBoard.tell, []
+
+    def tell(board: EmulatedBoard, word: str) -> None:
+        kept.append(gc.get_freeze_count())
+        told(board, word)
+
+    monkeypatch.setattr(EmulatedBoard, "tell", tell)
     with os.fdopen(read) as standard_input:
         monkeypatch.setattr(sys, "stdin", standard_input)
         with pytest.raises(SystemExit) as ended:
             main(["emulate", "pr2", "--json", "--wire", "usb", "--object", "block"])
+    assert all(kept), "a full collection would hold back reports for tens of milliseconds"
+    assert gc.get_freeze_count() == 0
     said = capsys.readouterr()
     states = [json.loads(line) for line in said.out.splitlines()]
     assert ended.value.code == 0

@@ -38,13 +38,16 @@ def doctor(timeout_s: float, as_json: bool, **asked: Any) -> None:
     With --gripper and -o, it looks for that gripper (-o gripper.vendor_id=..., -o gripper.serial=...), and reports a
     problem if it is missing. Exit code 0: no problem; 1: a problem.
     """
+    from graspsense.core.garbage_collection import no_collection
     from graspsense.core.plugins import Diagnosis, installed
 
     plugins = installed()
     config = None
     if any(asked.values()):
         config = settings_of(**{**asked, "options": (*GRIPPER_ALONE, *asked["options"])}).gripper.config
-    diagnoses = [Diagnosis("graspsense", _ourselves(plugins)), *plugins.diagnose(config, timeout_s)]
+    # A collection within a measurement would be told as a late report of the device.
+    with no_collection():
+        diagnoses = [Diagnosis("graspsense", _ourselves(plugins)), *plugins.diagnose(config, timeout_s)]
     problems = sum(one.error != "" for one in diagnoses) + sum(
         finding.state == "problem" for one in diagnoses for finding in one.findings
     )

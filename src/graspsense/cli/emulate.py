@@ -57,6 +57,7 @@ def emulate(
     device disappears with the process.
     """
     from graspsense.core.errors import ConfigError, suggestion
+    from graspsense.core.garbage_collection import present_objects_kept
     from graspsense.core.plugins import installed
 
     if gripper is not None:
@@ -73,7 +74,7 @@ def emulate(
     )
     device: EmulatedDevice = emulator.load()(settings.gripper.config, wire, settings.run.seed)
     try:
-        with _ended_by_signals():
+        with present_objects_kept(), _ended_by_signals():
             device.tell("plug")
             _tell_state(device, "plug", as_json)
             talk(f"emulated {name} over {device.wire} at {device.rate_hz:g} Hz: no gripper is touched")

@@ -16,11 +16,9 @@ by name for this.
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import os
 import re
-import threading
 import types
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
@@ -44,6 +42,7 @@ from graspsense.core.call_graph import (
     times_read,
 )
 from graspsense.core.compiled_code_folder import compiled_code_folder
+from graspsense.core.garbage_collection import no_collection
 
 MAX_COMPILED: Final = 4096
 """Compiled functions that a process holds; at that number all are given up and compiled (or loaded) again."""
@@ -89,8 +88,6 @@ class CompileOptions:
     """The requirement that brings numba, named to a user who does not have it."""
 
 
-_COLLECTING: Final = threading.Lock()
-_COLLECTED: Final[list[bool]] = []
 """Whether garbage was collected before, once for each context in which it is not."""
 _COMPILED: dict[str, Callable[..., Any]] = {}
 """What this process has compiled, by fingerprint, options and role, so that an entry is never out of date."""
@@ -156,7 +153,8 @@ def first_call(*, slp_vectorize: bool = False) -> Iterator[None]:
     if slp_vectorize:
         config.SLP_VECTORIZE = 1
     try:
-        with _no_collection():
+        # The compiler makes millions of objects, nearly all of which remain until it has ended.
+        with no_collection():
             yield
     except (NumbaError, UnsupportedBytecodeError) as error:
         places = re.findall(r'(?:File "|Raised from )([^"]+?)(?:", line | \()(\d+)', str(error))
@@ -167,23 +165,6 @@ def first_call(*, slp_vectorize: bool = False) -> Iterator[None]:
         raise NotCompilable(f"the compiler refuses {where}: {reason}") from error
     finally:
         config.SLP_VECTORIZE = before
-
-
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """Collect no garbage: the compiler makes millions of objects, nearly all of which remain until it has ended.
-
-    Contexts in several threads may overlap; the last that ends restores what was before the first.
-    """
-    with _COLLECTING:
-        _COLLECTED.append(_COLLECTED[0] if _COLLECTED else gc.isenabled())
-        gc.disable()
-    try:
-        yield
-    finally:
-        with _COLLECTING:
-            if _COLLECTED.pop() and not _COLLECTED:
-                gc.enable()
 
 
 def entry_point(compiled: Callable[..., Any]) -> Callable[..., Any]:

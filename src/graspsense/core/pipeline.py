@@ -13,10 +13,11 @@ from graspsense.core.anytime import Anytime, anytime_of
 from graspsense.core.config import Flag, Settings, resolve
 from graspsense.core.errors import named
 from graspsense.core.features import UNKNOWN, Features, Prediction, missing
+from graspsense.core.garbage_collection import no_collection
 from graspsense.core.model import Model, model_for
 from graspsense.core.plugins import Plugins, installed
 from graspsense.core.roles import Controller, DeviceInfo, FeatureSet, SensorBackend
-from graspsense.core.runner import Grasp, Sink, no_collection, run_grasp
+from graspsense.core.runner import Grasp, Sink, run_grasp
 from graspsense.core.signals import Outcome
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
 from graspsense.core.wiring import check

@@ -8,10 +8,9 @@ closed.
 
 from __future__ import annotations
 
-import gc
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from math import ceil, inf
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
@@ -21,6 +20,7 @@ from graspsense.core.binding import bind, maker
 from graspsense.core.contact import CONTACT_FORCE_N, RestState, at_rest, update_rest
 from graspsense.core.entries import Channel
 from graspsense.core.errors import DeviceLost, RecordingEnded, TareRefused, named
+from graspsense.core.garbage_collection import no_collection
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.interrupts import Interrupts
 from graspsense.core.roles import Controller, DeviceInfo, SensorBackend
@@ -220,18 +220,6 @@ def _declared(backend: SensorBackend[Any]) -> tuple[Channel, ...]:
         return tuple(backend.channels)
     except NotImplementedError:
         return ()
-
-
-@contextmanager
-def no_collection() -> Iterator[None]:
-    """Suspend garbage collection, which would pause a tick for milliseconds once there are thousands of frames."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collects:
-            gc.enable()
 
 
 class _Overdue(Exception):
