@@ -44,9 +44,12 @@ class GraspController:
 
     @cached_property
     def content(self) -> str:
-        """All numbers of the controller that a grasp depends on. They are text, because NaN is not equal to itself."""
-        law = self.controller
-        return repr((law.params(), law.init(), self.run.hold_s, self.run.grasp_timeout_s))
+        """All numbers of the controller that a grasp depends on. They are text, because NaN is not equal to itself.
+
+        Free motion in closed form differs from its ticks in the last digits.
+        """
+        law, run = self.controller, self.run
+        return repr((law.params(), law.init(), law.free_motion is not None, run.hold_s, run.grasp_timeout_s))
 
 
 @frozen(kw_only=True)
