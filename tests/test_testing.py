@@ -51,6 +51,14 @@ def test_a_check_catches_its_mutant(one):
     assert one.says in result.text
 
 
+def test_a_read_that_other_work_held_up_once_is_within_its_timeout():
+    hand = subject("sensor-backend", parts.ENTRIES["sensor-backend"])
+    (check,) = (one for one in CHECKS["sensor-backend"] if one.id == "read-returns-within-its-timeout")
+    hand.session.longest_read_s = 1.2
+
+    assert outcome_of(check, hand, {}).state == "passed"
+
+
 @pytest.mark.parametrize("role", ROLES)
 def test_every_check_has_a_mutant(role):
     caught = {one.check for one in mutants.MUTANTS if one.role in (role, "feature-set")}

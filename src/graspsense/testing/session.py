@@ -11,6 +11,7 @@ from attrs import define, field
 
 from graspsense.core.contact import CONTACT_FORCE_N
 from graspsense.core.errors import GraspsenseError, RecordingEnded
+from graspsense.core.garbage_collection import no_collection
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.roles import DeviceInfo, SensorBackend
 from graspsense.core.signals import Command, Frame, Pads, Reading
@@ -64,7 +65,7 @@ def recorded(subject: Subject) -> Session:
         if not isinstance(info, DeviceInfo):
             raise CheckFailed(f"open returned {info!r}: return graspsense.plugin_api.DeviceInfo")
         session = Session(info)
-        with suppress(RecordingEnded):
+        with suppress(RecordingEnded), no_collection():
             if info.opening is None:
                 _use(session, backend, "recording", RECORDED_FRAMES, None)
             else:
