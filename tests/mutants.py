@@ -278,6 +278,30 @@ class CompiledWithoutNumbers(Peak):
     compiled = CompiledFeatures(nothing_to_measure, lambda feature_set: (), peak_measured)
 
 
+@mutant("feature-set", "handles-every-trace", "has no attribute 'samples'", requires=(ACCELERATION,))
+class MisreadsSamples(Peak):
+    def extract(self, trace):
+        return peak_measured(self, (float(trace.signals["acceleration"].samples.max()),), trace.units)
+
+
+@mutant("feature-set", "a-whole-grasp-has-features", "has no attribute 'time'")
+class MisreadsEvents(Peak):
+    def extract(self, trace):
+        return peak_measured(self, [event.time for event in trace.events], trace.units)
+
+
+@mutant(
+    "feature-set",
+    "does-not-change-the-trace",
+    "changed signals['acceleration'].values of the trace",
+    requires=(*ENTRIES["feature-set"].requires, ACCELERATION),
+)
+class ChangesSamples(Peak):
+    def extract(self, trace):
+        trace.signals["acceleration"].values[:] = 0.0
+        return super().extract(trace)
+
+
 def last_gap(params, ticks):
     return (ticks.gap_m[-1] if len(ticks.gap_m) else 0.0,)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from math import inf, nan
+from typing import NamedTuple
 
 import numpy as np
 from attrs import frozen
@@ -16,6 +17,7 @@ from graspsense.plugin_api import (
     ClassifierConfig,
     ClassifierEntry,
     Command,
+    CompiledFeatures,
     Controller,
     ControllerEntry,
     DeviceInfo,
@@ -58,6 +60,45 @@ class Peak(FeatureSet[PeakConfig]):
         value = float(known.max()) if len(known) else nan
         reasons = {} if len(known) else {"peak": "the left pad gave no number"}
         return Features(names=("peak",), values=(value,), units=("N",), reasons=reasons)
+
+
+class Shaking(FeatureSet[PeakConfig]):
+    """Reads nothing but a fast channel."""
+
+    def extract(self, trace):
+        values = trace.signals["acceleration"].values
+        known = values[~np.isnan(values)]
+        reasons = {} if len(known) else {"shaking": "no sample has a number"}
+        value = float(np.abs(known).max()) if len(known) else nan
+        return Features(names=("shaking",), values=(value,), units=("m/s2",), reasons=reasons)
+
+
+class Extremes(NamedTuple):
+    peak_n: float
+    ticks: float
+
+
+def measure_extremes(params, ticks):
+    peak = -math.inf
+    n = 0
+    for force in ticks.force_left_n:
+        if not math.isnan(force):
+            peak = max(peak, force)
+            n += 1
+    return Extremes(peak, float(n))
+
+
+def features_of_extremes(feature_set, measured, units):
+    reasons = {} if measured.ticks else {"peak": "the left pad gave no number"}
+    return Features(
+        names=("peak",), values=(measured.peak_n if measured.ticks else nan,), units=("N",), reasons=reasons
+    )
+
+
+class NamedPeak(Peak):
+    """Is compiled with a named tuple."""
+
+    compiled = CompiledFeatures(measure_extremes, lambda feature_set: (), features_of_extremes)
 
 
 @frozen(kw_only=True)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import mutants
 import parts
 import pytest
+from attrs import evolve
 
 from graspsense.core.plugins import Component, IsolatedPlugins
-from graspsense.plugin_api import hookimpl
+from graspsense.plugin_api import Feature, hookimpl
 from graspsense.testing import CHECKS, MINIMUM_CHECKS, examine
 from graspsense.testing.checks import ConformanceReport, Result, outcome_of
 from graspsense.testing.conformance import Examined
@@ -49,6 +50,24 @@ def test_a_check_catches_its_mutant(one):
 
     assert result.state == "failed"
     assert one.says in result.text
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {
+            "target": "parts:Shaking",
+            "requires": (parts.ACCELERATION,),
+            "features": (Feature("shaking", "m/s2", "largest acceleration"),),
+        },
+        {"target": "parts:NamedPeak"},
+    ],
+    ids=["reads a fast channel only", "is compiled with a named tuple"],
+)
+def test_another_sound_feature_set_passes_every_check(changes):
+    entry = evolve(parts.ENTRIES["feature-set"], **changes)
+
+    assert Examined((subject("feature-set", entry),)).report().failures == []
 
 
 def test_a_read_that_other_work_held_up_once_is_within_its_timeout():

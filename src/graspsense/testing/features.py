@@ -7,6 +7,7 @@ import json
 from typing import Final
 
 import numpy as np
+from attrs import evolve
 
 from graspsense.core.compiled_features import columns_of_ticks, compiled_extraction
 from graspsense.core.errors import named
@@ -17,12 +18,14 @@ from graspsense.testing import component
 from graspsense.testing.checks import CheckFailed, checks_of, demand
 from graspsense.testing.samples import (
     COLUMNS_OF_CHANNEL,
-    columns_of,
+    an_event,
+    arrays_of,
     copied,
     shifted,
     squeeze,
     unusual_traces,
     with_channels,
+    with_signals,
 )
 from graspsense.testing.subject import Subject
 
@@ -44,9 +47,24 @@ def _features(subject: Subject, trace: Trace, of: str = "a whole grasp") -> Feat
     return features
 
 
+def _whole(subject: Subject, stiffness_n_m: float = 4000.0) -> Trace:
+    """Return a whole grasp of a gripper that has the further channels in `requires`, with an event."""
+    event = evolve(an_event(), source="controller")
+    return with_signals(evolve(squeeze(stiffness_n_m), events=(event,)), subject.entry.requires)
+
+
+def _unusual(subject: Subject) -> dict[str, Trace]:
+    """Return the unusual traces of a gripper that has the further channels in `requires`, by their description."""
+    return {of: with_signals(trace, subject.entry.requires) for of, trace in unusual_traces().items()}
+
+
+def _all(subject: Subject) -> dict[str, Trace]:
+    return {"a whole grasp": _whole(subject), **_unusual(subject)}
+
+
 def _own(subject: Subject) -> Trace:
     """Return a whole grasp of a gripper that has only the channels in `requires`."""
-    return with_channels(squeeze(), {one.name for one in subject.entry.requires})
+    return with_channels(_whole(subject), {one.name for one in subject.entry.requires})
 
 
 def _same(a: Features, b: Features) -> bool:
@@ -60,7 +78,7 @@ def _same(a: Features, b: Features) -> bool:
 def returns_the_declared_features(subject: Subject) -> None:
     """Names and units are those of the declared features, in their order, for every trace."""
     declared = tuple((feature.name, feature.unit) for feature in subject.entry.features)
-    for of, trace in {"a whole grasp": squeeze(), **unusual_traces()}.items():
+    for of, trace in _all(subject).items():
         features = _features(subject, trace, of)
         given = tuple(zip(features.names, features.units, strict=True))
         demand(
@@ -76,7 +94,7 @@ def _listed(features: tuple[tuple[str, str], ...]) -> str:
 
 def values_are_floats(subject: Subject) -> None:
     """Every value is a Python float, not an int or a scalar of numpy."""
-    for of, trace in {"a whole grasp": squeeze(), **unusual_traces()}.items():
+    for of, trace in _all(subject).items():
         features = _features(subject, trace, of)
         for name, value in zip(features.names, features.values, strict=True):
             demand(
@@ -87,7 +105,7 @@ def values_are_floats(subject: Subject) -> None:
 
 def a_whole_grasp_has_features(subject: Subject) -> None:
     """For a whole grasp of an elastic object, at least one feature is defined."""
-    features = _features(subject, squeeze())
+    features = _features(subject, _whole(subject))
     demand(
         any(value == value for value in features.values),
         f"every feature is missing on a whole grasp: {dict(features.reasons)}. A grasp approaches at 10 mm/s, touches "
@@ -97,13 +115,13 @@ def a_whole_grasp_has_features(subject: Subject) -> None:
 
 def handles_every_trace(subject: Subject) -> None:
     """Any trace (empty, short, without contact, without a channel, with gaps) gives values, or NaN with a reason."""
-    for of, trace in unusual_traces().items():
+    for of, trace in _unusual(subject).items():
         _features(subject, trace, of)
 
 
 def handles_a_trace_that_ends_anywhere(subject: Subject) -> None:
     """`extract(trace.until(t))` works for every t, as early recognition needs it."""
-    whole = squeeze()
+    whole = _whole(subject)
     for k in range(CUTS):
         t = float(whole.t_s[-1]) * k / (CUTS - 1)
         _features(subject, whole.until(t), f"trace.until({t:.3f})")
@@ -111,9 +129,9 @@ def handles_a_trace_that_ends_anywhere(subject: Subject) -> None:
 
 def same_trace_same_features(subject: Subject) -> None:
     """The same trace gives the same features with the same and with another instance."""
-    set_, trace = subject.create(), squeeze()
+    set_, trace = subject.create(), _whole(subject)
     first = set_.extract(trace)
-    set_.extract(squeeze(stiffness_n_m=500.0))
+    set_.extract(_whole(subject, stiffness_n_m=500.0))
     for again in (set_.extract(trace), subject.create().extract(trace)):
         demand(
             _same(first, again),
@@ -124,10 +142,10 @@ def same_trace_same_features(subject: Subject) -> None:
 
 def does_not_change_the_trace(subject: Subject) -> None:
     """`extract` does not change the trace."""
-    trace = copied(squeeze())
-    before = {name: getattr(trace, name).tobytes() for name in columns_of(trace)}
+    trace = copied(_whole(subject))
+    before = {name: array.tobytes() for name, array in arrays_of(trace).items()}
     _features(subject, trace)
-    changed = [name for name, data in before.items() if getattr(trace, name).tobytes() != data]
+    changed = [name for name, array in arrays_of(trace).items() if array.tobytes() != before[name]]
     demand(
         not changed,
         f"extract changed {', '.join(changed)} of the trace: work on a copy "
@@ -137,7 +155,7 @@ def does_not_change_the_trace(subject: Subject) -> None:
 
 def requires_what_it_reads(subject: Subject) -> None:
     """The channels in `requires` suffice: without the others, the features are the same."""
-    full, own = _features(subject, squeeze()), _features(subject, _own(subject), "a grasp")
+    full, own = _features(subject, _whole(subject)), _features(subject, _own(subject), "a grasp")
     required = {one.name for one in subject.entry.requires}
     others = [name for name in COLUMNS_OF_CHANNEL if name not in required]
     demand(
@@ -149,7 +167,7 @@ def requires_what_it_reads(subject: Subject) -> None:
 
 def independent_of_the_start_of_the_clock(subject: Subject) -> None:
     """A shift of all times changes no feature beyond rounding."""
-    early, late = _features(subject, squeeze()), _features(subject, shifted(squeeze(), 64.0))
+    early, late = (_features(subject, one) for one in (_whole(subject), shifted(_whole(subject), 64.0)))
     for name, a, b in zip(early.names, early.values, late.values, strict=True):
         demand(
             (a != a and b != b) or abs(a - b) <= 1e-6 * max(1.0, abs(a)),
@@ -160,7 +178,7 @@ def independent_of_the_start_of_the_clock(subject: Subject) -> None:
 
 def views_and_copies_agree(subject: Subject) -> None:
     """A view of a longer trace gives the same features as a copy of its ticks."""
-    view = squeeze().until(1.7)
+    view = _whole(subject).until(1.7)
     demand(
         _same(_features(subject, view), _features(subject, copied(view))),
         "a trace cut from a longer one gives other features than the same ticks by themselves: read the columns "
@@ -170,7 +188,7 @@ def views_and_copies_agree(subject: Subject) -> None:
 
 def survives_json(subject: Subject) -> None:
     """The features survive being written as JSON and read again."""
-    for of, trace in {"a whole grasp": squeeze(), **unusual_traces()}.items():
+    for of, trace in _all(subject).items():
         features = _features(subject, trace, of)
         again = json.loads(json.dumps(features.as_dict(), allow_nan=False))
         demand(again == features.as_dict(), f"on {of} {features.as_dict()} became {again} through JSON")
@@ -188,11 +206,13 @@ def compiled_features_are_those_of_extract(subject: Subject) -> None:
         inspect.isfunction(form.measure) and form.measure.__closure__ is None,
         f"{form.measure!r} in `compiled` is not a module function: write one, which numba can compile",
     )
-    for of, trace in {"a whole grasp": squeeze(), **unusual_traces()}.items():
+    for of, trace in _all(subject).items():
         extracted = set_.extract(trace)
         try:
             measured = form.measure(form.params, columns_of_ticks(trace))
-            features: Features = form.result(tuple(float(number) for number in measured))
+            numbers = map(float, measured)
+            named_tuple = getattr(measured, "_make", tuple)
+            features: Features = form.result(named_tuple(numbers))
         except Exception as error:
             raise CheckFailed(
                 f"`compiled` raised {named(error)} on {of}: return the same tuple of floats for every grasp"
@@ -210,7 +230,7 @@ def reads_no_release_unless_it_says_so(subject: Subject) -> None:
     form = compiled_extraction(set_.extract)
     if form is None or form.reads_release:
         return
-    for of, trace in {"a whole grasp": squeeze(), **unusual_traces()}.items():
+    for of, trace in _all(subject).items():
         released = np.flatnonzero(trace.phase == Phase.RELEASE)
         if not len(released) or not (trace.phase == Phase.HOLD).any():
             continue

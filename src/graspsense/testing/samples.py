@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from copy import deepcopy
 from math import nan
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from attrs import evolve, fields
 
+from graspsense.core.channels import further
+from graspsense.core.entries import Channel, FastChannel, TactileArray
 from graspsense.core.features import Features, FeatureTable
 from graspsense.core.roles import DeviceInfo
 from graspsense.core.signals import EFFORT, Command, Outcome, Pads, Phase
 from graspsense.core.signals import Frame as _Frame
-from graspsense.core.trace import PAD_COLUMNS, Trace, trace_of
+from graspsense.core.trace import PAD_COLUMNS, ImageTrace, SampleTrace, SignalTrace, Trace, trace_of
 from graspsense.core.trial import GraspEvent, RunInfo, Trial
 from graspsense.testing.model_gripper import CELLS, FIRST_PAD_CELL
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 RATE_HZ: Final = 500.0
 COLUMNS_OF_CHANNEL: Final = {
@@ -85,20 +92,58 @@ def with_channels(trace: Trace, channels: set[str]) -> Trace:
     return evolve(trace, **columns)
 
 
+def with_signals(trace: Trace, channels: Iterable[Channel]) -> Trace:
+    """Return the trace of a gripper that has the further ones of these channels, too.
+
+    All follow the force on the left pad: a number of it in each tick, an image of an array every 20 ticks, and in each
+    tick as many samples of a fast channel as it declares.
+    """
+    signals: dict[str, SignalTrace] = {}
+    for channel in further(channels):
+        force = trace.force_left_n
+        if isinstance(channel, TactileArray):
+            cells = np.linspace(0.0, 1.0, channel.cells)
+            signals[channel.name] = ImageTrace(t_s=trace.t_s[::20], cells=force[::20, np.newaxis] * cells)
+        elif isinstance(channel, FastChannel):
+            n = channel.samples
+            back = np.arange(n - 1, -1, -1) / (n * RATE_HZ)
+            ripple = np.cos(np.arange(n * len(trace)))[:, np.newaxis] * np.ones(len(channel.axes))
+            signals[channel.name] = SampleTrace(
+                t_s=(trace.t_s[:, np.newaxis] - back).ravel(),
+                values=(0.1 + np.repeat(force, n))[:, np.newaxis] * ripple,
+            )
+        else:
+            signals[channel.name] = force.copy()
+    return evolve(trace, signals=signals)
+
+
 def shifted(trace: Trace, seconds: float) -> Trace:
     """Return the trace with all times shifted."""
-    return evolve(trace, t_s=trace.t_s + seconds, pad_t_s=trace.pad_t_s + seconds)
+    signals = {
+        name: signal if isinstance(signal, np.ndarray) else evolve(signal, t_s=signal.t_s + seconds)
+        for name, signal in trace.signals.items()
+    }
+    events = tuple(evolve(event, t_s=event.t_s + seconds) for event in trace.events)
+    return evolve(
+        trace, t_s=trace.t_s + seconds, pad_t_s=trace.pad_t_s + seconds, signals=signals, events=events
+    )
 
 
 def copied(trace: Trace) -> Trace:
     """Return a trace with copied arrays."""
-    columns = {name: getattr(trace, name).copy() for name in columns_of(trace)}
-    return evolve(trace, **columns)
+    return deepcopy(trace)
 
 
-def columns_of(trace: Trace) -> list[str]:
-    """Return the names of the columns of a trace."""
-    return [one.name for one in fields(Trace) if isinstance(getattr(trace, one.name), np.ndarray)]
+def arrays_of(trace: Trace) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a trace, and of its further channels, by their names in it."""
+    found = {one.name: getattr(trace, one.name) for one in fields(Trace)}
+    for name, signal in trace.signals.items():
+        found[f"signals[{name!r}]"] = signal
+        if not isinstance(signal, np.ndarray):
+            found |= {
+                f"signals[{name!r}].{one.name}": getattr(signal, one.name) for one in fields(type(signal))
+            }
+    return {name: value for name, value in found.items() if isinstance(value, np.ndarray)}
 
 
 def unusual_traces() -> dict[str, Trace]:
