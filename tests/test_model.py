@@ -14,7 +14,7 @@ from graspsense.core.config import Flag, resolve
 from graspsense.core.errors import ConfigError, DataDamaged, UnknownName
 from graspsense.core.features import UNKNOWN, Features
 from graspsense.core.labelled import Labelled
-from graspsense.core.model import load_model, model_for, train, write_model
+from graspsense.core.model import load_model, model_for, train, worded, write_model
 from graspsense.core.plugins import IsolatedPlugins, installed
 from graspsense.core.roles import DeviceInfo
 from graspsense.core.signals import EFFORT, Command
@@ -251,3 +251,20 @@ def test_a_classifier_without_a_model_says_how_to_get_one():
     ):
         model_for(settings, installed())
     assert model_for(evolve(settings, classifier=None), installed()) is None
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("probing_force_n", 20.0, ("probing force", "20 N")),
+        ("rise_n_s", 10.0, ("rise", "10 N/s")),
+        ("closing_speed_m_s", 0.01, ("closing speed", "10 mm/s")),
+        ("closed_gap_m", 0.003, ("closed gap", "3 mm")),
+        ("velocity_gain_n_s_m", 15000, ("velocity gain", "15000 N s/m")),
+        ("hold_s", "long", ("hold s", "long")),
+        ("min_objects", 2, ("min objects", "2")),
+        ("is_m", True, ("is m", "True")),
+    ],
+)
+def test_a_setting_in_words_has_the_unit_of_its_key(key, value, words):
+    assert worded(key, value) == words

@@ -262,6 +262,11 @@ def test_a_plugin_for_another_api_is_refused_before_its_hooks_are_looked_at(site
             "graspsense_controllers returned None: return the entries, or yield them",
         ),
         (
+            "@hookimpl\n    def graspsense_controllers(config): return []",
+            "hookimpl definition: graspsense_controllers(config); Argument(s) {'config'} are declared in the hookimpl "
+            "but can not be found in the hookspec",
+        ),
+        (
             "@hookimpl\n    def graspsense_controllers(): return 'hybrid'",
             "graspsense_controllers returned 'hybrid': return a list of ControllerEntry, or yield them",
         ),

@@ -93,6 +93,20 @@ def test_the_components_of_a_package_fit_together(roles, tmp_path, monkeypatch):
             assert not any(one.distribution == "lab-thing" for one in plugins.pipelines())
 
 
+def test_the_first_commands_find_the_scene_from_where_they_are_printed_and_from_the_package(tmp_path):
+    *_, printed = make("lab-term", ["sim-term"], tmp_path / "lab-term")
+
+    assert printed.split() == [
+        "graspsense",
+        "run",
+        "--object",
+        str(tmp_path / "lab-term" / "scene.toml"),
+        "-o",
+        "classifier.type=none",
+    ]
+    assert "graspsense run --object scene.toml -o" in (tmp_path / "lab-term" / "README.md").read_text()
+
+
 def test_nothing_is_written_over(tmp_path):
     make("lab-thing", ["observer"], tmp_path / "lab-thing")
 

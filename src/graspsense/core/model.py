@@ -29,8 +29,9 @@ from graspsense.core.firstparty import MODELS
 from graspsense.core.json_values import json_ready, settings_from_json
 from graspsense.core.novelty import Novelty, novelty_from, novelty_of
 from graspsense.core.reasons import Reason
-from graspsense.core.setting import CHANGES_NO_RESULT, NAMES_INPUT, settings_marked
+from graspsense.core.setting import CHANGES_NO_RESULT, NAMES_INPUT, UNIT_OF_ENDING, settings_marked
 from graspsense.core.temperature import at_temperature
+from graspsense.core.units import display_unit, without_underscores
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,7 +51,6 @@ MODELS_KEPT: Final = 4
 _EQUAL: Final = 1e-6
 
 _COMPARED_TABLES: Final = ("gripper", "controller", "features", "classifier")
-_UNITS: Final = (("_m_s", "mm/s", 1e3), ("_n", "N", 1.0), ("_hz", "Hz", 1.0), ("_s", "s", 1.0))
 
 
 @frozen(kw_only=True, eq=False)
@@ -530,8 +530,8 @@ def _chosen(features: Features, names: Sequence[str]) -> Features:
 
 def worded(key: str, value: Any) -> tuple[str, str]:
     """Return a key and its value in words: `probing_force_n`, 20 as `probing force`, `20 N`."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        for ending, unit, factor in _UNITS:
-            if key.endswith(ending):
-                return key.removesuffix(ending).replace("_", " "), f"{value * factor:g} {unit}"
-    return key.replace("_", " "), str(value)
+    ending = next((one for one in UNIT_OF_ENDING if key.endswith(one)), "")
+    if not ending or isinstance(value, bool) or not isinstance(value, int | float):
+        return without_underscores(key), str(value)
+    unit, factor = display_unit(UNIT_OF_ENDING[ending])
+    return without_underscores(key.removesuffix(ending)), f"{value * factor:g} {unit}"

@@ -74,7 +74,7 @@ KINDS: Final[Mapping[str, ScaffoldKind]] = {
         "a term of the simulator: a part of an object's force",
         "",
         ("graspsense-sim-gripper>=0.1,<0.2",),
-        "graspsense run --object scene.toml -o classifier.type=none",
+        "graspsense run --object $scene -o classifier.type=none",
     ),
     "dataset": ScaffoldKind(
         None,
@@ -124,7 +124,7 @@ def make(name: str, roles: Sequence[str], folder: Path) -> list[str]:
         "  graspsense plugins list",
         f"  graspsense plugins check {name}",
         f"  pytest {folder}",
-        *(f"  {command}" for command in _first(kinds, words)),
+        *(f"  {command}" for command in _first(kinds, {**words, "scene": str(folder / "scene.toml")})),
     ]
 
 
@@ -157,7 +157,7 @@ def words_of(name: str, roles: Sequence[str]) -> dict[str, str]:
         "core": _compatible(__version__),
         "imports": _imports([*sorted(entries), "hookimpl"]),
     }
-    words["first"] = "\n    ".join(_first(kinds, words))
+    words["first"] = "\n    ".join(_first(kinds, {**words, "scene": "scene.toml"}))
     return words
 
 

@@ -62,7 +62,10 @@ class HookCalls:
 
         A plugin that is refused is left registered; `unregister` removes it.
         """
-        self._manager.register(plugin, name=f"{source.distribution}:{source.entry_point}")
+        try:
+            self._manager.register(plugin, name=f"{source.distribution}:{source.entry_point}")
+        except pluggy.PluginValidationError as error:
+            raise PluginRefused("; ".join(str(error).splitlines()[1:])) from error
         return self._hooks_of(plugin)
 
     def registered_as(self, plugin: object) -> str | None:
@@ -70,8 +73,9 @@ class HookCalls:
         return self._manager.get_name(plugin) if self._manager.is_registered(plugin) else None
 
     def unregister(self, plugin: object) -> None:
-        """Remove a plugin."""
-        self._manager.unregister(plugin)
+        """Remove a plugin. Some versions of pluggy have not registered one that they refuse."""
+        if self._manager.is_registered(plugin):
+            self._manager.unregister(plugin)
 
     def call(self, plugin: object, hook: str, **arguments: Any) -> list[Any]:
         """Call the implementation of one plugin; return its result in a list, or an empty list for None."""
