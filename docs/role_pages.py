@@ -11,6 +11,7 @@ import ast
 import inspect
 import re
 import sys
+from collections.abc import Sequence
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
@@ -20,7 +21,17 @@ from typing import Any
 import attrs
 
 from graspsense import plugin_api
-from graspsense.core import contact, entries, hookspecs, roles, signals, strict, tick
+from graspsense.core import (
+    compiled_features,
+    contact,
+    entries,
+    free_motion,
+    hookspecs,
+    roles,
+    signals,
+    strict,
+    tick,
+)
 from graspsense.core.entries import DECLARED, TABLE_OF_ROLE
 from graspsense.core.features import Features, FeatureTable, Prediction
 from graspsense.core.reasons import Contribution, FeatureValue, Reason
@@ -79,6 +90,21 @@ FURTHER = {
         "conformance checks, and what to do with a single force sensor.",
     )
 }
+FASTER: dict[str, tuple[str, str, Any, tuple[Any, ...]]] = {
+    "controller": (
+        "Free motion in closed form",
+        "free_motion",
+        free_motion,
+        (free_motion.FreeMotion, free_motion.FreeLimits),
+    ),
+    "feature-set": (
+        "A compiled form",
+        "compiled",
+        compiled_features,
+        (compiled_features.CompiledFeatures, compiled_features.TickColumns),
+    ),
+}
+"""What a role may declare so that simulated grasps take less time: title, attribute, module and classes."""
 FLOWING: tuple[Any, ...] = (
     *(signals.Reading, signals.Frame, signals.Pads, signals.Image, signals.Samples, signals.Command),
     *(entries.Channel, entries.TactileArray, entries.FastChannel, roles.DeviceInfo),
@@ -189,6 +215,7 @@ def page(role: str) -> str:
             "",
             *_methods(base),
             *(_many() if role == "sensor-backend" else ()),
+            *(_faster(*FASTER[role]) if role in FASTER else ()),
             "## Fields of the entry",
             "",
             *_entry(getattr(entries, f"{base.__name__}Entry")),
@@ -222,6 +249,7 @@ def signals_page() -> str:
     for cls in FLOWING:
         names = getattr(cls, "_fields", None) or tuple(one.name for one in attrs.fields(cls))
         lines += [f"## {cls.__name__}", "", f"    {cls.__name__}({', '.join(names)})", "", _text(cls), ""]
+        lines += _documented_fields(cls)
     lines += ["## Channels", "", "| channel | unit |", "|---|---|"]
     lines += [f"| `{name}` | {unit} |" for name, unit in signals.CHANNELS.items()]
     return "\n".join([*lines, ""])
@@ -320,7 +348,7 @@ def _attributes(base: Any) -> list[str]:
     lines = ["## What the class declares", "", "| attribute | type | meaning |", "|---|---|---|"]
     body = ast.parse(inspect.getsource(base)).body[0].body  # type: ignore[attr-defined]
     for one, text in pairwise(body):
-        if isinstance(one, ast.AnnAssign) and ast.unparse(one.target) in declared:
+        if isinstance(one, ast.AnnAssign) and ast.unparse(one.annotation).startswith("ClassVar"):
             kind = ast.unparse(one.annotation).removeprefix("ClassVar[").removesuffix("]")
             meaning = " ".join(ast.literal_eval(text.value).split())  # type: ignore[attr-defined]
             lines.append(f"| `{ast.unparse(one.target)}` | {_cell(kind)} | {_cell(meaning)} |")
@@ -370,6 +398,29 @@ def _many() -> list[str]:
         f"`Grasped`: {_text(roles.Grasped)}",
         "",
     ]
+
+
+def _faster(title: str, attribute: str, module: Any, classes: Sequence[Any]) -> list[str]:
+    """Return the section on what a class may declare so that simulated grasps take less time."""
+    lines = [f"## {title}", "", f"`{attribute}` is optional. {_text(module)}", ""]
+    for cls in classes:
+        meaning, _, example = (inspect.getdoc(cls) or "").partition("\n\n>>> ")
+        names = getattr(cls, "_fields", None) or tuple(one.name for one in attrs.fields(cls))
+        lines += [f"### {cls.__name__}", "", f"    {cls.__name__}({', '.join(names)})", ""]
+        lines += [re.sub(r"(?<!\n)\n(?!\n)", " ", meaning), "", *_documented_fields(cls)]
+        lines += ["```pycon", ">>> " + example, "```", ""] if example else []
+    return lines
+
+
+def _documented_fields(cls: Any) -> list[str]:
+    """Return a list of the fields of a class that have a docstring; nothing if none has one."""
+    body = ast.parse(inspect.getsource(cls)).body[0].body  # type: ignore[attr-defined]
+    lines = [
+        f"- `{ast.unparse(one.target)}`: {' '.join(ast.literal_eval(text.value).split())}"
+        for one, text in pairwise(body)
+        if isinstance(one, ast.AnnAssign) and isinstance(text, ast.Expr)
+    ]
+    return [*lines, ""] if lines else []
 
 
 def _text(thing: Any) -> str:

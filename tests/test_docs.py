@@ -86,6 +86,12 @@ def test_a_helper_has_an_example_that_holds(name):
     assert doctest.DocTestRunner().run(example).failed == 0
 
 
+def test_the_example_of_a_compiled_form_of_features_holds():
+    (example,) = doctest.DocTestFinder(recurse=False).find(plugin_api.CompiledFeatures, globs={})
+    assert example.examples
+    assert doctest.DocTestRunner().run(example).failed == 0
+
+
 def test_the_table_of_packages_is_the_rule_that_is_enforced():
     packages = {name: used for name, used in MAY_KNOW.items() if not name.startswith("__")}
     table = {row[0].strip("`"): set(re.findall(r"`(\w+)`", row[2])) for row in architecture_rows("Packages")}

@@ -43,6 +43,26 @@ class CompiledFeatures:
     """How a feature set extracts features without a trace; what it returns must agree with `extract`.
 
     The conformance checks compare both on whole and on unusual grasps.
+
+    >>> from graspsense.plugin_api import Channel, CompiledFeatures, Feature, FeatureSet, squeeze
+    >>> def measure(params, ticks):
+    ...     peak = -1.0
+    ...     for force in ticks.force_left_n:
+    ...         if force > peak:
+    ...             peak = force
+    ...     return (peak,)
+    >>> def features_of(feature_set, measured, units):
+    ...     (peak,) = measured
+    ...     return feature_set.result({"peak": peak}) if peak >= 0.0 else feature_set.undefined("no force is known")
+    >>> class Peak(FeatureSet[None]):
+    ...     requires = (Channel("force_left", "N"),)
+    ...     features = (Feature("peak", "N", "largest force of the left pad"),)
+    ...     compiled = CompiledFeatures(measure, lambda feature_set: (), features_of)
+    ...
+    ...     def extract(self, trace):
+    ...         return features_of(self, measure((), trace), trace.units)
+    >>> round(Peak(None).extract(squeeze(stiffness_n_m=1000.0))["peak"], 3)
+    4.0
     """
 
     measure: Callable[[Any, TickColumns], Numbers]
