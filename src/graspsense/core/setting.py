@@ -123,10 +123,13 @@ def setting(
     check: Any = validators.and_(*checks) if checks else None
     if check is not None and default is None:
         check = validators.optional(check)
+    allowed = _allowed_words(minimum, maximum, above, below)
+    if plain_number and not _is_within(default, minimum, maximum, above, below):
+        raise TypeError(f"the default {default} is not allowed: a value is {allowed}")
     declaration = Declaration(
         meaning=meaning,
         unit=unit,
-        allowed=_allowed_words(minimum, maximum, above, below),
+        allowed=allowed,
         plausible=plausible,
         origin=origin,
     )
@@ -260,6 +263,17 @@ def _is_a_choice(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> 
         raise ValueError(
             f"{attribute.name!r} must be one of {', '.join(map(repr, get_args(kind)))}: {value!r}"
         )
+
+
+def _is_within(
+    value: float, minimum: float | None, maximum: float | None, above: float | None, below: float | None
+) -> bool:
+    return (
+        (minimum is None or value >= minimum)
+        and (maximum is None or value <= maximum)
+        and (above is None or value > above)
+        and (below is None or value < below)
+    )
 
 
 def _allowed_words(
