@@ -72,7 +72,10 @@ def test_every_value_within_what_is_declared_is_accepted():
     [
         ({"default": 1.0}, "meaning"),
         ({"default": 1.0, "meaning": " "}, "needs a meaning"),
-        ({"default": -1.0, "above": 0.0, "meaning": "m"}, "the default -1.0 is not allowed: a value is above 0"),
+        (
+            {"default": -1.0, "above": 0.0, "meaning": "m"},
+            "the default -1.0 is not allowed: a value is above 0",
+        ),
         ({"default": 7, "maximum": 5, "meaning": "m"}, "the default 7 is not allowed: a value is at most 5"),
         ({"default": 1.0, "meaning": "M.", "minimum": 0.0, "above": 0.0}, "one lower"),
         ({"default": 1.0, "meaning": "M.", "plausible": (2.0, 1.0)}, "is empty"),

@@ -141,6 +141,8 @@ class SensorBackend(ABC, Generic[ConfigT]):
 
         Simulated and collected trials append the number of an instance, as in `foam:dry#2`: a backend whose objects
         do not differ ignores what follows `#`. Usually `return type(self)(attrs.evolve(self.config, object=name))`.
+        Declare the key that holds the object with `setting(..., effect=NAMES_INPUT)`. A model that was trained with
+        several objects would otherwise warn that another one is grasped.
         """
         raise ConfigError(
             f"{type(self).__name__} grasps real objects, so it cannot be given the object {name!r}. "
