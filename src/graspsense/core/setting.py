@@ -113,7 +113,7 @@ def setting(
     """
     if not meaning.strip():
         raise TypeError("a setting needs a meaning: say in a sentence what its value does")
-    _refuse_two_limits(minimum, above, maximum, below)
+    _check_limits(default, minimum, maximum, above, below)
     _check_origin(origin)
     plain_number = isinstance(default, int | float) and not isinstance(default, bool)
     number = bool(unit) or plausible is not None or plain_number
@@ -123,13 +123,10 @@ def setting(
     check: Any = validators.and_(*checks) if checks else None
     if check is not None and default is None:
         check = validators.optional(check)
-    allowed = _allowed_words(minimum, maximum, above, below)
-    if plain_number and not _is_within(default, minimum, maximum, above, below):
-        raise TypeError(f"the default {default} is not allowed: a value is {allowed}")
     declaration = Declaration(
         meaning=meaning,
         unit=unit,
-        allowed=allowed,
+        allowed=_allowed_words(minimum, maximum, above, below),
         plausible=plausible,
         origin=origin,
     )
@@ -159,14 +156,20 @@ def _check_origin(origin: str) -> None:
             raise TypeError(str(error)) from error
 
 
-def _refuse_two_limits(
-    minimum: float | None, above: float | None, maximum: float | None, below: float | None
+def _check_limits(
+    default: Any, minimum: float | None, maximum: float | None, above: float | None, below: float | None
 ) -> None:
-    """Raise TypeError for two lower or two upper limits."""
+    """Raise TypeError for two lower or two upper limits, and for a default outside of them."""
     if (minimum is not None and above is not None) or (maximum is not None and below is not None):
         raise TypeError(
             "a setting has one lower and one upper limit: `minimum` or `above`, `maximum` or `below`"
         )
+    if not isinstance(default, int | float) or isinstance(default, bool):
+        return
+    outside = (minimum is not None and default < minimum) or (maximum is not None and default > maximum)
+    if outside or (above is not None and default <= above) or (below is not None and default >= below):
+        allowed = _allowed_words(minimum, maximum, above, below)
+        raise TypeError(f"the default {default} is not allowed: a value is {allowed}")
 
 
 def declared(field: attrs.Attribute[Any]) -> Declaration:
@@ -263,17 +266,6 @@ def _is_a_choice(instance: Any, attribute: attrs.Attribute[Any], value: Any) -> 
         raise ValueError(
             f"{attribute.name!r} must be one of {', '.join(map(repr, get_args(kind)))}: {value!r}"
         )
-
-
-def _is_within(
-    value: float, minimum: float | None, maximum: float | None, above: float | None, below: float | None
-) -> bool:
-    return (
-        (minimum is None or value >= minimum)
-        and (maximum is None or value <= maximum)
-        and (above is None or value > above)
-        and (below is None or value < below)
-    )
 
 
 def _allowed_words(
