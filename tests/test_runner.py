@@ -4,6 +4,7 @@ import gc
 import math
 import signal
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -412,6 +413,28 @@ def test_a_report_that_fails_costs_nothing_else():
     grasp = run_grasp(Mute(squeezing, bottle), HYBRID, RUN)
     assert grasp.outcome is Outcome.STEADY
     assert grasp.report == {"report_failed": "ValueError: no report"}
+
+
+@pytest.mark.parametrize(
+    ("opened", "says"),
+    [
+        (lambda: Path("/dev/no-such-port").read_bytes(), "raised it"),
+        (lambda: None, "returned None: return graspsense.plugin_api.DeviceInfo"),
+    ],
+)
+def test_a_gripper_that_cannot_be_opened_is_named(opened, says, monkeypatch):
+    monkeypatch.setattr(Unready, "found", staticmethod(opened))
+    with pytest.raises((OSError, TypeError)) as raised:
+        run_grasp(Unready(squeezing, bottle), HYBRID, RUN)
+    *_, text = str(raised.value), *getattr(raised.value, "__notes__", [])
+    assert text == f"`open` of the gripper {Unready.__module__}.Unready {says}"
+
+
+class Unready(Scripted):
+    found = None
+
+    def open(self, seed):
+        return self.found()
 
 
 def test_no_garbage_is_collected_within_a_grasp_and_again_after_it():

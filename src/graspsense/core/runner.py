@@ -19,7 +19,7 @@ from attrs import evolve, frozen
 from graspsense.core.binding import bind, maker
 from graspsense.core.contact import CONTACT_FORCE_N, RestState, at_rest, update_rest
 from graspsense.core.entries import Channel
-from graspsense.core.errors import DeviceLost, RecordingEnded, TareRefused, named
+from graspsense.core.errors import DeviceLost, GraspsenseError, RecordingEnded, TareRefused, named
 from graspsense.core.garbage_collection import no_collection
 from graspsense.core.guard import GuardParams, GuardState, guard
 from graspsense.core.interrupts import Interrupts
@@ -173,7 +173,7 @@ def run_grasp(
     with Interrupts() as interrupts:
         try:
             backend.expect(controller, run)
-            info = backend.open(run.seed)
+            info = _opened(backend, run.seed)
             if not info.channels:
                 info = evolve(info, channels=_declared(backend))
             if on_open is not None:
@@ -212,6 +212,23 @@ def run_grasp(
         seconds_simulated=grasp.seconds() if info.clock == "virtual" else None,
         seconds_wall=time.perf_counter() - began,
     )
+
+
+def _opened(backend: SensorBackend[Any], seed: int) -> DeviceInfo:
+    """Open the gripper. An exception that is not ours names its class."""
+    name = f"{type(backend).__module__}.{type(backend).__qualname__}"
+    try:
+        info = backend.open(seed)
+    except GraspsenseError:
+        raise
+    except Exception as error:
+        error.add_note(f"`open` of the gripper {name} raised it")
+        raise
+    if not isinstance(info, DeviceInfo):
+        raise TypeError(
+            f"`open` of the gripper {name} returned {info!r}: return graspsense.plugin_api.DeviceInfo"
+        )
+    return info
 
 
 def _declared(backend: SensorBackend[Any]) -> tuple[Channel, ...]:
