@@ -263,7 +263,7 @@ def test_cases_are_every_combination_and_judge_by_the_same_folds(tmp_path):
 
     assert len(planned.cases) == 8
     names = [case.name for case in planned.cases]
-    assert names[0] == "few, probing force 17 N, noise counts 0.0"
+    assert names[0] == "few, probing force 17 N, noise 0 counts"
     assert len(set(names)) == 8
     # The classifiers at all points of the sweep over their keys are in one task, on the same trials.
     assert [one.name for one in planned.cases[0].learners] == [f"knn, neighbours {k}" for k in (1, 3, 5)]
