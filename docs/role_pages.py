@@ -149,19 +149,19 @@ def dataset_page() -> str:
             "",
             "## LabelledRecording",
             "",
-            f"    {_attrs_signature(LabelledRecording)}",
+            f"    {_fields_signature(LabelledRecording)}",
             "",
             _text(LabelledRecording),
             "",
             "## Recording",
             "",
-            f"    {_attrs_signature(Recording)}",
+            f"    {_fields_signature(Recording)}",
             "",
             _text(Recording),
             "",
             "## GraspColumns",
             "",
-            f"    {_attrs_signature(GraspColumns)}",
+            f"    {_fields_signature(GraspColumns)}",
             "",
             _text(GraspColumns),
             "",
@@ -182,10 +182,6 @@ def _dataset_anchor() -> str:
     return _section(f"graspsense_datasets{inspect.signature(spec)}".replace("'", "")).removeprefix(
         "../hooks.md"
     )
-
-
-def _attrs_signature(cls: Any) -> str:
-    return f"{cls.__name__}({', '.join(one.name for one in attrs.fields(cls))})"
 
 
 def page(role: str) -> str:
@@ -247,8 +243,7 @@ def signals_page() -> str:
     """Return the page of the values that pass between the parts."""
     lines = [HEAD + "# Values and units", "", _text(signals), ""]
     for cls in FLOWING:
-        names = getattr(cls, "_fields", None) or tuple(one.name for one in attrs.fields(cls))
-        lines += [f"## {cls.__name__}", "", f"    {cls.__name__}({', '.join(names)})", "", _text(cls), ""]
+        lines += [f"## {cls.__name__}", "", f"    {_fields_signature(cls)}", "", _text(cls), ""]
         lines += _documented_fields(cls)
     lines += ["## Channels", "", "| channel | unit |", "|---|---|"]
     lines += [f"| `{name}` | {unit} |" for name, unit in signals.CHANNELS.items()]
@@ -320,9 +315,7 @@ def _helper(name: str) -> list[str]:
     # The quotes of annotations go, those of default values stay.
     signature = re.sub(r"(: |-> )'([^']+)'", r"\1\2", str(inspect.signature(helper)))
     signature = re.sub(r"ForwardRef\('?(\w+)'?\)", r"\1", signature)
-    meaning, _, example = (inspect.getdoc(helper) or "").partition("\n\n>>> ")
-    lines = [f"### {name}", "", f"    {name}{signature}", "", re.sub(r"(?<!\n)\n(?!\n)", " ", meaning), ""]
-    return [*lines, "```pycon", ">>> " + example, "```", ""] if example else lines
+    return [f"### {name}", "", f"    {name}{signature}", "", *_meaning(helper), *_docstring_example(helper)]
 
 
 def _constant(name: str) -> str:
@@ -404,12 +397,27 @@ def _faster(title: str, attribute: str, module: Any, classes: Sequence[Any]) -> 
     """Return the section on what a class may declare so that simulated grasps take less time."""
     lines = [f"## {title}", "", f"`{attribute}` is optional. {_text(module)}", ""]
     for cls in classes:
-        meaning, _, example = (inspect.getdoc(cls) or "").partition("\n\n>>> ")
-        names = getattr(cls, "_fields", None) or tuple(one.name for one in attrs.fields(cls))
-        lines += [f"### {cls.__name__}", "", f"    {cls.__name__}({', '.join(names)})", ""]
-        lines += [re.sub(r"(?<!\n)\n(?!\n)", " ", meaning), "", *_documented_fields(cls)]
-        lines += ["```pycon", ">>> " + example, "```", ""] if example else []
+        lines += [f"### {cls.__name__}", "", f"    {_fields_signature(cls)}", ""]
+        lines += [*_meaning(cls), *_documented_fields(cls), *_docstring_example(cls)]
     return lines
+
+
+def _fields_signature(cls: Any) -> str:
+    """Return the name of a class of attrs or a named tuple, with its fields."""
+    names = getattr(cls, "_fields", None) or tuple(one.name for one in attrs.fields(cls))
+    return f"{cls.__name__}({', '.join(names)})"
+
+
+def _meaning(thing: Any) -> list[str]:
+    """Return the docstring up to its example."""
+    text = (inspect.getdoc(thing) or "").partition("\n\n>>> ")[0]
+    return [re.sub(r"(?<!\n)\n(?!\n)", " ", text), ""]
+
+
+def _docstring_example(thing: Any) -> list[str]:
+    """Return the example of a docstring, nothing if there is none."""
+    example = (inspect.getdoc(thing) or "").partition("\n\n>>> ")[2]
+    return ["```pycon", ">>> " + example, "```", ""] if example else []
 
 
 def _documented_fields(cls: Any) -> list[str]:

@@ -88,7 +88,6 @@ class CompileOptions:
     """The requirement that brings numba, named to a user who does not have it."""
 
 
-"""Whether garbage was collected before, once for each context in which it is not."""
 _COMPILED: dict[str, Callable[..., Any]] = {}
 """What this process has compiled, by fingerprint, options and role, so that an entry is never out of date."""
 

@@ -13,6 +13,7 @@ from typing import Final
 
 _LOCK: Final = threading.Lock()
 _COLLECTED: Final[list[bool]] = []
+"""Whether garbage was collected before, once for each context in which it is not."""
 
 
 @contextmanager

@@ -44,9 +44,10 @@ class GraspController:
 
     @cached_property
     def content(self) -> str:
-        """All numbers of the controller that a grasp depends on. They are text, because NaN is not equal to itself.
+        """All of the controller, besides its step, that a grasp depends on, as text: NaN is not equal to itself.
 
-        Free motion in closed form differs from its ticks in the last digits.
+        Whether it declares free motion is part of it: an approach of steps over several ticks changes the force that
+        the trial grasps measure by some 1e-8 of it.
         """
         law, run = self.controller, self.run
         return repr((law.params(), law.init(), law.free_motion is not None, run.hold_s, run.grasp_timeout_s))
