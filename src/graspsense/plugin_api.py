@@ -73,6 +73,7 @@ _TABLE: Final[Table] = {
         "tick": ("OPENING", "RELEASE", "TARING"),
     },
     "Sensor backends": {
+        "faults": ("StatusBit",),
         "roles": ("DeviceInfo", "ObjectKind", "SensorBackend"),
         "channels": ("no_signals", "signal_type"),
     },

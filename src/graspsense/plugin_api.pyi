@@ -61,6 +61,7 @@ from graspsense.core.tick import RELEASE as RELEASE
 from graspsense.core.tick import TARING as TARING
 
 # Sensor backends
+from graspsense.core.faults import StatusBit as StatusBit
 from graspsense.core.roles import DeviceInfo as DeviceInfo
 from graspsense.core.roles import ObjectKind as ObjectKind
 from graspsense.core.roles import SensorBackend as SensorBackend

@@ -26,6 +26,7 @@ from typing import (
 from attrs import field, frozen
 
 from graspsense.core.errors import ConfigError
+from graspsense.core.faults import StatusBit
 from graspsense.core.free_motion import FreeMotion
 from graspsense.core.setting import NAMES_INPUT, setting
 from graspsense.core.signals import Command, Frame, Outcome, Pads, Reading
@@ -81,6 +82,11 @@ class DeviceInfo:
     raw numbers of the device mean (counts per newton, transmission); a stored calibration is valid for these only.
     `units` names the units that are not SI, as in a recording: `{"t": "frame"}`. `notes` are sentences that a
     reader of the result must know. `channels` are those of the backend; the runner sets them where they are empty.
+
+    `friction_n` is the greatest friction of the drive while it closes (N, on the scale of the effort), measured or
+    declared: the guard adds it to the force that the controller asks for. `status_bits` says what the bits of
+    `Frame.status` mean. `harmless` is True where the fingers can hurt nothing, as in a pure model: the guard then only
+    keeps commands within the limits of the device.
     """
 
     name: str
@@ -100,6 +106,9 @@ class DeviceInfo:
     units: Mapping[str, str] = field(factory=dict)
     notes: tuple[str, ...] = ()
     channels: tuple[Channel, ...] = ()
+    friction_n: float = field(default=0.0, converter=float)
+    status_bits: tuple[StatusBit, ...] = ()
+    harmless: bool = False
 
 
 class SensorBackend(ABC, Generic[ConfigT]):
