@@ -228,7 +228,7 @@ class Pr2Backend(SensorBackend[Pr2Config]):
 
     def _counted(self, opened: Opened) -> dict[str, float | int | str | bool]:
         link, emulation = opened.link, opened.emulation
-        counted: dict[str, float | int | str | bool] = dict(emulation.body.report()) if emulation else {}
+        counted: dict[str, float | int | str | bool] = emulation.report() if emulation else {}
         counted.update(asdict(link.stream.counts))
         counted.update(
             discarded=link.discarded,

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
-from attrs import frozen
+from attrs import fields_dict, frozen
 from attrs.validators import max_len
 
 from graspsense.plugin_api import NAMES_INPUT, setting
+from graspsense_pr2_gripper.protocol import REPORT_SIZE, Identity
+
+IDENTITY_NUMBERS: Final = Identity._fields[Identity._fields.index("pad_counts_per_n") :]
+"""The fields of the feature report that `faults.identity` may set."""
 
 
 @frozen(kw_only=True)
 class FaultConfig:
-    """Faults of the emulated device, by default none. Probabilities are for each report or command."""
+    """Faults of the emulated device, by default none. Probabilities are for each report or command.
+
+    A time `..._at_s` is a device time, from which on the fault lasts. Left and right are those of the board.
+    """
 
     drop: float = setting(default=0.0, minimum=0.0, maximum=1.0, meaning="Probability that a report is lost.")
     corrupt: float = setting(
@@ -90,7 +97,123 @@ class FaultConfig:
         minimum=0.0,
         meaning="Device time from which on freeze_cell keeps its value.",
     )
-    drift_counts_s: float = setting(default=0.0, unit="counts/s", meaning="Drift of all raw cells.")
+    drift_counts_s: float = setting(
+        default=0.0,
+        unit="counts/s",
+        meaning="Drift of the raw cells of pad_side from pad_at_s on.",
+    )
+    pad_fault: Literal["none", "absent", "stuck", "zero"] = setting(
+        default="none",
+        meaning="absent: the status bit of a fingertip is set. stuck: its cells keep their values. zero: they read 0.",
+    )
+    pad_side: Literal["left", "right", "both"] = setting(
+        default="both",
+        meaning="Fingertip with pad_fault or drift_counts_s.",
+    )
+    pad_at_s: float = setting(
+        default=0.0,
+        unit="s",
+        minimum=0.0,
+        meaning="Device time from which on pad_fault and drift_counts_s act.",
+    )
+    image_fault: Literal["none", "frozen", "stale"] = setting(
+        default="none",
+        meaning="frozen: the counter of cell images stands still. stale: so it does, and the age of the image rises.",
+    )
+    image_at_s: float = setting(
+        default=0.0,
+        unit="s",
+        minimum=0.0,
+        meaning="Device time from which on image_fault acts.",
+    )
+    status_bits: int = setting(
+        default=0,
+        minimum=0,
+        maximum=0xFFFF,
+        meaning="Bits that are set in the status of each report from status_at_s on.",
+    )
+    status_at_s: float = setting(
+        default=0.0,
+        unit="s",
+        minimum=0.0,
+        meaning="Device time from which on status_bits are set.",
+    )
+    motor_gain: float = setting(
+        default=1.0,
+        plausible=(-10.0, 10.0),
+        meaning="Applied effort over commanded effort from motor_at_s on; below 0: the motor turns the wrong way.",
+    )
+    motor_at_s: float = setting(
+        default=0.0,
+        unit="s",
+        minimum=0.0,
+        meaning="Device time from which on motor_gain acts.",
+    )
+    effort_report_gain: float = setting(
+        default=1.0,
+        plausible=(-10.0, 10.0),
+        meaning="Reported effort over applied effort from effort_report_at_s on.",
+    )
+    effort_report_at_s: float = setting(
+        default=0.0,
+        unit="s",
+        minimum=0.0,
+        meaning="Device time from which on effort_report_gain acts.",
+    )
+    clock_rate: float = setting(
+        default=1.0,
+        minimum=0.0,
+        plausible=(0.0, 100.0),
+        meaning="Rate of the clock of the device from clock_at_s on; 0: it stands still.",
+    )
+    clock_at_s: float = setting(
+        default=0.0,
+        unit="s",
+        minimum=0.0,
+        meaning="Device time from which on clock_rate acts.",
+    )
+    identity: dict[str, Any] = setting(
+        factory=dict,
+        meaning="Numbers of the feature report that replace those of the board, under their names in "
+        "specs/pr2_hid.md: {watchdog_ms = 65535}.",
+    )
+    feature_bytes: int = setting(
+        default=REPORT_SIZE,
+        minimum=0,
+        maximum=REPORT_SIZE,
+        meaning="Number of bytes of the feature report that arrive.",
+    )
+
+    def __attrs_post_init__(self) -> None:
+        for key, needed in _WITHOUT_EFFECT_ALONE.items():
+            given = [
+                name
+                for name in (key, *needed)
+                if getattr(self, name) != fields_dict(FaultConfig)[name].default
+            ]
+            if given == [key]:
+                raise ValueError(
+                    f"{key} has no effect alone: set {' or '.join(needed)} too, or leave {key} out"
+                )
+        for name, value in self.identity.items():
+            if name not in IDENTITY_NUMBERS:
+                raise ValueError(
+                    f"identity has no number {name!r}: it has {', '.join(IDENTITY_NUMBERS)} (specs/pr2_hid.md)"
+                )
+            if type(value) is not int:
+                raise ValueError(f"identity.{name} is {value!r}: it must be a whole number")
+
+
+_WITHOUT_EFFECT_ALONE: Final = {
+    "pad_side": ("pad_fault", "drift_counts_s"),
+    "pad_at_s": ("pad_fault", "drift_counts_s"),
+    "image_at_s": ("image_fault",),
+    "status_at_s": ("status_bits",),
+    "motor_at_s": ("motor_gain",),
+    "effort_report_at_s": ("effort_report_gain",),
+    "clock_at_s": ("clock_rate",),
+}
+"""Keys of a fault that say where or when, each with the keys that say what."""
 
 
 @frozen(kw_only=True)

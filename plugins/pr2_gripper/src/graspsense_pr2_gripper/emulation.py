@@ -10,14 +10,14 @@ from graspsense.plugin_api import ConfigError, DeviceInfo, SensorBackend, create
 from graspsense_pr2_gripper.accelerometer import RANGE_G, has_accelerometer
 from graspsense_pr2_gripper.config import Pr2Config
 from graspsense_pr2_gripper.faults import Wire
-from graspsense_pr2_gripper.firmware import Firmware
+from graspsense_pr2_gripper.firmware import STRONG_N, Firmware
 from graspsense_pr2_gripper.linkage import (
     EDGE_COUNTS_PER_N,
     ENCODER_TICKS,
     PAD_COUNTS_PER_N,
     SIDE_COUNTS_PER_N,
 )
-from graspsense_pr2_gripper.protocol import Identity
+from graspsense_pr2_gripper.protocol import Identity, ProtocolError, encode_identity
 
 EMULATED_SERIAL: Final = "EMULATED"
 EFFORT_LIMIT_UN: Final = 100_000_000
@@ -33,6 +33,20 @@ class Emulation(NamedTuple):
     wire: Wire
     body: SensorBackend[Any]
     body_info: DeviceInfo
+
+    def report(self) -> dict[str, float | int | str | bool]:
+        """Return what the body knows, and the effort and the force that it got, whatever the board reported.
+
+        `largest_effort_n` is the largest closing effort, `seconds_above_30_n` the time with more than `STRONG_N`, and
+        `largest_force_n` the largest true force on a pad, where the body knows it.
+        """
+        report = dict(self.body.report())
+        firmware = self.wire.firmware
+        report["largest_effort_n"] = firmware.largest_effort_n
+        report[f"seconds_above_{STRONG_N:.0f}_n"] = round(firmware.strong_s, 6)
+        if "true_peak_force_n" in report:
+            report["largest_force_n"] = report["true_peak_force_n"]
+        return report
 
 
 def emulated_body(config: Pr2Config) -> SensorBackend[Any]:
@@ -73,5 +87,12 @@ def emulated_board(config: Pr2Config, seed: int) -> Emulation:
         watchdog_ms=WATCHDOG_MS,
         encoder_ticks_rev=ENCODER_TICKS,
         accelerometer_g=RANGE_G if has_accelerometer(body.channels) else 0,
-    )
+    )._replace(**config.faults.identity)
+    try:
+        encode_identity(identity)
+    except ProtocolError as error:
+        raise ConfigError(
+            f"the emulated board cannot have this identity: {error}. It follows from gripper.serial, "
+            "gripper.body_config and gripper.faults.identity"
+        ) from error
     return Emulation(Wire(Firmware(body, identity), config.faults, seed), body, info)

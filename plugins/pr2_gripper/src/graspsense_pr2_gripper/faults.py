@@ -1,4 +1,4 @@
-"""Faults of an emulated board: reports and commands that are lost, damaged or late, and frozen cells."""
+"""Faults of the connection of an emulated board: reports and commands that are lost, damaged or late."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import random
 from collections import deque
 from heapq import heappop, heappush
 
+from graspsense_pr2_gripper.board_faults import BoardFaults
 from graspsense_pr2_gripper.config import FaultConfig
 from graspsense_pr2_gripper.firmware import Firmware
-from graspsense_pr2_gripper.protocol import SLICE_CELLS, decode_input, encode_input
 
 
 class Wire:
@@ -19,18 +19,20 @@ class Wire:
         self.unplugged = False
         self._faults = faults
         self._behaves = faults == FaultConfig()
+        self._board = BoardFaults(faults)
         self._chance = random.Random(seed)
         self._late: list[tuple[int, int, bytes]] = []
         self._held: deque[bytes] = deque()
         self._steps = 0
-        self._frozen: int | None = None
 
     def step(self) -> list[bytes]:
         """Advance by one period; return the reports that reach the host in it."""
         faults, chance = self._faults, self._chance
-        report = self.firmware.step()
         if self._behaves:
+            report = self.firmware.step()
             return [] if self.unplugged else [report]
+        self.firmware.motor_gain = self._board.motor_gain(self.firmware.time_us)
+        report = self.firmware.step()
         now_us = self.firmware.time_us
         self._steps += 1
         if now_us >= faults.unplug_at_s * 1e6:
@@ -40,8 +42,7 @@ class Wire:
         arriving: list[bytes] = []
         while self._late and self._late[0][0] <= now_us:
             arriving.append(heappop(self._late)[2])
-        if faults.freeze_cell >= 0 or faults.drift_counts_s:
-            report = self._cells_gone_wrong(report, now_us)
+        report = self._board.altered(report, now_us)
         if chance.random() < faults.corrupt:
             report = _flipped(report, chance)
         if chance.random() < faults.drop:
@@ -68,21 +69,13 @@ class Wire:
             data = _flipped(data, chance)
         self.firmware.output(data)
 
+    def feature(self) -> bytes:
+        """Return the feature report, or as much of it as arrives."""
+        return self.firmware.feature()[: self._faults.feature_bytes]
+
     def _stalled(self, now_us: int) -> bool:
         faults = self._faults
         return faults.stall_at_s * 1e6 <= now_us < (faults.stall_at_s + faults.stall_s) * 1e6
-
-    def _cells_gone_wrong(self, data: bytes, now_us: int) -> bytes:
-        faults = self._faults
-        report = decode_input(data)
-        drift = round(faults.drift_counts_s * now_us * 1e-6)
-        cells = [min(max(cell + drift, 0), 0xFFFF) for cell in report.cells]
-        slice_, cell = divmod(faults.freeze_cell, SLICE_CELLS)
-        if report.slice == slice_ and report.image and now_us >= faults.freeze_at_s * 1e6:
-            if self._frozen is None:
-                self._frozen = cells[cell]
-            cells[cell] = self._frozen
-        return encode_input(report._replace(cells=tuple(cells)))  # type: ignore[arg-type]
 
 
 def _flipped(data: bytes, chance: random.Random) -> bytes:

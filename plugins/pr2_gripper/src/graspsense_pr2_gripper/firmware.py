@@ -49,6 +49,8 @@ from graspsense_pr2_gripper.protocol import (
 )
 
 _LARGEST: Final = 2**31 - 1
+STRONG_N: Final = 30.0
+"""Effort of the strongest of the three squeezes of the paper's recordings (20, 25 and 30 N)."""
 
 
 class Firmware:
@@ -61,6 +63,12 @@ class Firmware:
         self.identity = identity
         self.effort_un = 0
         """The effort of the motor before the limit of speed; 0 when relaxed."""
+        self.motor_gain = 1.0
+        """Applied effort over the effort before the limit of speed; other than 1 where the motor is faulty."""
+        self.largest_effort_n = 0.0
+        """Largest effort with which the body was squeezed."""
+        self.strong_s = 0.0
+        """Time for which the body was squeezed with more than `STRONG_N`."""
         self._body = body
         self._link = LINKAGES[identity.transmission]
         self._period_us = round(1e6 / identity.report_rate_hz)
@@ -141,6 +149,10 @@ class Firmware:
             raise RuntimeError("the body of an emulated gripper gave no frame: it needs a virtual clock")
         frame, pads, signals = reading
         self._step += 1
+        if frame.effort_n > STRONG_N:
+            self.strong_s += self._period_us / 1e6
+        if frame.effort_n > self.largest_effort_n:
+            self.largest_effort_n = frame.effort_n
         self._measure(frame)
         self._latch(pads, now_us)
         words = self._sampled(signals.acceleration) if self._has_accelerometer else ()
@@ -171,7 +183,7 @@ class Firmware:
             effort < 0 and -closing_um_s > self._speed_limit_um_s
         ):
             return 0.0
-        return effort / 1e6
+        return effort / 1e6 * self.motor_gain
 
     def _measure(self, frame: Frame) -> None:
         if not (math.isfinite(frame.gap_m) and math.isfinite(frame.velocity_m_s)):

@@ -56,7 +56,7 @@ def open_board(config: Pr2Config, seed: int, wait_s: float) -> Opened:
 def _emulated(config: Pr2Config, seed: int) -> Opened:
     emulation = emulated_board(config, seed)
     wire = emulation.wire
-    identity = decode_identity(wire.firmware.feature())
+    identity = decode_identity(wire.feature())
     link: Link
     if config.pace == "lock-step":
         link = LockStepLink(LockStepTransport(wire), 1.0 / identity.report_rate_hz)

@@ -119,7 +119,7 @@ class EmulatedBoard(EmulatedDevice):
         if report_id != FEATURE_ID or self.stalled:
             return None
         with self._lock:
-            return self._board.firmware.feature()
+            return self._board.feature()
 
     def _told(self) -> Mapping[str, Callable[[], object]]:
         return {

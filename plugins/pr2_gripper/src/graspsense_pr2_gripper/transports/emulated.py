@@ -45,7 +45,7 @@ class LockStepTransport(Transport):
 
     def feature(self, report_id: int) -> bytes:
         """Return the feature report of the board."""
-        return self._wire.firmware.feature()
+        return self._wire.feature()
 
     def close(self) -> None:
         """Do nothing: there are no resources."""
@@ -84,7 +84,7 @@ class PacedTransport(Transport):
 
     def feature(self, report_id: int) -> bytes:
         """Return the feature report of the board."""
-        return self._wire.firmware.feature()
+        return self._wire.feature()
 
     def close(self) -> None:
         """Stop the thread of the board."""

@@ -1,0 +1,199 @@
+"""The faults of the emulated board: each does from its time on what its setting says, and nothing before."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from graspsense import load_pipeline
+from graspsense.plugin_api import EFFORT, Command, ConfigError
+from graspsense_pr2_gripper.backend import Pr2Backend
+from graspsense_pr2_gripper.config import IDENTITY_NUMBERS, FaultConfig, Pr2Config
+from graspsense_pr2_gripper.emulation import emulated_board
+from graspsense_pr2_gripper.faults import Wire
+from graspsense_pr2_gripper.protocol import (
+    EFFORT_KIND,
+    LEFT_ABSENT,
+    OWN_LIMIT,
+    RIGHT_ABSENT,
+    SLICE_CELLS,
+    InputReport,
+    OutputReport,
+    decode_identity,
+    decode_input,
+    encode_output,
+)
+
+SIDES = {"left": range(22), "right": range(22, 44), "both": range(44)}
+AT_S = 0.2
+"""Device time from which on the faults act: after four cell images."""
+
+
+def reports(wire: Wire, count: int = 600) -> list[InputReport]:
+    return [decode_input(data) for _ in range(count) for data in wire.step()]
+
+
+def commanded(wire: Wire, newtons: float, count: int = 20) -> list[InputReport]:
+    """Return the reports of a board that is commanded this effort before each."""
+    sent = []
+    for counter in range(count):
+        wire.output(
+            encode_output(OutputReport(counter, EFFORT_KIND, round(newtons * 1e6), OWN_LIMIT, OWN_LIMIT))
+        )
+        sent += reports(wire, 1)
+    return sent
+
+
+def by_cell(sent: list[InputReport]) -> dict[int, list[tuple[int, int]]]:
+    """Return device time and value of each cell, as they come."""
+    found: dict[int, list[tuple[int, int]]] = {cell: [] for cell in range(44)}
+    for report in sent:
+        if report.image:
+            for i, value in enumerate(report.cells):
+                found[report.slice * SLICE_CELLS + i].append((report.time_us, value))
+    return found
+
+
+def healthy_and_faulty(board: Any, **faults: Any) -> tuple[list[InputReport], list[InputReport]]:
+    """Return what a healthy board sends, and what one with these faults sends."""
+    return reports(board()), reports(board(faults=FaultConfig(**faults)))
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("kind", ["stuck", "zero"])
+def test_cells_of_a_fingertip_go_wrong_from_a_time_on(board: Any, kind: Any, side: Any) -> None:
+    healthy, faulty = healthy_and_faulty(board, pad_fault=kind, pad_side=side, pad_at_s=AT_S)
+    good, bad = by_cell(healthy), by_cell(faulty)
+    assert {one.status for one in faulty} == {0}
+    for cell in range(44):
+        before = [value for time_us, value in bad[cell] if time_us < AT_S * 1e6]
+        after = [value for time_us, value in bad[cell] if time_us >= AT_S * 1e6]
+        assert before == [value for time_us, value in good[cell] if time_us < AT_S * 1e6]
+        if cell not in SIDES[side]:
+            assert bad[cell] == good[cell]
+        elif kind == "zero":
+            assert set(after) == {0}
+        else:
+            assert len(set(after)) == 1
+            assert after[0] > 0
+    assert any(len({value for _, value in good[cell]}) > 3 for cell in SIDES[side]), "a healthy cell varies"
+
+
+@pytest.mark.parametrize(
+    ("side", "bits"), [("left", LEFT_ABSENT), ("right", RIGHT_ABSENT), ("both", LEFT_ABSENT | RIGHT_ABSENT)]
+)
+def test_absent_fingertip_sets_its_bit_and_changes_no_cell(board: Any, side: Any, bits: int) -> None:
+    healthy, faulty = healthy_and_faulty(board, pad_fault="absent", pad_side=side, pad_at_s=AT_S)
+    assert by_cell(faulty) == by_cell(healthy)
+    assert {one.status for one in faulty if one.time_us < AT_S * 1e6} == {0}
+    assert {one.status for one in faulty if one.time_us >= AT_S * 1e6} == {bits}
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_cells_drift_on_the_side_and_from_the_time_that_are_set(board: Any, side: Any) -> None:
+    healthy, faulty = healthy_and_faulty(board, drift_counts_s=500.0, pad_side=side, pad_at_s=AT_S)
+    good, bad = by_cell(healthy), by_cell(faulty)
+    for cell in range(44):
+        for (time_us, value), (_, drifted) in zip(good[cell], bad[cell], strict=True):
+            drifts = cell in SIDES[side] and time_us >= AT_S * 1e6
+            assert drifted - value == (round(500.0 * (time_us * 1e-6 - AT_S)) if drifts else 0)
+
+
+def test_image_counter_stands_still_and_only_a_stale_image_tells_its_age(board: Any) -> None:
+    healthy, frozen = healthy_and_faulty(board, image_fault="frozen", image_at_s=AT_S)
+    stale = reports(board(faults=FaultConfig(image_fault="stale", image_at_s=AT_S)))
+    assert healthy[-1].image == 14, "0.6 s, with an image each 41 ms"
+    for sent in (frozen, stale):
+        assert [one.image for one in sent[:200]] == [one.image for one in healthy[:200]]
+        assert {one.image for one in sent[200:]} == {healthy[200].image}
+    assert max(one.image_age_us for one in frozen) <= 41_000
+    ages = [one.image_age_us for one in stale[200:]]
+    assert ages[:10] == list(range(ages[0], ages[0] + 10_000, 1000))
+    assert ages[-1] == 0xFFFF
+
+
+def test_status_bits_are_set_from_a_time_on(board: Any) -> None:
+    _, faulty = healthy_and_faulty(board, status_bits=0x8005, status_at_s=AT_S)
+    assert {one.status for one in faulty[:200]} == {0}
+    assert {one.status for one in faulty[200:]} == {0x8005}
+
+
+@pytest.mark.parametrize("gain", [5.0, 0.5, 0.0, -1.0])
+def test_motor_applies_a_multiple_of_the_command_and_the_board_reports_what_it_applies(
+    board: Any, gain: float
+) -> None:
+    wire = board(faults=FaultConfig(motor_gain=gain, motor_at_s=0.01))
+    sent = commanded(wire, 15.0)
+    assert {one.effort_un for one in sent[1:10]} == {15_000_000}
+    assert {one.effort_un for one in sent[11:]} == {round(15_000_000 * gain)}
+    assert wire.firmware.largest_effort_n == max(15.0, 15.0 * gain)
+    assert wire.firmware.strong_s == pytest.approx(0.009 if gain == 5.0 else 0.0)
+
+
+def test_effort_is_reported_wrongly_while_the_motor_is_right(board: Any) -> None:
+    wire = board(faults=FaultConfig(effort_report_gain=0.2, effort_report_at_s=0.01))
+    sent = commanded(wire, 15.0)
+    assert {one.effort_un for one in sent[1:10]} == {15_000_000}
+    assert {one.effort_un for one in sent[10:]} == {3_000_000}
+    assert wire.firmware.largest_effort_n == 15.0
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.5, 2.0])
+def test_clock_of_the_device_runs_at_another_rate(board: Any, rate: float) -> None:
+    _, faulty = healthy_and_faulty(board, clock_rate=rate, clock_at_s=AT_S)
+    assert [one.time_us for one in faulty[:201]] == list(range(0, 201_000, 1000))
+    assert [one.time_us - 200_000 for one in faulty[200:]] == [round(1000 * rate * i) for i in range(400)]
+    assert [one.sequence for one in faulty] == list(range(600))
+
+
+@pytest.mark.parametrize("number", IDENTITY_NUMBERS)
+def test_feature_report_has_the_numbers_that_are_set(number: str) -> None:
+    body = {"accelerometer_g": 4}.get(number, 77)
+    config = Pr2Config(transport="emulated", faults=FaultConfig(identity={number: body}))
+    assert getattr(decode_identity(emulated_board(config, 0).wire.feature()), number) == body
+
+
+def test_feature_report_can_be_cut_short(board: Any) -> None:
+    assert len(board(faults=FaultConfig(feature_bytes=10)).feature()) == 10
+    assert board(faults=FaultConfig(feature_bytes=0)).feature() == b""
+
+
+@pytest.mark.parametrize(
+    ("key", "needed"),
+    [
+        ("pad_side='left'", "pad_fault"),
+        ("pad_at_s=1", "drift_counts_s"),
+        ("image_at_s=1", "image_fault"),
+        ("status_at_s=1", "status_bits"),
+        ("motor_at_s=1", "motor_gain"),
+        ("effort_report_at_s=1", "effort_report_gain"),
+        ("clock_at_s=1", "clock_rate"),
+        ("identity.magic=7", "watchdog_ms"),
+        ("identity.watchdog_ms=0.5", "whole number"),
+        ("identity.watchdog_ms=70000", "65535"),
+    ],
+)
+def test_fault_that_cannot_act_is_a_users_mistake(key: str, needed: str) -> None:
+    options = ["gripper.type=pr2", "gripper.transport=emulated", "classifier.type=none"]
+    with pytest.raises(ConfigError, match=needed):
+        load_pipeline(options=[*options, f"gripper.faults.{key}"]).grasp()
+
+
+def test_report_of_a_grasp_tells_what_the_body_felt_whatever_the_board_reported() -> None:
+    """40 N for 100 ms and 20 N for 100 ms, of which the board reports a tenth; the fingers do not reach the object."""
+    faults = FaultConfig(effort_report_gain=0.1)
+    backend = Pr2Backend(Pr2Config(transport="emulated", faults=faults))
+    backend.open(0)
+    efforts = []
+    for value in [40.0] * 100 + [20.0] * 100:
+        reading = backend.read(0.1)
+        assert reading is not None
+        efforts.append(reading.frame.effort_n)
+        backend.apply(Command(EFFORT, value, float("inf"), float("inf")))
+    backend.close()
+    report = backend.report()
+    assert max(efforts) == pytest.approx(4.0)
+    assert report["largest_effort_n"] == 40.0
+    assert report["seconds_above_30_n"] == pytest.approx(0.1)
+    assert report["largest_force_n"] == report["true_peak_force_n"]
