@@ -19,6 +19,8 @@ FALSE_ALARM: Final = 1e-9
 """The probability that a sound cell stands still for long enough to be called frozen."""
 NOISY_SHARE: Final = 0.3
 """Share of images in which half of the cells must change in free air; below it the cells have no noise to judge by."""
+FREE_IMAGES: Final = 3
+"""Changes of the image in free air by which the noise of the cells is first judged."""
 FEWEST_IMAGES: Final = 6
 MOST_FROZEN_SHARE: Final = 0.25
 """Share of the cells of a fingertip that may stand still; with more of them its force means nothing."""
@@ -36,6 +38,8 @@ class Fingertip:
         self._still: NDArray[np.int64] = np.empty(0, np.int64)
         self._free_images = self._blank_images = 0
         self._has_pattern = False
+        self.activity = 0.0
+        """The largest share of the images in free air in which the median cell had changed."""
 
     def see(self, cells: tuple[float, ...], free: bool) -> None:
         """Take a new image; `free`: nothing touches the fingertip."""
@@ -49,17 +53,13 @@ class Fingertip:
             if free:
                 self._free_images += 1
                 self._changes += changed
+                if self._free_images >= FREE_IMAGES:
+                    share = float(np.median(self._changes)) / self._free_images
+                    self.activity = max(self.activity, share)
         self._cells = image
         blank = image.size > 1 and bool(np.all(image == image[0]))
         self._has_pattern = self._has_pattern or not blank
         self._blank_images = self._blank_images + 1 if blank and self._has_pattern else 0
-
-    @property
-    def activity(self) -> float:
-        """The share of the images in free air in which the median cell changed; 0 before there are enough images."""
-        if self._free_images < FEWEST_IMAGES - 1:
-            return 0.0
-        return float(np.median(self._changes)) / self._free_images
 
     def fault(self, activity: float) -> Fault | None:
         """Return the fault that the last images show, given the activity of sound cells."""

@@ -19,12 +19,22 @@ STRONG_N: Final = 3.0
 """By how much an effort above the command ends the grasp."""
 LASTS_S: Final = 0.03
 """Time for which a difference must last to be a fault of the motor."""
+STRONG_S: Final = 0.3
+"""Time for which a motor may answer somewhat more than its command before the grasp ends."""
 WEAK_S: Final = 0.5
 """Time for which a motor may answer less than its command, which crushes nothing, before the grasp ends."""
 WRONG_WAY_M: Final = 0.003
 """Travel against the command from which on the motor turns the wrong way round."""
 
 OPENING: Final = int(Phase.OPENING)
+
+
+def lasting(seconds: float, present: bool, dt_s: float) -> float:
+    """Return for how long (s) a difference has been there; it is forgotten as fast as it is gathered.
+
+    A command that the guard switches on and off at a limit of the speed shows a difference in half of the ticks only.
+    """
+    return seconds + dt_s if present else max(seconds - 0.5 * dt_s, 0.0)
 
 
 class Motor:
@@ -73,16 +83,16 @@ class Motor:
         reverse = (least > ALLOWED_N and answered_n < -ALLOWED_N) or (
             most < -ALLOWED_N and answered_n > ALLOWED_N
         )
-        self._reversed_s = self._reversed_s + frame.dt_s if reverse else 0.0
+        self._reversed_s = lasting(self._reversed_s, reverse, frame.dt_s)
         strong = above_n > ALLOWED_N + ALLOWED_SHARE * asked_n
-        self._strong_s = self._strong_s + frame.dt_s if strong else 0.0
+        self._strong_s = lasting(self._strong_s, strong, frame.dt_s)
         weak = short_n > ALLOWED_N + ALLOWED_SHARE * asked_n
-        self._weak_s = self._weak_s + frame.dt_s if weak else 0.0
+        self._weak_s = lasting(self._weak_s, weak, frame.dt_s)
         answer = f"it answers {answered_n:.1f} N to a command of {least if least > 0.0 else most:.1f} N"
         if self._reversed_s > LASTS_S:
             return Fault("motor reversed", f"{answer}: check its wiring", ends=True, relaxes=True)
         if self._strong_s > LASTS_S:
-            ends = above_n > STRONG_N + STRONG_SHARE * asked_n
+            ends = self._strong_s > STRONG_S or above_n > STRONG_N + STRONG_SHARE * asked_n
             return Fault("motor too strong", f"{answer}: check its drive and its scale", ends=ends)
         if self._weak_s > LASTS_S:
             ends = self._weak_s > WEAK_S
